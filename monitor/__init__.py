@@ -1,0 +1,1 @@
+"""The monitor: samples become residuals, friction estimates and alarms."""

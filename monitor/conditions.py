@@ -1,0 +1,109 @@
+"""What the pipeline says about each sample, before alarms make something lasting of it.
+
+A condition is a column: one flag a sample, with the value that was judged and the limits it was
+judged by. Nothing is delayed, held or latched here; `monitor.alarms` does that.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+DEPARTURE = "departure"
+DRY_FRICTION = "dry_friction"
+STICTION = "stiction"
+OTHER_FAULT = "other_fault"
+EXCITATION_CHANGED = "excitation_changed"
+NOT_OBSERVABLE = "not_observable"
+ILL_CONDITIONED = "ill_conditioned"
+GAP = "gap"
+
+
+@dataclass(frozen=True)
+class ConditionKind:
+    """One kind of condition: its name, what `value` means, its unit and its meaning in words."""
+
+    name: str
+    value: str
+    unit: str
+    meaning: str
+    is_fault: bool
+
+
+CONDITION_KINDS: tuple[ConditionKind, ...] = (
+    ConditionKind(
+        DEPARTURE,
+        "largest deviation from the healthy rig, in standard deviations",
+        "1",
+        "an estimate or a residual has left its thresholds",
+        True,
+    ),
+    ConditionKind(
+        DRY_FRICTION,
+        "Coulomb estimate theta1 as a share of its signature",
+        "1",
+        "the change follows the signature of dry friction",
+        True,
+    ),
+    ConditionKind(
+        STICTION,
+        "share of the time at rest in the window",
+        "1",
+        "the mass stands still where the model moves it",
+        True,
+    ),
+    ConditionKind(
+        OTHER_FAULT,
+        "share of the change that friction explains",
+        "1",
+        "the rig has changed and dry friction does not explain how",
+        True,
+    ),
+    ConditionKind(
+        EXCITATION_CHANGED,
+        "deviation of the excitation from the one that was armed with",
+        "1",
+        "the excitation is another one, the healthy reference no longer holds",
+        False,
+    ),
+    ConditionKind(
+        NOT_OBSERVABLE,
+        "velocity, root mean square over the window",
+        "m/s",
+        "too little motion to estimate friction, estimates are frozen",
+        False,
+    ),
+    ConditionKind(
+        ILL_CONDITIONED,
+        "condition number of the normal matrix",
+        "1",
+        "the two friction terms cannot be told apart, estimates are held",
+        False,
+    ),
+    ConditionKind(
+        GAP,
+        "samples missing before this one",
+        "1",
+        "samples are missing, the window was restarted",
+        False,
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One condition over a block of n samples.
+
+    Args:
+        name: one of `CONDITION_KINDS`.
+        active: 1 where the condition holds, shape (n,).
+        value: the judged quantity, shape (n,), in the kind's unit; NaN where nothing was judged.
+        low: lower limit of `value`, shape (n,); -inf where there is none.
+        high: upper limit of `value`, shape (n,); +inf where there is none.
+    """
+
+    name: str
+    active: NDArray[np.uint8]
+    value: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
