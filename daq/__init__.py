@@ -1,0 +1,1 @@
+"""Data acquisition: a device becomes calibrated samples with quality on the bus."""

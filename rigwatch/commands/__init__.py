@@ -1,0 +1,78 @@
+"""The command line: one thin module a command, found through the table below.
+
+A command module has
+
+    HELP: str        one line for `rigwatch --help`
+    EXAMPLE: str     at least one line that a user can type, shown by `rigwatch <command> --help`
+    def add_arguments(parser: argparse.ArgumentParser) -> None
+    def run(arguments: argparse.Namespace) -> int      the exit code, 0 for success
+
+and imports what it needs inside `run` where the import is slow. Results go to stdout, progress and remarks to stderr.
+Every command has `--json`, added here: `arguments.json` is then true and stdout carries JSON and nothing else.
+"""
+
+import argparse
+import importlib
+import os
+import sys
+from types import ModuleType
+
+from rigwatch import __version__
+from rigwatch.wire.errors import RigwatchError
+
+COMMANDS: dict[str, str] = {
+    # name on the command line: module below rigwatch.commands
+}
+"""One row a command; keep the rows sorted by what a newcomer needs first."""
+
+EXIT_ERROR = 2
+EXIT_INTERRUPTED = 130
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Entry point of `rigwatch`; returns the exit code."""
+    arguments = _parser(sys.argv[1:] if argv is None else argv).parse_args(argv)
+    try:
+        return int(arguments.run(arguments))
+    except RigwatchError as error:
+        print(f"rigwatch: {error}", file=sys.stderr)
+        return EXIT_ERROR
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_ERROR
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+
+
+def _parser(argv: list[str]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="rigwatch",
+        description="Watches a test rig against a model of it and tells what the model is missing.",
+    )
+    parser.add_argument("--version", action="version", version=f"rigwatch {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    for name, module_name in COMMANDS.items():
+        # Only the command that was asked for is loaded whole, so that the others cost it nothing.
+        module = importlib.import_module(f"rigwatch.commands.{module_name}")
+        _add_command(commands, name, module, full=name in argv)
+    return parser
+
+
+def _add_command(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
+    name: str,
+    module: ModuleType,
+    *,
+    full: bool,
+) -> None:
+    parser = commands.add_parser(
+        name,
+        help=module.HELP,
+        description=module.HELP,
+        epilog=f"example:\n{module.EXAMPLE}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    if full:
+        parser.add_argument("--json", action="store_true", help="print results as JSON")
+        module.add_arguments(parser)
+        parser.set_defaults(run=module.run)

@@ -1,0 +1,1 @@
+"""Models as equations: transfer functions, frequency responses and their fits."""

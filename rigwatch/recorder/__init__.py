@@ -1,0 +1,1 @@
+"""The recorder process: everything on the bus that is worth keeping goes into session files."""

@@ -1,0 +1,1 @@
+"""What travels between the processes and what is kept: messages, topics, bus, files, errors."""

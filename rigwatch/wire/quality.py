@@ -1,0 +1,43 @@
+"""Quality flags of a sample, one byte a channel.
+
+A sample whose byte is zero is good. Any bit of `INVALID` keeps it out of every filter and estimate; the other
+bits are remarks that travel with it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+GOOD = 0
+STALE = 1 << 0
+"""Held from an earlier sample because the device did not deliver."""
+SATURATED = 1 << 1
+"""At a rail of the converter or outside the sensor's range."""
+STUCK = 1 << 2
+"""The raw code has not changed for longer than a live sensor could leave it."""
+NON_FINITE = 1 << 3
+"""NaN or infinite."""
+SPIKE = 1 << 4
+"""A jump that the sensor cannot have made."""
+RESAMPLED = 1 << 5
+"""A remark, not a defect: interpolated from samples with jittered time stamps."""
+
+INVALID = STALE | SATURATED | STUCK | NON_FINITE | SPIKE
+
+NAMES = {
+    STALE: "stale",
+    SATURATED: "saturated",
+    STUCK: "stuck",
+    NON_FINITE: "non-finite",
+    SPIKE: "spike",
+    RESAMPLED: "resampled",
+}
+
+
+def valid(quality: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """True where a sample may enter filters and estimates; same shape as `quality`."""
+    return (quality & INVALID) == 0
+
+
+def describe(flags: int) -> str:
+    """The names of the flags that are set, for people; "good" where none is."""
+    return ", ".join(name for bit, name in NAMES.items() if flags & bit) or "good"

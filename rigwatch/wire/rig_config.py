@@ -1,0 +1,211 @@
+"""The configuration of a rig: one TOML file that every process of it reads.
+
+Each process has its section. `load_rig` reads the file; `configs/demo.toml` is an example with every part in use.
+Every key's description is its documentation (`docs/configuration.md` is printed from them).
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from msgspec import Meta, field
+
+from rigwatch.wire.config import Section, load
+from rigwatch.wire.errors import ConfigError
+
+Text = Annotated[str, Meta(min_length=1)]
+Positive = Annotated[float, Meta(gt=0)]
+NotNegative = Annotated[float, Meta(ge=0)]
+Count = Annotated[int, Meta(ge=1)]
+
+
+class RigSection(Section):
+    """[rig] — what is watched."""
+
+    id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_-]+$", description="the rig's name on the bus")]
+    sample_rate: Annotated[float, Meta(gt=0, description="nominal sample rate [Hz]")] = 256.0
+
+
+class BusSection(Section):
+    """[bus] — where the Zenoh router is."""
+
+    router: Annotated[Text, Meta(description="endpoint that processes connect to")] = (
+        "tcp/127.0.0.1:7447"
+    )
+    listen: Annotated[Text, Meta(description="endpoint on which `rigwatch router` listens")] = (
+        "tcp/127.0.0.1:7447"
+    )
+
+
+class ChannelSection(Section):
+    """[[channels]] — one channel of the device, in the order of its codes."""
+
+    name: Annotated[Text, Meta(description="the channel's name, such as voltage")]
+    unit: Annotated[Text, Meta(description="SI unit of the calibrated value")]
+    gain: Annotated[float, Meta(description="SI units per code")]
+    offset: Annotated[float, Meta(description="SI value at code 0")] = 0.0
+    code_low: Annotated[int, Meta(description="lower rail of the converter")] = -32768
+    code_high: Annotated[int, Meta(description="upper rail of the converter")] = 32767
+    low: Annotated[float | None, Meta(description="lower end of the sensor's range [SI]")] = None
+    high: Annotated[float | None, Meta(description="upper end of the sensor's range [SI]")] = None
+    stuck_after: Annotated[
+        int, Meta(ge=0, description="equal codes that mean a stuck sensor, 0 for never")
+    ] = 100
+
+
+class SerialSection(Section, tag="serial", tag_field="adapter"):
+    """[daq.device] adapter = "serial" — COBS frames on a serial line."""
+
+    port: Annotated[Text, Meta(description="device file or glob pattern, such as by-id links")]
+    baud: Annotated[int, Meta(gt=0, description="baud rate")] = 115200
+
+
+class ModbusSection(Section, tag="modbus-tcp", tag_field="adapter"):
+    """[daq.device] adapter = "modbus-tcp" — blocks of buffered samples polled over TCP."""
+
+    host: Annotated[Text, Meta(description="host name or address")]
+    port: Annotated[int, Meta(ge=1, le=65535, description="TCP port")] = 502
+    unit: Annotated[int, Meta(ge=0, le=247, description="unit id")] = 1
+    polls: Annotated[float, Meta(gt=0, description="polls a second")] = 32.0
+    word_order: Annotated[
+        Literal["big", "little"], Meta(description="which half of a 32-bit value comes first")
+    ] = "big"
+    timeout: Annotated[float, Meta(gt=0, description="time a reply may take [s]")] = 0.3
+
+
+class ModbusRtuSection(Section, tag="modbus-rtu", tag_field="adapter"):
+    """[daq.device] adapter = "modbus-rtu" — the same registers over a serial line."""
+
+    port: Annotated[Text, Meta(description="device file or glob pattern")]
+    baud: Annotated[int, Meta(gt=0, description="baud rate")] = 115200
+    unit: Annotated[int, Meta(ge=0, le=247, description="unit id")] = 1
+    polls: Annotated[float, Meta(gt=0, description="polls a second")] = 32.0
+    word_order: Annotated[
+        Literal["big", "little"], Meta(description="which half of a 32-bit value comes first")
+    ] = "big"
+    timeout: Annotated[float, Meta(gt=0, description="time a reply may take [s]")] = 0.3
+
+
+class ReplaySection(Section, tag="replay", tag_field="adapter"):
+    """[daq.device] adapter = "replay" — a recorded session in place of a device."""
+
+    session: Annotated[Text, Meta(description="session file or folder")]
+    speed: Annotated[float, Meta(gt=0, description="times real time")] = 1.0
+    loop: Annotated[bool, Meta(description="start again at the end")] = False
+
+
+class PluginSection(Section, tag="plugin", tag_field="adapter"):
+    """[daq.device] adapter = "plugin" — an adapter found through the entry points."""
+
+    name: Annotated[Text, Meta(description="name in the entry point group rigwatch.adapters")]
+    options: Annotated[dict[str, str | int | float | bool], Meta(description="for the adapter")] = (
+        field(default_factory=dict)
+    )
+
+
+DeviceSection = SerialSection | ModbusSection | ModbusRtuSection | ReplaySection | PluginSection
+
+
+class DaqSection(Section):
+    """[daq] — the device and how its samples are published."""
+
+    device: Annotated[DeviceSection, Meta(description="which adapter, and its settings")]
+    name: Annotated[Text, Meta(description="the device's name in messages")] = "rig"
+    ring: Annotated[int, Meta(ge=256, description="samples kept for readers that miss some")] = (
+        65536
+    )
+    stale_after: Annotated[float, Meta(gt=0, description="silence that means stale [s]")] = 0.1
+
+
+class PlantSection(Section):
+    """[plant] — the simulated rig that takes the device's place."""
+
+    scenario: Annotated[Text, Meta(description="scenario file")]
+    serve: Annotated[
+        Literal["serial", "modbus-tcp", "modbus-rtu"], Meta(description="how it is read")
+    ] = "serial"
+    port: Annotated[str, Meta(description="link made to the pty, or host:port for TCP")] = (
+        "/tmp/rigwatch-plant"  # noqa: S108
+    )
+    seed: Annotated[int, Meta(ge=0, description="seed of noise and multisines")] = 1
+
+
+class AlarmSection(Section):
+    """[monitor.alarms.<name>] — how one condition becomes an alarm."""
+
+    persistence: Annotated[int, Meta(ge=1, description="samples the condition must hold")] = 2
+    clear_after: Annotated[int, Meta(ge=1, description="samples without it before it clears")] = 256
+    latch: Annotated[bool, Meta(description="stays until reset by a person")] = True
+    enabled: Annotated[bool, Meta(description="whether it is raised at all")] = True
+
+
+class MonitorSection(Section):
+    """[monitor] — the model and what is watched with it."""
+
+    model: Annotated[Text, Meta(description="model file made by `rigwatch commission`")]
+    detectors: Annotated[
+        tuple[Literal["friction", "parity-arma", "parity-ma", "unknown-input-kalman"], ...],
+        Meta(description="which detectors run"),
+    ] = ("friction",)
+    journal: Annotated[
+        str, Meta(description="alarm journal that survives restarts, empty for none")
+    ] = ""
+    alarms: Annotated[dict[str, AlarmSection], Meta(description="settings by alarm")] = field(
+        default_factory=dict
+    )
+
+
+class RecorderSection(Section):
+    """[recorder] — where session files go."""
+
+    folder: Annotated[Text, Meta(description="folder of the sessions")] = "sessions"
+    segment: Annotated[float, Meta(gt=0, description="length of a segment [s]")] = 3600.0
+    flush: Annotated[float, Meta(gt=0, le=0.5, description="time between flushes [s]")] = 0.5
+
+
+class DashboardSection(Section):
+    """[dashboard] — the live view."""
+
+    viewer: Annotated[
+        Literal["auto", "native", "web", "connect"], Meta(description="which viewer is used")
+    ] = "auto"
+    grpc_port: Annotated[int, Meta(ge=1, le=65535, description="port of the viewer's data")] = 9876
+    web_port: Annotated[int, Meta(ge=1, le=65535, description="port of the web viewer")] = 9090
+    update_rate: Annotated[float, Meta(gt=0, le=30, description="updates a second [Hz]")] = 6.0
+
+
+class RigConfig(Section):
+    """The whole file."""
+
+    rig: Annotated[RigSection, Meta(description="what is watched")]
+    channels: Annotated[tuple[ChannelSection, ...], Meta(min_length=1, description="channels")]
+    daq: Annotated[DaqSection, Meta(description="data acquisition")]
+    bus: Annotated[BusSection, Meta(description="the bus")] = field(default_factory=BusSection)
+    plant: Annotated[PlantSection | None, Meta(description="the simulated rig")] = None
+    monitor: Annotated[MonitorSection | None, Meta(description="the monitor")] = None
+    recorder: Annotated[RecorderSection | None, Meta(description="the recorder")] = None
+    dashboard: Annotated[DashboardSection | None, Meta(description="the dashboard")] = None
+
+
+def load_rig(path: Path | str) -> RigConfig:
+    """The configuration at `path`; relative paths in it stay relative to the working folder.
+
+    Raises:
+        ConfigError: the file is wrong, or two channels have one name.
+    """
+    config = load(path, RigConfig)
+    names = [channel.name for channel in config.channels]
+    if len(set(names)) < len(names):
+        raise ConfigError(path, "channels", f"the names {', '.join(names)}", "different names")
+    return config
+
+
+def section_or_error(config: RigConfig, name: str, path: Path | str) -> Section:
+    """The optional section `name` of `config`.
+
+    Raises:
+        ConfigError: the file has no such section.
+    """
+    section: Section | None = getattr(config, name)
+    if section is None:
+        raise ConfigError(path, name, "no such section", f"a section [{name}]")
+    return section
