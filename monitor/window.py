@@ -1,0 +1,134 @@
+"""Least squares over a sliding window, exact after any number of samples (theory 5.39).
+
+    θ̂ = ( Σ g·gᵀ )⁻¹ · Σ g·y   over the last N samples
+
+The sums over the window are never down-dated. They are kept the way a queue is made of two stacks: `back` is the running
+sum of the newer samples, `front[i]` the sum of the older ones from place i up to where `back` begins. A sample that
+leaves is left out by reading the next `front`; when none is left, `front` is summed anew from the stored samples. So a
+spike is gone to the last bit once it has left, at a constant cost a sample on average.
+
+Rows are (g1 … gp, y); the sums are those of all products of two entries, upper triangle row by row. A row that must not
+count (an invalid sample) is pushed as zeros, so that the window stays a stretch of time.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_HEAD, _FILL, _FRONT_LEFT = 0, 1, 2
+
+
+class Window(NamedTuple):
+    """State of one sliding window.
+
+    Args:
+        rows: ring of the stored rows, shape (N, p + 1).
+        front: sums of the older samples, shape (N + 1, m), m = (p + 1)(p + 2)/2.
+        back: sum of the newer samples, shape (m,).
+        place: head of the ring, samples in it, older samples left in `front`.
+    """
+
+    rows: FloatArray
+    front: FloatArray
+    back: FloatArray
+    place: IntArray
+
+
+def new_window(length: int, parameters: int) -> Window:
+    """An empty window over `length` samples for `parameters` regressors."""
+    width = parameters + 1
+    sums = width * (width + 1) // 2
+    return Window(
+        np.zeros((length, width)), np.zeros((length + 1, sums)), np.zeros(sums), np.zeros(3, np.int64)
+    )
+
+
+def clear(window: Window) -> None:
+    """Forget every sample."""
+    for part in window:
+        part[...] = 0
+
+
+@njit(cache=True)
+def push(window: Window, row: FloatArray) -> None:
+    """Take one row in, and the oldest out when the window is full."""
+    rows, front, back, place = window
+    length, width = rows.shape
+    head = place[0]
+    if place[1] == length:
+        if place[2] == 0:
+            _refill(window)
+        place[2] -= 1
+    else:
+        place[1] += 1
+    k = 0
+    for i in range(width):
+        rows[head, i] = row[i]
+        for j in range(i, width):
+            back[k] += row[i] * row[j]
+            k += 1
+    place[0] = head + 1 if head + 1 < length else 0
+
+
+@njit(cache=True)
+def _refill(window: Window) -> None:
+    """Move everything from `back` to `front`: suffix sums from the newest sample to the oldest."""
+    rows, front, back, place = window
+    length, width = rows.shape
+    newest = place[0] - 1
+    front[0, :] = 0.0
+    for n in range(length):
+        at = newest - n
+        if at < 0:
+            at += length
+        k = 0
+        for i in range(width):
+            for j in range(i, width):
+                front[n + 1, k] = front[n, k] + rows[at, i] * rows[at, j]
+                k += 1
+    back[:] = 0.0
+    place[2] = length
+
+
+@njit(cache=True)
+def sums(window: Window, out: FloatArray) -> None:
+    """Sums of products over the window into `out`, shape (m,)."""
+    _, front, back, place = window
+    for k in range(back.size):
+        out[k] = front[place[2], k] + back[k]
+
+
+@njit(cache=True)
+def solve_two(s: FloatArray) -> tuple[float, float, float]:
+    """(θ1, θ2, condition number of the normal matrix scaled to unit diagonal) from six sums.
+
+    `s` holds Σ g1², g1·g2, g1·y, g2², g2·y, y². The condition number is infinite where the matrix is singular, and θ is
+    zero then.
+    """
+    determinant = s[0] * s[3] - s[1] * s[1]
+    scale = s[0] * s[3]
+    if not (scale > 0.0 and determinant > 1e-15 * scale):
+        return 0.0, 0.0, np.inf
+    correlation = abs(s[1]) / np.sqrt(scale)
+    condition = (1.0 + correlation) / (1.0 - correlation)
+    theta1 = (s[3] * s[2] - s[1] * s[4]) / determinant
+    theta2 = (s[0] * s[4] - s[1] * s[2]) / determinant
+    return theta1, theta2, condition
+
+
+@njit(cache=True)
+def windowed_least_squares(
+    window: Window, g1: FloatArray, g2: FloatArray, y: FloatArray, theta: FloatArray
+) -> None:
+    """Estimates after each sample of a block into `theta`, shape (n, 2): the plain scheme of the thesis."""
+    row, s = np.empty(3), np.empty(6)
+    for k in range(y.size):
+        row[0], row[1], row[2] = g1[k], g2[k], y[k]
+        push(window, row)
+        sums(window, s)
+        theta[k, 0], theta[k, 1], _ = solve_two(s)
