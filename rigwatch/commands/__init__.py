@@ -7,8 +7,9 @@ A command module has
     def add_arguments(parser: argparse.ArgumentParser) -> None
     def run(arguments: argparse.Namespace) -> int      the exit code, 0 for success
 
-and imports what it needs inside `run` where the import is slow. Results go to stdout, progress and remarks to stderr.
-Every command has `--json`, added here: `arguments.json` is then true and stdout carries JSON and nothing else.
+and imports what it needs inside `run` where the import is slow. Results go to stdout, progress and
+remarks to stderr. Every command has `--json`, added here: `arguments.json` is then true and stdout
+carries JSON and nothing else.
 """
 
 import argparse

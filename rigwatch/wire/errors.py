@@ -1,7 +1,7 @@
 """Every error that rigwatch shows to its users, drawn as a tree.
 
 RigwatchError             one plain line, shown by the command line without a traceback
-├── ConfigError           a configuration, scenario or model file is wrong (file, key, found, expected)
+├── ConfigError           a configuration, scenario or model file is wrong
 ├── WireError             bytes that came from outside do not mean what they should
 │   ├── FrameError        a serial frame: framing, length or checksum
 │   ├── ModbusError       a Modbus reply: short, late, an exception code, a wrong map
@@ -88,5 +88,6 @@ class MissingExtraError(RigwatchError):
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         super().__init__(
-            f"{purpose} needs the package {package}: install it with pip install 'rigwatch[{extra}]'"
+            f"{purpose} needs the package {package}:"
+            f" install it with pip install 'rigwatch[{extra}]'"
         )

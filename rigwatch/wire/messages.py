@@ -1,12 +1,13 @@
 """What the processes say to each other, and what a session file keeps: one declaration a message.
 
-Every message is a frozen dataclass. Its protobuf schema is built from the annotations (`schema.py`), so that the bus and
-the session files carry the same bytes and any protobuf or MCAP tool can read them. A field's number on the wire is its
-place in the class: new fields go to the end, none is removed or moved.
+Every message is a frozen dataclass. Its protobuf schema is built from the annotations
+(`schema.py`), so that the bus and the session files carry the same bytes and any protobuf or MCAP
+tool can read them. A field's number on the wire is its place in the class: new fields go to the
+end, none is removed or moved.
 
-Time stamps `t_ns` are Unix time in nanoseconds, taken from the device's clock mapped to host time. Samples and
-everything computed from them carry `(boot, seq)`: `boot` is drawn anew by the device at each start, `seq` counts its
-samples from 0.
+Time stamps `t_ns` are Unix time in nanoseconds, taken from the device's clock mapped to host time.
+Samples and everything computed from them carry `(boot, seq)`: `boot` is drawn anew by the device at
+each start, `seq` counts its samples from 0.
 """
 
 from collections.abc import Mapping

@@ -1,7 +1,7 @@
 """Quality flags of a sample, one byte a channel.
 
-A sample whose byte is zero is good. Any bit of `INVALID` keeps it out of every filter and estimate; the other
-bits are remarks that travel with it.
+A sample whose byte is zero is good. Any bit of `INVALID` keeps it out of every filter and estimate;
+the other bits are remarks that travel with it.
 """
 
 import numpy as np
@@ -35,7 +35,8 @@ NAMES = {
 
 def valid(quality: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """True where a sample may enter filters and estimates; same shape as `quality`."""
-    return (quality & INVALID) == 0
+    good: NDArray[np.bool_] = (quality & INVALID) == 0
+    return good
 
 
 def describe(flags: int) -> str:

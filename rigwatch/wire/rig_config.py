@@ -1,7 +1,8 @@
 """The configuration of a rig: one TOML file that every process of it reads.
 
-Each process has its section. `load_rig` reads the file; `configs/demo.toml` is an example with every part in use.
-Every key's description is its documentation (`docs/configuration.md` is printed from them).
+Each process has its section. `load_rig` reads the file; `configs/demo.toml` is an example with
+every part in use. A key's description is its documentation: `docs/configuration.md` is printed from
+them.
 """
 
 from pathlib import Path
@@ -18,14 +19,14 @@ NotNegative = Annotated[float, Meta(ge=0)]
 Count = Annotated[int, Meta(ge=1)]
 
 
-class RigSection(Section):
+class RigSection(Section, frozen=True):
     """[rig] — what is watched."""
 
     id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_-]+$", description="the rig's name on the bus")]
     sample_rate: Annotated[float, Meta(gt=0, description="nominal sample rate [Hz]")] = 256.0
 
 
-class BusSection(Section):
+class BusSection(Section, frozen=True):
     """[bus] — where the Zenoh router is."""
 
     router: Annotated[Text, Meta(description="endpoint that processes connect to")] = (
@@ -36,7 +37,7 @@ class BusSection(Section):
     )
 
 
-class ChannelSection(Section):
+class ChannelSection(Section, frozen=True):
     """[[channels]] — one channel of the device, in the order of its codes."""
 
     name: Annotated[Text, Meta(description="the channel's name, such as voltage")]
@@ -52,14 +53,14 @@ class ChannelSection(Section):
     ] = 100
 
 
-class SerialSection(Section, tag="serial", tag_field="adapter"):
+class SerialSection(Section, frozen=True, tag="serial", tag_field="adapter"):
     """[daq.device] adapter = "serial" — COBS frames on a serial line."""
 
     port: Annotated[Text, Meta(description="device file or glob pattern, such as by-id links")]
     baud: Annotated[int, Meta(gt=0, description="baud rate")] = 115200
 
 
-class ModbusSection(Section, tag="modbus-tcp", tag_field="adapter"):
+class ModbusSection(Section, frozen=True, tag="modbus-tcp", tag_field="adapter"):
     """[daq.device] adapter = "modbus-tcp" — blocks of buffered samples polled over TCP."""
 
     host: Annotated[Text, Meta(description="host name or address")]
@@ -72,7 +73,7 @@ class ModbusSection(Section, tag="modbus-tcp", tag_field="adapter"):
     timeout: Annotated[float, Meta(gt=0, description="time a reply may take [s]")] = 0.3
 
 
-class ModbusRtuSection(Section, tag="modbus-rtu", tag_field="adapter"):
+class ModbusRtuSection(Section, frozen=True, tag="modbus-rtu", tag_field="adapter"):
     """[daq.device] adapter = "modbus-rtu" — the same registers over a serial line."""
 
     port: Annotated[Text, Meta(description="device file or glob pattern")]
@@ -85,7 +86,7 @@ class ModbusRtuSection(Section, tag="modbus-rtu", tag_field="adapter"):
     timeout: Annotated[float, Meta(gt=0, description="time a reply may take [s]")] = 0.3
 
 
-class ReplaySection(Section, tag="replay", tag_field="adapter"):
+class ReplaySection(Section, frozen=True, tag="replay", tag_field="adapter"):
     """[daq.device] adapter = "replay" — a recorded session in place of a device."""
 
     session: Annotated[Text, Meta(description="session file or folder")]
@@ -93,7 +94,7 @@ class ReplaySection(Section, tag="replay", tag_field="adapter"):
     loop: Annotated[bool, Meta(description="start again at the end")] = False
 
 
-class PluginSection(Section, tag="plugin", tag_field="adapter"):
+class PluginSection(Section, frozen=True, tag="plugin", tag_field="adapter"):
     """[daq.device] adapter = "plugin" — an adapter found through the entry points."""
 
     name: Annotated[Text, Meta(description="name in the entry point group rigwatch.adapters")]
@@ -105,7 +106,7 @@ class PluginSection(Section, tag="plugin", tag_field="adapter"):
 DeviceSection = SerialSection | ModbusSection | ModbusRtuSection | ReplaySection | PluginSection
 
 
-class DaqSection(Section):
+class DaqSection(Section, frozen=True):
     """[daq] — the device and how its samples are published."""
 
     device: Annotated[DeviceSection, Meta(description="which adapter, and its settings")]
@@ -116,7 +117,7 @@ class DaqSection(Section):
     stale_after: Annotated[float, Meta(gt=0, description="silence that means stale [s]")] = 0.1
 
 
-class PlantSection(Section):
+class PlantSection(Section, frozen=True):
     """[plant] — the simulated rig that takes the device's place."""
 
     scenario: Annotated[Text, Meta(description="scenario file")]
@@ -124,12 +125,12 @@ class PlantSection(Section):
         Literal["serial", "modbus-tcp", "modbus-rtu"], Meta(description="how it is read")
     ] = "serial"
     port: Annotated[str, Meta(description="link made to the pty, or host:port for TCP")] = (
-        "/tmp/rigwatch-plant"  # noqa: S108
+        "/tmp/rigwatch-plant"
     )
     seed: Annotated[int, Meta(ge=0, description="seed of noise and multisines")] = 1
 
 
-class AlarmSection(Section):
+class AlarmSection(Section, frozen=True):
     """[monitor.alarms.<name>] — how one condition becomes an alarm."""
 
     persistence: Annotated[int, Meta(ge=1, description="samples the condition must hold")] = 2
@@ -138,7 +139,7 @@ class AlarmSection(Section):
     enabled: Annotated[bool, Meta(description="whether it is raised at all")] = True
 
 
-class MonitorSection(Section):
+class MonitorSection(Section, frozen=True):
     """[monitor] — the model and what is watched with it."""
 
     model: Annotated[Text, Meta(description="model file made by `rigwatch commission`")]
@@ -154,7 +155,7 @@ class MonitorSection(Section):
     )
 
 
-class RecorderSection(Section):
+class RecorderSection(Section, frozen=True):
     """[recorder] — where session files go."""
 
     folder: Annotated[Text, Meta(description="folder of the sessions")] = "sessions"
@@ -162,7 +163,7 @@ class RecorderSection(Section):
     flush: Annotated[float, Meta(gt=0, le=0.5, description="time between flushes [s]")] = 0.5
 
 
-class DashboardSection(Section):
+class DashboardSection(Section, frozen=True):
     """[dashboard] — the live view."""
 
     viewer: Annotated[
@@ -173,7 +174,7 @@ class DashboardSection(Section):
     update_rate: Annotated[float, Meta(gt=0, le=30, description="updates a second [Hz]")] = 6.0
 
 
-class RigConfig(Section):
+class RigConfig(Section, frozen=True):
     """The whole file."""
 
     rig: Annotated[RigSection, Meta(description="what is watched")]

@@ -1,7 +1,7 @@
-"""Protobuf bytes of the messages, with schemas built at run time from the dataclasses of `messages.py`.
+"""Protobuf bytes of the messages; schemas are built at run time from `messages.py`.
 
-`encode` and `decode` are the only way a message becomes bytes and back. The descriptors need no compiler, and
-`file_descriptor_set` is what MCAP stores so that other tools can decode a session.
+`encode` and `decode` are the only way a message becomes bytes and back. The descriptors need no
+compiler, and `file_descriptor_set` is what MCAP stores so that other tools can decode a session.
 """
 
 from collections.abc import Callable, Mapping
@@ -35,10 +35,11 @@ _SCALARS: dict[Any, tuple[int, bool]] = {
     IntArray: (_Field.TYPE_SFIXED64, True),
     ByteArray: (_Field.TYPE_BYTES, False),
 }
+_KINDS: dict[str, Any] = {kind.__name__: kind for kind in (Column, *MESSAGE_TYPES)}
 M = TypeVar("M", bound=Message)
 
 
-def type_name(kind: type[Any]) -> str:
+def type_name(kind: type[Message]) -> str:
     """Full protobuf name of a message class, such as "rigwatch.SampleBlock"."""
     return f"{PACKAGE}.{kind.__name__}"
 
@@ -65,7 +66,7 @@ def _add_field(proto: descriptor_pb2.DescriptorProto, name: str, number: int, hi
     else:
         kind, repeated = _SCALARS[str if get_origin(hint) is Literal else hint]
         label = _Field.LABEL_REPEATED if repeated else _Field.LABEL_OPTIONAL
-        proto.field.add(name=name, number=number, type=kind, label=label)  # type: ignore[arg-type]
+        proto.field.add(name=name, number=number, type=kind, label=label)
 
 
 def _add_map(proto: descriptor_pb2.DescriptorProto, name: str, number: int) -> None:
@@ -89,7 +90,7 @@ def _file_descriptor() -> descriptor_pb2.FileDescriptorProto:
     file = descriptor_pb2.FileDescriptorProto(
         name="rigwatch.proto", package=PACKAGE, syntax="proto3"
     )
-    for kind in (Column, *MESSAGE_TYPES):
+    for kind in _KINDS.values():
         proto = file.message_type.add(name=kind.__name__)
         for number, (name, hint) in enumerate(_hints(kind), start=1):
             _add_field(proto, name, number, hint)
@@ -107,23 +108,23 @@ def file_descriptor_set() -> bytes:
 @cache
 def _pool() -> descriptor_pool.DescriptorPool:
     pool = descriptor_pool.DescriptorPool()
-    pool.Add(_file_descriptor())  # type: ignore[no-untyped-call]
+    pool.Add(_file_descriptor())
     return pool
 
 
 @cache
-def _proto_class(kind: type[Any]) -> type[ProtoMessage]:
-    return message_factory.GetMessageClass(_pool().FindMessageTypeByName(type_name(kind)))
+def _proto_class(name: str) -> type[ProtoMessage]:
+    return message_factory.GetMessageClass(_pool().FindMessageTypeByName(f"{PACKAGE}.{name}"))
 
 
-def _hints(kind: type[Any]) -> list[tuple[str, Any]]:
+def _hints(kind: Any) -> list[tuple[str, Any]]:
     hints = get_type_hints(kind)
     return [(field.name, hints[field.name]) for field in fields(kind)]
 
 
 def _to_wire(hint: Any) -> Callable[[Any], Any]:
     if _is_columns(hint):
-        column = _proto_class(Column)
+        column = _proto_class("Column")
         return lambda value: [_fill(column(), part) for part in value]
     if hint == ByteArray:
         return lambda value: value.tobytes()
@@ -158,24 +159,24 @@ def _literal(allowed: tuple[str, ...]) -> Callable[[str], str]:
 
 
 @cache
-def _codec(kind: type[Any]) -> list[tuple[str, Callable[[Any], Any], Callable[[Any], Any]]]:
-    return [(name, _to_wire(hint), _from_wire(hint)) for name, hint in _hints(kind)]
+def _codec(name: str) -> list[tuple[str, Callable[[Any], Any], Callable[[Any], Any]]]:
+    return [(field, _to_wire(hint), _from_wire(hint)) for field, hint in _hints(_KINDS[name])]
 
 
 def _fill(proto: ProtoMessage, message: Any) -> ProtoMessage:
     return type(proto)(
-        **{name: out(getattr(message, name)) for name, out, _ in _codec(type(message))}
+        **{name: out(getattr(message, name)) for name, out, _ in _codec(type(message).__name__)}
     )
 
 
 def _read(kind: type[Any], proto: ProtoMessage) -> Any:
-    return kind(*[back(getattr(proto, name)) for name, _, back in _codec(kind)])
+    return kind(*[back(getattr(proto, name)) for name, _, back in _codec(kind.__name__)])
 
 
 def encode(message: Message) -> bytes:
     """The message as protobuf bytes."""
     kind = type(message)
-    return _fill(_proto_class(kind)(), message).SerializeToString()
+    return _fill(_proto_class(kind.__name__)(), message).SerializeToString()
 
 
 def decode(kind: type[M], data: bytes) -> M:
@@ -185,7 +186,7 @@ def decode(kind: type[M], data: bytes) -> M:
         MessageError: the bytes are no such message, or its columns differ in length.
     """
     try:
-        message: M = _read(kind, _proto_class(kind).FromString(data))
+        message: M = _read(kind, _proto_class(kind.__name__).FromString(data))
     except (DecodeError, MessageError) as error:
         raise MessageError(f"{kind.__name__}: {len(data)} bytes that are none: {error}") from error
     _check_lengths(message)

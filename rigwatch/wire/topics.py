@@ -1,4 +1,4 @@
-"""The one table of topics: name, key, message, who says it, how often, and whether it is recorded."""
+"""The one table of topics: name, key, message, publisher, rate, recorded or not."""
 
 from dataclasses import dataclass
 

@@ -1,0 +1,89 @@
+"""A wrong configuration is told in one line: file, line, key, found, expected."""
+
+import pytest
+
+from rigwatch.wire.config import load, parse
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.rig_config import RigConfig, load_rig, section_or_error
+
+GOOD = """[rig]
+id = "bench1"
+
+[[channels]]
+name = "voltage"
+unit = "V"
+gain = 3e-4
+
+[[channels]]
+name = "position"
+unit = "m"
+gain = 1e-6
+
+[daq.device]
+adapter = "serial"
+port = "/dev/ttyUSB0"
+
+[monitor]
+model = "model.toml"
+
+[monitor.alarms.dry_friction]
+persistence = 2
+"""
+
+MISTAKES = [
+    ("persistence", "persistance", "rig.toml:22: monitor.alarms.dry_friction.persistance: found an"
+     " unknown key, expected 'persistence'"),
+    ("persistence = 2", "persistence = 0", "rig.toml:22: monitor.alarms.dry_friction.persistence:"
+     " found 0, expected int >= 1"),
+    ("gain = 1e-6", 'gain = "a"', "rig.toml:12: channels[1].gain: found 'a', expected float"),
+    ('id = "bench1"', "", "rig.toml:1: rig.id: found no such key, expected a value for it"),
+    ('id = "bench1"', 'id = "a b"', "rig.toml:2: rig.id: found 'a b', expected str matching regex"
+     " '^[A-Za-z0-9_-]+$'"),
+    ('"serial"', '"serail"', "rig.toml:15: daq.device.adapter: found 'serail', expected one of"
+     " modbus-rtu, modbus-tcp, plugin, replay, serial"),
+    ("port", "prot", "rig.toml:16: daq.device.prot: found an unknown key, expected 'port'"),
+    ("[monitor]", "[monitro]", "rig.toml:18: monitro: found an unknown key, expected 'monitor'"),
+    ('model = "model.toml"', 'model = 3', "rig.toml:19: monitor.model: found 3, expected str"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("right", "wrong", "said"), MISTAKES, ids=[m[1] for m in MISTAKES])
+def test_a_mistake_is_named(right, wrong, said):
+    with pytest.raises(ConfigError) as error:
+        parse(GOOD.replace(right, wrong, 1), RigConfig, "rig.toml")
+    assert str(error.value) == said
+
+
+def test_a_good_configuration_is_read(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(GOOD)
+    config = load_rig(path)
+    assert config.daq.device.port == "/dev/ttyUSB0"
+    assert config.monitor.alarms["dry_friction"].persistence == 2
+
+
+def test_two_channels_of_one_name_are_refused(tmp_path):
+    path = tmp_path / "rig.toml"
+    path.write_text(GOOD.replace('"position"', '"voltage"'))
+    with pytest.raises(ConfigError, match="different names"):
+        load_rig(path)
+
+
+def test_a_section_that_a_process_needs_is_asked_for():
+    config = parse(GOOD, RigConfig, "rig.toml")
+    with pytest.raises(ConfigError, match=r"a section \[recorder\]"):
+        section_or_error(config, "recorder", "rig.toml")
+    assert section_or_error(config, "monitor", "rig.toml") is config.monitor
+
+
+@pytest.mark.parametrize("content", [b"[rig", b"\xff\xfe", b"id = 1\nid = 2"])
+def test_a_file_that_is_no_toml_is_named(tmp_path, content):
+    path = tmp_path / "rig.toml"
+    path.write_bytes(content)
+    with pytest.raises(ConfigError, match=r"rig\.toml"):
+        load(path, RigConfig)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(ConfigError, match=r"absent\.toml.*expected a readable file"):
+        load(tmp_path / "absent.toml", RigConfig)
