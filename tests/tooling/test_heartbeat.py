@@ -1,0 +1,83 @@
+"""A process's word to its supervisor."""
+
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rigwatch.wire.heartbeat import INTERVAL, Heartbeat
+
+
+@pytest.fixture
+def supervisor(tmp_path: Path) -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(str(tmp_path / "notify"))
+        listener.setblocking(False)
+        yield listener
+
+
+def said(listener: socket.socket) -> list[str]:
+    words = []
+    while True:
+        try:
+            words.append(listener.recv(4096).decode())
+        except BlockingIOError:
+            return words
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def heartbeat(listener: socket.socket, clock: Clock) -> Heartbeat:
+    return Heartbeat("daq", {"NOTIFY_SOCKET": listener.getsockname()}, clock)
+
+
+def test_watchdog_is_fed_only_while_samples_advance(supervisor: socket.socket) -> None:
+    clock = Clock()
+    beat = heartbeat(supervisor, clock)
+    for count in (8, 16, 16, 16, 24):
+        beat.advance(count)
+        clock.now += INTERVAL
+    fed = ["WATCHDOG=1" in word for word in said(supervisor)]
+    assert fed == [True, True, False, False, True]
+
+
+def test_words_are_limited_in_rate(supervisor: socket.socket) -> None:
+    clock = Clock()
+    beat = heartbeat(supervisor, clock)
+    for count in range(1, 257):
+        beat.advance(count)
+        clock.now += 1 / 256
+    assert len(said(supervisor)) == round(1 / INTERVAL)
+
+
+def test_ready_status_and_stopping_are_systemds_words(supervisor: socket.socket) -> None:
+    beat = heartbeat(supervisor, Clock())
+    beat.ready("serial line open")
+    beat.status("reconnecting")
+    beat.stopping()
+    first, second, third = said(supervisor)
+    assert first.startswith("READY=1\nSTATUS=serial line open\n")
+    assert (second, third) == ("STATUS=reconnecting", "STOPPING=1")
+
+
+def test_nothing_is_needed_where_nobody_listens(tmp_path: Path) -> None:
+    Heartbeat("daq", {}).advance(1)
+    gone = Heartbeat("daq", {"NOTIFY_SOCKET": str(tmp_path / "gone")})
+    gone.ready()
+    gone.advance(1)
+    gone.stopping()
+
+
+def test_a_full_socket_does_not_block(supervisor: socket.socket) -> None:
+    clock = Clock()
+    beat = heartbeat(supervisor, clock)
+    for count in range(5000):
+        beat.advance(count)
+        clock.now += INTERVAL
+    assert said(supervisor)
