@@ -1,0 +1,175 @@
+"""Frames on a serial line: bytes in, raw blocks out.
+
+    port (device file or glob) ── SerialPort ──bytes──▶ FrameDecoder ──frames──▶ RawBlock
+
+The port is waited for with `select`, so that a frame is handed on as soon as its last byte is here. A test hands the
+adapter a transport of its own.
+"""
+
+import glob
+import os
+import select
+import time
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from typing import Protocol
+
+import numpy as np
+import serial
+
+from daq.adapter import RawBlock
+from rigwatch.wire.errors import DeviceError
+from rigwatch.wire.frame import Frame, FrameDecoder
+from rigwatch.wire.rig_config import ChannelSection, SerialSection
+
+_CHUNK = 4096
+
+
+class ByteSource(Protocol):
+    """A line that bytes come from."""
+
+    def open(self) -> None:
+        """Open the line; `DeviceError` where it is not there or in use."""
+
+    def read(self, timeout: float) -> bytes:
+        """The bytes that are there or come within `timeout` [s]; `DeviceError` when it is gone."""
+
+    def close(self) -> None:
+        """Close the line; harmless when it is closed."""
+
+
+class SerialPort:
+    """A serial device or pty, for this process alone.
+
+    Args:
+        port: device file or glob pattern; the first match that opens is taken.
+        baud: baud rate.
+    """
+
+    def __init__(self, port: str, baud: int) -> None:
+        self.port = port
+        self.baud = baud
+        self._serial: serial.Serial | None = None
+
+    def open(self) -> None:
+        """Open the first match of the pattern.
+
+        Raises:
+            DeviceError: nothing matches, or all that match are in use or refuse.
+        """
+        self.close()
+        candidates = matches(self.port)
+        refusals = []
+        for path in candidates:
+            try:
+                self._serial = serial.Serial(path, self.baud, timeout=0, exclusive=True)
+                return
+            except (OSError, ValueError) as error:
+                refusals.append(f"{path}: {_plain(error)}")
+        raise DeviceError("; ".join(refusals) or f"no device matches {self.port}")
+
+    def read(self, timeout: float) -> bytes:
+        """The bytes that are there or come within `timeout` [s].
+
+        Raises:
+            DeviceError: the line was closed at its other end or unplugged.
+        """
+        if self._serial is None:
+            raise DeviceError(f"{self.port} is not open")
+        try:
+            fd = self._serial.fileno()
+            ready, _, _ = select.select([fd], [], [], timeout)
+            data = os.read(fd, _CHUNK) if ready else None
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise DeviceError(f"{self.port}: {_plain(error)}") from error
+        if data == b"":
+            raise DeviceError(f"{self.port}: the line was closed at its other end")
+        return data or b""
+
+    def close(self) -> None:
+        """Close the device; harmless when it is closed."""
+        if self._serial is not None:
+            self._serial.close()
+            self._serial = None
+
+
+def matches(pattern: str) -> list[str]:
+    """Device files that `pattern` means, at least the pattern itself where it is a plain path."""
+    return sorted(glob.glob(pattern)) if glob.has_magic(pattern) else [pattern]
+
+
+def _plain(error: Exception) -> str:
+    if "exclusively lock" in str(error) or getattr(error, "errno", None) == 16:
+        return "in use by another process"
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if number else str(error)
+
+
+class SerialAdapter:
+    """Frames of a serial line as raw blocks, one block a read.
+
+    Args:
+        source: the line.
+        channels: how many channels a frame must have.
+    """
+
+    clock_rate = 1.0
+
+    def __init__(self, source: ByteSource, channels: int) -> None:
+        self._source = source
+        self._channels = channels
+        self._decoder = FrameDecoder()
+        self._bytes = 0
+
+    def open(self) -> None:
+        """Open the line; an unfinished frame of an earlier opening is dropped."""
+        self._decoder.forget()
+        self._source.open()
+
+    def read(self, timeout: float) -> Sequence[RawBlock]:
+        """The samples whose frames are complete; waits up to `timeout` [s] for the first byte.
+
+        Raises:
+            DeviceError: the line is gone, or frames have another number of channels.
+        """
+        data = self._source.read(timeout)
+        arrived = time.monotonic_ns()
+        self._bytes += len(data)
+        frames = self._decoder.feed(data)
+        for frame in frames:
+            if len(frame.codes) != self._channels:
+                found = f"the device sends {len(frame.codes)} channels"
+                raise DeviceError(f"{found}, the configuration has {self._channels}")
+        return [_block(list(run), arrived) for _, run in groupby(frames, lambda f: f.boot)]
+
+    def close(self) -> None:
+        """Close the line."""
+        self._source.close()
+
+    def counters(self) -> Mapping[str, float]:
+        """What the line lost, in frames and bytes."""
+        decoder = self._decoder
+        return {
+            "bytes": self._bytes,
+            "good_frames": decoder.good,
+            "crc_errors": decoder.crc_errors,
+            "skipped_bytes": decoder.skipped_bytes,
+            "resyncs": decoder.resyncs,
+        }
+
+
+def _block(frames: list[Frame], arrived: int) -> RawBlock:
+    return RawBlock(
+        boot=frames[0].boot,
+        seq=np.array([frame.seq for frame in frames], np.int64),
+        device_us=np.array([frame.device_us for frame in frames], np.int64),
+        codes=np.array([frame.codes for frame in frames], np.int16),
+        arrived_ns=np.full(len(frames), arrived, np.int64),
+    )
+
+
+def from_section(section: SerialSection, channels: tuple[ChannelSection, ...]) -> SerialAdapter:
+    """Entry point `serial` of the group `rigwatch.adapters`."""
+    return SerialAdapter(SerialPort(section.port, section.baud), len(channels))
