@@ -1,0 +1,198 @@
+"""Finds every intact chunk of an MCAP file, also in a truncated, overwritten or bit-flipped one.
+
+    record  := opcode u8 | length u64 | body
+    chunk   := start u64 | end u64 | raw size u64 | CRC-32 u32 | "zstd" | size u64 | compressed records
+
+A chunk counts only if its two lengths agree and the checksum of its unpacked bytes is right. Where they do not, the search
+goes on at the next place that looks like a chunk, and the bytes between are reported. Records outside of chunks (indexes) are
+skipped, but none may hide a chunk whose opcode was flipped.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import zstandard
+
+from rigwatch.wire.errors import SessionError
+
+MAGIC = b"\x89MCAP0\r\n"
+LARGEST_RECORD = 1 << 28
+"""No record of ours comes near this; a length beyond it is a flipped bit [bytes]."""
+_CHUNK, _MESSAGE, _MESSAGE_INDEX, _DATA_END, _FOOTER = 0x06, 0x05, 0x07, 0x0F, 0x02
+_KNOWN = frozenset(range(0x01, 0x10))
+_RECORD = struct.Struct("<BQ")
+_CHUNK_HEAD = struct.Struct("<QQQII")
+_U64 = struct.Struct("<Q")
+_U32 = struct.Struct("<I")
+_ZSTD = b"\x04\x00\x00\x00zstd"
+_BEFORE_ZSTD = _RECORD.size + _CHUNK_HEAD.size - 4
+_STEP = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """The unpacked records of one intact chunk, and where in the file it began."""
+
+    offset: int
+    records: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """Bytes of a file that could not be read: `size` from `offset` on, and why."""
+
+    offset: int
+    size: int
+    reason: str
+
+
+class _Damaged(Exception):
+    """What is wrong with the record at hand."""
+
+
+def magic_problem(head: bytes) -> str:
+    """What is wrong with a file's first eight bytes, in words; empty where they are those of an MCAP file."""
+    if head == MAGIC:
+        return ""
+    if not head:
+        return "the file is empty, expected a session (MCAP)"
+    return f"not an MCAP file (it begins with {head.hex(' ')})"
+
+
+def _refuse_later_version(path: Path, head: bytes) -> None:
+    if len(head) == len(MAGIC) and head[:5] == MAGIC[:5] and head[6:] == MAGIC[6:]:
+        if head[5] != MAGIC[5]:
+            version = repr(chr(head[5]))
+            raise SessionError(f"{path}: MCAP version {version}, this rigwatch reads version '0'")
+
+
+def scan(path: Path) -> Iterator[Chunk | Damage]:
+    """Every intact chunk of the file in order, and the damage between them.
+
+    Raises:
+        SessionError: the file cannot be opened, or is an MCAP file of another version.
+    """
+    try:
+        with path.open("rb", buffering=_STEP) as file:
+            head = file.read(len(MAGIC))
+            _refuse_later_version(path, head)
+            yield from _scan_records(file, head, path.stat().st_size)
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _scan_records(file: BinaryIO, magic: bytes, size: int) -> Iterator[Chunk | Damage]:
+    offset = len(magic)
+    if problem := magic_problem(magic):
+        offset = _next_chunk(file, 0, size)
+        yield Damage(0, offset, problem)
+        file.seek(offset)
+    unpack = zstandard.ZstdDecompressor().decompress
+    while offset < size:
+        head = file.read(_RECORD.size)
+        if head == MAGIC and offset + len(MAGIC) == size:
+            return
+        try:
+            body = _body(file, head, size - offset)
+            if head[0] == _CHUNK:
+                yield Chunk(offset, _records(body, unpack))
+            else:
+                _check_other(head[0], body)
+            offset += _RECORD.size + len(body)
+        except _Damaged as damage:
+            found = _next_chunk(file, offset + 1, size)
+            yield Damage(offset, found - offset, str(damage))
+            file.seek(found)
+            offset = found
+
+
+def _body(file: BinaryIO, head: bytes, left: int) -> bytes:
+    if len(head) < _RECORD.size:
+        raise _Damaged("truncated")
+    length = _RECORD.unpack(head)[1]
+    if length > left - _RECORD.size:
+        raise _Damaged("truncated, or a damaged length")
+    if length > LARGEST_RECORD:
+        raise _Damaged("a damaged length")
+    return file.read(length)
+
+
+def _records(body: bytes, unpack: "_Unpack") -> bytes:
+    """The unpacked, checked records of a chunk."""
+    if not _is_chunk(body):
+        raise _Damaged("a chunk whose lengths disagree, or not packed with zstd")
+    _, _, raw_size, crc, _ = _CHUNK_HEAD.unpack_from(body)
+    packed = memoryview(body)[_CHUNK_HEAD.size + 12 :]
+    try:
+        if raw_size > LARGEST_RECORD or zstandard.frame_content_size(packed) != raw_size:
+            raise _Damaged("a chunk of the wrong size")
+        records = unpack(packed)
+    except zstandard.ZstdError as error:
+        raise _Damaged("a chunk that cannot be unpacked") from error
+    if zlib.crc32(records) != crc:
+        raise _Damaged("a chunk with a wrong checksum")
+    return records
+
+
+class _Unpack:
+    """Type of `ZstdDecompressor.decompress`, as used here."""
+
+    def __call__(self, data: memoryview, /) -> bytes:
+        raise NotImplementedError
+
+
+def _is_chunk(body: bytes) -> bool:
+    at = _CHUNK_HEAD.size
+    return (
+        len(body) >= at + 12
+        and body[at - 4 : at + 4] == _ZSTD
+        and _U64.unpack_from(body, at + 4)[0] == len(body) - at - 12
+    )
+
+
+def _check_other(opcode: int, body: bytes) -> None:
+    """Raise where a record other than a chunk cannot be what its opcode says."""
+    if opcode not in _KNOWN:
+        raise _Damaged(f"a record of unknown kind {opcode:#04x}")
+    if _is_chunk(body):
+        raise _Damaged("a chunk with a damaged opcode")
+    if opcode == _MESSAGE:
+        raise _Damaged("a message outside of chunks, which no checksum protects")
+    if opcode == _DATA_END and len(body) != 4:
+        raise _Damaged("a damaged end of data")
+    if opcode == _FOOTER and len(body) != 20:
+        raise _Damaged("a damaged footer")
+    if opcode == _MESSAGE_INDEX and not (
+        len(body) >= 6 and _U32.unpack_from(body, 2)[0] == len(body) - 6
+    ):
+        raise _Damaged("a damaged index")
+
+
+def _next_chunk(file: BinaryIO, start: int, size: int) -> int:
+    """Offset of the next record from `start` on that looks like a whole chunk, `size` where none does."""
+    position = start
+    overlap = len(_ZSTD) - 1
+    while position < size:
+        file.seek(position)
+        window = file.read(_STEP + overlap)
+        at = window.find(_ZSTD)
+        while at >= 0:
+            candidate = position + at - _BEFORE_ZSTD
+            if candidate >= start and _chunk_at(file, candidate, size):
+                return candidate
+            at = window.find(_ZSTD, at + 1)
+        position += _STEP
+    return size
+
+
+def _chunk_at(file: BinaryIO, offset: int, size: int) -> bool:
+    file.seek(offset)
+    head = file.read(_BEFORE_ZSTD + len(_ZSTD) + 8)
+    opcode, length = _RECORD.unpack_from(head)
+    inner = _U64.unpack_from(head, len(head) - 8)[0]
+    whole = length == inner + _CHUNK_HEAD.size + 12 and offset + _RECORD.size + length <= size
+    return bool(opcode == _CHUNK and whole)

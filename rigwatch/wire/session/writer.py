@@ -1,0 +1,279 @@
+"""Writes one MCAP file: every flush is one chunk with its own checksum, on the disk before `flush` returns.
+
+    magic, header
+    chunk  schemas, channels, RunInfo
+    chunk  everything between two flushes: samples and estimates each merged into one block
+    …
+    summary, magic                          only where the file was closed; a killed one ends with its last chunk
+
+Channel numbers are the places in the table of topics, so that a file whose first chunk is damaged can still be read.
+"""
+
+import errno
+import os
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from mcap.writer import CompressionType, Writer
+
+from rigwatch import __version__
+from rigwatch.wire import blocks, schema
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import (
+    AlarmCommand,
+    EstimateBlock,
+    Message,
+    RunInfo,
+    SampleBlock,
+)
+from rigwatch.wire.topics import TOPICS
+
+PROFILE = "rigwatch"
+FORMAT = 1
+"""Version of what is inside: readers refuse a higher one."""
+FORMAT_KEY = "rigwatch_format"
+SOFTWARE = f"rigwatch {__version__}"
+LARGEST_BLOCK = 4096
+"""Samples in one message at most, which bounds a reader's memory [samples]."""
+SPILL = 2 * LARGEST_BLOCK
+"""Samples that may wait before they are written without being asked for [samples]."""
+_NEVER = 1 << 62
+_CHANNEL_IDS = {line.message: number for number, line in enumerate(TOPICS, start=1)}
+
+
+def message_time(message: Message) -> int:
+    """Time of the message, of its first sample where it has samples [ns]."""
+    if isinstance(message, SampleBlock | EstimateBlock):
+        return int(message.t_ns[0]) if len(message) else 0
+    return message.t_ns
+
+
+class SessionWriter:
+    """One session file being written.
+
+    `write` only remembers; `flush` merges what is remembered, writes it as one chunk and waits for the disk. After a
+    failed flush the file holds what it held before, `pending` what it does not, and the writer is of no more use.
+
+    Args:
+        path: the file; it must not exist.
+        run: stands at its head.
+        sync: whether each flush waits for the disk.
+
+    Raises:
+        SessionError: the file exists already or cannot be written.
+    """
+
+    def __init__(self, path: Path | str, run: RunInfo, *, sync: bool = True) -> None:
+        self.path = Path(path)
+        self.pending: list[Message] = []
+        self._waiting = 0
+        self._output = _Output(self.path, sync)
+        self._mcap = Writer(self._output, _NEVER, CompressionType.ZSTD)  # type: ignore[arg-type]
+        try:
+            self._head(run)
+        except SessionError:
+            self.abandon()
+            raise
+
+    def _head(self, run: RunInfo) -> None:
+        self._mcap.start(profile=PROFILE, library=SOFTWARE)
+        metadata = {FORMAT_KEY: str(FORMAT)}
+        for line in TOPICS:
+            name = schema.type_name(line.message)
+            number = self._mcap.register_schema(name, "protobuf", schema.file_descriptor_set())
+            self._mcap.register_channel(line.name, "protobuf", number, metadata)
+        self.write(run)
+        self.flush()
+
+    @property
+    def size(self) -> int:
+        """Bytes on the disk."""
+        return self._output.committed
+
+    def write(self, message: Message) -> None:
+        """Remember the message; it is on the disk after the next flush."""
+        self.pending.append(message)
+        if isinstance(message, SampleBlock | EstimateBlock):
+            self._waiting += len(message)
+            if self._waiting >= SPILL:
+                self.flush()
+
+    def flush(self) -> None:
+        """Put everything remembered on the disk.
+
+        Raises:
+            SessionError: the disk is full, gone or read-only. `pending` still holds the messages.
+        """
+        if not self.pending and not self._output.waiting:
+            return
+        for message in merge_pending(self.pending):
+            self._add(message)
+        self._mcap.flush()
+        self._output.commit()
+        self.pending.clear()
+        self._waiting = 0
+
+    def _add(self, message: Message) -> None:
+        t_ns = max(0, message_time(message))
+        self._mcap.add_message(_CHANNEL_IDS[type(message)], t_ns, schema.encode(message), t_ns)
+
+    def close(self) -> None:
+        """Write what is left and the index, and close the file.
+
+        Raises:
+            SessionError: as `flush`.
+        """
+        if self._output.closed:
+            return
+        try:
+            self.flush()
+            self._mcap.finish()
+            self._output.commit()
+        finally:
+            self.abandon()
+
+    def abandon(self) -> None:
+        """Close the file as it stands on the disk, without an index."""
+        self._output.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.abandon()
+
+
+def merge_pending(messages: Iterable[Message]) -> list[Message]:
+    """The messages with consecutive blocks of one kind and device joined, none longer than `LARGEST_BLOCK`.
+
+    A joined block stands where its first part stood. Nothing is joined across an operator's command, so that the
+    command keeps its place between the samples.
+    """
+    slots: list[list[Message]] = []
+    runs: dict[tuple[type[Message], str], tuple[list[Message], int]] = {}
+    for message in messages:
+        if isinstance(message, SampleBlock | EstimateBlock):
+            if len(message):
+                _append_block(slots, runs, message)
+            continue
+        if isinstance(message, AlarmCommand):
+            runs.clear()
+        slots.append([message])
+    return [joined for slot in slots for joined in _joined(slot)]
+
+
+def _append_block(
+    slots: list[list[Message]],
+    runs: dict[tuple[type[Message], str], tuple[list[Message], int]],
+    block: SampleBlock | EstimateBlock,
+) -> None:
+    key = (type(block), block.device)
+    slot, length = runs.get(key, ([], 0))
+    tail = slot[-1] if slot else None
+    fits = length + len(block) <= LARGEST_BLOCK
+    if fits and isinstance(tail, SampleBlock | EstimateBlock) and blocks.continues(tail, block):
+        slot.append(block)
+        runs[key] = (slot, length + len(block))
+        return
+    slot = [block]
+    slots.append(slot)
+    runs[key] = (slot, len(block))
+
+
+def _joined(slot: list[Message]) -> list[Message]:
+    head = slot[0]
+    if isinstance(head, SampleBlock):
+        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var, arg-type]
+    if isinstance(head, EstimateBlock):
+        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var, arg-type]
+    return slot
+
+
+class _Output:
+    """The stream below the MCAP writer: bytes wait here until `commit` has all of them on the disk."""
+
+    def __init__(self, path: Path, sync: bool) -> None:
+        self._path, self._sync = path, sync
+        self._bytes = bytearray()
+        self.committed = 0
+        try:
+            self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+        except FileExistsError:
+            raise SessionError(f"{path}: the file exists already and is not overwritten") from None
+        except OSError as error:
+            raise SessionError(f"{path}: cannot be written: {error.strerror}") from error
+        self.closed = False
+
+    @property
+    def waiting(self) -> int:
+        return len(self._bytes)
+
+    def write(self, data: bytes) -> int:
+        self._bytes += data
+        return len(data)
+
+    def tell(self) -> int:
+        return self.committed + len(self._bytes)
+
+    def flush(self) -> None:
+        """Nothing: the MCAP writer flushes more often than a chunk is whole."""
+
+    def commit(self) -> None:
+        try:
+            self._write_all()
+        except OSError as error:
+            self._roll_back()
+            raise SessionError(f"{self._path}: cannot be written: {_reason(error)}") from error
+
+    def _write_all(self) -> None:
+        view = memoryview(bytes(self._bytes))
+        done = 0
+        while done < len(view):
+            done += os.write(self._descriptor, view[done:])
+        if self._sync:
+            os.fsync(self._descriptor)
+        self.committed += done
+        self._bytes.clear()
+
+    def _roll_back(self) -> None:
+        """Take a half-written chunk away again, so that its messages are not in two segments."""
+        try:
+            os.ftruncate(self._descriptor, self.committed)
+            os.lseek(self._descriptor, self.committed, os.SEEK_SET)
+        except OSError:
+            pass
+
+    def close(self) -> None:
+        if not self.closed:
+            self.closed = True
+            os.close(self._descriptor)
+
+
+def _reason(error: OSError) -> str:
+    known = {errno.ENOSPC: "no space left on the disk", errno.EROFS: "the disk is read-only"}
+    return known.get(error.errno or 0, error.strerror or str(error))
+
+
+def run_info(
+    rig: str,
+    sample_rate_hz: float,
+    *,
+    t_ns: int | None = None,
+    notes: str = "",
+    configuration: str = "",
+    configuration_sha256: str = "",
+) -> RunInfo:
+    """A `RunInfo` signed by this version; `t_ns` is now where it is not given [ns]."""
+    began = time.time_ns() if t_ns is None else t_ns
+    return RunInfo(rig, began, sample_rate_hz, configuration, configuration_sha256, SOFTWARE, notes)
