@@ -1,0 +1,72 @@
+# `make demo` and `make test` do all the set-up on a machine with Python 3.11 to 3.13 and make.
+
+VENV ?= .venv
+PYTHON_IN := $(VENV)/bin/python
+STAMPS := $(VENV)/stamps
+
+# Compiled kernels are kept in the checkout, so that every process and every run finds them.
+export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba_cache
+export PATH := $(abspath $(VENV)/bin):$(PATH)
+
+# Measured data, where they lie beside the checkout.
+ifeq ($(RIGWATCH_DATA),)
+RIGWATCH_DATA := $(wildcard $(abspath ../shared/datasets))
+endif
+ifneq ($(RIGWATCH_DATA),)
+export RIGWATCH_DATA
+endif
+
+RUN_LOCKS := requirements/lock.txt requirements/build.txt
+VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
+
+.DEFAULT_GOAL := help
+.PHONY: help setup test demo bench lint unit demo-headless lock viewer-packages clean
+
+help:  ## what can be made
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
+
+setup: $(STAMPS)/dev  ## only the virtual environment, in .venv
+
+demo: $(STAMPS)/run  ## simulated rig, monitor and live dashboard: friction appears, an alarm names it
+	@rigwatch demo $(DEMO)
+
+test: lint demo-headless unit  ## everything that is checked: style, types, layers, demo, tests
+
+lint: $(STAMPS)/dev  ## ruff, mypy --strict and the rules of which layer imports which
+	@ruff check .
+	@ruff format --check .
+	@mypy
+	@lint-imports --no-timing
+
+demo-headless: $(STAMPS)/run
+	@rigwatch demo --headless
+
+unit: $(STAMPS)/dev viewer-packages
+	@if [ "$${CI:-}" = true ] && [ ! -d "$${RIGWATCH_DATA:-}" ]; then \
+		echo "test: RIGWATCH_DATA names no folder with the measured data sets" >&2; exit 1; fi
+	@pytest -n 2 --dist loadgroup $(TESTS)
+
+bench: $(STAMPS)/bench  ## the benchmarks, printed as a table beside the published figures
+	@python -m benchmarks $(BENCH)
+
+lock: $(STAMPS)/dev  ## write the lock files again (UPGRADE=1 takes newer versions)
+	@tools/lock.sh $(PYTHON_IN)
+
+viewer-packages:  # what the headless viewer of the dashboard test draws with
+	@tools/debian_packages.sh --wish $(VIEWER_PACKAGES)
+
+# Each environment is made anew only when its lock files or the project's metadata change.
+$(STAMPS)/run: $(RUN_LOCKS) pyproject.toml tools/setup.sh
+	@tools/setup.sh $(VENV) $(RUN_LOCKS)
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/dev: requirements/dev.txt $(STAMPS)/run
+	@tools/setup.sh $(VENV) requirements/dev.txt
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/bench: requirements/bench.txt $(STAMPS)/dev
+	@tools/setup.sh $(VENV) requirements/bench.txt
+	@mkdir -p $(STAMPS) && touch $@
+
+clean:  ## remove the environment and all that was computed
+	rm -rf $(VENV) .numba_cache .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

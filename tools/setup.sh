@@ -1,0 +1,50 @@
+#!/bin/sh
+# Makes the virtual environment and puts the locked packages into it: setup.sh VENV LOCK...
+#
+# Needs a Python from 3.11 to 3.13 and nothing else. Files that the locks do not name by hash are
+# refused; which index pip asks is the user's own setting.
+set -eu
+cd "$(dirname "$0")/.."
+venv=$1
+shift
+
+fits() {
+    "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null
+}
+
+find_python() {
+    for candidate in ${PYTHON:-} python3 python3.13 python3.12 python3.11 python; do
+        if fits "$candidate"; then
+            echo "$candidate"
+            return
+        fi
+    done
+    found=$(python3 --version 2>&1) || found="no python3"
+    echo "setup: found $found, expected Python 3.11, 3.12 or 3.13" >&2
+    echo "setup: install one of them, or name it: make PYTHON=/path/to/python3.12 ..." >&2
+    exit 1
+}
+
+make_venv() {
+    python=$(find_python) || exit 1
+    # Debian keeps the part of Python that puts pip into an environment in a package of its own.
+    if ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then
+        tools/debian_packages.sh python3-venv || exit 1
+    fi
+    echo "setup: virtual environment $venv with $("$python" --version)"
+    "$python" -m venv --clear "$venv"
+}
+
+if ! { [ -x "$venv/bin/python" ] && fits "$venv/bin/python" \
+    && "$venv/bin/python" -m pip --version >/dev/null 2>&1; }; then
+    make_venv
+fi
+
+# Some rivals in the benchmarks are published as source only: they are built with the locked tools
+# that are already in the environment, so that nothing unlocked is fetched.
+for lock in "$@"; do
+    echo "setup: $lock"
+    PIP_DISABLE_PIP_VERSION_CHECK=1 "$venv/bin/python" -m pip install --quiet \
+        --require-hashes --no-deps --no-build-isolation -r "$lock"
+done
+"$venv/bin/python" -m pip install --quiet --no-deps --no-build-isolation --editable .
