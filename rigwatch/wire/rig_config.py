@@ -131,11 +131,15 @@ class PlantSection(Section, frozen=True):
 
 
 class AlarmSection(Section, frozen=True):
-    """[monitor.alarms.<name>] — how one condition becomes an alarm."""
+    """[monitor.alarms.<name>] — how a condition becomes an alarm; left out: the alarm's own."""
 
-    persistence: Annotated[int, Meta(ge=1, description="samples the condition must hold")] = 2
-    clear_after: Annotated[int, Meta(ge=1, description="samples without it before it clears")] = 256
-    latch: Annotated[bool, Meta(description="stays until reset by a person")] = True
+    persistence: Annotated[
+        int | None, Meta(ge=1, description="samples the condition must hold")
+    ] = None
+    clear_after: Annotated[
+        int | None, Meta(ge=1, description="samples without it before it clears")
+    ] = None
+    latch: Annotated[bool | None, Meta(description="stays until reset by a person")] = None
     enabled: Annotated[bool, Meta(description="whether it is raised at all")] = True
 
 

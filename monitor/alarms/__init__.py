@@ -1,0 +1,26 @@
+"""Alarms: from per-sample conditions to something that a person sees, acknowledges and resets.
+
+The core is pure (`AlarmManager`); only `journal.py` touches a file. One table, `kinds.py`, declares
+every alarm with its severity, cause, guidance and default settings.
+"""
+
+from monitor.alarms.journal import AlarmJournal, last_records, read_journal
+from monitor.alarms.kinds import ALARM_KINDS, AlarmKind, check_settings
+from monitor.alarms.manager import AlarmManager, Announcement
+from monitor.alarms.quality import quality_conditions
+from monitor.alarms.record import AlarmRecord
+from monitor.alarms.state import Occasion
+
+__all__ = [
+    "ALARM_KINDS",
+    "AlarmJournal",
+    "AlarmKind",
+    "AlarmManager",
+    "AlarmRecord",
+    "Announcement",
+    "Occasion",
+    "check_settings",
+    "last_records",
+    "quality_conditions",
+    "read_journal",
+]

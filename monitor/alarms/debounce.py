@@ -1,0 +1,76 @@
+"""From a flag a sample to edges that mean something: persistence on the way in, hysteresis on the
+way out.
+
+The level rises at the `persistence`-th consecutive sample with the condition and falls at the
+`clear_after`-th consecutive sample without it. Nothing depends on how the samples are cut into
+blocks.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """The level has changed.
+
+    Attributes:
+        index: place in the block of the sample that decided.
+        rising: whether the level is on from here.
+        onset_seq: for a rising edge, number of the first sample of the run.
+    """
+
+    index: int
+    rising: bool
+    onset_seq: int
+
+
+class Debouncer:
+    """One condition's level, carried from block to block.
+
+    Args:
+        persistence: consecutive samples with the condition for the level to rise.
+        clear_after: consecutive samples without it for the level to fall.
+        level: level to start from.
+    """
+
+    def __init__(self, persistence: int, clear_after: int, *, level: bool = False) -> None:
+        self.persistence, self.clear_after = persistence, clear_after
+        self.level = level
+        self._run = 0
+        self._onset_seq = -1
+
+    def interrupt(self) -> None:
+        """Forget a run that has begun: the next sample does not follow the last one."""
+        self._run = 0
+
+    def update(self, active: NDArray[np.uint8], first_seq: int) -> list[Edge]:
+        """Edges within a block whose first sample is `first_seq`; `active` has shape (n,)."""
+        n = len(active)
+        if not self.level and self._run == 0 and not active.any():
+            return []
+        edges: list[Edge] = []
+        cuts = np.flatnonzero(np.diff(active)) + 1
+        start = 0
+        for stop in (*cuts.tolist(), n):
+            self._take_run(bool(active[start]), start, stop, first_seq, edges)
+            start = stop
+        return edges
+
+    def _take_run(
+        self, active: bool, start: int, stop: int, first_seq: int, edges: list[Edge]
+    ) -> None:
+        """Account for the samples from `start` to `stop`, all alike."""
+        if active == self.level:
+            self._run = 0
+            return
+        if self._run == 0:
+            self._onset_seq = first_seq + start
+        needed = (self.persistence if active else self.clear_after) - self._run
+        if needed > stop - start:
+            self._run += stop - start
+            return
+        self.level, self._run = active, 0
+        edges.append(Edge(start + needed - 1, active, self._onset_seq))

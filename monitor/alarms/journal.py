@@ -1,0 +1,150 @@
+"""The alarm journal: an append-only file of JSON lines that a killed monitor leaves readable.
+
+    {"alarm": {"name": "dry_friction", "state": "unacknowledged", …}, "active": true, …}
+
+Each write ends with fsync, so that what has been published is on disk. A line torn by a kill or a
+power cut has no newline or is no JSON: reading skips it and counts it, and writing starts a fresh
+line behind it. Figures that JSON cannot say are written as the words "nan", "inf" and "-inf".
+"""
+
+import json
+import math
+import os
+from collections.abc import Iterable
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from monitor.alarms.record import AlarmRecord
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import Alarm
+
+_ALARM_TYPES = get_type_hints(Alarm)
+_RECORD_TYPES = get_type_hints(AlarmRecord)
+
+
+class AlarmJournal:
+    """The journal at one path, open for appending.
+
+    Args:
+        path: the file; it and its folder are made where they are missing.
+
+    Attributes:
+        failure: why the last write failed, "" where it did not; the lines wait in memory for the
+            next write.
+
+    Raises:
+        SessionError: the file cannot be opened.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self.failure = ""
+        self._waiting: list[bytes] = []
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+            self._end_torn_line()
+            _sync_folder(self.path.parent)
+        except OSError as error:
+            raise SessionError(
+                f"{path}: alarm journal cannot be opened: {error.strerror}"
+            ) from error
+
+    def write(self, records: Iterable[AlarmRecord]) -> None:
+        """Append records and force them to disk; a full disk shows in `failure` only."""
+        self._waiting += [_line(record) for record in records]
+        if not self._waiting:
+            return
+        try:
+            _write_all(self._file, self._waiting)
+            os.fsync(self._file)
+        except OSError as error:
+            self.failure = f"{self.path}: alarm journal cannot be written: {error.strerror}"
+            return
+        self.failure = ""
+
+    def close(self) -> None:
+        """Close the file; what could not be written is lost."""
+        os.close(self._file)
+
+    def _end_torn_line(self) -> None:
+        size = os.fstat(self._file).st_size
+        if size and os.pread(self._file, 1, size - 1) != b"\n":
+            os.write(self._file, b"\n")
+
+
+def read_journal(path: Path | str) -> tuple[list[AlarmRecord], int]:
+    """All records in order, and the number of lines that could not be read.
+
+    Raises:
+        SessionError: the file exists and cannot be read.
+    """
+    try:
+        lines = Path(path).read_bytes().split(b"\n")
+    except FileNotFoundError:
+        return [], 0
+    except OSError as error:
+        raise SessionError(f"{path}: alarm journal cannot be read: {error.strerror}") from error
+    parsed = [_parse(line) for line in lines if line.strip()]
+    records = [record for record in parsed if record is not None]
+    return records, len(parsed) - len(records)
+
+
+def last_records(records: Iterable[AlarmRecord]) -> list[AlarmRecord]:
+    """The newest record of each alarm: what a restarted monitor has to stand by."""
+    return list({record.alarm.name: record for record in records}.values())
+
+
+def _write_all(file: int, waiting: list[bytes]) -> None:
+    """Write and drop line by line; a line that was written in part is written again as a whole."""
+    while waiting:
+        line = waiting[0]
+        if os.write(file, line) < len(line):
+            waiting[0] = b"\n" + line.lstrip(b"\n")
+            continue
+        del waiting[0]
+
+
+def _sync_folder(folder: Path) -> None:
+    """A new file survives a power cut only once its folder is on disk as well."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _line(record: AlarmRecord) -> bytes:
+    plain = asdict(record)
+    plain["alarm"] = {name: _said(value) for name, value in plain["alarm"].items()}
+    return json.dumps(plain, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+
+
+def _said(value: object) -> object:
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _parse(line: bytes) -> AlarmRecord | None:
+    try:
+        plain = json.loads(line)
+        alarm = Alarm(**_typed(plain.pop("alarm"), Alarm, _ALARM_TYPES))
+        return AlarmRecord(alarm=alarm, **_typed(plain, AlarmRecord, _RECORD_TYPES))
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return None
+
+
+def _typed(plain: dict[str, Any], kind: type, types: dict[str, Any]) -> dict[str, Any]:
+    """The fields of `kind` that `plain` must hold, with figures as their type says.
+
+    Raises:
+        KeyError: a field is missing.
+        TypeError: a field is of another type.
+    """
+    typed: dict[str, Any] = {}
+    for name in [one.name for one in fields(kind) if one.name != "alarm"]:
+        value = float(plain[name]) if types[name] is float else plain[name]
+        if isinstance(types[name], type) and not isinstance(value, types[name]):
+            raise TypeError(name)
+        typed[name] = value
+    return typed

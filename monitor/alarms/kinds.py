@@ -1,0 +1,307 @@
+"""Every alarm there is, in one table: name, severity, cause, guidance and default settings.
+
+An alarm takes its name from the condition that raises it. A sensor alarm exists once a channel and
+is called `<kind>.<channel>`, such as "sensor_stuck.position"; `{channel}` in its texts stands for
+the channel. Severities follow EEMUA 191: critical means that nobody is watching the rig any more,
+info is a remark that nobody has to acknowledge. An alarm that `refines` another names the same
+fault better and takes its place.
+"""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.messages import Severity
+from rigwatch.wire.rig_config import AlarmSection
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmSettings:
+    """How a condition becomes an alarm, with every default filled in.
+
+    Attributes:
+        persistence: consecutive samples that the condition must hold before the alarm is raised
+            [1].
+        clear_after: consecutive samples without the condition before it counts as gone [1].
+        latch: a person must reset the alarm after the condition has gone.
+        enabled: whether the alarm is raised at all.
+    """
+
+    persistence: int
+    clear_after: int
+    latch: bool
+    enabled: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmKind:
+    """One line of the table.
+
+    Attributes:
+        name: the condition that raises it; for a sensor alarm the part before the dot.
+        severity: how bad; "info" needs no acknowledging.
+        cause: what is probably wrong.
+        guidance: what to do now.
+        defaults: settings where the configuration says nothing.
+        refines: the alarm that this one takes the place of, "" for none.
+    """
+
+    name: str
+    severity: Severity
+    cause: str
+    guidance: str
+    defaults: AlarmSettings
+    refines: str = ""
+
+
+_LASTING = AlarmSettings(persistence=2, clear_after=256, latch=True)
+_AT_ONCE = AlarmSettings(persistence=1, clear_after=256, latch=True)
+_PASSING = AlarmSettings(persistence=1, clear_after=256, latch=False)
+_SENSOR = AlarmSettings(persistence=3, clear_after=256, latch=True)
+_REMARK = AlarmSettings(persistence=1, clear_after=64, latch=False)
+
+ALARM_FLOOD = "alarm_flood"
+
+ALARM_KINDS: tuple[AlarmKind, ...] = (
+    # The line to the rig: without it nothing below can be judged.
+    AlarmKind(
+        "link",
+        "critical",
+        "the device is gone: cable, power or port",
+        "Check the cable and the device's power. The line reopens by "
+        "itself; the lost samples are counted.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "stale",
+        "critical",
+        "no samples arrive although the line is open",
+        "Look whether the device runs and whether daq does (rigwatch "
+        "doctor). Do not trust the last values.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "duplicate_source",
+        "critical",
+        "a second publisher speaks for this device; the first one is believed",
+        "Find and stop the second daq process, or give it a rig id of its own.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "loss",
+        "error",
+        "samples were lost and could not be recovered",
+        "See the gaps in the recording. Check the load of the "
+        "machine and the line's error counters.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "gap",
+        "warning",
+        "samples are missing, the estimation window was restarted",
+        "Wait one window for new estimates. If it repeats, check the line and the machine's load.",
+        _PASSING,
+    ),
+    AlarmKind(
+        "clock_drift",
+        "warning",
+        "the device's clock runs at another rate than this machine's",
+        "Compare rate_hz in the health message with the nominal "
+        "rate; check the device's oscillator.",
+        _PASSING,
+    ),
+    AlarmKind(
+        "disk",
+        "error",
+        "the disk is full or nearly so; recording or journal may stop",
+        "Free space or mount another disk. Watching goes on; what is not recorded is counted.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "monitor_reset",
+        "error",
+        "a filter left its limits or lost its numbers and was reset",
+        "See the event log. Estimates are valid again after one "
+        "window; commission anew if it repeats.",
+        _AT_ONCE,
+    ),
+    # The sensors: an alarm a channel.
+    AlarmKind(
+        "sensor_non_finite",
+        "error",
+        "the {channel} channel delivers no number",
+        "Check the sensor, its supply and its calibration. The "
+        "channel is kept out of every estimate.",
+        _SENSOR,
+    ),
+    AlarmKind(
+        "sensor_saturated",
+        "warning",
+        "the {channel} signal stands at its rail or outside the sensor's range",
+        "Lower the excitation or choose another range. Saturated "
+        "samples are kept out of the estimates.",
+        _SENSOR,
+    ),
+    AlarmKind(
+        "sensor_stuck",
+        "error",
+        "the {channel} code has not changed for longer than a live sensor can leave it",
+        "Check the sensor's wiring and supply; move the rig by hand and watch the channel.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "sensor_stale",
+        "error",
+        "the {channel} channel repeats an old value",
+        "Check the device's sampling of this channel.",
+        _SENSOR,
+    ),
+    AlarmKind(
+        "sensor_spike",
+        "warning",
+        "the {channel} signal jumps as the sensor cannot have",
+        "Look for a loose contact or electrical disturbance near the sensor's cable.",
+        _SENSOR,
+    ),
+    # The rig itself.
+    AlarmKind(
+        "departure",
+        "error",
+        "the rig no longer behaves as its healthy model; the kind of fault is being worked out",
+        "Keep the excitation running: naming the fault takes about one window of faulty samples.",
+        _LASTING,
+    ),
+    AlarmKind(
+        "dry_friction",
+        "error",
+        "dry friction: bearing pressure too low, wear, side load or dirt",
+        "Stop soon. Check the air bearing's supply, then alignment, seals and guides.",
+        _LASTING,
+        refines="departure",
+    ),
+    AlarmKind(
+        "stiction",
+        "error",
+        "stiction: the mass sticks and breaks away",
+        "Stop now. The bearing touches or a part is jammed; turn on the air before moving again.",
+        _LASTING,
+        refines="departure",
+    ),
+    AlarmKind(
+        "other_fault",
+        "error",
+        "the rig has changed, and dry friction does not explain how",
+        "Check sensors (gain, offset), supply pressure, valve and "
+        "leaks; compare with a healthy recording.",
+        _LASTING,
+        refines="departure",
+    ),
+    # The detectors beside the friction scheme.
+    AlarmKind(
+        "parity_arma",
+        "warning",
+        "output and model differ: the ARMA parity residual left its adaptive threshold",
+        "Compare with the friction estimates; a constant residual points to a sensor offset.",
+        _LASTING,
+    ),
+    AlarmKind(
+        "parity_ma",
+        "warning",
+        "the model's difference equation no longer holds: the MA "
+        "parity residual left its threshold",
+        "Compare with the friction estimates; short bursts point to impacts or spikes.",
+        _LASTING,
+    ),
+    AlarmKind(
+        "unknown_input",
+        "warning",
+        "the measured position carries a bias that the model does not explain",
+        "Compare with the friction estimates; check the position sensor's zero and mounting.",
+        _LASTING,
+    ),
+    # Remarks: why there is no verdict just now.
+    AlarmKind(
+        "excitation_changed",
+        "warning",
+        "the excitation is not the one that the healthy reference was taken with",
+        "Go back to the known excitation, or record a healthy "
+        "stretch with the new one and arm anew.",
+        _PASSING,
+    ),
+    AlarmKind(
+        "not_observable",
+        "info",
+        "too little motion to estimate friction; estimates are frozen",
+        "Nothing is wrong. Move the rig to watch its friction.",
+        _REMARK,
+    ),
+    AlarmKind(
+        "ill_conditioned",
+        "info",
+        "this motion cannot tell the two friction terms apart; estimates are held",
+        "Nothing is wrong. Vary the amplitude or the frequency of the excitation.",
+        _REMARK,
+    ),
+    AlarmKind(
+        ALARM_FLOOD,
+        "error",
+        "more alarms than a person can follow; they are grouped, critical ones excepted",
+        "Look at the first-out alarm: it is probably the cause of the others.",
+        _PASSING,
+    ),
+)
+
+REFINED = tuple(dict.fromkeys(kind.refines for kind in ALARM_KINDS if kind.refines))
+"""Alarms that others give a better name."""
+
+_BY_NAME = {kind.name: kind for kind in ALARM_KINDS}
+_ORDER = {kind.name: place for place, kind in enumerate(ALARM_KINDS)}
+
+
+def split(name: str) -> tuple[str, str]:
+    """Kind and channel of an alarm's name; the channel is "" where there is none."""
+    kind, _, channel = name.partition(".")
+    return kind, channel
+
+
+def kind_of(name: str) -> AlarmKind:
+    """The table's line for the alarm `name`; a plain warning for a condition that is not listed."""
+    kind, _ = split(name)
+    if kind in _BY_NAME:
+        return _BY_NAME[kind]
+    words = kind.replace("_", " ")
+    return AlarmKind(kind, "warning", words, "See the event log and the recording.", _LASTING)
+
+
+def order_of(name: str) -> tuple[int, str]:
+    """Place of the alarm `name` among alarms raised by one sample: nearest to the cause first."""
+    return _ORDER.get(split(name)[0], len(_ORDER)), name
+
+
+def settings_of(name: str, settings: Mapping[str, AlarmSection]) -> AlarmSettings:
+    """Settings of the alarm `name`: its own section, else its kind's, over the table's defaults."""
+    defaults = kind_of(name).defaults
+    section = settings.get(name) or settings.get(split(name)[0])
+    if section is None:
+        return defaults
+    return AlarmSettings(
+        persistence=defaults.persistence if section.persistence is None else section.persistence,
+        clear_after=defaults.clear_after if section.clear_after is None else section.clear_after,
+        latch=defaults.latch if section.latch is None else section.latch,
+        enabled=section.enabled,
+    )
+
+
+def check_settings(settings: Mapping[str, AlarmSection], file: Path | str) -> None:
+    """Refuse settings for alarms that do not exist.
+
+    Raises:
+        ConfigError: a section under [monitor.alarms] names no alarm of the table.
+    """
+    for name in settings:
+        if split(name)[0] not in _BY_NAME:
+            near = difflib.get_close_matches(split(name)[0], _BY_NAME, n=1)
+            expected = f"{near[0]}" if near else f"one of {', '.join(_BY_NAME)}"
+            raise ConfigError(file, f"monitor.alarms.{name}", "no such alarm", expected)

@@ -1,0 +1,339 @@
+"""All alarms of a rig: conditions, reports and commands come in, transitions go out.
+
+Three ways in, one way out. `update` takes the per-sample conditions of a block; `report` takes what
+processes notice without a sample (link, disk, clock); `command` takes what an operator wants. Each
+returns what is to be published. The manager reads no clock and no file; how samples are cut into
+blocks changes nothing.
+
+A fault is detected before it is named. `departure` is raised first; when `dry_friction`, `stiction`
+or `other_fault` follows while the departure lasts, it takes the departure's place in the list, with
+the departure's `onset_seq` and first-out mark, so that one fault stands as one alarm with the best
+name it has.
+
+The first alarm raised while no other waits to be seen is the first-out. In a flood (`flood.py`)
+further alarms stand and are journalled, but are announced only as events, until the flood ends;
+critical alarms always show.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from monitor.alarms.debounce import Debouncer
+from monitor.alarms.flood import MOST_IN_WINDOW, FloodWatch
+from monitor.alarms.kinds import ALARM_FLOOD, REFINED, check_settings, order_of, settings_of
+from monitor.alarms.operator import refusal, wanted
+from monitor.alarms.record import AlarmRecord
+from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
+from monitor.conditions import Condition
+from rigwatch.wire.messages import Alarm, AlarmCommand, Event, IntArray
+from rigwatch.wire.rig_config import AlarmSection
+
+Announcement = Alarm | Event
+
+SHELF_LIFE_NS = 8 * 3600 * 1_000_000_000
+"""Shelving ends by itself after one shift, so that no alarm is forgotten on the shelf."""
+SOURCE = "monitor/alarms"
+
+
+class AlarmManager:
+    """The alarms of one device.
+
+    Args:
+        settings: sections by alarm or kind of alarm, from [monitor.alarms].
+        file: the configuration's name, for errors.
+
+    Raises:
+        ConfigError: a section names no alarm.
+    """
+
+    def __init__(
+        self, settings: Mapping[str, AlarmSection] | None = None, file: str = "configuration"
+    ) -> None:
+        self._settings = dict(settings or {})
+        check_settings(self._settings, file)
+        self._alarms: dict[str, AlarmInstance] = {}
+        self._debouncers: dict[str, Debouncer] = {}
+        self._flood = FloodWatch()
+        self._first_out = ""
+        self._next: tuple[int, int] | None = None
+        self._said: list[Announcement] = []
+        self._changes: list[AlarmRecord] = []
+
+    def update(
+        self,
+        device: str,
+        boot: int,
+        seq: int,
+        t_ns: IntArray,
+        conditions: Iterable[Condition],
+    ) -> list[Announcement]:
+        """Judge consecutive samples.
+
+        Args:
+            device: the device whose samples these are.
+            boot: boot of the samples.
+            seq: number of the first one.
+            t_ns: shape (n,), their times [ns].
+            conditions: each over the same n samples; one that is left out keeps its level.
+        """
+        if self._next != (boot, seq):
+            for debouncer in self._debouncers.values():
+                debouncer.interrupt()
+        self._next = (boot, seq + len(t_ns))
+        for index, name, rising, at in sorted(
+            self._edges(device, boot, seq, t_ns, conditions), key=lambda row: row[:2]
+        ):
+            self._advance(int(t_ns[index]))
+            self._set(name[1], at, active=rising)
+        if len(t_ns):
+            self._advance(int(t_ns[-1]))
+        return self._take_said()
+
+    def report(self, name: str, at: Occasion, *, active: bool) -> list[Announcement]:
+        """Take over what a process knows without a sample: whether `name` holds since `at`.
+
+        Saying the same again changes nothing. Persistence and hysteresis are counted in samples and
+        do not apply here.
+        """
+        self._advance(at.t_ns)
+        if self._alarm(name).active != active:
+            self._set(name, at, active=active)
+        return self._take_said()
+
+    def command(self, command: AlarmCommand) -> list[Announcement]:
+        """Do what an operator asks, or say in an event why not."""
+        self._advance(command.t_ns)
+        found = wanted(command, self._alarms.values())
+        why_not = refusal(command, found)
+        if why_not:
+            self._tell("alarm_command_refused", why_not, command.t_ns)
+            return self._take_said()
+        for alarm in found:
+            self._obey(alarm, command)
+        self._raise_unnamed(command.t_ns)
+        return self._take_said()
+
+    def standing(self) -> list[Alarm]:
+        """Every alarm that is not normal, first-out first, then in order of time."""
+        alarms = [alarm.message() for alarm in self._alarms.values() if alarm.state != "normal"]
+        return sorted(alarms, key=lambda alarm: (not alarm.first_out, alarm.t_ns))
+
+    def take_changes(self) -> list[AlarmRecord]:
+        """What the journal has to keep since the last call, in order."""
+        changes, self._changes = self._changes, []
+        return changes
+
+    def restore(self, records: Iterable[AlarmRecord]) -> list[Alarm]:
+        """Stand as the records say, and return the standing alarms to be published again."""
+        for record in records:
+            self._restore_one(record)
+        return self.standing()
+
+    def _restore_one(self, record: AlarmRecord) -> None:
+        said = record.alarm
+        alarm = self._alarm(said.name)
+        alarm.state, alarm.active, alarm.latched = said.state, record.active, record.latched
+        alarm.shelved_until_ns, alarm.first_out = record.shelved_until_ns, said.first_out
+        alarm.superseded = record.active and said.state == "normal" and not record.shelved_until_ns
+        alarm.occasion = Occasion(
+            said.device, said.boot, said.seq, said.t_ns, said.value, said.low, said.high,
+            said.onset_seq, record.text,
+        )  # fmt: skip
+        self._debouncer(said.name).level = record.active
+        if said.first_out and said.state != "normal":
+            self._first_out = said.name
+
+    def _edges(
+        self, device: str, boot: int, seq: int, t_ns: IntArray, conditions: Iterable[Condition]
+    ) -> Iterable[tuple[int, tuple[tuple[int, str], str], bool, Occasion]]:
+        """Edges of all conditions as sortable rows: place, order and name, direction, occasion."""
+        for condition in conditions:
+            name = condition.name
+            for edge in self._debouncer(name).update(condition.active, seq):
+                i = edge.index
+                at = Occasion(
+                    device, boot, seq + i, int(t_ns[i]), float(condition.value[i]),
+                    float(condition.low[i]), float(condition.high[i]), edge.onset_seq,
+                )  # fmt: skip
+                yield i, (order_of(name), name), edge.rising, at
+
+    def _alarm(self, name: str) -> AlarmInstance:
+        if name not in self._alarms:
+            self._alarms[name] = AlarmInstance(name, settings_of(name, self._settings))
+        return self._alarms[name]
+
+    def _debouncer(self, name: str) -> Debouncer:
+        if name not in self._debouncers:
+            settings = settings_of(name, self._settings)
+            self._debouncers[name] = Debouncer(settings.persistence, settings.clear_after)
+        return self._debouncers[name]
+
+    def _set(self, name: str, at: Occasion, *, active: bool) -> None:
+        """The condition of `name` has come or gone."""
+        alarm = self._alarm(name)
+        alarm.active = active
+        if not alarm.settings.enabled or alarm.shelved_until_ns:
+            alarm.occasion = at
+        elif active:
+            self._raise(alarm, at)
+        else:
+            self._clear(alarm, at)
+
+    def _raise(self, alarm: AlarmInstance, at: Occasion) -> None:
+        if any(other.active and other.settings.enabled for other in self._refinements(alarm)):
+            alarm.superseded, alarm.occasion = True, at
+            self._note(alarm, at.t_ns)
+            return
+        named = self._named_by(alarm)
+        first_out = named.first_out if named else self._is_first(alarm)
+        if named:
+            at = replace(at, onset_seq=named.occasion.onset_seq)
+            named.superseded = named.dismiss()
+            named.occasion = replace(named.occasion, boot=at.boot, seq=at.seq, t_ns=at.t_ns)
+            self._publish(named, at.t_ns, text=f"named {alarm.name}")
+        alarm.raise_(at, first_out=first_out)
+        self._first_out = alarm.name if first_out else self._first_out
+        self._count(alarm, is_new=named is None)
+        self._publish(alarm, at.t_ns)
+
+    def _clear(self, alarm: AlarmInstance, at: Occasion) -> None:
+        alarm.superseded = False
+        before = alarm.occasion
+        alarm.occasion = replace(at, onset_seq=before.onset_seq, text=before.text)
+        if alarm.clear():
+            self._publish(alarm, at.t_ns)
+        else:
+            self._note(alarm, at.t_ns)
+        self._raise_unnamed(at.t_ns)
+
+    def _refinements(self, alarm: AlarmInstance) -> list[AlarmInstance]:
+        """Alarms that give `alarm` a better name."""
+        return [other for other in self._alarms.values() if other.kind.refines == alarm.kind.name]
+
+    def _named_by(self, alarm: AlarmInstance) -> AlarmInstance | None:
+        """The standing alarm whose place `alarm` takes."""
+        coarse = self._alarms.get(alarm.kind.refines)
+        return coarse if coarse and coarse.active and coarse.state != "normal" else None
+
+    def _raise_unnamed(self, t_ns: int) -> None:
+        """Raise again what still holds although every better name for it is off the list."""
+        for name in REFINED:
+            coarse = self._alarms.get(name)
+            if not coarse or not (coarse.superseded and coarse.active):
+                continue
+            if not any(other.stands_for_fault for other in self._refinements(coarse)):
+                coarse.superseded = False
+                self._raise(coarse, replace(coarse.occasion, t_ns=t_ns))
+
+    def _is_first(self, alarm: AlarmInstance) -> bool:
+        if alarm.is_remark:
+            return False
+        return not any(
+            other.state in UNSEEN for other in self._alarms.values() if other is not alarm
+        )
+
+    def _count(self, alarm: AlarmInstance, *, is_new: bool) -> None:
+        """Count a raised alarm; begin a flood, or group the alarm in the one that runs."""
+        if alarm.is_remark or alarm.name == ALARM_FLOOD:
+            return
+        t_ns = alarm.occasion.t_ns
+        begins = is_new and self._flood.add(t_ns)
+        alarm.grouped = self._flood.active and alarm.kind.severity != "critical"
+        if begins:
+            at = replace(
+                alarm.occasion,
+                value=float(self._flood.count),
+                high=float(MOST_IN_WINDOW),
+                low=float("nan"),
+                text=f"first out was {self._first_out}" if self._first_out else "",
+            )
+            self._set(ALARM_FLOOD, at, active=True)
+
+    def _advance(self, to_ns: int) -> None:
+        """Let everything happen whose time has come by `to_ns` [ns]."""
+        while due := [when for when in self._deadlines() if when[0] <= to_ns]:
+            t_ns, name = min(due)
+            if name == ALARM_FLOOD:
+                self._end_flood(t_ns)
+            else:
+                self._unshelve(self._alarms[name], t_ns, "", "its time on the shelf is over")
+
+    def _deadlines(self) -> list[tuple[int, str]]:
+        shelved = [
+            (alarm.shelved_until_ns, alarm.name)
+            for alarm in self._alarms.values()
+            if alarm.shelved_until_ns
+        ]
+        ends_ns = self._flood.ends_ns
+        return shelved if ends_ns is None else [(ends_ns, ALARM_FLOOD), *shelved]
+
+    def _end_flood(self, t_ns: int) -> None:
+        self._flood.end()
+        if self._alarm(ALARM_FLOOD).active:
+            self._set(ALARM_FLOOD, Occasion(t_ns=t_ns), active=False)
+        for alarm in self._alarms.values():
+            if alarm.grouped:
+                alarm.grouped = False
+                self._publish(alarm, t_ns, text="shown again after the flood")
+
+    def _obey(self, alarm: AlarmInstance, command: AlarmCommand) -> None:
+        t_ns, user, text = command.t_ns, command.user, command.text
+        if command.action == "shelve":
+            self._shelve(alarm, command)
+        elif command.action == "unshelve":
+            self._unshelve(alarm, t_ns, user, text)
+        elif alarm.acknowledge() if command.action == "acknowledge" else alarm.reset():
+            alarm.grouped = False
+            self._publish(alarm, t_ns, user, text)
+            if alarm.name == ALARM_FLOOD and command.action == "acknowledge":
+                self._acknowledge_group(command)
+
+    def _acknowledge_group(self, command: AlarmCommand) -> None:
+        """Whoever acknowledges a flood acknowledges what is grouped in it."""
+        for alarm in self._alarms.values():
+            if alarm.grouped and alarm.acknowledge():
+                self._publish(alarm, command.t_ns, command.user, command.text)
+
+    def _shelve(self, alarm: AlarmInstance, command: AlarmCommand) -> None:
+        alarm.shelved_until_ns = command.t_ns + SHELF_LIFE_NS
+        alarm.dismiss()
+        self._publish(alarm, command.t_ns, command.user, command.text)
+        hours = SHELF_LIFE_NS // 3_600_000_000_000
+        text = f"{alarm.name} shelved by {command.user} for {hours} h: {command.text}"
+        self._tell("alarm_shelved", text, command.t_ns)
+
+    def _unshelve(self, alarm: AlarmInstance, t_ns: int, user: str, text: str) -> None:
+        alarm.shelved_until_ns = 0
+        self._tell("alarm_unshelved", f"{alarm.name} taken off the shelf: {user or text}", t_ns)
+        if alarm.active and alarm.settings.enabled:
+            self._raise(alarm, replace(alarm.occasion, t_ns=t_ns))
+        else:
+            self._note(alarm, t_ns, user, text)
+
+    def _publish(self, alarm: AlarmInstance, t_ns: int, user: str = "", text: str = "") -> None:
+        self._note(alarm, t_ns, user, text)
+        if alarm.grouped:
+            self._tell("alarm_grouped", f"{alarm.name} is {alarm.state}, grouped in a flood", t_ns)
+        else:
+            self._said.append(alarm.message(user, t_ns))
+
+    def _note(self, alarm: AlarmInstance, t_ns: int, user: str = "", text: str = "") -> None:
+        """Leave a record for the journal."""
+        self._changes.append(
+            AlarmRecord(
+                alarm.message(user, t_ns), alarm.active, alarm.latched, alarm.shelved_until_ns,
+                alarm.grouped, text,
+            )
+        )  # fmt: skip
+
+    def _tell(self, code: str, text: str, t_ns: int) -> None:
+        self._said.append(Event(SOURCE, t_ns, "warning", code, text))
+
+    def _take_said(self) -> list[Announcement]:
+        said, self._said = self._said, []
+        return said
+
+
+def alarms_of(said: Sequence[Announcement]) -> list[Alarm]:
+    """The alarms among what was said."""
+    return [one for one in said if isinstance(one, Alarm)]

@@ -1,0 +1,152 @@
+"""The states of one alarm after ISA-18.2, and how it moves between them.
+
+                       condition holds                        condition holds again
+        ┌──────────┐  for `persistence`   ┌────────────────┐ ◀───────────────────────┐
+        │  normal  │ ───────────────────▶ │ unacknowledged │ ──── condition gone ──┐ │
+        └──────────┘                      └────────────────┘  for `clear_after`    ▼ │
+         ▲   ▲    ▲                               │ acknowledge     ┌────────────────────────┐
+         │   │    │   condition gone,             ▼                 │ cleared_unacknowledged │
+         │   │    │   not latched         ┌──────────────┐          └────────────────────────┘
+         │   │    └────────────────────── │ acknowledged │ ◀── acknowledge, latched ──┘  │
+         │   └──── reset, once gone ───── └──────────────┘                               │
+         └───────────────────── acknowledge, not latched (any more) ─────────────────────┘
+
+An alarm that latches stays acknowledged after its condition has gone (the standard's state F,
+latched acknowledged) until a person resets it. `reset` on a cleared alarm that nobody has seen yet
+releases the latch only (E to D): it must still be acknowledged. `reset` while the condition holds
+is refused. A remark (severity info) needs nobody: it is acknowledged from the start and never
+latches. Shelving keeps an alarm in normal, whatever its condition does, for a limited time.
+"""
+
+from dataclasses import dataclass, field
+
+from monitor.alarms.kinds import AlarmKind, AlarmSettings, kind_of, split
+from rigwatch.wire.messages import Alarm, AlarmState
+
+UNSEEN: tuple[AlarmState, ...] = ("unacknowledged", "cleared_unacknowledged")
+
+
+@dataclass(frozen=True, slots=True)
+class Occasion:
+    """What decided on a transition: sample, time, and the figure with its limits.
+
+    Attributes:
+        device, boot, seq, t_ns: the sample; seq -1 where no sample decided.
+        value, low, high: the figure judged and its limits; NaN where there are none.
+        onset_seq: first sample at which the condition held; -1 where there is none.
+        text: added to the cause.
+    """
+
+    device: str = ""
+    boot: int = 0
+    seq: int = -1
+    t_ns: int = 0
+    value: float = float("nan")
+    low: float = float("nan")
+    high: float = float("nan")
+    onset_seq: int = -1
+    text: str = ""
+
+
+@dataclass(slots=True)
+class AlarmInstance:
+    """One alarm and the state it is in.
+
+    Attributes:
+        name: the alarm's name.
+        settings: its settings.
+        state: state of ISA-18.2 as published.
+        active: whether the condition holds, after persistence and hysteresis.
+        latched: a person must still reset it.
+        shelved_until_ns: end of shelving [ns]; 0 where it is not shelved.
+        superseded: an alarm that refines it has named this episode.
+        first_out: it was raised while no other alarm waited to be seen.
+        grouped: it stands hidden in a flood.
+        occasion: what raised it.
+    """
+
+    name: str
+    settings: AlarmSettings
+    kind: AlarmKind = field(init=False)
+    state: AlarmState = "normal"
+    active: bool = False
+    latched: bool = False
+    shelved_until_ns: int = 0
+    superseded: bool = False
+    first_out: bool = False
+    grouped: bool = False
+    occasion: Occasion = field(default_factory=Occasion)
+
+    def __post_init__(self) -> None:
+        self.kind = kind_of(self.name)
+
+    @property
+    def is_remark(self) -> bool:
+        """Whether nobody has to acknowledge it."""
+        return self.kind.severity == "info"
+
+    @property
+    def stands_for_fault(self) -> bool:
+        """Whether the list shows it, or would if nobody had shelved it."""
+        return self.state != "normal" or (self.active and self.shelved_until_ns > 0)
+
+    def raise_(self, occasion: Occasion, *, first_out: bool) -> None:
+        """The condition has come: the alarm waits to be seen, whatever it was before."""
+        self.state = "acknowledged" if self.is_remark else "unacknowledged"
+        self.latched = self.settings.latch and not self.is_remark
+        self.first_out, self.occasion = first_out, occasion
+
+    def clear(self) -> bool:
+        """The condition has gone; whether the published state changed."""
+        if self.state == "unacknowledged":
+            self.state = "cleared_unacknowledged"
+            return True
+        if self.state == "acknowledged" and not self.latched:
+            self.state = "normal"
+            return True
+        return False
+
+    def acknowledge(self) -> bool:
+        """A person has seen it; whether that meant anything."""
+        if self.state not in UNSEEN:
+            return False
+        gone = self.state == "cleared_unacknowledged"
+        self.state = "normal" if gone and not self.latched else "acknowledged"
+        return True
+
+    def reset(self) -> bool:
+        """A person releases the latch; whether that was possible."""
+        if self.active or not self.latched:
+            return False
+        self.latched = False
+        if self.state == "acknowledged":
+            self.state = "normal"
+        return True
+
+    def dismiss(self) -> bool:
+        """Leave the list without a person: shelved, or a better name stands in its place."""
+        was_standing = self.state != "normal"
+        self.state, self.latched, self.grouped = "normal", False, False
+        return was_standing
+
+    def message(self, user: str = "", t_ns: int | None = None) -> Alarm:
+        """The alarm as published; decided at `t_ns` [ns] by `user`, else by its occasion."""
+        at = self.occasion
+        cause = self.kind.cause.format(channel=split(self.name)[1])
+        return Alarm(
+            name=self.name,
+            state=self.state,
+            severity=self.kind.severity,
+            cause=f"{cause}: {at.text}" if at.text else cause,
+            guidance=self.kind.guidance,
+            device=at.device,
+            boot=at.boot,
+            seq=at.seq,
+            t_ns=at.t_ns if t_ns is None else t_ns,
+            value=at.value,
+            low=at.low,
+            high=at.high,
+            first_out=self.first_out,
+            user=user,
+            onset_seq=at.onset_seq,
+        )
