@@ -1,10 +1,12 @@
 """Blocks of samples or estimates cut, joined and put in order, without touching a single value.
 
-A block holds consecutive samples `seq`, `seq + 1`, … of one boot of one device. Two blocks are joined only where the
-second goes on where the first ended and has the same columns; everything else stays apart.
+A block holds consecutive samples `seq`, `seq + 1`, … of one boot of one device. Two blocks are
+joined only where the second goes on where the first ended and has the same columns; everything else
+stays apart.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -47,7 +49,7 @@ def concatenate(blocks: Sequence[B]) -> B:
     """
     if not blocks:
         raise ValueError("no block to concatenate")
-    for first, second in zip(blocks, blocks[1:], strict=False):
+    for first, second in pairwise(blocks):
         if not continues(first, second):
             raise ValueError(f"the block at seq {second.seq} does not continue the one before it")
     return blocks[0] if len(blocks) == 1 else _joined(blocks)
@@ -58,7 +60,7 @@ def _joined(blocks: Sequence[B]) -> B:
     columns = tuple(_joined_column(part) for part in parts)
     head, t_ns = blocks[0], np.concatenate([block.t_ns for block in blocks])
     if isinstance(head, SampleBlock):
-        device_us = np.concatenate([block.device_us for block in blocks])  # type: ignore[union-attr]
+        device_us = np.concatenate([block.device_us for block in blocks])
         return SampleBlock(head.device, head.boot, head.seq, device_us, t_ns, columns)
     return EstimateBlock(head.device, head.boot, head.seq, t_ns, columns)
 
@@ -70,7 +72,7 @@ def _joined_column(parts: Sequence[Column]) -> Column:
 
 
 def cut(block: B, first: int, last: int) -> B:
-    """Samples `first` to `last - 1` of the block, counted from 0 as in a slice; views, no copies."""
+    """Samples `first` to `last - 1` of the block, counted from 0; views, no copies."""
     part = slice(first, last)
     columns = tuple(
         Column(column.name, column.unit, column.values[part], column.quality[part])
@@ -117,8 +119,9 @@ def _inside(t_ns: NDArray[np.int64], start: int | None, end: int | None) -> NDAr
 def merged(blocks: Iterable[B], size: int) -> Iterator[B]:
     """Blocks of `size` samples and a little more, in which no gap is bridged.
 
-    A block that does not continue the one before starts a new one, so that every gap, restart of the device
-    and change of columns falls between two blocks. Memory is that of one merged block, whose arrays are its own.
+    A block that does not continue the one before starts a new one, so that every gap, restart of
+    the device and change of columns falls between two blocks. Memory is that of one merged block,
+    whose arrays are its own.
     """
     run: list[B] = []
     length = 0
@@ -135,7 +138,7 @@ def merged(blocks: Iterable[B], size: int) -> Iterator[B]:
 
 
 def unseen(block: B, next_seq: int | None) -> B | None:
-    """The part of the block from `next_seq` on (None: all of it); None where all was seen before."""
+    """The part of the block from `next_seq` on; None where all was seen before."""
     if next_seq is None or block.seq >= next_seq:
         return block
     known = next_seq - block.seq
@@ -143,5 +146,5 @@ def unseen(block: B, next_seq: int | None) -> B | None:
 
 
 def owned(block: B) -> B:
-    """The same block with arrays of its own: aligned, writable, and holding nothing else in memory."""
+    """The same block with arrays of its own: aligned and writable."""
     return _joined([block])

@@ -20,6 +20,7 @@ from rigwatch.wire.messages import (
     Event,
     Gap,
     Health,
+    Message,
     SampleBlock,
 )
 from rigwatch.wire.session import SessionWriter, open_session, run_info
@@ -31,9 +32,10 @@ STEP = 3_906_250
 def samples(seq: int, n: int, boot: int = 7) -> SampleBlock:
     index = np.arange(seq, seq + n)
     quality = (index % 5 == 0).astype(np.uint8)
+    holes = np.asarray(np.where(index % 11 == 3, np.nan, index * 1e-5), np.float64)
     channels = (
-        Column("voltage", "V", np.sin(index / 9.0), quality),
-        Column("position", "m", np.where(index % 11 == 3, np.nan, index * 1e-5), quality),
+        Column("voltage", "V", np.asarray(np.sin(index / 9.0), np.float64), quality),
+        Column("position", "m", holes, quality),
     )
     return SampleBlock("rig", boot, seq, index * 3906, T0 + index * STEP, channels)
 
@@ -62,7 +64,7 @@ OTHERS = (
 
 def test_every_kind_of_message_comes_back(tmp_path: Path) -> None:
     run = run_info("bench1", 256.0, t_ns=T0, notes="from a test", configuration="a = 1")
-    written = [*OTHERS, samples(0, 3), estimates(0, 2)]
+    written: list[Message] = [*OTHERS, samples(0, 3), estimates(0, 2)]
     with SessionWriter(tmp_path / "a.mcap", run) as writer:
         for message in written:
             writer.write(message)
@@ -81,7 +83,7 @@ def test_other_tools_can_decode_it(tmp_path: Path) -> None:
         writer.write(samples(0, 10))
     with (tmp_path / "a.mcap").open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
-        found = [(where.name, channel.topic) for where, channel, _ in reader.iter_messages()]
+        found = [(s.name if s else "", c.topic) for s, c, _ in reader.iter_messages()]
         summary = reader.get_summary()
     assert sorted(found) == [("rigwatch.RunInfo", "run"), ("rigwatch.SampleBlock", "samples")]
     assert summary is not None

@@ -1,6 +1,7 @@
 """Session files: what a rig said, kept as MCAP with protobuf messages.
 
-`SessionWriter` writes one file, `open_session` reads a file or a folder of segments, damaged or not.
+`SessionWriter` writes one file, `open_session` reads a file or a folder of segments, damaged or
+not.
 """
 
 from rigwatch.wire.session.reader import LostSpan, Recorded, Session, open_session

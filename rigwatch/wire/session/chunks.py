@@ -1,11 +1,13 @@
 """Finds every intact chunk of an MCAP file, also in a truncated, overwritten or bit-flipped one.
 
     record  := opcode u8 | length u64 | body
-    chunk   := start u64 | end u64 | raw size u64 | CRC-32 u32 | "zstd" | size u64 | compressed records
+    chunk   := start u64 | end u64 | raw size u64 | CRC-32 u32 | "zstd" | size u64 | compressed
+    records
 
-A chunk counts only if its two lengths agree and the checksum of its unpacked bytes is right. Where they do not, the search
-goes on at the next place that looks like a chunk, and the bytes between are reported. Records outside of chunks (indexes) are
-skipped, but none may hide a chunk whose opcode was flipped.
+A chunk counts only if its two lengths agree and the checksum of its unpacked bytes is right. Where
+they do not, the search goes on at the next place that looks like a chunk, and the bytes between are
+reported. Records outside of chunks (indexes) are skipped, but none may hide a chunk whose opcode
+was flipped.
 """
 
 import struct
@@ -50,12 +52,12 @@ class Damage:
     reason: str
 
 
-class _Damaged(Exception):
+class _DamagedError(Exception):
     """What is wrong with the record at hand."""
 
 
 def magic_problem(head: bytes) -> str:
-    """What is wrong with a file's first eight bytes, in words; empty where they are those of an MCAP file."""
+    """What is wrong with a file's first eight bytes, in words; empty for an MCAP file."""
     if head == MAGIC:
         return ""
     if not head:
@@ -64,10 +66,9 @@ def magic_problem(head: bytes) -> str:
 
 
 def _refuse_later_version(path: Path, head: bytes) -> None:
-    if len(head) == len(MAGIC) and head[:5] == MAGIC[:5] and head[6:] == MAGIC[6:]:
-        if head[5] != MAGIC[5]:
-            version = repr(chr(head[5]))
-            raise SessionError(f"{path}: MCAP version {version}, this rigwatch reads version '0'")
+    if len(head) == len(MAGIC) and head[:5] + head[6:] == MAGIC[:5] + MAGIC[6:] and head != MAGIC:
+        version = repr(chr(head[5]))
+        raise SessionError(f"{path}: MCAP version {version}, this rigwatch reads version '0'")
 
 
 def scan(path: Path) -> Iterator[Chunk | Damage]:
@@ -91,7 +92,7 @@ def _scan_records(file: BinaryIO, magic: bytes, size: int) -> Iterator[Chunk | D
         offset = _next_chunk(file, 0, size)
         yield Damage(0, offset, problem)
         file.seek(offset)
-    unpack = zstandard.ZstdDecompressor().decompress
+    unpacker = zstandard.ZstdDecompressor()
     while offset < size:
         head = file.read(_RECORD.size)
         if head == MAGIC and offset + len(MAGIC) == size:
@@ -99,11 +100,11 @@ def _scan_records(file: BinaryIO, magic: bytes, size: int) -> Iterator[Chunk | D
         try:
             body = _body(file, head, size - offset)
             if head[0] == _CHUNK:
-                yield Chunk(offset, _records(body, unpack))
+                yield Chunk(offset, _records(body, unpacker))
             else:
                 _check_other(head[0], body)
             offset += _RECORD.size + len(body)
-        except _Damaged as damage:
+        except _DamagedError as damage:
             found = _next_chunk(file, offset + 1, size)
             yield Damage(offset, found - offset, str(damage))
             file.seek(found)
@@ -112,37 +113,30 @@ def _scan_records(file: BinaryIO, magic: bytes, size: int) -> Iterator[Chunk | D
 
 def _body(file: BinaryIO, head: bytes, left: int) -> bytes:
     if len(head) < _RECORD.size:
-        raise _Damaged("truncated")
+        raise _DamagedError("truncated")
     length = _RECORD.unpack(head)[1]
     if length > left - _RECORD.size:
-        raise _Damaged("truncated, or a damaged length")
+        raise _DamagedError("truncated, or a damaged length")
     if length > LARGEST_RECORD:
-        raise _Damaged("a damaged length")
+        raise _DamagedError("a damaged length")
     return file.read(length)
 
 
-def _records(body: bytes, unpack: "_Unpack") -> bytes:
+def _records(body: bytes, unpacker: zstandard.ZstdDecompressor) -> bytes:
     """The unpacked, checked records of a chunk."""
     if not _is_chunk(body):
-        raise _Damaged("a chunk whose lengths disagree, or not packed with zstd")
+        raise _DamagedError("a chunk whose lengths disagree, or not packed with zstd")
     _, _, raw_size, crc, _ = _CHUNK_HEAD.unpack_from(body)
     packed = memoryview(body)[_CHUNK_HEAD.size + 12 :]
     try:
         if raw_size > LARGEST_RECORD or zstandard.frame_content_size(packed) != raw_size:
-            raise _Damaged("a chunk of the wrong size")
-        records = unpack(packed)
+            raise _DamagedError("a chunk of the wrong size")
+        records = unpacker.decompress(packed)
     except zstandard.ZstdError as error:
-        raise _Damaged("a chunk that cannot be unpacked") from error
+        raise _DamagedError("a chunk that cannot be unpacked") from error
     if zlib.crc32(records) != crc:
-        raise _Damaged("a chunk with a wrong checksum")
+        raise _DamagedError("a chunk with a wrong checksum")
     return records
-
-
-class _Unpack:
-    """Type of `ZstdDecompressor.decompress`, as used here."""
-
-    def __call__(self, data: memoryview, /) -> bytes:
-        raise NotImplementedError
 
 
 def _is_chunk(body: bytes) -> bool:
@@ -157,23 +151,23 @@ def _is_chunk(body: bytes) -> bool:
 def _check_other(opcode: int, body: bytes) -> None:
     """Raise where a record other than a chunk cannot be what its opcode says."""
     if opcode not in _KNOWN:
-        raise _Damaged(f"a record of unknown kind {opcode:#04x}")
+        raise _DamagedError(f"a record of unknown kind {opcode:#04x}")
     if _is_chunk(body):
-        raise _Damaged("a chunk with a damaged opcode")
+        raise _DamagedError("a chunk with a damaged opcode")
     if opcode == _MESSAGE:
-        raise _Damaged("a message outside of chunks, which no checksum protects")
+        raise _DamagedError("a message outside of chunks, which no checksum protects")
     if opcode == _DATA_END and len(body) != 4:
-        raise _Damaged("a damaged end of data")
+        raise _DamagedError("a damaged end of data")
     if opcode == _FOOTER and len(body) != 20:
-        raise _Damaged("a damaged footer")
+        raise _DamagedError("a damaged footer")
     if opcode == _MESSAGE_INDEX and not (
         len(body) >= 6 and _U32.unpack_from(body, 2)[0] == len(body) - 6
     ):
-        raise _Damaged("a damaged index")
+        raise _DamagedError("a damaged index")
 
 
 def _next_chunk(file: BinaryIO, start: int, size: int) -> int:
-    """Offset of the next record from `start` on that looks like a whole chunk, `size` where none does."""
+    """Offset of the next whole chunk from `start` on, `size` where there is none."""
     position = start
     overlap = len(_ZSTD) - 1
     while position < size:

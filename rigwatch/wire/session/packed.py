@@ -1,7 +1,8 @@
 """Reads blocks of samples and estimates straight from their protobuf bytes, as numpy arrays.
 
-The general decoder makes a Python object of every number; here the packed doubles and integers are taken over as they lie.
-Whatever this module does not recognise is left to `schema.decode`, which says what is wrong.
+The general decoder makes a Python object of every number; here the packed doubles and integers are
+taken over as they lie. Whatever this module does not recognise is left to `schema.decode`, which
+says what is wrong.
 """
 
 from collections.abc import Callable
@@ -19,7 +20,7 @@ _LENGTH_DELIMITED, _VARINT = 2, 0
 K = TypeVar("K", SampleBlock, EstimateBlock)
 
 
-class _Unfamiliar(Exception):
+class _UnfamiliarError(Exception):
     """An encoding that this module leaves to the general decoder."""
 
 
@@ -32,7 +33,7 @@ def decode_block(kind: type[K], data: bytes) -> K:
     try:
         block: K = _PARSERS[kind](data)
         _check(block)
-    except (_Unfamiliar, IndexError, ValueError):
+    except (_UnfamiliarError, IndexError, ValueError):
         return schema.decode(kind, data)
     return block
 
@@ -42,9 +43,9 @@ def _check(block: SampleBlock | EstimateBlock) -> None:
     columns = block.channels if isinstance(block, SampleBlock) else block.columns
     for column in columns:
         if len(column.values) != n or len(column.quality) not in (0, n):
-            raise _Unfamiliar
+            raise _UnfamiliarError
     if isinstance(block, SampleBlock) and len(block.device_us) != n:
-        raise _Unfamiliar
+        raise _UnfamiliarError
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
@@ -57,7 +58,7 @@ def _varint(data: bytes, at: int) -> tuple[int, int]:
             return value, at
         shift += 7
         if shift > 63:
-            raise _Unfamiliar
+            raise _UnfamiliarError
 
 
 def _fields(data: bytes, at: int, end: int) -> dict[int, Any]:
@@ -76,9 +77,9 @@ def _fields(data: bytes, at: int, end: int) -> dict[int, Any]:
             at = after
             found[tag >> 3] = (value >> 1) ^ -(value & 1)
         else:
-            raise _Unfamiliar
+            raise _UnfamiliarError
     if at != end:
-        raise _Unfamiliar
+        raise _UnfamiliarError
     return found
 
 
@@ -100,7 +101,7 @@ def _array(data: bytes, spans: list[tuple[int, int]] | None, dtype: "np.dtype[An
     ((start, stop),) = spans
     count, rest = divmod(stop - start, dtype.itemsize)
     if rest:
-        raise _Unfamiliar
+        raise _UnfamiliarError
     return np.frombuffer(data, dtype, count, start)
 
 

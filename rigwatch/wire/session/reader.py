@@ -1,11 +1,11 @@
 """Opens a session: one MCAP file, or a folder of segments in the order of their names.
 
-    with-less use:   session = open_session("sessions/bench1-20260101T120000Z")
-                     for block in session.samples(): …
-                     for span in session.lost: …
+    session = open_session("sessions/bench1-20260101T120000Z")
+    for block in session.samples(): …
+    for span in session.lost: …
 
-Everything intact is delivered, every checksum is checked, and what cannot be read is in `lost`. Memory is that of one
-chunk and one merged block, however long the recording is.
+Everything intact is delivered, every checksum is checked, and what cannot be read is in `lost`.
+Memory is that of one chunk and one merged block, however long the recording is.
 """
 
 import struct
@@ -25,7 +25,7 @@ from rigwatch.wire.messages import EstimateBlock, Message, RunInfo, SampleBlock
 from rigwatch.wire.session.chunks import Damage, scan
 from rigwatch.wire.session.packed import decode_block
 from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY, message_time
-from rigwatch.wire.topics import ESTIMATES, RUN, SAMPLES, TOPICS, Topic, topic
+from rigwatch.wire.topics import ESTIMATES, SAMPLES, TOPICS, Topic, topic
 
 SUFFIX = ".mcap"
 MERGED_SAMPLES = 16384
@@ -70,7 +70,8 @@ def open_session(path: Path | str) -> "Session":
     """The session at `path`, a file or a folder of segments.
 
     Raises:
-        SessionError: there is none, it is not an MCAP file, of a later version, or holds nothing of rigwatch.
+        SessionError: there is none, it is not an MCAP file, of a later version, or holds nothing of
+            rigwatch.
     """
     session = Session(Path(path), _segments(Path(path)))
     session.check_content()
@@ -161,7 +162,7 @@ class Session:
         end: int | None = None,
         size: int = MERGED_SAMPLES,
     ) -> Iterator[SampleBlock]:
-        """The samples as large merged blocks; no gap, restart or change of channels lies inside one.
+        """The samples as large merged blocks, none of which bridges a gap, restart or new channel.
 
         A sample that was recorded twice is delivered once.
 
@@ -260,7 +261,7 @@ def _topic(name: str) -> Topic:
 
 def _within(message: Message, start: int | None, end: int | None) -> Message | None:
     if isinstance(message, SampleBlock | EstimateBlock):
-        return message if start is None and end is None else blocks.between(message, start, end)
+        return message if start is None and end is None else blocks.between(message, start, end)  # type: ignore[type-var]
     t_ns = message_time(message)
     early = start is not None and t_ns < start
     return None if early or (end is not None and t_ns >= end) else message
@@ -269,8 +270,8 @@ def _within(message: Message, start: int | None, end: int | None) -> Message | N
 class _ChunkReader:
     """Cuts the records of intact chunks into messages, with the channels that were declared so far.
 
-    The numbers of the table of topics are taken for channels that nobody declared, as their declaration stands in a
-    damaged chunk.
+    The numbers of the table of topics are taken for channels that nobody declared, as their
+    declaration stands in a damaged chunk.
     """
 
     def __init__(self, path: Path, foreign: set[str]) -> None:

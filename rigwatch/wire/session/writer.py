@@ -1,12 +1,14 @@
-"""Writes one MCAP file: every flush is one chunk with its own checksum, on the disk before `flush` returns.
+"""Writes one MCAP file: every flush is one chunk with its checksum, safely on the disk.
 
     magic, header
     chunk  schemas, channels, RunInfo
     chunk  everything between two flushes: samples and estimates each merged into one block
     …
-    summary, magic                          only where the file was closed; a killed one ends with its last chunk
+    summary, magic                          only where the file was closed; a killed one ends with
+    its last chunk
 
-Channel numbers are the places in the table of topics, so that a file whose first chunk is damaged can still be read.
+Channel numbers are the places in the table of topics, so that a file whose first chunk is damaged
+can still be read.
 """
 
 import errno
@@ -54,8 +56,9 @@ def message_time(message: Message) -> int:
 class SessionWriter:
     """One session file being written.
 
-    `write` only remembers; `flush` merges what is remembered, writes it as one chunk and waits for the disk. After a
-    failed flush the file holds what it held before, `pending` what it does not, and the writer is of no more use.
+    `write` only remembers; `flush` merges what is remembered, writes it as one chunk and waits for
+    the disk. After a failed flush the file holds what it held before, `pending` what it does not,
+    and the writer is of no more use.
 
     Args:
         path: the file; it must not exist.
@@ -111,7 +114,7 @@ class SessionWriter:
             return
         for message in merge_pending(self.pending):
             self._add(message)
-        self._mcap.flush()
+        self._mcap.flush()  # type: ignore[no-untyped-call]
         self._output.commit()
         self.pending.clear()
         self._waiting = 0
@@ -130,7 +133,7 @@ class SessionWriter:
             return
         try:
             self.flush()
-            self._mcap.finish()
+            self._mcap.finish()  # type: ignore[no-untyped-call]
             self._output.commit()
         finally:
             self.abandon()
@@ -155,10 +158,10 @@ class SessionWriter:
 
 
 def merge_pending(messages: Iterable[Message]) -> list[Message]:
-    """The messages with consecutive blocks of one kind and device joined, none longer than `LARGEST_BLOCK`.
+    """The messages, with consecutive blocks joined up to `LARGEST_BLOCK` samples.
 
-    A joined block stands where its first part stood. Nothing is joined across an operator's command, so that the
-    command keeps its place between the samples.
+    A joined block stands where its first part stood. Nothing is joined across an operator's
+    command, so that the command keeps its place between the samples.
     """
     slots: list[list[Message]] = []
     runs: dict[tuple[type[Message], str], tuple[list[Message], int]] = {}
@@ -194,14 +197,14 @@ def _append_block(
 def _joined(slot: list[Message]) -> list[Message]:
     head = slot[0]
     if isinstance(head, SampleBlock):
-        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var, arg-type]
+        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var]
     if isinstance(head, EstimateBlock):
-        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var, arg-type]
+        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var]
     return slot
 
 
 class _Output:
-    """The stream below the MCAP writer: bytes wait here until `commit` has all of them on the disk."""
+    """The stream below the MCAP writer: bytes wait here until `commit` puts them on the disk."""
 
     def __init__(self, path: Path, sync: bool) -> None:
         self._path, self._sync = path, sync
