@@ -18,6 +18,7 @@ from rigwatch.wire.messages import (
     Column,
     EstimateBlock,
     Event,
+    FloatArray,
     Gap,
     Health,
     Message,
@@ -32,7 +33,8 @@ STEP = 3_906_250
 def samples(seq: int, n: int, boot: int = 7) -> SampleBlock:
     index = np.arange(seq, seq + n)
     quality = (index % 5 == 0).astype(np.uint8)
-    holes = np.asarray(np.where(index % 11 == 3, np.nan, index * 1e-5), np.float64)
+    holes: FloatArray = index * 1e-5
+    holes[index % 11 == 3] = np.nan
     channels = (
         Column("voltage", "V", np.asarray(np.sin(index / 9.0), np.float64), quality),
         Column("position", "m", holes, quality),

@@ -10,6 +10,7 @@ reported. Records outside of chunks (indexes) are skipped, but none may hide a c
 was flipped.
 """
 
+import os
 import struct
 import zlib
 from collections.abc import Iterator
@@ -69,6 +70,16 @@ def _refuse_later_version(path: Path, head: bytes) -> None:
     if len(head) == len(MAGIC) and head[:5] + head[6:] == MAGIC[:5] + MAGIC[6:] and head != MAGIC:
         version = repr(chr(head[5]))
         raise SessionError(f"{path}: MCAP version {version}, this rigwatch reads version '0'")
+
+
+def ends_closed(path: Path) -> bool:
+    """Whether the file ends as a closed MCAP file does."""
+    try:
+        with path.open("rb") as file:
+            file.seek(-len(MAGIC), os.SEEK_END)
+            return file.read() == MAGIC
+    except OSError:
+        return False
 
 
 def scan(path: Path) -> Iterator[Chunk | Damage]:

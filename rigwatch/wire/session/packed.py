@@ -49,6 +49,8 @@ def _check(block: SampleBlock | EstimateBlock) -> None:
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
+    if data[at + 1] < 0x80:
+        return (data[at] & 0x7F) | (data[at + 1] << 7), at + 2
     value = shift = 0
     while True:
         byte = data[at]
@@ -68,8 +70,9 @@ def _fields(data: bytes, at: int, end: int) -> dict[int, Any]:
     """
     found: dict[int, Any] = {}
     while at < end:
-        tag = data[at]
-        value, after = _varint(data, at + 1)
+        tag, value, after = data[at], data[at + 1], at + 2
+        if value >= 0x80:
+            value, after = _varint(data, at + 1)
         if tag & 7 == _LENGTH_DELIMITED:
             at = after + value
             found.setdefault(tag >> 3, []).append((after, at))

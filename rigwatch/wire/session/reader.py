@@ -22,7 +22,7 @@ from mcap.records import Channel, Schema
 from rigwatch.wire import blocks, schema
 from rigwatch.wire.errors import MessageError, SessionError
 from rigwatch.wire.messages import EstimateBlock, Message, RunInfo, SampleBlock
-from rigwatch.wire.session.chunks import Damage, scan
+from rigwatch.wire.session.chunks import Damage, ends_closed, scan
 from rigwatch.wire.session.packed import decode_block
 from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY, message_time
 from rigwatch.wire.topics import ESTIMATES, SAMPLES, TOPICS, Topic, topic
@@ -107,6 +107,11 @@ class Session:
     def lost(self) -> tuple[LostSpan, ...]:
         """Damage met so far, in order; complete after one pass through the session."""
         return tuple(self._lost[key] for key in sorted(self._lost))
+
+    @property
+    def unclosed(self) -> tuple[Path, ...]:
+        """Segments that end without an index: still being written, killed, or truncated."""
+        return tuple(path for path in self.segments if not ends_closed(path))
 
     @cached_property
     def info(self) -> RunInfo:
@@ -197,7 +202,7 @@ class Session:
             for found, _, data in self._records(index):
                 if found is not line:
                     continue
-                block: Any = decode_block(line.message, data)  # type: ignore[type-var]
+                block = self._block(line, data)
                 if device is not None and block.device != device:
                     continue
                 key = (block.device, block.boot)
@@ -232,11 +237,16 @@ class Session:
             self._note(index, damage, last, None)
 
     def _decode(self, line: Topic, data: bytes) -> Message:
+        if line is SAMPLES or line is ESTIMATES:
+            return cast(Message, blocks.owned(self._block(line, data)))
         try:
-            if line is SAMPLES or line is ESTIMATES:
-                block: Any = decode_block(line.message, data)  # type: ignore[type-var]
-                return cast(Message, blocks.owned(block))
             return schema.decode(line.message, data)
+        except MessageError as error:
+            raise SessionError(f"{self.path}: {error}") from error
+
+    def _block(self, line: Topic, data: bytes) -> Any:
+        try:
+            return decode_block(line.message, data)  # type: ignore[type-var]
         except MessageError as error:
             raise SessionError(f"{self.path}: {error}") from error
 
