@@ -1,0 +1,64 @@
+"""What the alarms say at the moment: their states, the worst of them, and the verdict in plain words.
+
+Fed with transitions in the order in which they come; no clock, no bus, no drawing.
+"""
+
+from dataclasses import dataclass, field
+
+from rigwatch.wire.messages import Alarm
+
+LANES: dict[str, str] = {
+    "departure": "departure from the model",
+    "dry_friction": "dry friction",
+    "stiction": "stiction",
+    "other_fault": "other fault",
+}
+"""Alarms that have a lane on the timeline from the start, with the words for people; others get one when they come."""
+_SEVERITIES = ("info", "warning", "error", "critical")
+
+
+def title(name: str) -> str:
+    """The alarm's name for people."""
+    kind, _, channel = name.partition(".")
+    words = LANES.get(kind, kind.replace("_", " "))
+    return f"{words}, {channel}" if channel else words
+
+
+def is_active(alarm: Alarm) -> bool:
+    """Whether the alarm stands, seen or not."""
+    return alarm.state in ("unacknowledged", "acknowledged")
+
+
+@dataclass(slots=True)
+class AlarmBook:
+    """The last transition of each alarm.
+
+    Attributes:
+        last: by name.
+    """
+
+    last: dict[str, Alarm] = field(default_factory=dict)
+
+    def record(self, alarm: Alarm) -> bool:
+        """Take one transition; true where it changes the alarm's state."""
+        before = self.last.get(alarm.name)
+        self.last[alarm.name] = alarm
+        return before is None or before.state != alarm.state
+
+    def faults(self) -> list[Alarm]:
+        """Alarms that stand and mean a fault: the worst first, then the first-out, then the oldest."""
+        standing = [a for a in self.last.values() if is_active(a) and a.severity != "info"]
+        return sorted(standing, key=_rank)
+
+    def remarks(self) -> list[Alarm]:
+        """Remarks that stand: why there is no verdict, though nothing is wrong."""
+        return [a for a in self.last.values() if is_active(a) and a.severity == "info"]
+
+    def unseen(self) -> list[Alarm]:
+        """Alarms that are over and that nobody has acknowledged."""
+        gone = [a for a in self.last.values() if a.state == "cleared_unacknowledged"]
+        return sorted(gone, key=_rank)
+
+
+def _rank(alarm: Alarm) -> tuple[int, bool, int]:
+    return -_SEVERITIES.index(alarm.severity), not alarm.first_out, alarm.t_ns

@@ -1,0 +1,59 @@
+"""One colour a quantity, everywhere: in plots, in tests and in the manual. Chosen for a dark background.
+
+Colours are (red, green, blue) from 0 to 255. Measured things are warm or saturated, modelled ones pale, limits red.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rigwatch.wire.messages import AlarmState
+
+Colour = tuple[int, int, int]
+
+VOLTAGE: Colour = (88, 160, 255)
+POSITION: Colour = (76, 205, 140)
+ACCELERATION: Colour = (255, 165, 60)
+MODEL: Colour = (196, 150, 255)
+RESIDUAL: Colour = (235, 225, 120)
+THETA1: Colour = (255, 110, 190)
+THETA2: Colour = (70, 205, 220)
+LIMIT: Colour = (235, 75, 75)
+SIGNATURE: Colour = (245, 245, 245)
+OTHERS: tuple[Colour, ...] = ((160, 190, 220), (220, 180, 150), (170, 210, 150), (210, 160, 210))
+"""For channels and counters that have no colour of their own."""
+
+STATES: dict[AlarmState, tuple[str, Colour]] = {
+    "normal": ("normal", (38, 92, 62)),
+    "unacknowledged": ("ALARM", (226, 54, 54)),
+    "acknowledged": ("alarm, seen", (214, 124, 36)),
+    "cleared_unacknowledged": ("over, not yet seen", (150, 110, 30)),
+}
+"""Label and colour of each alarm state."""
+
+
+_ALARM: Colour = STATES["unacknowledged"][1]
+VERDICTS: dict[str, tuple[str, Colour]] = {
+    "waiting": ("no estimates yet", (70, 70, 78)),
+    "healthy": ("healthy", (36, 140, 84)),
+    "no_verdict": ("no verdict", (84, 92, 110)),
+    "over": ("over, not yet seen", (150, 110, 30)),
+    "departure": ("departed from the model", (220, 120, 30)),
+    "dry_friction": ("DRY FRICTION", _ALARM),
+    "stiction": ("STICTION", (200, 40, 110)),
+    "other_fault": ("OTHER FAULT", (190, 70, 30)),
+    "link": ("NO DEVICE", (120, 60, 150)),
+    "stale": ("NO SAMPLES", (120, 60, 150)),
+    "fault": ("FAULT", (200, 80, 60)),
+}
+"""Label and colour of each verdict on the rig."""
+
+
+def rgba(colour: Colour) -> int:
+    """The colour as 0xRRGGBBAA, opaque."""
+    red, green, blue = colour
+    return red << 24 | green << 16 | blue << 8 | 0xFF
+
+
+def state_colours(looks: Mapping[Any, tuple[str, Colour]]) -> list[int]:
+    """The colours of states, each as 0xRRGGBBAA."""
+    return [rgba(colour) for _, colour in looks.values()]

@@ -1,0 +1,45 @@
+"""Axis ranges that stand still: learnt from what was seen, in steps of 1, 2 and 5, growing only when needed.
+
+A range that follows every sample makes noise look like motion; one that is set by the sensor's range makes motion
+look like noise.
+"""
+
+import math
+
+import numpy as np
+
+from rigwatch.wire.messages import FloatArray
+
+Range = tuple[float, float]
+_STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0)
+
+
+def nice_above(value: float) -> float:
+    """The smallest round figure that is not below `value`, which is positive."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return next(step * decade for step in _STEPS if step * decade >= value * (1 - 1e-9))
+
+
+def symmetric(peak: float) -> Range | None:
+    """A round range around zero that holds `peak` with a margin; None where there is nothing to hold."""
+    if not math.isfinite(peak) or peak <= 0:
+        return None
+    edge = nice_above(1.1 * peak)
+    return -edge, edge
+
+
+def around_signature(signature: float, low: float, high: float) -> Range | None:
+    """A range that holds zero, the thresholds and the signature of a fault, whatever the estimate does.
+
+    Estimates have no physical meaning before a fault and may be huge when the rig hardly moves; the plot is about how
+    they stand to thresholds and signature.
+    """
+    marks = [value for value in (0.0, signature, low, high) if math.isfinite(value)]
+    span = max(marks) - min(marks)
+    return (min(marks) - 0.4 * span, max(marks) + 0.4 * span) if span > 0 else None
+
+
+def peak(values: FloatArray) -> float:
+    """The largest finite magnitude in `values`, 0 where there is none."""
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max()) if finite.size else 0.0

@@ -1,0 +1,73 @@
+"""What has been seen so far, as far as the layout depends on it: channels, units, and how far the axes must reach.
+
+The layout is sent anew when `Survey.plan` changes; its ranges move in wide steps, so that this is rare.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from rigwatch.dashboard import quantities
+from rigwatch.dashboard.quantities import Plot
+from rigwatch.dashboard.ranges import Range, around_signature, peak, symmetric
+from rigwatch.wire.messages import Column, FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class PlotPlan:
+    """How one plot is to be shown.
+
+    Attributes:
+        plot: the row of the table.
+        unit: unit of the drawn values.
+        range: of the vertical axis; None where nothing is known yet.
+    """
+
+    plot: Plot
+    unit: str
+    range: Range | None
+
+
+@dataclass(slots=True)
+class Survey:
+    """Peaks, limits and units by plot.
+
+    Attributes:
+        plots: by path, in the order in which they were first seen.
+        units: of the drawn values, by path.
+        peaks: largest magnitude drawn so far, by path.
+        marks: last (signature, low, high) of plots that have a signature, by path.
+    """
+
+    plots: dict[str, Plot] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    peaks: dict[str, float] = field(default_factory=dict)
+    marks: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+
+    def see(self, plot: Plot, columns: Iterable[Column], drawn: FloatArray) -> None:
+        """Take notice of values drawn in a plot, shape (n, series)."""
+        if plot.path not in self.plots:
+            self.plots[plot.path] = plot
+            own = next(c.unit for c in columns if c.name == plot.key)
+            self.units[plot.path] = plot.unit or own
+        self.peaks[plot.path] = max(self.peaks.get(plot.path, 0.0), peak(drawn))
+        if len(plot.series) == 4 and len(drawn):
+            low, high, signature = drawn[-1, 1:4]
+            self.marks[plot.path] = (float(signature), float(low), float(high))
+
+    def plan(self) -> tuple[PlotPlan, ...]:
+        """How each plot is to be shown, given all that was seen."""
+        return tuple(
+            PlotPlan(plot, self.units[path], self._range(path)) for path, plot in self.plots.items()
+        )
+
+    def _range(self, path: str) -> Range | None:
+        if path in self.marks and (span := around_signature(*self.marks[path])):
+            return span
+        shared = [p for p in self.peaks if _same_axis(p, path)]
+        return symmetric(max(self.peaks[p] for p in shared))
+
+
+def _same_axis(path: str, other: str) -> bool:
+    """Measured and modelled acceleration share one plot."""
+    both = (quantities.MEASURED.path, quantities.MODELLED.path)
+    return path == other or (path in both and other in both)

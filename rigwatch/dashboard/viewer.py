@@ -1,0 +1,146 @@
+"""Rerun's viewer as a process of its own: started, asked whether it lives, ended.
+
+It listens on 127.0.0.1 only, drops its oldest data at a memory limit, ends with the process that started it,
+and neither reports its use nor looks for examples on the network.
+"""
+
+import ctypes
+import importlib.util
+import os
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from typing import IO, Literal
+
+from rigwatch.wire.errors import RigwatchError
+
+HOST = "127.0.0.1"
+MEMORY_LIMIT = "1GiB"
+SERVER_MEMORY_LIMIT = "256MiB"
+_START_TIMEOUT = 30.0
+_STOP_TIMEOUT = 3.0
+_SET_DEATH_SIGNAL = 1
+_LIBC = ctypes.CDLL(None, use_errno=True)
+
+Kind = Literal["native", "web", "headless"]
+
+
+class ViewerError(RigwatchError):
+    """The viewer cannot be started or does not answer."""
+
+
+class Viewer:
+    """One viewer process.
+
+    Args:
+        kind: a window, a web page, or drawn into memory for pictures and tests.
+        port: where it takes data; 0 for any that is free.
+        web_port: where a browser finds it; 0 for any that is free.
+
+    Raises:
+        ViewerError: a port is taken, or the viewer ended at once.
+    """
+
+    def __init__(self, kind: Kind, port: int = 0, web_port: int = 0) -> None:
+        self.kind = kind
+        self.port = port or free_port()
+        self.web_port = (web_port or free_port()) if kind == "web" else 0
+        for taken in filter(answers, filter(None, (self.port, self.web_port))):
+            raise ViewerError(f"port {taken} is taken: end what listens there or configure another")
+        self._words: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
+        self._process = subprocess.Popen(
+            [str(_binary()), *self._options()],
+            env=_environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=self._words,
+            stderr=self._words,
+            preexec_fn=_die_with_parent,
+        )
+        self._await_answer()
+
+    @property
+    def url(self) -> str:
+        """Where data are sent to."""
+        return f"rerun+http://{HOST}:{self.port}/proxy"
+
+    @property
+    def web_url(self) -> str:
+        """What a browser opens."""
+        data = f"rerun%2Bhttp%3A%2F%2F{HOST}%3A{self.port}%2Fproxy"
+        return f"http://{HOST}:{self.web_port}/?url={data}"
+
+    def exit_code(self) -> int | None:
+        """None while it runs; 0 where a person closed the window."""
+        return self._process.poll()
+
+    def stop(self) -> None:
+        """End the process, with force where it does not listen."""
+        self._process.terminate()
+        try:
+            self._process.wait(_STOP_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def last_words(self) -> str:
+        """The last line that it said."""
+        self._words.seek(0)
+        lines = self._words.read().decode(errors="replace").strip().splitlines()
+        return lines[-1] if lines else "it said nothing"
+
+    def _options(self) -> list[str]:
+        options = ["--bind", HOST, "--port", str(self.port), "--hide-welcome-screen"]
+        options += ["--memory-limit", MEMORY_LIMIT, "--server-memory-limit", SERVER_MEMORY_LIMIT]
+        kind = {
+            "native": ["--expect-data-soon"],
+            "headless": ["--headless"],
+            "web": ["--serve-web", "--web-viewer-port", str(self.web_port)],
+        }
+        return options + kind[self.kind]
+
+    def _await_answer(self) -> None:
+        deadline = time.monotonic() + _START_TIMEOUT
+        while not answers(self.port):
+            if self.exit_code() is not None or time.monotonic() > deadline:
+                self.stop()
+                raise ViewerError(f"the viewer did not start: {self.last_words()}")
+            time.sleep(0.05)
+
+
+def has_display() -> bool:
+    """Whether a window can be opened."""
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def answers(port: int) -> bool:
+    """Whether somebody listens at a port of this machine."""
+    with socket.socket() as probe:
+        probe.settimeout(0.5)
+        return probe.connect_ex((HOST, port)) == 0
+
+
+def free_port() -> int:
+    """A port of this machine at which nobody listens."""
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])
+
+
+def _binary() -> Path:
+    """The viewer itself rather than its Python starter, which would survive in its place."""
+    found = importlib.util.find_spec("rerun_cli")
+    if found is None or found.origin is None:
+        raise ViewerError("the package rerun-sdk is incomplete: its viewer is missing")
+    return Path(found.origin).with_name("rerun")
+
+
+def _environment() -> dict[str, str]:
+    """The environment of the viewer: CI is what switches its usage reports off for one process."""
+    return {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true", "RUST_LOG": "warn"}
+
+
+def _die_with_parent() -> None:
+    _LIBC.prctl(_SET_DEATH_SIGNAL, signal.SIGTERM)
