@@ -1,0 +1,77 @@
+"""Conditions and blocks for the alarm tests, and the manager driven over them in any cut."""
+
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from monitor.alarms import AlarmManager, Announcement
+from monitor.conditions import Condition
+from rigwatch.wire.messages import Alarm, AlarmCommand, Event
+
+PERIOD_NS = 3_906_250
+START_NS = 1_700_000_000_000_000_000
+
+
+def condition(name: str, active: Sequence[int] | np.ndarray) -> Condition:
+    """A condition whose value is its place, between limits -1 and 1."""
+    flags = np.asarray(active, np.uint8)
+    place = np.arange(len(flags), dtype=float)
+    one = np.ones(len(flags))
+    return Condition(name, flags, place, -one, one)
+
+
+def spell(n: int, *stretches: tuple[int, int]) -> np.ndarray:
+    """Flags of n samples, set over each stretch (first, one past the last)."""
+    flags = np.zeros(n, np.uint8)
+    for first, last in stretches:
+        flags[first:last] = 1
+    return flags
+
+
+def time_of(seq: int) -> int:
+    return START_NS + seq * PERIOD_NS
+
+
+def times(n: int, first: int = 0) -> np.ndarray:
+    """Times of n samples from sample `first` on [ns]."""
+    return START_NS + PERIOD_NS * np.arange(first, first + n, dtype=np.int64)
+
+
+def _cut(one: Condition, first: int, last: int) -> Condition:
+    return Condition(
+        one.name,
+        one.active[first:last],
+        one.value[first:last],
+        one.low[first:last],
+        one.high[first:last],
+    )
+
+
+def run(
+    manager: AlarmManager, conditions: Sequence[Condition], cuts: Iterable[int] = ()
+) -> list[Announcement]:
+    """What the manager says to samples 0 to n - 1, cut into blocks at `cuts`."""
+    n = len(conditions[0].active)
+    said: list[Announcement] = []
+    edges = sorted({0, n, *(cut for cut in cuts if 0 < cut < n)})
+    for first, last in pairwise(edges):
+        t_ns = times(last - first, first)
+        parts = [_cut(one, first, last) for one in conditions]
+        said += manager.update("rig", 7, first, t_ns, parts)
+    return said
+
+
+def steps(said: Iterable[Announcement]) -> list[tuple[str, str, int]]:
+    """Alarms as (name, state, seq)."""
+    return [(one.name, one.state, one.seq) for one in said if isinstance(one, Alarm)]
+
+
+def codes(said: Iterable[Announcement]) -> list[str]:
+    return [one.code for one in said if isinstance(one, Event)]
+
+
+def order(
+    name: str, action: str, user: str = "ann", at: int = 5000, text: str = ""
+) -> AlarmCommand:
+    return AlarmCommand(name, action, user, time_of(at), text)

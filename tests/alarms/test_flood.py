@@ -1,0 +1,88 @@
+"""More alarms than a person can follow: grouped, the first-out and critical ones in sight."""
+
+from alarm_signals import codes, condition, order, run, spell, steps, time_of, times
+
+from monitor.alarms import AlarmManager, Occasion
+from rigwatch.wire.messages import Alarm
+
+MINUTE = 60 * 256
+
+
+def raised(alarms: AlarmManager, count: int, at: int = 0, apart: int = 256):
+    """Sensor alarms of `count` channels, one after the other."""
+    said = []
+    for i in range(count):
+        occasion = Occasion("rig", 7, t_ns=time_of(at + i * apart))
+        said += alarms.report(f"sensor_stuck.ch{i}", occasion, active=True)
+    return said
+
+
+def test_ten_alarms_are_no_flood():
+    said = raised(AlarmManager(), 10)
+    assert len(said) == 10
+    assert all(isinstance(one, Alarm) for one in said)
+
+
+def test_the_eleventh_alarm_within_ten_minutes_begins_a_flood_that_names_the_first_out():
+    alarms = AlarmManager()
+    said = raised(alarms, 15)
+    shown = [name for name, _, _ in steps(said)]
+    assert shown == [f"sensor_stuck.ch{i}" for i in range(10)] + ["alarm_flood"]
+    assert codes(said) == ["alarm_grouped"] * 5
+    flood = next(one for one in said if isinstance(one, Alarm) and one.name == "alarm_flood")
+    assert "sensor_stuck.ch0" in flood.cause
+    assert alarms.standing()[0].name == "sensor_stuck.ch0"
+    assert alarms.standing()[0].first_out
+    assert len(alarms.standing()) == 16
+
+
+def test_slower_alarms_are_no_flood():
+    assert codes(raised(AlarmManager(), 15, apart=61 * 256)) == []
+
+
+def test_a_critical_alarm_is_never_grouped():
+    alarms = AlarmManager()
+    raised(alarms, 15)
+    said = alarms.report("link", Occasion("rig", t_ns=time_of(20 * 256)), active=True)
+    assert steps(said) == [("link", "unacknowledged", -1)]
+
+
+def test_after_the_flood_the_grouped_alarms_are_shown():
+    alarms = AlarmManager()
+    raised(alarms, 15)
+    ends = 10 * 256 + 10 * MINUTE
+    assert run_quiet(alarms, ends - 1) == []
+    said = run_quiet(alarms, ends)
+    shown = {name for name, _, _ in steps(said)}
+    assert shown == {"alarm_flood"} | {f"sensor_stuck.ch{i}" for i in range(10, 15)}
+    assert {one.t_ns for one in said} == {time_of(ends)}
+
+
+def test_acknowledging_the_flood_acknowledges_what_is_grouped_in_it():
+    alarms = AlarmManager()
+    raised(alarms, 15)
+    alarms.command(order("alarm_flood", "acknowledge"))
+    states = {one.name: one.state for one in alarms.standing()}
+    assert all(states[f"sensor_stuck.ch{i}"] == "acknowledged" for i in range(10, 15))
+    assert all(states[f"sensor_stuck.ch{i}"] == "unacknowledged" for i in range(10))
+
+
+def test_grouped_alarms_are_journalled():
+    alarms = AlarmManager()
+    raised(alarms, 15)
+    names = {record.alarm.name for record in alarms.take_changes() if record.grouped}
+    assert names == {f"sensor_stuck.ch{i}" for i in range(10, 15)}
+
+
+def test_a_flood_does_not_depend_on_the_cut_of_blocks():
+    conditions = [
+        condition(f"sensor_stuck.ch{i}", spell(4000, (100 + 50 * i, 2000))) for i in range(14)
+    ]
+    whole, pieces = AlarmManager(), AlarmManager()
+    said = run(whole, conditions)
+    assert "alarm_grouped" in codes(said)
+    assert repr(said) == repr(run(pieces, conditions, range(1, 4000, 17)))
+
+
+def run_quiet(alarms: AlarmManager, seq: int):
+    return alarms.update("rig", 7, seq, times(1, seq), [])

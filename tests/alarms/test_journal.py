@@ -1,0 +1,155 @@
+"""What the journal keeps: everything that was written, after kill -9, torn lines and full disks."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+from alarm_signals import condition, order, run, spell
+
+from monitor.alarms import AlarmJournal, AlarmManager, last_records, read_journal
+from rigwatch.wire.errors import SessionError
+
+ROOT = Path(__file__).parents[2]
+
+
+def faulty_manager() -> AlarmManager:
+    """Friction named and acknowledged, a sensor stuck and not seen, one alarm shelved."""
+    alarms = AlarmManager()
+    run(
+        alarms,
+        [
+            condition("departure", spell(1500, (100, 1500))),
+            condition("dry_friction", spell(1500, (400, 1500))),
+            condition("sensor_stuck.position", spell(1500, (600, 700))),
+            condition("gap", spell(1500, (800, 801))),
+        ],
+    )
+    alarms.command(order("dry_friction", "acknowledge", text="looking"))
+    alarms.command(order("gap", "shelve"))
+    return alarms
+
+
+def restarted(path: Path) -> AlarmManager:
+    alarms = AlarmManager()
+    alarms.restore(last_records(read_journal(path)[0]))
+    return alarms
+
+
+def test_a_restarted_manager_stands_where_the_old_one_stood(tmp_path):
+    old = faulty_manager()
+    path = tmp_path / "deep" / "alarms.jsonl"
+    journal = AlarmJournal(path)
+    journal.write(old.take_changes())
+    journal.close()
+    new = restarted(path)
+    assert {(a.name, a.state, a.onset_seq, a.first_out) for a in new.standing()} == {
+        ("dry_friction", "acknowledged", 100, True),
+        ("sensor_stuck.position", "cleared_unacknowledged", 600, False),
+    }
+    assert new.command(order("gap", "unshelve"))[0].code == "alarm_unshelved"
+
+
+def test_after_the_restart_a_fault_that_has_gone_clears_and_can_be_reset(tmp_path):
+    path = tmp_path / "alarms.jsonl"
+    AlarmJournal(path).write(faulty_manager().take_changes())
+    new = restarted(path)
+    quiet = [condition(name, [0] * 600) for name in ("departure", "dry_friction")]
+    assert run(new, quiet) == []
+    assert new.command(order("dry_friction", "reset"))[0].state == "normal"
+
+
+def test_after_the_restart_a_fault_that_lasts_is_not_announced_as_new(tmp_path):
+    path = tmp_path / "alarms.jsonl"
+    AlarmJournal(path).write(faulty_manager().take_changes())
+    lasting = [condition(name, [1] * 600) for name in ("departure", "dry_friction")]
+    assert run(restarted(path), lasting) == []
+
+
+def test_records_come_back_equal_and_are_strict_json(tmp_path):
+    path = tmp_path / "alarms.jsonl"
+    changes = faulty_manager().take_changes()
+    AlarmJournal(path).write(changes)
+    records, unreadable = read_journal(path)
+    assert (repr(records), unreadable) == (repr(changes), 0)
+    for line in path.read_text().splitlines():
+        json.loads(line, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
+
+
+@pytest.mark.parametrize("torn", [1, 5, 40, 200])
+def test_a_torn_last_line_costs_that_line_only(tmp_path, torn):
+    path = tmp_path / "alarms.jsonl"
+    changes = faulty_manager().take_changes()
+    journal = AlarmJournal(path)
+    journal.write(changes)
+    journal.close()
+    os.truncate(path, path.stat().st_size - torn)
+    kept, unreadable = read_journal(path)
+    whole = torn == 1
+    assert len(kept) == len(changes) - (not whole)
+    assert unreadable == (not whole)
+    again = AlarmJournal(path)
+    again.write(changes[:1])
+    assert read_journal(path)[0] == [*kept, changes[0]] or repr(read_journal(path)[0]) == repr(
+        [*kept, changes[0]]
+    )
+
+
+def test_garbage_lines_are_counted_and_skipped(tmp_path):
+    path = tmp_path / "alarms.jsonl"
+    changes = faulty_manager().take_changes()
+    garbage = [b"\xff\xfe\x00", b"[]", b'{"alarm": 3}', b"null", b'{"alarm": {"name": "x"}}']
+    path.write_bytes(b"\n".join(garbage) + b"\n")
+    AlarmJournal(path).write(changes)
+    records, unreadable = read_journal(path)
+    assert (repr(records), unreadable) == (repr(changes), len(garbage))
+
+
+def test_no_journal_yet_is_no_error(tmp_path):
+    assert read_journal(tmp_path / "none.jsonl") == ([], 0)
+
+
+def test_a_journal_that_cannot_be_opened_is_one_plain_line(tmp_path):
+    with pytest.raises(SessionError, match="alarm journal cannot be opened"):
+        AlarmJournal(tmp_path)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_is_remembered_not_raised():
+    journal = AlarmJournal("/dev/full")
+    journal.write(faulty_manager().take_changes())
+    assert "No space left" in journal.failure
+
+
+def test_kill_9_loses_nothing_that_was_written(tmp_path):
+    """A process writes a record and then says so; killed, all that it said is in the file."""
+    path = tmp_path / "alarms.jsonl"
+    program = textwrap.dedent(
+        f"""
+        import sys
+        sys.path[:0] = [{str(ROOT)!r}, {str(Path(__file__).parent)!r}]
+        from dataclasses import replace
+        from test_journal import faulty_manager
+        from monitor.alarms import AlarmJournal
+        journal = AlarmJournal({str(path)!r})
+        record = faulty_manager().take_changes()[0]
+        for number in range(1_000_000):
+            journal.write([replace(record, alarm=replace(record.alarm, seq=number))])
+            print(number, flush=True)
+        """
+    )
+    process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    for _ in range(50):
+        process.stdout.readline()
+    process.send_signal(signal.SIGKILL)
+    said = process.stdout.read().split()
+    process.wait()
+    records, unreadable = read_journal(path)
+    assert unreadable <= 1
+    assert [record.alarm.seq for record in records] == list(range(len(records)))
+    assert len(records) > int(said[-1] if said else 49)
