@@ -1,9 +1,9 @@
 """The same samples give the same alarms however they are cut into blocks."""
 
 import numpy as np
+from alarm_signals import condition, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from alarm_signals import condition, run
 
 from monitor.alarms import AlarmManager
 from rigwatch.wire.rig_config import AlarmSection
