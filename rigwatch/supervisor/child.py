@@ -1,0 +1,116 @@
+"""One process under supervision: its start, its words, its output and its end."""
+
+import contextlib
+import ctypes
+import os
+import signal
+import socket
+import subprocess
+from pathlib import Path
+
+from rigwatch.supervisor.plan import ProcessPlan
+from rigwatch.supervisor.vitals import Vitals
+
+_LIBC = ctypes.CDLL(None)
+_PR_SET_PDEATHSIG = 1
+_READ_SIZE = 65536
+
+
+class Child:
+    """One process; started again as often as wanted.
+
+    Args:
+        plan: what to run.
+        folder: a private folder for the socket on which it speaks.
+    """
+
+    def __init__(self, plan: ProcessPlan, folder: Path) -> None:
+        self.plan = plan
+        self.vitals = Vitals(0.0)
+        self.last_line = ""
+        self._unfinished = b""
+        self._output = -1
+        self._process: subprocess.Popen[bytes] | None = None
+        self._address = str(folder / f"{plan.name}.notify")
+        self.words = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
+        self.words.bind(self._address)
+        self.words.setblocking(False)
+
+    @property
+    def pid(self) -> int:
+        """Process id of the present run, 0 before the first."""
+        return self._process.pid if self._process else 0
+
+    def start(self, now: float) -> None:
+        """Start it; it speaks to us alone and dies with us, but gets no Ctrl-C of our terminal."""
+        self.close_run()
+        environment = {k: v for k, v in os.environ.items() if not k.startswith("WATCHDOG_")}
+        environment |= {"NOTIFY_SOCKET": self._address, "PYTHONUNBUFFERED": "1"}
+        self.vitals = Vitals(now)
+        self.last_line = ""
+        self._output, writing = os.pipe()
+        os.set_blocking(self._output, False)
+        self._process = subprocess.Popen(
+            self.plan.arguments,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=writing,
+            stderr=writing,
+            process_group=0,
+            preexec_fn=_die_with_parent,  # noqa: PLW1509 (this process has one thread)
+        )
+        os.close(writing)
+
+    def listen(self, now: float) -> None:
+        """Take in what it has said since the last time."""
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                self.vitals.take(self.words.recv(4096).decode(errors="replace"), now)
+
+    def lines(self) -> list[str]:
+        """What it has printed since the last time, whole lines."""
+        with contextlib.suppress(BlockingIOError):
+            self._unfinished += os.read(self._output, _READ_SIZE)
+        *whole, self._unfinished = self._unfinished.split(b"\n")
+        found = [line.decode(errors="replace").rstrip() for line in whole if line.strip()]
+        if found:
+            self.last_line = found[-1]
+        return found
+
+    def exit_code(self) -> int | None:
+        """Its exit code, minus the signal that ended it; None while it runs."""
+        return self._process.poll() if self._process else 0
+
+    def terminate(self) -> None:
+        """Ask it to stop in good order."""
+        if self._process is not None:
+            self._process.terminate()
+
+    def kill(self) -> None:
+        """End it and all that it has started, at once."""
+        if self._process is not None:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+
+    def close_run(self) -> None:
+        """Clear away what an ended run has left: its own children, its pipe, its unread words."""
+        if self._process is None:
+            return
+        self.kill()
+        os.close(self._output)
+        self._process, self._unfinished = None, b""
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                self.words.recv(_READ_SIZE)
+
+    def close(self) -> None:
+        """End it and free the socket."""
+        self.close_run()
+        self.words.close()
+        Path(self._address).unlink(missing_ok=True)
+
+
+def _die_with_parent() -> None:
+    """In the new process: a supervisor that is killed leaves no orphans that hold its ports."""
+    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

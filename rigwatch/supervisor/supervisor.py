@@ -1,0 +1,231 @@
+"""All processes of a rig under one loop: started, watched, started again, stopped in order.
+
+    every 0.1 s, for each process:  take in its words and lines
+                                    ended?            → pause, longer each time, then start
+                                    hangs or stalls?  → kill, pause, start
+    on stop:                        reverse order, SIGTERM, then SIGKILL
+
+A process that dies changes nothing for the others: each of them finds its way back by itself.
+"""
+
+import contextlib
+import selectors
+import shutil
+import signal
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from rigwatch.supervisor.child import Child
+from rigwatch.supervisor.plan import ProcessPlan
+from rigwatch.supervisor.vitals import Limits, Vitals
+
+Kind = Literal[
+    "started", "ready", "says", "ended", "ill", "restarting", "finished", "stopping", "stopped"
+]
+TURN = 0.1
+"""Time between two looks at the processes [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessEvent:
+    """Something that happened to one process: what kind of thing, and one plain line."""
+
+    process: str
+    kind: Kind
+    text: str
+    pid: int
+    restarts: int
+
+
+@dataclass(slots=True)
+class Watched:
+    """One process and how it has fared under this supervisor."""
+
+    child: Child
+    restarts: int = 0
+    failures: int = 0
+    start_at: float | None = None
+    was_ready: bool = False
+    finished: bool = False
+
+    @property
+    def vitals(self) -> Vitals:
+        """What the present run has said."""
+        return self.child.vitals
+
+    @property
+    def state(self) -> str:
+        """One word for people."""
+        if self.finished:
+            return "finished"
+        if self.start_at is not None:
+            return "down"
+        return "running" if self.vitals.ready else "starting"
+
+
+class Supervisor:
+    """Runs a rig's processes until `stop` is called or a signal comes.
+
+    Args:
+        plans: the processes in starting order.
+        report: called with every event.
+        limits: how long things may take.
+        clock: seconds on a monotonic clock [s].
+    """
+
+    def __init__(
+        self,
+        plans: Sequence[ProcessPlan],
+        report: Callable[[ProcessEvent], None],
+        limits: Limits | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._report = report
+        self._limits = limits or Limits()
+        self._clock = clock
+        self._folder = Path(tempfile.mkdtemp(prefix="rigwatch-"))
+        self._watched = {plan.name: Watched(Child(plan, self._folder)) for plan in plans}
+        self._selector = selectors.DefaultSelector()
+        for watched in self._watched.values():
+            self._selector.register(watched.child.words, selectors.EVENT_READ)
+        self._stopped = False
+
+    @property
+    def processes(self) -> dict[str, Watched]:
+        """All processes by name, in starting order."""
+        return self._watched
+
+    def run(self, each_turn: Callable[[], None] = lambda: None) -> None:
+        """Start everything and watch it until `stop`; then stop in reverse order and clean up."""
+        try:
+            for watched in self._watched.values():
+                self._start(watched)
+            while not self._stopped:
+                self._turn()
+                each_turn()
+        finally:
+            self._stop_all()
+
+    def stop(self) -> None:
+        """End `run` after the present turn; may be called from a signal handler."""
+        self._stopped = True
+
+    def stop_on_signals(self) -> None:
+        """Stop in good order on SIGTERM and SIGINT."""
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda _number, _frame: self.stop())
+
+    def _turn(self) -> None:
+        self._selector.select(TURN)
+        now = self._clock()
+        # All words are taken in before any process is judged: after a turn that was itself late,
+        # they have been waiting here and nobody was silent.
+        for watched in self._watched.values():
+            self._take_in(watched, now)
+        for watched in self._watched.values():
+            self._judge(watched, now)
+        time.sleep(TURN / 2)
+
+    def _take_in(self, watched: Watched, now: float) -> None:
+        if watched.child.pid == 0:
+            return
+        watched.child.listen(now)
+        for line in watched.child.lines():
+            self._say(watched, "says", line)
+        if watched.vitals.ready and not watched.was_ready:
+            watched.was_ready = True
+            self._say(watched, "ready", watched.vitals.status or "ready")
+
+    def _judge(self, watched: Watched, now: float) -> None:
+        if watched.finished:
+            return
+        if watched.start_at is not None:
+            if now >= watched.start_at:
+                self._start_again(watched)
+            return
+        code = watched.child.exit_code()
+        if code is not None:
+            self._ended(watched, code, now)
+            return
+        complaint = watched.vitals.complaint(self._source(watched), now, self._limits)
+        if complaint:
+            self._say(watched, "ill", complaint)
+            self._pause(watched, now)
+        elif now - watched.vitals.started_at > self._limits.settled:
+            watched.failures = 0
+
+    def _source(self, watched: Watched) -> Vitals | None:
+        source = self._watched.get(watched.child.plan.source)
+        return source.vitals if source is not None else None
+
+    def _ended(self, watched: Watched, code: int, now: float) -> None:
+        for line in watched.child.lines():
+            self._say(watched, "says", line)
+        if code == 0 and watched.child.plan.may_finish:
+            watched.finished = True
+            watched.child.close_run()
+            self._say(watched, "finished", "closed by its user")
+            return
+        self._say(watched, "ended", how_it_ended(code, watched.child.last_line))
+        self._pause(watched, now)
+
+    def _pause(self, watched: Watched, now: float) -> None:
+        watched.child.close_run()
+        longest = self._limits.longest_pause
+        pause = min(longest, self._limits.first_pause * 2 ** min(watched.failures, 16))
+        watched.failures += 1
+        watched.start_at = now + pause
+        self._say(watched, "restarting", f"starts again in {pause:.1f} s")
+
+    def _start_again(self, watched: Watched) -> None:
+        watched.restarts += 1
+        self._start(watched)
+
+    def _start(self, watched: Watched) -> None:
+        watched.start_at, watched.was_ready = None, False
+        watched.child.start(self._clock())
+        self._say(watched, "started", f"process {watched.child.pid}")
+
+    def _stop_all(self) -> None:
+        for watched in reversed(self._watched.values()):
+            self._stop(watched)
+            watched.child.close()
+        self._selector.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _stop(self, watched: Watched) -> None:
+        if watched.start_at is not None or watched.child.exit_code() is not None:
+            return
+        self._say(watched, "stopping", "asked to stop")
+        watched.child.terminate()
+        deadline = self._clock() + self._limits.stop
+        while watched.child.exit_code() is None and self._clock() < deadline:
+            # Those that wait for their turn to stop go on printing: their pipes must not fill.
+            for other in self._watched.values():
+                self._take_in(other, self._clock())
+            time.sleep(TURN / 5)
+        self._take_in(watched, self._clock())
+        code = watched.child.exit_code()
+        if code is None:
+            text = f"killed: did not stop within {self._limits.stop:g} s"
+        else:
+            text = "stopped" if code == 0 else how_it_ended(code, watched.child.last_line)
+        self._say(watched, "stopped", text)
+
+    def _say(self, watched: Watched, kind: Kind, text: str) -> None:
+        child = watched.child
+        self._report(ProcessEvent(child.plan.name, kind, text, child.pid, watched.restarts))
+
+
+def how_it_ended(code: int, last_line: str) -> str:
+    """An exit code in words, with the last line that the process printed."""
+    how = f"ended with code {code}"
+    if code < 0:
+        how = f"ended by signal {-code}"
+        with contextlib.suppress(ValueError):
+            how = f"ended by {signal.Signals(-code).name}"
+    return f"{how}: {last_line}" if last_line else how

@@ -1,0 +1,98 @@
+"""What one process has said of itself, and when that means that it has to be started again.
+
+Three ways to be ill, told apart: it never got ready; it is silent, so its loop hangs; its loop
+turns but no sample goes through although its source has them. A process that waits for its source
+is well.
+"""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """How long things may take [s].
+
+    Attributes:
+        start: until a process is ready; compiling the kernels of a first run is within it.
+        silence: between two words of a process.
+        stall: without samples while its source has them.
+        stop: from the request to stop until it is killed.
+        first_pause: before the first restart; doubled for each one that follows.
+        longest_pause: before any restart.
+        settled: running this long, a process counts as well again.
+    """
+
+    start: float = 120.0
+    silence: float = 3.0
+    stall: float = 10.0
+    stop: float = 8.0
+    first_pause: float = 0.2
+    longest_pause: float = 30.0
+    settled: float = 10.0
+
+
+@dataclass(slots=True)
+class Vitals:
+    """The words of one run of one process; all times on the supervisor's monotonic clock [s].
+
+    Attributes:
+        started_at: when it was started.
+        heard_at: when it said something last.
+        ready: it has said that it is.
+        stopping: it has said that it stops.
+        count: samples that went through it since its start.
+        advanced_at: when the count last grew.
+        flowing_since: since when it has grown without a pause.
+        status: its own line for people.
+    """
+
+    started_at: float
+    heard_at: float = field(init=False)
+    ready: bool = False
+    stopping: bool = False
+    count: int = 0
+    advanced_at: float = field(init=False)
+    flowing_since: float = field(init=False)
+    status: str = ""
+
+    def __post_init__(self) -> None:
+        self.heard_at = self.advanced_at = self.flowing_since = self.started_at
+
+    def take(self, word: str, now: float) -> None:
+        """Take in one datagram of systemd's notify protocol; unknown variables are passed over."""
+        self.heard_at = now
+        for line in word.splitlines():
+            name, _, value = line.partition("=")
+            if name == "READY":
+                self.ready = True
+            elif name == "STOPPING":
+                self.stopping = True
+            elif name == "STATUS":
+                self.status = value
+            elif name == "X_RIGWATCH_COUNT" and value.isdigit():
+                self._count(int(value), now)
+
+    def _count(self, count: int, now: float) -> None:
+        if count <= self.count:
+            return
+        self.ready = True
+        if now - self.advanced_at > 1.0:
+            self.flowing_since = now
+        self.count, self.advanced_at = count, now
+
+    def flows(self, now: float) -> bool:
+        """Whether samples went through it in the last second."""
+        return self.count > 0 and now - self.advanced_at <= 1.0
+
+    def complaint(self, source: "Vitals | None", now: float, limits: Limits) -> str:
+        """Why the process has to be started again, empty where it has not."""
+        if not self.ready:
+            late = now - self.started_at > limits.start
+            return f"not ready after {limits.start:g} s" if late else ""
+        if now - self.heard_at > limits.silence:
+            return f"hangs: silent for {limits.silence:g} s"
+        if source is not None and source.flows(now):
+            dry_since = max(self.advanced_at, source.flowing_since)
+            if now - dry_since > limits.stall:
+                return f"takes no samples for {limits.stall:g} s while its source has them"
+        return ""

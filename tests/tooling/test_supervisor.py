@@ -1,0 +1,173 @@
+"""Real processes under the supervisor: killed, stopped dead, starved, stalled, ended, stopped."""
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rigwatch.supervisor.plan import ProcessPlan
+from rigwatch.supervisor.supervisor import ProcessEvent, Supervisor, how_it_ended
+from rigwatch.supervisor.vitals import Limits, Vitals
+
+LIMITS = Limits(start=20, silence=1.0, stall=1.5, stop=2, first_pause=0.1, settled=3)
+
+WORKER = """
+import signal, sys, time
+from rigwatch.wire.heartbeat import Heartbeat
+run = [True]
+signal.signal(signal.SIGTERM, lambda *_: run.clear())
+beat = Heartbeat("worker")
+beat.ready()
+count = 0
+while run:
+    count += {step}
+    beat.advance(count)
+    time.sleep(0.02)
+beat.stopping()
+print("stopped in good order")
+"""
+FALLS_AT_START = "import sys; print('model.toml: no such file'); sys.exit(2)"
+IGNORES_STOP = WORKER.replace("lambda *_: run.clear()", "signal.SIG_IGN")
+
+
+def worker(name: str, code: str = "", source: str = "", may_finish: bool = False) -> ProcessPlan:
+    code = code or WORKER.format(step=1)
+    return ProcessPlan(name, (sys.executable, "-c", code), source, may_finish)
+
+
+def supervise(
+    plans: list[ProcessPlan],
+    script: Callable[[Supervisor, list[ProcessEvent]], bool],
+    seconds: float = 30,
+) -> list[ProcessEvent]:
+    """Run until `script`, called at every turn, says that it has seen enough."""
+    events: list[ProcessEvent] = []
+    supervisor = Supervisor(plans, events.append, LIMITS)
+    deadline = time.monotonic() + seconds
+
+    def each_turn() -> None:
+        assert time.monotonic() < deadline, events
+        if script(supervisor, events):
+            supervisor.stop()
+
+    supervisor.run(each_turn)
+    return events
+
+
+def of_kind(events: list[ProcessEvent], process: str, kind: str) -> list[ProcessEvent]:
+    return [event for event in events if (event.process, event.kind) == (process, kind)]
+
+
+def all_ready(supervisor: Supervisor) -> bool:
+    return all(w.vitals.ready and w.vitals.count for w in supervisor.processes.values())
+
+
+def test_a_killed_process_is_started_again_within_two_seconds_and_the_other_goes_on() -> None:
+    killed_at: list[float] = []
+    back_at: list[float] = []
+
+    def script(supervisor: Supervisor, events: list[ProcessEvent]) -> bool:
+        if not killed_at and all_ready(supervisor):
+            os.kill(supervisor.processes["daq"].child.pid, signal.SIGKILL)
+            killed_at.append(time.monotonic())
+        if killed_at and not back_at and len(of_kind(events, "daq", "started")) == 2:
+            back_at.append(time.monotonic())
+        return len(of_kind(events, "daq", "ready")) == 2
+
+    events = supervise([worker("daq"), worker("monitor")], script)
+    assert of_kind(events, "daq", "ended")[0].text == "ended by SIGKILL"
+    assert back_at[0] - killed_at[0] < 2.0
+    assert len(of_kind(events, "monitor", "started")) == 1
+
+
+def test_a_process_that_hangs_is_killed_and_started_again() -> None:
+    def script(supervisor: Supervisor, events: list[ProcessEvent]) -> bool:
+        if all_ready(supervisor) and not of_kind(events, "daq", "ill"):
+            os.kill(supervisor.processes["daq"].child.pid, signal.SIGSTOP)
+        return len(of_kind(events, "daq", "ready")) >= 2
+
+    events = supervise([worker("daq")], script)
+    assert of_kind(events, "daq", "ill")[0].text == "hangs: silent for 1 s"
+
+
+def test_only_a_process_whose_source_has_samples_is_started_again_for_having_none() -> None:
+    idle = WORKER.format(step=0)
+    plans = [
+        worker("plant"),
+        worker("daq", idle, source="plant"),
+        worker("monitor", idle, source="daq"),
+    ]
+    events = supervise(plans, lambda _, events: len(of_kind(events, "daq", "ill")) == 2)
+    assert "takes no samples" in of_kind(events, "daq", "ill")[0].text
+    assert not of_kind(events, "monitor", "ill")
+
+
+def test_pauses_grow_and_the_reason_is_the_last_line_that_was_printed() -> None:
+    events = supervise(
+        [worker("monitor", FALLS_AT_START)],
+        lambda _, events: len(of_kind(events, "monitor", "restarting")) == 4,
+    )
+    pauses = [event.text for event in of_kind(events, "monitor", "restarting")]
+    assert pauses == [f"starts again in {pause} s" for pause in (0.1, 0.2, 0.4, 0.8)]
+    ended = of_kind(events, "monitor", "ended")[0]
+    assert ended.text == "ended with code 2: model.toml: no such file"
+
+
+def test_a_viewer_that_was_closed_stays_closed() -> None:
+    events = supervise(
+        [worker("dashboard", "pass", may_finish=True)],
+        lambda _, events: bool(of_kind(events, "dashboard", "finished")),
+    )
+    assert len(of_kind(events, "dashboard", "started")) == 1
+
+
+def test_stopping_goes_backwards_and_nothing_is_left_behind() -> None:
+    pids: list[int] = []
+
+    def script(supervisor: Supervisor, _events: list[ProcessEvent]) -> bool:
+        if not all_ready(supervisor):
+            return False
+        pids.extend(w.child.pid for w in supervisor.processes.values())
+        return True
+
+    plans = [worker("router"), worker("daq", IGNORES_STOP.format(step=1)), worker("recorder")]
+    events = supervise(plans, script)
+    stopped = [event for event in events if event.kind == "stopped"]
+    assert [event.process for event in stopped] == ["recorder", "daq", "router"]
+    assert [event.text.split(":")[0] for event in stopped] == ["stopped", "killed", "stopped"]
+    assert [e.text for e in of_kind(events, "recorder", "says")] == ["stopped in good order"]
+    assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
+
+
+def test_a_process_cannot_be_judged_by_words_that_waited_for_a_late_supervisor() -> None:
+    vitals = Vitals(0.0)
+    vitals.take("READY=1\nX_RIGWATCH_COUNT=5", now=30.0)
+    assert vitals.complaint(None, 30.0, LIMITS) == ""
+
+
+@pytest.mark.parametrize(("silent_for", "ill"), [(0.5, False), (1.5, True)])
+def test_silence_is_measured_from_the_last_word(silent_for: float, ill: bool) -> None:
+    vitals = Vitals(0.0)
+    vitals.take("READY=1", now=10.0)
+    assert bool(vitals.complaint(None, 10.0 + silent_for, LIMITS)) is ill
+
+
+def test_a_source_that_has_just_come_back_gives_its_readers_time() -> None:
+    source, reader = Vitals(0.0), Vitals(0.0)
+    for vitals in (source, reader):
+        vitals.take("X_RIGWATCH_COUNT=5", now=1.0)
+    source.take("X_RIGWATCH_COUNT=6", now=100.0)
+    reader.take("X_RIGWATCH_COUNT=5", now=100.0)
+    assert reader.complaint(source, 100.0, LIMITS) == ""
+    source.take("X_RIGWATCH_COUNT=7", now=100.9)
+    reader.take("X_RIGWATCH_COUNT=5", now=101.6)
+    assert "takes no samples" in reader.complaint(source, 101.6, LIMITS)
+
+
+def test_exit_codes_in_words() -> None:
+    assert how_it_ended(-9, "") == "ended by SIGKILL"
+    assert how_it_ended(2, "no such port") == "ended with code 2: no such port"
