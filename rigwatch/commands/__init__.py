@@ -23,6 +23,9 @@ from rigwatch.wire.errors import RigwatchError
 
 COMMANDS: dict[str, str] = {
     # name on the command line: module below rigwatch.commands
+    "info": "info",
+    "trim": "trim",
+    "recover": "recover",
 }
 """One row a command; keep the rows sorted by what a newcomer needs first."""
 

@@ -1,0 +1,182 @@
+"""Makes new files of recorded sessions: `recover` saves what is intact, `trim` cuts by time."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.wire import blocks
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import (
+    Alarm,
+    Message,
+    RunInfo,
+    SampleBlock,
+)
+from rigwatch.wire.session.reader import LostSpan, Recorded, Session
+from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
+
+FLUSH_EVERY = 4096
+"""Messages after which a new chunk is begun."""
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What came into a new session file.
+
+    Attributes:
+        path: the new file.
+        messages: how many of each topic.
+        samples: how many samples.
+        lost: what of the old session could not be read.
+        notes: remarks for people, such as a description of the run that had to be made up.
+    """
+
+    path: Path
+    messages: dict[str, int]
+    samples: int
+    lost: tuple[LostSpan, ...]
+    notes: str = ""
+
+
+def recover(session: Session, target: Path) -> Written:
+    """Everything intact of `session` in one new, closed and indexed file at `target`.
+
+    Raises:
+        SessionError: the target exists or cannot be written.
+    """
+    run, notes = _run_or_substitute(session)
+    written = copy_messages(session.messages(), run, target)
+    return replace(written, lost=session.lost, notes=notes)
+
+
+def _run_or_substitute(session: Session) -> tuple[RunInfo, str]:
+    try:
+        return session.info, ""
+    except SessionError:
+        notes = "recovered; the description of the run was lost, its rate is that of the samples"
+        return run_info("unknown", _rate(session), t_ns=first_time(session), notes=notes), notes
+
+
+def _rate(session: Session) -> float:
+    """Median rate of the first samples [Hz], 0 where there are too few."""
+    first = next(session.samples(), None)
+    if first is None or len(first) < 2:
+        return 0.0
+    step = float(np.median(np.diff(first.t_ns)))
+    return 1e9 / step if step > 0 else 0.0
+
+
+def first_time(session: Session) -> int:
+    """Time of the first sample, else of the first message [ns]; 0 where there is none."""
+    first = next(session.samples(size=1), None)
+    if first is not None:
+        return int(first.t_ns[0])
+    return next((message_time(item.message) for item in session.messages()), 0)
+
+
+def trim(session: Session, target: Path, start: int | None, end: int | None) -> Written:
+    """The part of `session` in [start, end) [ns], cut at the sample, as one new file at `target`.
+
+    The description of the run is kept, and so are alarms that stood when the part begins.
+
+    Raises:
+        SessionError: nothing lies in the span, or the target exists or cannot be written.
+    """
+    run = session.info
+    cut = f"trimmed to {_text(start, 'the start')} … {_text(end, 'the end')}"
+    run = replace(run, notes=f"{run.notes}; {cut}" if run.notes else cut)
+    if next(session.messages(start=start, end=end), None) is None:
+        raise SessionError(f"{session.path}: nothing was recorded in the span {cut[11:]}")
+    written = copy_messages(_part(session, start, end), run, target)
+    return replace(written, lost=session.lost, notes=cut)
+
+
+def _text(t_ns: int | None, otherwise: str) -> str:
+    return otherwise if t_ns is None else iso_time(t_ns)
+
+
+def iso_time(t_ns: int) -> str:
+    """Unix time as people write it: UTC, to the millisecond."""
+    whole, rest = divmod(t_ns, 1_000_000_000)
+    text = datetime.fromtimestamp(whole, UTC).strftime("%Y-%m-%dT%H:%M:%S")
+    return f"{text}.{rest // 1_000_000:03d}Z"
+
+
+def _part(session: Session, start: int | None, end: int | None) -> Iterator[Recorded]:
+    """Messages of the span, behind the alarms that stood before it."""
+    standing: dict[str, Recorded] = {}
+    if start is not None:
+        for item in session.messages(["alarms"], end=start):
+            if isinstance(item.message, Alarm):
+                standing[item.message.name] = item
+    for item in standing.values():
+        if isinstance(item.message, Alarm) and item.message.state != "normal":
+            yield item
+    yield from session.messages(start=start, end=end)
+
+
+def copy_messages(
+    messages: Iterable[Recorded],
+    run: RunInfo,
+    target: Path,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Written:
+    """A new file at `target` with `run` at its head and `messages` behind it, each sample once.
+
+    Args:
+        messages: what is copied; descriptions of runs among them only where they are new.
+        run: stands at the head.
+        target: the file to be made.
+        progress: called with the time of each message [ns].
+
+    Raises:
+        SessionError: the target exists or cannot be written.
+    """
+    writer = SessionWriter(target, run, sync=False)
+    try:
+        with writer:
+            return _copy(messages, run, writer, progress)
+    except BaseException:
+        target.unlink(missing_ok=True)
+        raise
+
+
+def _copy(
+    messages: Iterable[Recorded],
+    run: RunInfo,
+    writer: SessionWriter,
+    progress: Callable[[int], None],
+) -> Written:
+    counts: Counter[str] = Counter(run=1)
+    following: dict[tuple[str, int], int] = {}
+    samples = 0
+    for item in messages:
+        message = _new_part(item.message, following)
+        if message is None or (isinstance(message, RunInfo) and _same_run(message, run)):
+            continue
+        progress(item.t_ns)
+        writer.write(message)
+        counts[item.topic.name] += 1
+        samples += len(message) if isinstance(message, SampleBlock) else 0
+        if len(writer.pending) >= FLUSH_EVERY:
+            writer.flush()
+    return Written(writer.path, dict(counts), samples, ())
+
+
+def _new_part(message: Message, following: dict[tuple[str, int], int]) -> Message | None:
+    """The message without samples that were copied before."""
+    if not isinstance(message, SampleBlock):
+        return message
+    key = (message.device, message.boot)
+    part = blocks.unseen(message, following.get(key))
+    if part is not None:
+        following[key] = part.seq + len(part)
+    return part
+
+
+def _same_run(first: RunInfo, second: RunInfo) -> bool:
+    return replace(first, notes="", t_ns=0) == replace(second, notes="", t_ns=0)

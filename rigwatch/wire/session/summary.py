@@ -1,0 +1,200 @@
+"""What is in a session, in figures: rates, gaps, quality, topics, alarms, damage."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigwatch.wire import blocks, quality
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Gap, Message, RunInfo, SampleBlock
+from rigwatch.wire.session.reader import LostSpan, Session
+from rigwatch.wire.session.writer import message_time
+
+
+@dataclass(slots=True)
+class ChannelSummary:
+    """One channel over a session; `low`, `high` and `mean` [unit] are those of its good samples.
+
+    Attributes:
+        flags: how many samples carry which quality flag; "good" those that carry none.
+    """
+
+    name: str
+    unit: str
+    low: float = float("nan")
+    high: float = float("nan")
+    mean: float = float("nan")
+    flags: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class DeviceSummary:
+    """The samples of one device.
+
+    Attributes:
+        samples: how many there are.
+        boots: how often the device started.
+        rate_hz: mean rate inside unbroken stretches [Hz].
+        longest_step_s: longest time between two neighbours of a stretch [s].
+        gaps: places where numbers are missing.
+        missing: samples missing there.
+    """
+
+    name: str
+    samples: int = 0
+    boots: int = 0
+    rate_hz: float = 0.0
+    longest_step_s: float = 0.0
+    gaps: int = 0
+    missing: int = 0
+    channels: list[ChannelSummary] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Summary:
+    """What is in a session.
+
+    Attributes:
+        run: what it was made with, None where that is lost.
+        start_ns, end_ns: times of the first and last message [ns], 0 where there is none.
+        topics: messages of each topic.
+        reported_lost: samples that readers reported as lost (Gap messages).
+        lost: damage.
+        unclosed: segments without an index, by name.
+    """
+
+    path: str
+    segments: int
+    run: RunInfo | None = None
+    start_ns: int = 0
+    end_ns: int = 0
+    topics: dict[str, int] = field(default_factory=dict)
+    devices: list[DeviceSummary] = field(default_factory=list)
+    alarms: list[Alarm] = field(default_factory=list)
+    reported_lost: int = 0
+    lost: tuple[LostSpan, ...] = ()
+    unclosed: list[str] = field(default_factory=list)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first message to the last [s]."""
+        return (self.end_ns - self.start_ns) / 1e9
+
+
+def summarise(session: Session) -> Summary:
+    """The figures of the whole session.
+
+    Raises:
+        SessionError: a segment cannot be opened.
+    """
+    summary = Summary(str(session.path), len(session.segments))
+    devices: dict[str, _Device] = {}
+    counts: Counter[str] = Counter()
+    for item in session.messages():
+        counts[item.topic.name] += 1
+        message = item.message
+        if isinstance(message, SampleBlock):
+            devices.setdefault(message.device, _Device(message.device)).add(message)
+        elif isinstance(message, Alarm):
+            summary.alarms.append(message)
+        elif isinstance(message, Gap):
+            summary.reported_lost += max(0, message.last - message.first + 1)
+        _extend(summary, message)
+    summary.topics = dict(sorted(counts.items()))
+    summary.devices = [device.result() for device in devices.values()]
+    summary.run = _run(session)
+    summary.lost = session.lost
+    summary.unclosed = [path.name for path in session.unclosed]
+    return summary
+
+
+def _run(session: Session) -> RunInfo | None:
+    try:
+        return session.info
+    except SessionError:
+        return None
+
+
+def _extend(summary: Summary, message: Message) -> None:
+    """Widen the span of time; the description of the run does not, it may be years older."""
+    if isinstance(message, RunInfo):
+        return
+    first = last = message_time(message)
+    if isinstance(message, SampleBlock | EstimateBlock):
+        last = int(message.t_ns[-1]) if len(message) else first
+    summary.start_ns = min(summary.start_ns or first, first)
+    summary.end_ns = max(summary.end_ns, last)
+
+
+class _Device:
+    """Running figures of one device."""
+
+    def __init__(self, name: str) -> None:
+        self._figures = DeviceSummary(name)
+        self._channels: dict[str, _Channel] = {}
+        self._next: dict[int, int] = {}
+        self._last: tuple[int, int, int] | None = None
+        self._steps = self._time_ns = 0
+
+    def add(self, block: SampleBlock) -> None:
+        known = self._next.get(block.boot)
+        part = blocks.unseen(block, known)
+        if part is None or not len(part):
+            return
+        self._count_gap(part, known)
+        self._measure_steps(part)
+        self._figures.samples += len(part)
+        self._next[part.boot] = part.seq + len(part)
+        for column in part.channels:
+            self._channels.setdefault(column.name, _Channel(column)).add(column)
+
+    def _count_gap(self, block: SampleBlock, known: int | None) -> None:
+        if known is None:
+            self._figures.boots += 1
+        elif block.seq > known:
+            self._figures.gaps += 1
+            self._figures.missing += block.seq - known
+
+    def _measure_steps(self, block: SampleBlock) -> None:
+        t_ns = block.t_ns
+        if self._last is not None and self._last[:2] == (block.boot, block.seq):
+            t_ns = np.concatenate([[self._last[2]], t_ns])
+        if len(t_ns) > 1:
+            longest = int(np.diff(t_ns).max()) / 1e9
+            self._figures.longest_step_s = max(self._figures.longest_step_s, longest)
+            self._steps += len(t_ns) - 1
+            self._time_ns += int(t_ns[-1] - t_ns[0])
+        self._last = (block.boot, block.seq + len(block), int(block.t_ns[-1]))
+
+    def result(self) -> DeviceSummary:
+        figures = self._figures
+        figures.rate_hz = self._steps / self._time_ns * 1e9 if self._time_ns > 0 else 0.0
+        figures.channels = [channel.result() for channel in self._channels.values()]
+        return figures
+
+
+class _Channel:
+    """Running figures of one channel."""
+
+    def __init__(self, column: Column) -> None:
+        self._figures = ChannelSummary(column.name, column.unit)
+        self._flags: Counter[str] = Counter()
+        self._sum, self._good = 0.0, 0
+
+    def add(self, column: Column) -> None:
+        flags = column.quality if len(column.quality) else np.zeros(len(column.values), np.uint8)
+        for bit, name in quality.NAMES.items():
+            self._flags[name] += int(np.count_nonzero(flags & bit))
+        self._flags["good"] += int(np.count_nonzero(flags == quality.GOOD))
+        good = column.values[quality.valid(flags) & np.isfinite(column.values)]
+        if len(good):
+            self._figures.low = float(np.fmin(self._figures.low, good.min()))
+            self._figures.high = float(np.fmax(self._figures.high, good.max()))
+            self._sum += float(good.sum())
+            self._good += len(good)
+
+    def result(self) -> ChannelSummary:
+        self._figures.mean = self._sum / self._good if self._good else float("nan")
+        self._figures.flags = {name: count for name, count in self._flags.items() if count}
+        return self._figures
