@@ -1,0 +1,1 @@
+"""What rigwatch reaches, measured on this machine beside published figures: `make bench`."""

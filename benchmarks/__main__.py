@@ -1,0 +1,90 @@
+"""`python -m benchmarks [NAME...]`: runs the benchmarks and prints one table.
+
+A benchmark is a module of this folder with `def run(quick: bool) -> list[Row]`; nothing else has
+to be entered anywhere.
+"""
+
+import argparse
+import importlib
+import json
+import os
+import platform
+import sys
+import time
+import traceback
+from dataclasses import asdict
+from pathlib import Path
+
+import benchmarks
+from benchmarks.table import Row, as_markdown, as_text
+
+
+def names() -> list[str]:
+    """All benchmarks there are: the modules of this folder that have a function `run`."""
+    sources = sorted(Path(benchmarks.__path__[0]).glob("*.py"))
+    return [path.stem for path in sources if "\ndef run(" in path.read_text(encoding="utf-8")]
+
+
+def machine() -> dict[str, str]:
+    """What the figures were measured on."""
+    return {
+        "processor": _processor(),
+        "cores": str(len(os.sched_getaffinity(0))),
+        "memory": f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2**30:.0f} GiB",
+        "system": f"{platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        "load": f"{os.getloadavg()[0]:.1f}",
+        "date": time.strftime("%Y-%m-%d"),
+    }
+
+
+def _processor() -> str:
+    for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.machine()
+
+
+def measure(name: str, quick: bool) -> list[Row]:
+    """A benchmark's rows; one that fails is a row that misses its bar, and the others go on."""
+    started = time.perf_counter()
+    print(f"{name} ...", end=" ", file=sys.stderr, flush=True)
+    try:
+        rows: list[Row] = importlib.import_module(f"benchmarks.{name}").run(quick)
+    except Exception as error:
+        traceback.print_exc()
+        rows = [Row(name, f"failed: {type(error).__name__}", "runs", "", str(error), passed=False)]
+    print(f"{time.perf_counter() - started:.1f} s", file=sys.stderr)
+    return rows
+
+
+def main() -> int:
+    """0 when every row that has a bar reaches it, else 1."""
+    parser = _parser()
+    arguments = parser.parse_args()
+    if unknown := set(arguments.names) - set(names()):
+        parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(names())}")
+    results = {name: measure(name, arguments.quick) for name in arguments.names or names()}
+    rows = [row for found in results.values() for row in found]
+    print("measured on " + ", ".join(f"{key} {value}" for key, value in machine().items()) + "\n")
+    print(as_markdown(rows) if arguments.markdown else as_text(rows))
+    if arguments.json:
+        as_dicts = {name: [asdict(row) for row in found] for name, found in results.items()}
+        text = {"machine": machine(), "results": as_dicts}
+        arguments.json.write_text(json.dumps(text, indent=1), encoding="utf-8")
+    return 1 if any(row.passed is False for row in rows) else 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks", description=__doc__, epilog=f"benchmarks: {', '.join(names())}"
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="which, default all")
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions, to try them")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the results there")
+    parser.add_argument("--markdown", action="store_true", help="print the table for a README")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())
