@@ -62,27 +62,25 @@ class RigParameters(Section, frozen=True, kw_only=True):
         float, _positive("change of each upstream pressure, chosen [Pa/V]")
     ] = 43.6e3
     valve_limit: Annotated[float, _positive("largest drive voltage [V]")] = 5.0
-    valve_frequency: Annotated[float, _positive("natural frequency, chosen [Hz]")] = 20.0
+    valve_frequency: Annotated[float, _positive("natural frequency, chosen [Hz]")] = 30.0
     valve_damping: Annotated[
         float, Meta(ge=1, description="damping ratio of the heavily damped flapper, chosen")
-    ] = 1.25
+    ] = 1.667
     temperature: Annotated[float, _positive("of the air [K]")] = 294.0
     heat_capacity_ratio: Annotated[float, Meta(ge=1, le=1.67, description="gamma of air")] = 1.4
     discharge: Annotated[float, _positive("coefficient of the orifices")] = 0.85
-    port_area: Annotated[float, _positive("orifice of each port, chosen [mm^2]")] = 0.24
-    port_laminar: Annotated[
-        float, _positive("drop at which hose and orifice lose alike, chosen [Pa]")
-    ] = 800.0e3
+    port_area: Annotated[float, _positive("orifice of each port, chosen [mm^2]")] = 0.5
+    port_resistance: Annotated[
+        float, _positive("laminar, of each line from the valve's nozzle, chosen [Pa s/m^3]")
+    ] = 5.5e9
     piston_leak: Annotated[float, _not_negative("clearance seal, as an orifice, chosen [mm^2]")] = (
         0.0126
     )
-    leak_laminar: Annotated[
-        float, _positive("drop at which a leak turns from laminar, chosen [Pa]")
-    ] = 20.0e3
+    leak_resistance: Annotated[float, _positive("laminar, of a leak, chosen [Pa s/m^3]")] = 5.0e9
 
     centring_gain: Annotated[
         float, _not_negative("drive voltage per offset of the slow centring loop, chosen [V/m]")
-    ] = 8.0
+    ] = 16.0
     centring_frequency: Annotated[
         float, _positive("low-pass of the centring pick-off, chosen [Hz]")
     ] = 0.7

@@ -1,6 +1,6 @@
 """The rig's motion, stepped on a fixed fine grid: valve, chambers, piston, load, dry friction.
 
-    w(Pa, Pb) = 2 c sqrt(Pd) (Pu - Pd) / (sqrt(pl) + sqrt(pl + 4 (Pu - Pd)))    signed from a to b
+    w(Pa, Pb) : Pu - Pd = w r / ((Pu + Pd) / 2) + w^2 / (c^2 Pd),   signed from a to b
     V1 dP1/dt = n ( w(Pu1, P1) - w(P1, P2) - w(P1, Pe) - P1 A1 v ),   V1 = Vd + A1 (L/2 + x)
     V2 dP2/dt = n ( w(Pu2, P2) + w(P1, P2) - w(P2, Pe) + P2 A2 v ),   V2 = Vd + A2 (L/2 - x)
     m dv/dt   = P1 A1 - P2 A2 - Pe (A1 - A2) + other forces - dry friction
@@ -8,11 +8,11 @@
 
 Symbols: P absolute pressure [Pa], Pu upstream, Pd downstream but not below Pu/2 (choked), Pm mean,
 Pe of the room [Pa], w flow times R T [Pa m^3/s], c = 2 psi2 Cd a sqrt(R T) [m^3/s] for an orifice
-of area a, pl drop at which laminar and orifice losses are alike [Pa], n ratio of heat capacities [1],
-A areas [m^2], V volumes, Vd dead volume [m^3], L stroke [m], x from mid stroke [m], m mass [kg].
+of area a, r laminar resistance to volume flow [Pa s/m^3], n ratio of heat capacities [1], A areas
+[m^2], V volumes, Vd dead volume [m^3], L stroke [m], x from mid stroke [m], m mass [kg].
 
-The flow is that of theory eq 5.14 behind a laminar resistance, solved in closed form: far above pl
-it is eq 5.14, and near Pu = Pd it is linear, which takes away the infinite slope. Steps are
+The flow is that of theory eq 5.14 behind a laminar passage, solved in closed form: a fast flow
+follows eq 5.14, and near Pu = Pd it is linear, which takes away the infinite slope. Steps are
 semi-implicit (velocity, then position, then pressure, so that the air spring conserves energy). Dry
 friction is implicit: an impulse of at most level times step that cannot turn the velocity round, so
 the mass sticks exactly and no level is too large.
@@ -48,7 +48,7 @@ _GAP_STIFFNESS = 5.0e4
 _GAP_DAMPING = 10.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def orifice(area_mm2: float, p: Record) -> float:
     """Conductance c of an orifice of `area_mm2` [m^3/s]."""
     n = p.heat_capacity_ratio
@@ -56,23 +56,24 @@ def orifice(area_mm2: float, p: Record) -> float:
     return 2.0e-6 * psi * p.discharge * area_mm2 * math.sqrt(_GAS * p.temperature)
 
 
-@njit(cache=True)
-def flow(pressure_a: float, pressure_b: float, conductance: float, laminar: float) -> float:
+@njit(cache=True, error_model="numpy")
+def flow(pressure_a: float, pressure_b: float, conductance: float, resistance: float) -> float:
     """Flow from a to b through an orifice behind a laminar resistance [Pa m^3/s]."""
     upstream = max(pressure_a, pressure_b)
     downstream = max(min(pressure_a, pressure_b), 0.5 * upstream)
-    drop = upstream - downstream
-    roots = math.sqrt(laminar) + math.sqrt(laminar + 4.0 * drop)
-    amount = 2.0 * conductance * math.sqrt(downstream) * drop / roots
+    square = conductance * conductance * downstream
+    linear = 2.0 * resistance * square / (upstream + downstream)
+    drop = 4.0 * square * (upstream - downstream)
+    amount = 0.5 * (math.sqrt(linear * linear + drop) - linear)
     return amount if pressure_a > pressure_b else -amount
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def dry_friction(  # noqa: PLR0917
     free_velocity: float,
     velocity: float,
     x: float,
-    impulse_to_velocity: float,
+    per_mass: float,
     base: float,
     e: Record,
 ) -> float:
@@ -86,14 +87,14 @@ def dry_friction(  # noqa: PLR0917
     kinetic = max(kinetic, 0.0)
     if velocity == 0.0:
         static = e.static_ratio * kinetic + e.stribeck + e.stiction
-        if abs(free_velocity) <= static * impulse_to_velocity:
+        if abs(free_velocity) <= static * per_mass:
             return 0.0
     if e.stribeck > 0.0:
         kinetic += e.stribeck * math.exp(-((velocity / e.stribeck_speed) ** 2))
-    return toward * max(abs(free_velocity) - kinetic * impulse_to_velocity, 0.0)
+    return toward * max(abs(free_velocity) - kinetic * per_mass, 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def end_stop(x: float, v: float, p: Record) -> float:
     """Force of the end stops on the piston [N]: stiff, dissipative, never pulling."""
     over = abs(x) - 0.5 * p.stroke
@@ -104,7 +105,7 @@ def end_stop(x: float, v: float, p: Record) -> float:
     return -force if x > 0.0 else force
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def contact(offset: float, closing: float, gap: float) -> float:
     """Force of the rod on the load across play of width `gap` [N]; `offset` is rod less load."""
     over = abs(offset) - 0.5 * gap
@@ -114,7 +115,7 @@ def contact(offset: float, closing: float, gap: float) -> float:
     return toward * max(_GAP_STIFFNESS * over + _GAP_DAMPING * closing * toward, 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def other_forces(x: float, time: float, e: Record) -> float:
     """Hidden forces on the load that are neither dry nor proportional to velocity [N]."""
     force = e.constant_force - e.spring * x - e.cubic_spring * x**3
@@ -123,7 +124,7 @@ def other_forces(x: float, time: float, e: Record) -> float:
     return force
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def valve_voltage(line: Floats, sample: int, s: Record, e: Record, p: Record) -> float:
     """What reaches the flapper of the drive voltage, after the actuator's faults [V]."""
     late = min(e.actuator_delay * p.sample_rate, DELAY_LINE - 2.0)
@@ -144,7 +145,7 @@ def valve_voltage(line: Floats, sample: int, s: Record, e: Record, p: Record) ->
     return min(max(volts, -limit), limit)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance_plant(  # noqa: PLR0915, PLR0917
     command: Floats,
     parameters: NDArray[np.void],
@@ -164,7 +165,8 @@ def advance_plant(  # noqa: PLR0915, PLR0917
     e: Record = effects[0]
     s: Record = state[0]
     h = 1.0 / (p.sample_rate * p.substeps)
-    n, area_1, area_2 = p.heat_capacity_ratio, p.piston_area, p.annulus_area
+    hn = h * p.heat_capacity_ratio
+    area_1, area_2 = p.piston_area, p.annulus_area
     half = 0.5 * p.stroke
     port = orifice(p.port_area, p) * (1.0 - e.port_blockage)
     leak = orifice(p.piston_leak + e.chamber_leak, p)
@@ -178,7 +180,10 @@ def advance_plant(  # noqa: PLR0915, PLR0917
     share_c = 1.0 - math.exp(-2.0 * math.pi * p.centring_frequency / p.sample_rate)
     load = p.load_mass + e.added_mass
     rigid = e.backlash <= 0.0
-    mass = load + p.piston_mass if rigid else load
+    per_mass = h / (load + p.piston_mass if rigid else load)
+    viscous = e.viscous + (p.piston_viscous if rigid else 0.0)
+    braked = 1.0 / (1.0 + per_mass * viscous)
+    steps_per_second = p.sample_rate * p.substeps
     if rigid:
         if s.apart > 0.0:
             s.v = (p.piston_mass * s.v + load * s.load_v) / (p.piston_mass + load)
@@ -221,13 +226,12 @@ def advance_plant(  # noqa: PLR0915, PLR0917
                 v += h * (push - joint) / p.piston_mass
                 v /= 1.0 + h * p.piston_viscous / p.piston_mass
                 force += joint
-            viscous = e.viscous + e.quadratic_drag * abs(load_v)
-            if rigid:
-                viscous += p.piston_viscous
-            free = (load_v + h * force / mass) / (1.0 + h * viscous / mass)
-            slid = dry_friction(free, load_v, load_x, h / mass, p.piston_coulomb, e)
-            friction = (free - slid) * mass / h
-            a = (slid - load_v) / h
+            if e.quadratic_drag != 0.0:
+                braked = 1.0 / (1.0 + per_mass * (viscous + e.quadratic_drag * abs(load_v)))
+            free = (load_v + per_mass * force) * braked
+            slid = dry_friction(free, load_v, load_x, per_mass, p.piston_coulomb, e)
+            friction = (free - slid) / per_mass
+            a = (slid - load_v) * steps_per_second
             load_v = slid
             load_x += h * load_v
             sensed += share_a * (a - sensed)
@@ -236,34 +240,36 @@ def advance_plant(  # noqa: PLR0915, PLR0917
             else:
                 x += h * v
 
-            across = flow(p1, p2, leak, p.leak_laminar)
-            into_1 = flow(pu1, p1, port, p.port_laminar) - across
-            into_2 = flow(pu2, p2, port, p.port_laminar) + across
+            across = flow(p1, p2, leak, p.leak_resistance)
+            into_1 = flow(pu1, p1, port, p.port_resistance) - across
+            into_2 = flow(pu2, p2, port, p.port_resistance) + across
             if leak_1 > 0.0:
-                into_1 -= flow(p1, p.atmosphere, leak_1, p.leak_laminar)
+                into_1 -= flow(p1, p.atmosphere, leak_1, p.leak_resistance)
             if leak_2 > 0.0:
-                into_2 -= flow(p2, p.atmosphere, leak_2, p.leak_laminar)
-            volume_1 = p.dead_volume + area_1 * max(half + x, 0.0)
-            volume_2 = p.dead_volume + area_2 * max(half - x, 0.0)
-            p1 += h * n * (into_1 - p1 * area_1 * v) / volume_1
-            p2 += h * n * (into_2 + p2 * area_2 * v) / volume_2
+                into_2 -= flow(p2, p.atmosphere, leak_2, p.leak_resistance)
+            middle = x - 0.5 * h * v
+            volume_1 = p.dead_volume + area_1 * max(half + middle, 0.0)
+            volume_2 = p.dead_volume + area_2 * max(half - middle, 0.0)
+            swept_1, swept_2 = 0.5 * hn * area_1 * v, -0.5 * hn * area_2 * v
+            p1 = (p1 * (volume_1 - swept_1) + hn * into_1) / (volume_1 + swept_1)
+            p2 = (p2 * (volume_2 - swept_2) + hn * into_2) / (volume_2 + swept_2)
     s.x, s.v, s.load_x, s.load_v, s.a = x, v, load_x, load_v, a
     s.P1, s.P2, s.valve_1, s.valve_2 = p1, p2, valve_1, valve_2
     s.friction, s.sensed_a = friction, sensed
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _upstream(pressure: float, wanted: float, port: float, p: Record) -> float:
     """Upstream pressure that drives the flow `wanted` into a chamber at `pressure` [Pa]."""
     low, high = 0.5 * pressure, 2.0 * pressure
     for _ in range(100):
         middle = 0.5 * (low + high)
-        enough = flow(middle, pressure, port, p.port_laminar) > wanted
+        enough = flow(middle, pressure, port, p.port_resistance) > wanted
         low, high = (low, middle) if enough else (middle, high)
     return 0.5 * (low + high)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def balance(parameters: NDArray[np.void]) -> tuple[float, float, float]:
     """Pressures at which the piston rests at mid stroke, and the valve's null that gives them.
 
@@ -279,7 +285,7 @@ def balance(parameters: NDArray[np.void]) -> tuple[float, float, float]:
     for _ in range(100):
         p1 = 0.5 * (low + high)
         p2 = (p1 * p.piston_area - p.atmosphere * (p.piston_area - p.annulus_area)) / p.annulus_area
-        across = flow(p1, p2, leak, p.leak_laminar)
+        across = flow(p1, p2, leak, p.leak_resistance)
         pu1 = _upstream(p1, across, port, p)
         pu2 = _upstream(p2, -across, port, p)
         low, high = (p1, high) if pu1 + pu2 < 2.0 * p.mean_pressure else (low, p1)

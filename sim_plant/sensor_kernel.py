@@ -29,7 +29,7 @@ SENSOR_DELAY_LINE = 128
 _SPIKES_PER_SECOND = 2.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def high_passed(value: float, corner: float, rate: float, s: Record) -> float:
     """First-order high-pass, bilinear, as a piezo element with its charge amplifier has."""
     warped = math.tan(math.pi * corner / rate)
@@ -38,7 +38,7 @@ def high_passed(value: float, corner: float, rate: float, s: Record) -> float:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def delayed(value: float, line: Floats, sample: int, late: float) -> float:
     """`value` as it was `late` samples ago, between samples by a straight line."""
     line[sample % SENSOR_DELAY_LINE] = value
@@ -49,7 +49,7 @@ def delayed(value: float, line: Floats, sample: int, late: float) -> float:
     return value + part * line[(sample - whole - 1) % SENSOR_DELAY_LINE]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def reading(  # noqa: PLR0917
     value: float,
     normal: float,
@@ -75,7 +75,7 @@ def reading(  # noqa: PLR0917
     return value
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance_sensors(  # noqa: PLR0917
     true_values: Floats,
     normal: Floats,
