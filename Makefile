@@ -36,7 +36,7 @@ lint: $(STAMPS)/dev  ## ruff, mypy --strict and the rules of which layer imports
 	@ruff check .
 	@ruff format --check .
 	@mypy
-	@lint-imports --no-timing
+	@lint-imports
 
 demo-headless: $(STAMPS)/run
 	@rigwatch demo --headless

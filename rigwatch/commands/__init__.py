@@ -23,6 +23,8 @@ from rigwatch.wire.errors import RigwatchError
 
 COMMANDS: dict[str, str] = {
     # name on the command line: module below rigwatch.commands
+    "up": "up",
+    "doctor": "doctor",
     "info": "info",
     "trim": "trim",
     "recover": "recover",

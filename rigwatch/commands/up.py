@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rigwatch.supervisor.console import Console, Flow
 from rigwatch.supervisor.plan import PROCESSES, plan
-from rigwatch.supervisor.ports import endpoint_address, is_free
+from rigwatch.wire.ports import endpoint_address, is_free
 from rigwatch.supervisor.supervisor import Supervisor
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.heartbeat import Heartbeat

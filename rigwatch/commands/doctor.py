@@ -1,0 +1,58 @@
+"""`rigwatch doctor`: checks the installation, this machine and a configuration."""
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+from rigwatch.doctor.finding import Finding
+from rigwatch.doctor.machine import check_machine
+from rigwatch.doctor.rig import check_rig
+from rigwatch.doctor.viewer import check_viewer
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.rig_config import load_rig
+
+HELP = "check the installation, ports, devices and a configuration"
+EXAMPLE = """  rigwatch doctor
+  rigwatch doctor configs/demo.toml"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "config", type=Path, nargs="?", metavar="CONFIG", help="configuration to check as well"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print every finding; 1 where one of them keeps rigwatch from running."""
+    findings = []
+    for finding in _findings(arguments.config):
+        findings.append(finding)
+        if not arguments.json:
+            print(_line(finding), flush=True)
+    if arguments.json:
+        print(json.dumps([asdict(finding) for finding in findings], indent=1))
+    return 1 if any(finding.level == "fail" for finding in findings) else 0
+
+
+def _findings(config: Path | None) -> Iterator[Finding]:
+    yield from check_machine(_recordings(config))
+    yield from check_viewer()
+    if config is not None:
+        yield from check_rig(config)
+
+
+def _recordings(config: Path | None) -> Path:
+    """Where recordings go; a configuration that is wrong is told of by its own check."""
+    try:
+        recorder = load_rig(config).recorder if config is not None else None
+    except RigwatchError:
+        recorder = None
+    return Path(recorder.folder if recorder is not None else "sessions")
+
+
+def _line(finding: Finding) -> str:
+    remedy = f" -> {finding.remedy}" if finding.remedy else ""
+    return f"{finding.level:4} {finding.what:24} {finding.text}{remedy}"
