@@ -79,6 +79,7 @@ class SessionWriter:
             self._head(run)
         except SessionError:
             self.abandon()
+            self.path.unlink(missing_ok=True)
             raise
 
     def _head(self, run: RunInfo) -> None:

@@ -1,0 +1,170 @@
+"""Keeps a session on the disk whatever the disk does: in segments, or in memory meanwhile.
+
+    add → waiting (bounded, oldest dropped and counted) → flush → segment 000001.mcap, 000002.mcap,
+    …
+
+Where the disk is full, gone or read-only, messages wait in memory and the store tries again once a
+second, in a new segment. Nothing here raises for that: what happened is told as events.
+"""
+
+from collections import deque
+from pathlib import Path
+
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import EstimateBlock, Event, Message, RunInfo, SampleBlock, Severity
+from rigwatch.wire.session.reader import SUFFIX
+from rigwatch.wire.session.writer import SessionWriter
+
+SOURCE = "recorder"
+RAM_BYTES = 64 << 20
+"""Memory for messages that wait for the disk, about half an hour of them [bytes]."""
+RETRY_AFTER = 1.0
+"""Time between attempts to write again [s]."""
+_PLAIN_MESSAGE = 500
+_PER_VALUE = 9
+
+
+def weight(message: Message) -> int:
+    """About how much memory the message takes [bytes]."""
+    if isinstance(message, SampleBlock):
+        return _PLAIN_MESSAGE + len(message) * _PER_VALUE * (len(message.channels) + 2)
+    if isinstance(message, EstimateBlock):
+        return _PLAIN_MESSAGE + len(message) * _PER_VALUE * (len(message.columns) + 1)
+    return _PLAIN_MESSAGE
+
+
+class Store:
+    """One session folder being written; `now` is a monotonic clock's time [s] throughout.
+
+    Args:
+        folder: the session's folder, made with the first segment.
+        run: stands at the head of each segment.
+        segment: length of a segment [s].
+        ram_bytes: memory for messages that wait [bytes].
+
+    Attributes:
+        samples: samples on the disk.
+        dropped_samples: samples given up because the disk was away for too long.
+        dropped_messages: other messages given up.
+        segment_count: segments begun.
+        failure: why the disk cannot be written, empty while it can.
+    """
+
+    def __init__(
+        self, folder: Path, run: RunInfo, segment: float, ram_bytes: int = RAM_BYTES
+    ) -> None:
+        self.folder = folder
+        self.samples = self.dropped_samples = self.dropped_messages = 0
+        self.segment_count = 0
+        self.failure = ""
+        self._run, self._segment, self._ram_bytes = run, segment, ram_bytes
+        self._waiting: deque[Message] = deque()
+        self._waiting_bytes = 0
+        self._writer: SessionWriter | None = None
+        self._opened_at = self._retry_at = float("-inf")
+        self._dropped_before = 0
+        self._events: list[Event] = []
+
+    def add(self, message: Message) -> None:
+        """Take a message for the next flush; the oldest is dropped where memory is used up."""
+        self._waiting.append(message)
+        self._waiting_bytes += weight(message)
+        while self._waiting_bytes > self._ram_bytes:
+            self._drop(self._waiting.popleft())
+
+    def _drop(self, message: Message) -> None:
+        self._waiting_bytes -= weight(message)
+        if isinstance(message, SampleBlock):
+            self.dropped_samples += len(message)
+        else:
+            self.dropped_messages += 1
+
+    def flush(self, now: float, t_ns: int) -> list[Event]:
+        """Write what waits, if the disk lets us; returns what happened (`t_ns`: time of events)."""
+        if self._waiting and now >= self._retry_at:
+            try:
+                self._flush(now)
+            except SessionError as error:
+                self._fail(str(error), now, t_ns)
+            else:
+                self._recover(t_ns)
+        events, self._events = self._events, []
+        return events
+
+    def _flush(self, now: float) -> None:
+        if self._writer is not None and now - self._opened_at >= self._segment:
+            self._finish()
+        if self._writer is None:
+            self._open(now)
+        self._write_waiting()
+
+    def _open(self, now: float) -> None:
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            raise SessionError(f"{self.folder}: cannot be made: {reason}") from error
+        path = self.folder / f"{self.segment_count + 1:06d}{SUFFIX}"
+        while path.exists():
+            self.segment_count += 1
+            path = self.folder / f"{self.segment_count + 1:06d}{SUFFIX}"
+        self._writer = SessionWriter(path, self._run)
+        self.segment_count += 1
+        self._opened_at = now
+
+    def _write_waiting(self) -> None:
+        writer = self._writer
+        assert writer is not None
+        samples = 0
+        while self._waiting:
+            message = self._waiting.popleft()
+            samples += len(message) if isinstance(message, SampleBlock) else 0
+            writer.write(message)
+        writer.flush()
+        self._waiting_bytes = 0
+        self.samples += samples
+
+    def _fail(self, reason: str, now: float, t_ns: int) -> None:
+        """Take back what did not reach the disk, and begin a new segment later."""
+        self._retry_at = now + RETRY_AFTER
+        if self._writer is not None:
+            self._waiting.extendleft(reversed(self._writer.pending))
+            self._writer.abandon()
+            self._writer = None
+        self._waiting_bytes = sum(map(weight, self._waiting))
+        if not self.failure:
+            self._dropped_before = self.dropped_samples + self.dropped_messages
+            self._tell("error", "RECORDING_STOPPED", reason, t_ns)
+        self.failure = reason
+
+    def _recover(self, t_ns: int) -> None:
+        if self.failure:
+            dropped = self.dropped_samples + self.dropped_messages - self._dropped_before
+            text = (
+                f"writing again in segment {self.segment_count}, {dropped} messages or samples lost"
+            )
+            self._tell("warning" if dropped else "info", "RECORDING_RESUMED", text, t_ns)
+        self.failure = ""
+
+    def _tell(self, severity: Severity, code: str, text: str, t_ns: int) -> None:
+        self._events.append(Event(SOURCE, t_ns, severity, code, text))
+
+    def _finish(self) -> None:
+        """Close the segment; its data are on the disk whether or not the index fits."""
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()
+
+    def close(self, now: float, t_ns: int) -> list[Event]:
+        """Write what waits and close the segment; what cannot be written is counted as dropped."""
+        self._retry_at = now
+        events = self.flush(now, t_ns)
+        try:
+            self._finish()
+        except SessionError as error:
+            self._tell("error", "RECORDING_STOPPED", str(error), t_ns)
+        while self._waiting:
+            self._drop(self._waiting.popleft())
+        events += self._events
+        self._events = []
+        return events
