@@ -60,7 +60,7 @@ class RigParameters(Section, frozen=True, kw_only=True):
     ] = 542.0e3
     pressure_per_volt: Annotated[
         float, _positive("change of each upstream pressure, chosen [Pa/V]")
-    ] = 43.6e3
+    ] = 40.0e3
     valve_limit: Annotated[float, _positive("largest drive voltage [V]")] = 5.0
     valve_frequency: Annotated[float, _positive("natural frequency, chosen [Hz]")] = 30.0
     valve_damping: Annotated[
@@ -72,9 +72,9 @@ class RigParameters(Section, frozen=True, kw_only=True):
     port_area: Annotated[float, _positive("orifice of each port, chosen [mm^2]")] = 0.5
     port_resistance: Annotated[
         float, _positive("laminar, of each line from the valve's nozzle, chosen [Pa s/m^3]")
-    ] = 5.5e9
+    ] = 7.0e9
     piston_leak: Annotated[float, _not_negative("clearance seal, as an orifice, chosen [mm^2]")] = (
-        0.0126
+        0.006
     )
     leak_resistance: Annotated[float, _positive("laminar, of a leak, chosen [Pa s/m^3]")] = 5.0e9
 
@@ -88,7 +88,7 @@ class RigParameters(Section, frozen=True, kw_only=True):
     lvdt_range: Annotated[float, _positive("half range [m]")] = 1.0 * INCH
     lvdt_gain: Annotated[float, _positive("[V/m]")] = 10.0 / INCH
     lvdt_resolution: Annotated[float, _not_negative("smallest step, 0 for none [m]")] = 0.001 * INCH
-    lvdt_noise: Annotated[float, _not_negative("rms, chosen [m]")] = 0.0003 * INCH
+    lvdt_noise: Annotated[float, _not_negative("rms, chosen [m]")] = 7.62e-6
     accelerometer_range: Annotated[float, _positive("half range [m/s^2]")] = 50.0 * GRAVITY
     accelerometer_gain: Annotated[float, _positive("[V/(m/s^2)]")] = 0.1014 / GRAVITY
     accelerometer_corner: Annotated[float, _positive("piezo high-pass, chosen [Hz]")] = 0.5

@@ -79,15 +79,16 @@ def dry_friction(  # noqa: PLR0917
 ) -> float:
     """Velocity after one step of dry friction [m/s].
 
-    `free_velocity` is what the step would give without it. A load at rest (`velocity` exactly zero)
-    has to overcome the static level, a sliding one the kinetic level; neither is turned round.
+    `free_velocity` is what the step would give without it. A load at rest, or one that comes to
+    rest within the step, stays unless the other forces exceed the static level; a sliding one is
+    slowed by the kinetic level, which cannot turn it round.
     """
     toward = 1.0 if free_velocity > 0.0 else -1.0
     kinetic = base + e.coulomb + e.binding * abs(x) + e.coulomb_direction * toward
     kinetic = max(kinetic, 0.0)
-    if velocity == 0.0:
+    if velocity * free_velocity <= 0.0:
         static = e.static_ratio * kinetic + e.stribeck + e.stiction
-        if abs(free_velocity) <= static * per_mass:
+        if abs(free_velocity - velocity) <= static * per_mass:
             return 0.0
     if e.stribeck > 0.0:
         kinetic += e.stribeck * math.exp(-((velocity / e.stribeck_speed) ** 2))
@@ -146,6 +147,13 @@ def valve_voltage(line: Floats, sample: int, s: Record, e: Record, p: Record) ->
 
 
 @njit(cache=True, error_model="numpy")
+def upstream(lift: float, supply: float, p: Record) -> float:
+    """Pressure at a nozzle that the flapper lifts by `lift`, with a share of the supply [Pa]."""
+    pressure = min(max(p.mean_pressure + lift, p.atmosphere), p.highest_pressure)
+    return p.atmosphere + supply * (pressure - p.atmosphere)
+
+
+@njit(cache=True, error_model="numpy")
 def advance_plant(  # noqa: PLR0915, PLR0917
     command: Floats,
     parameters: NDArray[np.void],
@@ -193,7 +201,6 @@ def advance_plant(  # noqa: PLR0915, PLR0917
     x, v, load_x, load_v, a = s.x, s.v, s.load_x, s.load_v, s.a
     p1, p2, valve_1, valve_2 = s.P1, s.P2, s.valve_1, s.valve_2
     friction, sensed = s.friction, s.sensed_a
-    pu1 = pu2 = p.mean_pressure
     for row in range(command.size):
         sample = first + row
         s.pick_off += share_c * (load_x - s.pick_off)
@@ -202,8 +209,7 @@ def advance_plant(  # noqa: PLR0915, PLR0917
         line[sample % DELAY_LINE] = drive
         volts = valve_voltage(line, sample, s, e, p)
         lift = null + p.pressure_per_volt * valve_2
-        pu1 = min(max(p.mean_pressure + lift, p.atmosphere), p.highest_pressure)
-        pu2 = min(max(p.mean_pressure - lift, p.atmosphere), p.highest_pressure)
+        pu1, pu2 = upstream(lift, supply, p), upstream(-lift, supply, p)
         truth[row, 0], truth[row, 1], truth[row, 2] = load_x, load_v, a
         truth[row, 3], truth[row, 4], truth[row, 5], truth[row, 6] = p1, p2, pu1, pu2
         truth[row, 7], truth[row, 8], truth[row, 9] = friction, drive, sensed
@@ -211,10 +217,7 @@ def advance_plant(  # noqa: PLR0915, PLR0917
             valve_1 += share_1 * (volts - valve_1)
             valve_2 += share_2 * (valve_1 - valve_2)
             lift = null + p.pressure_per_volt * valve_2
-            pu1 = min(max(p.mean_pressure + lift, p.atmosphere), p.highest_pressure)
-            pu2 = min(max(p.mean_pressure - lift, p.atmosphere), p.highest_pressure)
-            pu1 = p.atmosphere + supply * (pu1 - p.atmosphere)
-            pu2 = p.atmosphere + supply * (pu2 - p.atmosphere)
+            pu1, pu2 = upstream(lift, supply, p), upstream(-lift, supply, p)
 
             push = p1 * area_1 - p2 * area_2 - p.atmosphere * (area_1 - area_2)
             push += end_stop(x, v, p)

@@ -101,12 +101,10 @@ class Rig:
         """Gives the effect `name` its `value` from the next sample on, or by a ramp over `over_s`.
 
         Raises:
-            ModelError: there is no such effect, or the value is not finite.
+            ModelError: there is no such effect, or it cannot have this value.
         """
-        if name not in table.EFFECTS:
-            raise ModelError(f"{name!r} is not an effect of the rig: see rigwatch plant --effects")
-        if not np.isfinite(value):
-            raise ModelError(f"effect {name}: found {value}, expected a finite number")
+        if wrong := table.complaint(name, value):
+            raise ModelError(f"effect {name}: found {wrong[0]}, expected {wrong[1]}")
         self._ramps.pop(name, None)
         length = round(over_s * self.parameters.sample_rate)
         if length > 0:

@@ -17,7 +17,7 @@ from msgspec import Meta, field, structs
 
 from rigwatch.wire.config import Section, load
 from rigwatch.wire.errors import ConfigError
-from sim_plant.effects import EFFECTS
+from sim_plant.effects import complaint
 from sim_plant.excitation import Excitation, drive
 from sim_plant.parameters import RigParameters
 from sim_plant.rig import RawSamples, Rig
@@ -83,18 +83,18 @@ def load_scenario(path: Path | str) -> Scenario:
     """
     scenario = load(path, Scenario)
     for index, event in enumerate(scenario.events):
-        _check_effect(path, f"events[{index}].effect", event.effect)
+        _check_effect(path, f"events[{index}]", event.effect, event.value)
         if scenario.cycle_s and event.at_s + event.over_s > scenario.cycle_s:
             expected = f"an end before cycle_s = {scenario.cycle_s} s"
             raise ConfigError(path, f"events[{index}].at_s", f"{event.at_s} s", expected)
-    for name in scenario.effects:
-        _check_effect(path, f"effects.{name}", name)
+    for name, value in scenario.effects.items():
+        _check_effect(path, f"effects.{name}", name, value)
     return _beside(scenario, Path(path).parent)
 
 
-def _check_effect(path: Path | str, key: str, name: str) -> None:
-    if name not in EFFECTS:
-        raise ConfigError(path, key, repr(name), f"one of {', '.join(EFFECTS)}")
+def _check_effect(path: Path | str, key: str, name: str, value: float) -> None:
+    if wrong := complaint(name, value):
+        raise ConfigError(path, key, *wrong)
 
 
 def _beside(scenario: Scenario, folder: Path) -> Scenario:
