@@ -2,16 +2,19 @@
 
 TIMELINE = "time"
 
+ADVICE = "advice"
 STATUS = "status"
 WAITING = "waiting"
-STATES = "rig"
-"""The verdict's lane; a lane an alarm stands below it."""
+VERDICT = "verdict"
+LANES = "rig"
 LOG = "alarms"
 EVENTS = "events"
 HEALTH = "health"
 
 VERDICT_VIEW = "Verdict"
-ALARMS_VIEW = "Verdict and alarms over time"
-LOG_VIEW = "Alarm log: what happened, what to do"
+ADVICE_VIEW = "What to do"
+STATUS_VIEW = "Status"
+ALARMS_VIEW = "Alarms over time"
+LOG_VIEW = "Alarm log"
 EVENTS_VIEW = "Events and gaps"
 HEALTH_VIEWS = {"rates": "Rates [Hz]", "latency": "Times [ms]", "counts": "Counts since start"}

@@ -12,21 +12,8 @@ from dataclasses import dataclass
 
 import rerun.blueprint as rrb
 
+from rigwatch.dashboard import entities as at
 from rigwatch.dashboard import quantities
-from rigwatch.dashboard.entities import (
-    ALARMS_VIEW,
-    EVENTS,
-    EVENTS_VIEW,
-    HEALTH,
-    HEALTH_VIEWS,
-    LOG,
-    LOG_VIEW,
-    STATES,
-    STATUS,
-    TIMELINE,
-    VERDICT_VIEW,
-    WAITING,
-)
 from rigwatch.dashboard.survey import PlotPlan
 
 _TITLES = {
@@ -37,6 +24,7 @@ _TITLES = {
     quantities.THETA1.path: "Coulomb friction θ1, with thresholds and signature",
     quantities.THETA2.path: "Viscous friction θ2, with thresholds and signature",
 }
+FRICTION = (quantities.THETA1.path, quantities.THETA2.path)
 ACCELERATION_TITLE = "Acceleration, measured and modelled"
 
 
@@ -64,7 +52,7 @@ def blueprint(plan: Sequence[PlotPlan], windows: Windows, *, live: bool) -> rrb.
     return rrb.Blueprint(
         rrb.Tabs(_watch(plan, windows), _health(windows), active_tab=0),
         rrb.TimePanel(
-            state="collapsed", timeline=TIMELINE, play_state="following" if live else "paused"
+            state="collapsed", timeline=at.TIMELINE, play_state="following" if live else "paused"
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
@@ -75,7 +63,7 @@ def blueprint(plan: Sequence[PlotPlan], windows: Windows, *, live: bool) -> rrb.
 
 def title_of(plan: PlotPlan) -> str:
     """Title of a plot's view, with the unit."""
-    return f"{_TITLES.get(plan.plot.path, plan.plot.series[0].label.capitalize())}{_in(plan.unit)}"
+    return f"{_TITLES.get(plan.plot.path, plan.plot.series[-1].label.capitalize())}{_in(plan.unit)}"
 
 
 def _in(unit: str) -> str:
@@ -84,22 +72,30 @@ def _in(unit: str) -> str:
 
 def _watch(plan: Sequence[PlotPlan], windows: Windows) -> rrb.Container:
     by_path = {line.plot.path: line for line in plan}
-    friction = [quantities.THETA1.path, quantities.THETA2.path]
-    left = _signal_views(plan, windows, skip=friction)
-    right = [
-        rrb.TextDocumentView(origin=STATUS if plan else WAITING, name=VERDICT_VIEW),
-        rrb.StateTimelineView(
-            origin=STATES,
-            name=ALARMS_VIEW,
-            time_view=_time_axis(windows.history),
+    friction = [by_path[path] for path in FRICTION if path in by_path]
+    right: list[rrb.Container | rrb.View] = [
+        rrb.Horizontal(
+            rrb.TextDocumentView(origin=at.ADVICE if plan else at.WAITING, name=at.ADVICE_VIEW),
+            rrb.TextDocumentView(origin=at.STATUS, name=at.STATUS_VIEW),
         ),
-        *(_series_view(by_path[path], windows.history) for path in friction if path in by_path),
-        _log_view(LOG, LOG_VIEW),
+        _states_view(at.LANES, at.ALARMS_VIEW, windows),
+        *(_series_view(line, windows.history) for line in friction),
+        _log_view(at.LOG, at.LOG_VIEW),
     ]
-    shares = [2.6, 1.7, *[1.7] * (len(right) - 3), 1.5]
-    columns = [rrb.Vertical(*left)] if left else []
-    columns.append(rrb.Vertical(*right, row_shares=shares))
-    return rrb.Horizontal(*columns, column_shares=[6, 5][-len(columns) :], name="Watch")
+    shares = [2.8, 2.2, *[1.9] * len(friction), 1.4]
+    columns: list[rrb.Container] = [rrb.Vertical(*right, row_shares=shares)]
+    if left := _signal_views(plan, windows):
+        columns.insert(0, rrb.Vertical(*left))
+    return rrb.Vertical(
+        _states_view(at.VERDICT, at.VERDICT_VIEW, windows),
+        rrb.Horizontal(*columns, column_shares=[6, 5][-len(columns) :]),
+        row_shares=[1, 9],
+        name="Watch",
+    )
+
+
+def _states_view(origin: str, name: str, windows: Windows) -> rrb.View:
+    return rrb.StateTimelineView(origin=origin, name=name, time_view=_time_axis(windows.history))
 
 
 def _log_view(origin: str, name: str) -> rrb.View:
@@ -108,7 +104,7 @@ def _log_view(origin: str, name: str) -> rrb.View:
     )
 
 
-def _signal_views(plan: Sequence[PlotPlan], windows: Windows, skip: list[str]) -> list[rrb.View]:
+def _signal_views(plan: Sequence[PlotPlan], windows: Windows) -> list[rrb.View]:
     """One view a signal, in the order of the table; both accelerations in one."""
     views: list[rrb.View] = []
     order = [plot.path for plot in (*quantities.SAMPLE_PLOTS, *quantities.ESTIMATE_PLOTS)]
@@ -117,7 +113,7 @@ def _signal_views(plan: Sequence[PlotPlan], windows: Windows, skip: list[str]) -
     done: set[str] = set()
     for line in lines:
         path = line.plot.path
-        if path in skip or path in done:
+        if path in FRICTION or path in done:
             continue
         if path in pair:
             done.update(pair)
@@ -154,7 +150,7 @@ def _visible(window: float | None) -> rrb.VisibleTimeRange | None:
     if window is None:
         return None
     return rrb.VisibleTimeRange(
-        TIMELINE,
+        at.TIMELINE,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-window),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )
@@ -174,12 +170,12 @@ def _time_axis(window: float | None) -> rrb.TimeAxis | None:
 def _health(windows: Windows) -> rrb.Container:
     views = [
         rrb.TimeSeriesView(
-            origin=f"{HEALTH}/{kind}",
+            origin=f"{at.HEALTH}/{kind}",
             name=title,
             time_ranges=_visible(windows.history),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
         )
-        for kind, title in HEALTH_VIEWS.items()
+        for kind, title in at.HEALTH_VIEWS.items()
     ]
-    log = _log_view(EVENTS, EVENTS_VIEW)
+    log = _log_view(at.EVENTS, at.EVENTS_VIEW)
     return rrb.Grid(*views, log, grid_columns=2, name="Health")

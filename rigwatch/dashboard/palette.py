@@ -3,9 +3,6 @@
 Colours are (red, green, blue) from 0 to 255. Measured things are warm or saturated, modelled ones pale, limits red.
 """
 
-from collections.abc import Mapping
-from typing import Any
-
 from rigwatch.wire.messages import AlarmState
 
 Colour = tuple[int, int, int]
@@ -52,8 +49,3 @@ def rgba(colour: Colour) -> int:
     """The colour as 0xRRGGBBAA, opaque."""
     red, green, blue = colour
     return red << 24 | green << 16 | blue << 8 | 0xFF
-
-
-def state_colours(looks: Mapping[Any, tuple[str, Colour]]) -> list[int]:
-    """The colours of states, each as 0xRRGGBBAA."""
-    return [rgba(colour) for _, colour in looks.values()]

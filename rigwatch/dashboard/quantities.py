@@ -1,7 +1,7 @@
 """Which column of a message is drawn where: one row a plot, one line a series.
 
-A plot is one entity with several scalars, so that one batch a plot travels to the viewer. Its first series decides
-whether the plot exists; a message without the others leaves them out (NaN). Channels without a row of their own get a
+A plot is one entity with several scalars, so that one batch a plot travels to the viewer. Its last series, which is drawn
+on top, decides whether the plot exists; a message without the others leaves them out (NaN). Channels without a row of their own get a
 plot each under `signals/other`.
 """
 
@@ -49,7 +49,7 @@ class Plot:
     @property
     def key(self) -> str:
         """Name of the column that decides whether the plot exists."""
-        return self.series[0].column
+        return self.series[-1].column
 
 
 def _limited(path: str, column: str, label: str, colour: Colour) -> Plot:
@@ -57,13 +57,13 @@ def _limited(path: str, column: str, label: str, colour: Colour) -> Plot:
         Series(f"{column}_low", "limit", palette.LIMIT, 1.2),
         Series(f"{column}_high", "limit", palette.LIMIT, 1.2),
     )
-    return Plot(path, (Series(column, label, colour), *limits))
+    return Plot(path, (*limits, Series(column, label, colour)))
 
 
 def _friction(path: str, column: str, label: str, colour: Colour) -> Plot:
-    plot = _limited(path, column, label, colour)
+    low, high, estimate = _limited(path, column, label, colour).series
     signature = Series(f"{column}_signature", "signature", palette.SIGNATURE, 1.2)
-    return Plot(path, (*plot.series, signature))
+    return Plot(path, (low, high, signature, estimate))
 
 
 VOLTAGE = Plot("signals/voltage", (Series("voltage", "servo voltage", palette.VOLTAGE),))
@@ -91,6 +91,6 @@ def other_plot(column: Column, index: int) -> Plot:
 
 
 def plots_of(columns: Iterable[Column], table: tuple[Plot, ...]) -> list[Plot]:
-    """The rows of `table` whose first series is among `columns`."""
+    """The rows of `table` whose key is among `columns`."""
     names = {column.name for column in columns}
     return [plot for plot in table if plot.key in names]

@@ -1,125 +1,104 @@
-"""The verdict in words, as Markdown: is there a fault, what is it probably, what to do, and how far to trust it.
+"""The verdict in words, as Markdown: is there a fault, what is it probably, what to do, how sure.
 
 Made so that the first line answers the question that people walk up to the screen with.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
 
-from rigwatch.dashboard.alarm_book import AlarmBook, title
-from rigwatch.dashboard.palette import VERDICTS
-from rigwatch.wire.messages import Alarm, Health
+from rigwatch.dashboard.alarm_book import title
+from rigwatch.dashboard.facts import Facts
+from rigwatch.wire.messages import Alarm
 
-
-@dataclass(slots=True)
-class Facts:
-    """What the status text is made of.
-
-    Attributes:
-        rig: the rig's id.
-        book: states of the alarms.
-        health: last health message of each process, by source.
-        figures: last value of each estimated figure, by column name.
-        latency_ms: now, mean, worst: from the sample's time stamp to its arrival here [ms]; None where not live.
-        skipped: messages that the dashboard left out because it was slow.
-        samples: samples drawn.
-        model: name of the model in use, "" where unknown.
-    """
-
-    rig: str
-    book: AlarmBook
-    health: dict[str, Health] = field(default_factory=dict)
-    figures: dict[str, float] = field(default_factory=dict)
-    latency_ms: tuple[float, float, float] | None = None
-    skipped: int = 0
-    samples: int = 0
-    model: str = ""
-
-    def verdict(self) -> str:
-        """The verdict as one of `palette.VERDICTS`."""
-        if faults := self.book.faults():
-            name = faults[0].name.partition(".")[0]
-            return name if name in VERDICTS else "fault"
-        if self.book.unseen():
-            return "over"
-        if self.book.remarks():
-            return "no_verdict"
-        return "healthy" if self.figures else "waiting"
+_UNITS = {"hz": "Hz", "ms": "ms", "us": "µs", "ppm": "ppm", "s": "s"}
+_SIGNATURES = (("theta1", "Coulomb θ1"), ("theta2", "viscous θ2"))
 
 
-def markdown(facts: Facts) -> str:
-    """The whole text."""
-    return "\n\n".join(part for part in (_verdict(facts), _table(facts), _processes(facts)) if part)
-
-
-def _verdict(facts: Facts) -> str:
+def advice(facts: Facts) -> str:
+    """Is there a fault, what is it probably, and what to do."""
     faults, remarks, unseen = facts.book.faults(), facts.book.remarks(), facts.book.unseen()
     if faults:
-        return _fault(faults[0], faults[1:])
+        return _paragraphs(*_fault(faults[0], faults[1:]), _friction(facts))
     if facts.samples == 0:
-        return "# Waiting for samples\n\nNo sample has arrived yet."
-    if unseen:
-        text = _sentence(unseen[0].cause)
-        return (
-            f"# Over, not yet seen: {title(unseen[0].name)}\n\n{text} Acknowledge it to clear this."
+        return _paragraphs(f"# Waiting for {facts.rig}", "No sample has arrived yet.")
+    if facts.silent_s:
+        text = (
+            f"Nothing for {facts.silent_s:.0f} s. What is drawn is old: look at daq and its line."
         )
+        return _paragraphs("# NO SAMPLES", text)
+    if unseen:
+        text = f"{_sentence(unseen[0].cause)} It has gone, and nobody has acknowledged it."
+        return _paragraphs(f"# Over: {title(unseen[0].name)}", text, _friction(facts))
     if remarks:
-        return f"# No verdict just now\n\n{_sentence(remarks[0].cause)} {remarks[0].guidance}"
+        return _paragraphs("# No verdict now", _sentence(remarks[0].cause), remarks[0].guidance)
     if not facts.figures:
-        return "# No estimates yet\n\nSamples arrive, the monitor has not said anything about them."
-    return "# Healthy\n\nThe rig moves as its model says: no sign of friction."
+        return _paragraphs("# No estimates yet", "Samples arrive; the monitor is silent so far.")
+    text = "The rig moves as its model says: no sign of friction. Nothing to do."
+    return _paragraphs("# Healthy", text, _friction(facts))
 
 
-def _fault(worst: Alarm, others: Sequence[Alarm]) -> str:
-    lines = [f"# {title(worst.name).upper()}", f"{_sentence(worst.cause)}", f"**{worst.guidance}**"]
+def status(facts: Facts) -> str:
+    """How far to trust the verdict: figures of the processes, and what they complain of."""
+    rows = [*_counter_rows(facts)]
+    if facts.age.known:
+        age = facts.age
+        rows.append(_row("newest sample here, age [ms]", age.now, age.mean, age.worst))
+    head = ["| | now | mean | worst |", "|---|---:|---:|---:|"]
+    complaints = [f"* {h.source}: {h.state}, {h.text}" for h in facts.health.values() if h.text]
+    if facts.skipped:
+        complaints.append(f"* this screen left out {facts.skipped} messages to keep up")
+    return _paragraphs("\n".join(complaints), "\n".join([*head, *rows]) if rows else "")
+
+
+def _paragraphs(*parts: str) -> str:
+    return "\n\n".join(part for part in parts if part)
+
+
+def _fault(worst: Alarm, others: Sequence[Alarm]) -> Iterator[str]:
+    yield f"# {title(worst.name).upper()}"
+    yield f"**{worst.guidance}**"
+    yield _sentence(worst.cause)
     if others:
-        lines.append("Also: " + "; ".join(title(alarm.name) for alarm in others[:4]) + ".")
-    return "\n\n".join(lines)
+        yield f"Also: {'; '.join(title(alarm.name) for alarm in others[:4])}."
 
 
 def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
-def _table(facts: Facts) -> str:
-    rows = [*_counter_rows(facts.health)]
-    if facts.latency_ms:
-        rows.append(_row("latency to this screen [ms]", *facts.latency_ms))
-    if not rows:
-        return ""
-    return "\n".join(["| | now | mean | worst |", "|---|---:|---:|---:|", *rows])
+def _friction(facts: Facts) -> str:
+    """The estimates beside the signature of the fault, where both are known."""
+    parts = []
+    for name, label in _SIGNATURES:
+        value, signature = facts.figures.get(name), facts.figures.get(f"{name}_signature")
+        if value is not None:
+            known = f" (friction: {signature:.3g})" if signature is not None else ""
+            parts.append(f"{label} = {value:.2f}{known}")
+    return ", ".join(parts)
 
 
-def _counter_rows(health: Mapping[str, Health]) -> list[str]:
-    """Rows of the counters that every process may report; `_mean` and `_worst` join their counter."""
-    rows = []
-    for source in sorted(health):
-        counters = health[source].counters
-        for name, value in counters.items():
-            if name.rpartition("_")[2] in ("mean", "worst") or _companion(name, counters):
-                continue
-            mean, worst = counters.get(_with(name, "mean")), counters.get(_with(name, "worst"))
-            rows.append(_row(f"{source}: {_words(name)}", value, mean, worst))
-    return rows
+def _counter_rows(facts: Facts) -> Iterator[str]:
+    """One row a counter; `rate_mean_hz` and `rate_worst_hz` join `rate_hz`."""
+    for source, health in sorted(facts.health.items()):
+        for name, value in health.counters.items():
+            if not _belongs_to_another(name, health.counters):
+                mean, worst = (health.counters.get(_with(name, w)) for w in ("mean", "worst"))
+                yield _row(f"{source}: {_words(name)}", value, mean, worst)
 
 
-def _companion(name: str, counters: Mapping[str, float]) -> bool:
-    """Whether the counter is the mean or the worst of another one, such as `rate_mean_hz`."""
-    for word in ("_mean", "_worst"):
-        if word in name and name.replace(word, "", 1) in counters:
-            return True
-    return False
+def _belongs_to_another(name: str, counters: Mapping[str, float]) -> bool:
+    stems = (name.replace(f"_{word}", "", 1) for word in ("mean", "worst") if f"_{word}" in name)
+    return any(stem in counters for stem in stems)
 
 
 def _with(name: str, word: str) -> str:
     stem, _, unit = name.rpartition("_")
-    return f"{stem}_{word}_{unit}" if unit in ("hz", "ms", "us") else f"{name}_{word}"
+    return f"{stem}_{word}_{unit}" if unit in _UNITS else f"{name}_{word}"
 
 
 def _words(name: str) -> str:
     stem, _, unit = name.rpartition("_")
-    shown = {"hz": "Hz", "ms": "ms", "us": "µs", "ppm": "ppm"}.get(unit)
-    return f"{stem.replace('_', ' ')} [{shown}]" if shown else name.replace("_", " ")
+    text = f"{stem} [{_UNITS[unit]}]" if unit in _UNITS else name
+    return text.replace("_", " ").replace("crc", "CRC")
 
 
 def _row(label: str, now: float, mean: float | None = None, worst: float | None = None) -> str:
@@ -130,11 +109,3 @@ def _figure(value: float | None) -> str:
     if value is None:
         return ""
     return f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
-
-
-def _processes(facts: Facts) -> str:
-    ill = [h for _, h in sorted(facts.health.items()) if h.text]
-    lines = [f"* {h.source}: {h.state}, {h.text}" for h in ill]
-    if facts.skipped:
-        lines.append(f"* this screen skipped {facts.skipped} messages to keep up")
-    return "\n".join(lines)

@@ -51,7 +51,7 @@ class Survey:
             self.units[plot.path] = plot.unit or own
         self.peaks[plot.path] = max(self.peaks.get(plot.path, 0.0), peak(drawn))
         if len(plot.series) == 4 and len(drawn):
-            low, high, signature = drawn[-1, 1:4]
+            low, high, signature = drawn[-1, :3]
             self.marks[plot.path] = (float(signature), float(low), float(high))
 
     def plan(self) -> tuple[PlotPlan, ...]:

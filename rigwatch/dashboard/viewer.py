@@ -12,8 +12,9 @@ import socket
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Literal
+from typing import IO, Literal, Self
 
 from rigwatch.wire.errors import RigwatchError
 
@@ -41,7 +42,7 @@ class Viewer:
         web_port: where a browser finds it; 0 for any that is free.
 
     Raises:
-        ViewerError: a port is taken, or the viewer ended at once.
+        ViewerError: a port is taken.
     """
 
     def __init__(self, kind: Kind, port: int = 0, web_port: int = 0) -> None:
@@ -59,7 +60,6 @@ class Viewer:
             stderr=self._words,
             preexec_fn=_die_with_parent,
         )
-        self._await_answer()
 
     @property
     def url(self) -> str:
@@ -71,6 +71,21 @@ class Viewer:
         """What a browser opens."""
         data = f"rerun%2Bhttp%3A%2F%2F{HOST}%3A{self.port}%2Fproxy"
         return f"http://{HOST}:{self.web_port}/?url={data}"
+
+    def await_answer(self, tick: Callable[[], None] = lambda: None) -> Self:
+        """Wait until it takes data, calling `tick` meanwhile; returns itself.
+
+        Raises:
+            ViewerError: it ended, or did not answer in time.
+        """
+        deadline = time.monotonic() + _START_TIMEOUT
+        while not answers(self.port):
+            if self.exit_code() is not None or time.monotonic() > deadline:
+                self.stop()
+                raise ViewerError(f"the viewer did not start: {self.last_words()}")
+            tick()
+            time.sleep(0.05)
+        return self
 
     def exit_code(self) -> int | None:
         """None while it runs; 0 where a person closed the window."""
@@ -101,13 +116,24 @@ class Viewer:
         }
         return options + kind[self.kind]
 
-    def _await_answer(self) -> None:
-        deadline = time.monotonic() + _START_TIMEOUT
-        while not answers(self.port):
-            if self.exit_code() is not None or time.monotonic() > deadline:
-                self.stop()
-                raise ViewerError(f"the viewer did not start: {self.last_words()}")
-            time.sleep(0.05)
+
+class ForeignViewer:
+    """A viewer that somebody else has started on this machine.
+
+    Args:
+        port: where it takes data.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.port = port
+        self.url = f"rerun+http://{HOST}:{port}/proxy"
+
+    def exit_code(self) -> int | None:
+        """None while it answers, 1 after."""
+        return None if answers(self.port) else 1
+
+    def stop(self) -> None:
+        """Leave it to its owner."""
 
 
 def has_display() -> bool:

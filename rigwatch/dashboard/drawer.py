@@ -1,0 +1,65 @@
+"""The feed drawn into one viewer, in a thread of its own: a viewer that hangs holds whoever draws.
+
+A drawer lives as long as its viewer. The next one goes on with the same facts, so that a verdict survives the
+viewer in which it was shown.
+"""
+
+import copy
+import threading
+import time
+
+import rerun as rr
+
+from rigwatch.dashboard.board import APPLICATION, Dashboard
+from rigwatch.dashboard.facts import Facts
+from rigwatch.dashboard.feed import Feed
+
+_FLUSH_TIMEOUT = 1.0
+
+
+class Drawer:
+    """Takes from the feed at a steady rate and draws.
+
+    Args:
+        feed: what is drawn.
+        url: the viewer's.
+        facts: what is known already.
+        rate: updates a second [Hz].
+    """
+
+    def __init__(self, feed: Feed, url: str, facts: Facts, rate: float) -> None:
+        self._feed, self._url, self._period = feed, url, 1.0 / rate
+        self.facts = copy.deepcopy(facts)
+        self.failure: Exception | None = None
+        self._turned_at = time.monotonic()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="drawer", daemon=True)
+        self._thread.start()
+
+    @property
+    def held_for(self) -> float:
+        """Time since it last finished a turn [s]; large where the viewer takes nothing."""
+        return time.monotonic() - self._turned_at
+
+    def stop(self, patience: float = 2.0) -> None:
+        """Ask it to end; one that is held by a viewer is left to end with that viewer."""
+        self._stop.set()
+        self._thread.join(patience)
+
+    def _run(self) -> None:
+        try:
+            self._draw()
+        except Exception as error:
+            self.failure = error
+
+    def _draw(self) -> None:
+        stream = rr.RecordingStream(APPLICATION, recording_id=f"{self.facts.rig}-{time.time_ns()}")
+        stream.connect_grpc(self._url)
+        dashboard = Dashboard(stream, self.facts)
+        while not self._stop.wait(max(0.0, self._period - self.held_for)):
+            self._turned_at = time.monotonic()
+            for message in self._feed.drain():
+                dashboard.show(message)
+            self.facts.skipped = self._feed.skipped
+            dashboard.flush(time.time_ns())
+        stream.flush(timeout_sec=_FLUSH_TIMEOUT)

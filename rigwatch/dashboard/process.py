@@ -1,0 +1,126 @@
+"""The dashboard's process: feed, drawer and viewer, and what happens when the viewer goes.
+
+    bus ──▶ Feed ──▶ Drawer (thread) ──▶ viewer (process)
+                        this loop watches both and speaks of them
+
+Nothing waits for the dashboard: its queues are bounded, and it asks nobody for anything. A viewer that
+dies or takes no data is started again; a window that was closed by a person ends the process.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+
+from rigwatch.dashboard.drawer import Drawer
+from rigwatch.dashboard.facts import Facts
+from rigwatch.dashboard.feed import Feed
+from rigwatch.dashboard.opening import Choice, open_viewer
+from rigwatch.dashboard.viewer import ForeignViewer, Viewer, ViewerError
+from rigwatch.wire.bus import Bus
+from rigwatch.wire.heartbeat import Heartbeat
+from rigwatch.wire.messages import Health
+from rigwatch.wire.rig_config import DashboardSection
+from rigwatch.wire.topics import HEALTH
+
+_TURN = 0.2
+_HEALTH_PERIOD = 1.0
+_HELD_TOO_LONG = 6.0
+_RESTARTS, _WITHIN = 5, 60.0
+
+
+class LiveDashboard:
+    """One rig's screen, live.
+
+    Args:
+        bus: where the rig's processes speak.
+        settings: section [dashboard] of the configuration.
+        choice: which viewer.
+        say: takes remarks for people.
+
+    Attributes:
+        stop: ends `run` when set.
+        viewer: the viewer in use, None before the first.
+        facts: what is known when no viewer is in use.
+    """
+
+    def __init__(
+        self, bus: Bus, settings: DashboardSection, choice: Choice, say: Callable[[str], None]
+    ) -> None:
+        self.stop = threading.Event()
+        self.viewer: Viewer | ForeignViewer | None = None
+        self.facts = Facts(bus.rig)
+        self._bus, self._settings, self._choice, self._say = bus, settings, choice, say
+        self._feed = Feed(bus)
+        self._heartbeat = Heartbeat("dashboard")
+        self._ends: list[float] = []
+        self._told_at = 0.0
+
+    def run(self) -> None:
+        """Show the rig until stopped, or until a person closes the window.
+
+        Raises:
+            ViewerError: no viewer can be started, or it dies again and again.
+        """
+        try:
+            while not self.stop.is_set() and (reason := self._show()):
+                self._say(reason)
+                self._count_end(reason)
+        finally:
+            self._heartbeat.stopping()
+            self._feed.close()
+
+    def _show(self) -> str:
+        """One viewer's life: why another one is wanted, empty where none is."""
+        self.viewer = open_viewer(
+            self._choice, self._settings, self.stop, self._say, self._tell_supervisor
+        )
+        if self.viewer is None:
+            return ""
+        self._heartbeat.ready()
+        drawer = Drawer(self._feed, self.viewer.url, self.facts, self._settings.update_rate)
+        try:
+            return self._watch(self.viewer, drawer)
+        finally:
+            drawer.stop()
+            self.viewer.stop()
+            self.facts = drawer.facts
+
+    def _watch(self, viewer: Viewer | ForeignViewer, drawer: Drawer) -> str:
+        while not self.stop.wait(_TURN):
+            self.facts = drawer.facts
+            self._tell_supervisor()
+            self._tell_rig()
+            if drawer.failure is not None:
+                return f"drawing failed and begins again: {drawer.failure}"
+            if (code := viewer.exit_code()) == 0:
+                self._say("the viewer was closed: the dashboard ends")
+                return ""
+            if code is not None:
+                return "the viewer has died and is opened again"
+            if drawer.held_for > _HELD_TOO_LONG:
+                return "the viewer takes no data and is opened again"
+        return ""
+
+    def _tell_supervisor(self) -> None:
+        self._heartbeat.advance(self.facts.samples)
+
+    def _tell_rig(self) -> None:
+        """The dashboard's own health, once a second."""
+        if time.monotonic() - self._told_at < _HEALTH_PERIOD:
+            return
+        self._told_at = time.monotonic()
+        counters = {
+            "drawn_samples": float(self.facts.samples),
+            "skipped_messages": float(self._feed.skipped),
+            "viewer_restarts": float(len(self._ends)),
+        }
+        health = Health("dashboard", time.time_ns(), "running", "", counters)
+        self._bus.publish(HEALTH, health)
+
+    def _count_end(self, reason: str) -> None:
+        """Give up on a viewer that ends again and again; a foreign one is waited for instead."""
+        now = time.monotonic()
+        self._ends.append(now)
+        recent = [end for end in self._ends if now - end < _WITHIN]
+        if self._choice != "connect" and len(recent) > _RESTARTS:
+            raise ViewerError(f"{len(recent)} times in {_WITHIN:.0f} s: {reason}")
