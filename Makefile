@@ -20,7 +20,7 @@ RUN_LOCKS := requirements/lock.txt requirements/build.txt
 VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test demo bench lint unit demo-headless lock viewer-packages clean
+.PHONY: help setup test docs demo bench lint unit demo-headless lock viewer-packages clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -48,6 +48,9 @@ unit: $(STAMPS)/dev viewer-packages
 
 bench: $(STAMPS)/bench  ## the benchmarks, printed as a table beside the published figures
 	@python -m benchmarks $(BENCH)
+
+docs: $(STAMPS)/run  ## write the pages that are printed from the code
+	@python tools/config_docs.py && python tools/command_docs.py
 
 lock: $(STAMPS)/dev  ## write the lock files again (UPGRADE=1 takes newer versions)
 	@tools/lock.sh $(PYTHON_IN)

@@ -51,6 +51,10 @@ class ChannelSection(Section, frozen=True):
     stuck_after: Annotated[
         int, Meta(ge=0, description="equal codes that mean a stuck sensor, 0 for never")
     ] = 100
+    spike_above: Annotated[
+        Annotated[float, Meta(gt=0)] | None,
+        Meta(description="largest change within one sample [SI]"),
+    ] = None
 
 
 class SerialSection(Section, frozen=True, tag="serial", tag_field="adapter"):
@@ -134,10 +138,10 @@ class AlarmSection(Section, frozen=True):
     """[monitor.alarms.<name>] — how a condition becomes an alarm; left out: the alarm's own."""
 
     persistence: Annotated[
-        int | None, Meta(ge=1, description="samples the condition must hold")
+        Annotated[int, Meta(ge=1)] | None, Meta(description="samples the condition must hold")
     ] = None
     clear_after: Annotated[
-        int | None, Meta(ge=1, description="samples without it before it clears")
+        Annotated[int, Meta(ge=1)] | None, Meta(description="samples without it before it clears")
     ] = None
     latch: Annotated[bool | None, Meta(description="stays until reset by a person")] = None
     enabled: Annotated[bool, Meta(description="whether it is raised at all")] = True

@@ -1,0 +1,74 @@
+"""Every command and every key of a configuration is documented."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from rigwatch.commands import COMMANDS, main
+
+ROOT = Path(__file__).parents[2]
+PRINTED_PAGES = (("configuration.md", "config_docs"), ("commands.md", "command_docs"))
+
+
+def load_tool(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def pages() -> str:
+    found = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+    return "\n".join(page.read_text(encoding="utf-8") for page in found)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_of_every_command_has_an_example_that_names_it(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        main([name, "--help"])
+    assert exit_.value.code == 0
+    _, _, example = capsys.readouterr().out.partition("example:")
+    assert f"rigwatch {name}" in example
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_is_in_the_readme_or_the_documentation(name: str) -> None:
+    assert f"rigwatch {name}" in pages()
+
+
+def test_every_key_of_a_configuration_has_a_description() -> None:
+    assert load_tool("config_docs").undocumented() == []
+
+
+@pytest.mark.parametrize(("page", "tool"), PRINTED_PAGES)
+def test_printed_pages_say_what_the_code_says(page: str, tool: str) -> None:
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    assert text == load_tool(tool).page(), "run `make docs`"
+
+
+def test_help_is_quick_because_nothing_slow_is_imported() -> None:
+    slow = ("numba", "zenoh", "rerun", "scipy", "pyarrow", "pymodbus")
+    code = (
+        "import sys, rigwatch.commands as c\n"
+        "try: c.main(['--help'])\n"
+        f"except SystemExit: sys.exit(' '.join(m for m in {slow!r} if m in sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert done.stderr.strip() == ""
+    assert "COMMAND" in done.stdout
