@@ -6,13 +6,18 @@ has gone away and the supervisor opens it again.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigwatch.wire.errors import DeviceError
 from rigwatch.wire.messages import ByteArray, IntArray
+
+
+class DeviceBusyError(DeviceError):
+    """The device is there and another process has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,3 +75,16 @@ class Adapter(Protocol):
 
     def counters(self) -> Mapping[str, float]:
         """Figures since the adapter was made, such as `crc_errors`, for the health message."""
+
+
+def picked(raw: RawBlock, index: Sequence[int] | slice) -> RawBlock:
+    """Some of a block's samples."""
+    span = index if isinstance(index, slice) else list(index)
+    return replace(
+        raw,
+        seq=raw.seq[span],
+        device_us=raw.device_us[span],
+        codes=raw.codes[span],
+        arrived_ns=raw.arrived_ns[span],
+        quality=raw.quality[span] if len(raw.quality) else raw.quality,
+    )

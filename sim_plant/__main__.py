@@ -7,18 +7,23 @@ import signal
 import sys
 import threading
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rigwatch.wire.errors import ConfigError, RigwatchError
 from rigwatch.wire.heartbeat import Heartbeat
 from rigwatch.wire.rig_config import PlantSection, RigConfig, load_rig, section_or_error
-from sim_plant.effects import EFFECTS
+from sim_plant.effects import CHANNELS, EFFECTS
 from sim_plant.scenario import ScenarioRun, load_scenario
 from sim_plant.serve.commands import Commands, Controlled
 from sim_plant.serve.control import ControlServer, control_path
 from sim_plant.serve.line_faults import LineFaults
+from sim_plant.serve.pty_bridge import PtyBridge
 from sim_plant.serve.pty_line import PtyLine
 from sim_plant.serve.serial_server import SerialServer
 from sim_plant.serve.source import Device
+
+if TYPE_CHECKING:
+    from sim_plant.serve.modbus_server import ModbusServer
 
 
 def serve(config: RigConfig, plant: PlantSection, stop: threading.Event) -> None:
@@ -37,12 +42,57 @@ def serve(config: RigConfig, plant: PlantSection, stop: threading.Event) -> None
     controlled = Controlled(run, run.rig)
     device, faults = Device(controlled), LineFaults(plant.seed)
     neutral = {name: effect.neutral for name, effect in EFFECTS.items()}
-    has_line = plant.serve == "serial"
-    commands = Commands(controlled, device, faults if has_line else None, neutral)
-    heartbeat = _Beat(stop)
+    commands = Commands(controlled, device, faults if plant.serve == "serial" else None, neutral)
     with ControlServer(control_path(config.rig.id), commands.answer):
-        if plant.serve == "serial":
-            line = PtyLine(plant.port)
-            SerialServer(device, line, rate, faults, heartbeat.advance).run(stop)
-        else:
-            _serve_modbus(plant, device, rate, stop, heartbeat)
+        _SERVERS[plant.serve](plant, device, rate, faults, stop)
+
+
+def _serial(
+    plant: PlantSection, device: Device, rate: float, faults: LineFaults, stop: threading.Event
+) -> None:
+    SerialServer(device, PtyLine(plant.port), rate, faults, Heartbeat("plant")).run(stop)
+
+
+def _modbus_tcp(
+    plant: PlantSection, device: Device, rate: float, _faults: LineFaults, stop: threading.Event
+) -> None:
+    host, _, port = plant.port.rpartition(":")
+    if not host or not port.isdigit():
+        raise ConfigError("[plant]", "port", repr(plant.port), "host:port for Modbus TCP")
+    _modbus(device, rate).run_tcp(host, int(port), stop)
+
+
+def _modbus_rtu(
+    plant: PlantSection, device: Device, rate: float, _faults: LineFaults, stop: threading.Event
+) -> None:
+    _modbus(device, rate).run_rtu(PtyBridge(plant.port), stop=stop)
+
+
+def _modbus(device: Device, rate: float) -> "ModbusServer":
+    # pymodbus takes a third of a second to import, which the serial line need not wait for.
+    from sim_plant.serve.modbus_server import ModbusServer
+    from sim_plant.serve.register_bank import RegisterBank
+
+    return ModbusServer(device, RegisterBank(len(CHANNELS)), rate, heartbeat=Heartbeat("plant"))
+
+
+_SERVERS = {"serial": _serial, "modbus-tcp": _modbus_tcp, "modbus-rtu": _modbus_rtu}
+
+
+def main(path: Path | str) -> int:
+    """Serve the rig configured at `path` until a signal ends it; the exit code."""
+    config = load_rig(path)
+    section_or_error(config, "plant", path)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    if config.plant is not None:
+        serve(config, config.plant, stop)
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1]))
+    except RigwatchError as error:
+        sys.exit(f"sim_plant: {error}")

@@ -6,18 +6,19 @@ The port is waited for with `select`, so that a frame is handed on as soon as it
 adapter a transport of its own.
 """
 
+import errno
 import glob
 import os
 import select
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 import serial
 
-from daq.adapter import RawBlock
+from daq.adapter import DeviceBusyError, RawBlock
 from rigwatch.wire.errors import DeviceError
 from rigwatch.wire.frame import Frame, FrameDecoder
 from rigwatch.wire.rig_config import ChannelSection, SerialSection
@@ -55,18 +56,13 @@ class SerialPort:
         """Open the first match of the pattern.
 
         Raises:
-            DeviceError: nothing matches, or all that match are in use or refuse.
+            DeviceBusyError: what matches is in use by another process.
+            DeviceError: nothing matches, or what matches refuses.
         """
         self.close()
-        candidates = matches(self.port)
-        refusals = []
-        for path in candidates:
-            try:
-                self._serial = serial.Serial(path, self.baud, timeout=0, exclusive=True)
-                return
-            except (OSError, ValueError) as error:
-                refusals.append(f"{path}: {_plain(error)}")
-        raise DeviceError("; ".join(refusals) or f"no device matches {self.port}")
+        self._serial = first_that_opens(
+            self.port, lambda path: serial.Serial(path, self.baud, timeout=0, exclusive=True)
+        )
 
     def read(self, timeout: float) -> bytes:
         """The bytes that are there or come within `timeout` [s].
@@ -95,13 +91,34 @@ class SerialPort:
             self._serial = None
 
 
-def matches(pattern: str) -> list[str]:
-    """Device files that `pattern` means, at least the pattern itself where it is a plain path."""
-    return sorted(glob.glob(pattern)) if glob.has_magic(pattern) else [pattern]
+P = TypeVar("P")
+
+
+def first_that_opens(pattern: str, opened: Callable[[str], P]) -> P:
+    """`opened(path)` of the first device file that matches `pattern` and opens.
+
+    Raises:
+        DeviceBusyError: what matches is in use by another process.
+        DeviceError: nothing matches, or what matches refuses.
+    """
+    paths = sorted(glob.glob(pattern)) if glob.has_magic(pattern) else [pattern]
+    refusals: list[str] = []
+    kind = DeviceError
+    for path in paths:
+        try:
+            return opened(path)
+        except (OSError, ValueError) as error:
+            kind = DeviceBusyError if _busy(error) else kind
+            refusals.append(f"{path}: {_plain(error)}")
+    raise kind("; ".join(refusals) or f"no device matches {pattern}")
+
+
+def _busy(error: Exception) -> bool:
+    return "exclusively lock" in str(error) or getattr(error, "errno", None) == errno.EBUSY
 
 
 def _plain(error: Exception) -> str:
-    if "exclusively lock" in str(error) or getattr(error, "errno", None) == 16:
+    if _busy(error):
         return "in use by another process"
     number = getattr(error, "errno", None)
     return os.strerror(number) if number else str(error)

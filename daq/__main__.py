@@ -1,0 +1,73 @@
+"""The acquisition process: device ─▶ adapter ─▶ acquisition ─▶ bus and ring.
+
+    python -m daq CONFIG
+"""
+
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+
+from daq.acquisition import Acquisition
+from daq.adapter import Adapter
+from daq.adapters import adapter_for
+from daq.publisher import Publisher
+from daq.supervisor import Supervisor
+from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.heartbeat import Heartbeat
+from rigwatch.wire.rig_config import RigConfig, load_rig
+
+
+def acquire(config: RigConfig, adapter: Adapter, bus: Bus, stop: threading.Event) -> None:
+    """Acquire until `stop` is set.
+
+    Raises:
+        DeviceBusyError: another process has the device.
+    """
+    device = Supervisor(adapter)
+    acquisition = Acquisition(config, adapter.clock_rate)
+    publisher = Publisher(bus, config)
+    heartbeat = Heartbeat("daq")
+    device.start()
+    heartbeat.ready()
+    while not stop.is_set():
+        for raw in device.read(acquisition.patience(time.monotonic_ns())):
+            publisher.publish(acquisition.update(raw))
+        publisher.publish(acquisition.tick(time.monotonic_ns(), device.link, adapter.counters()))
+        heartbeat.advance(acquisition.samples)
+    heartbeat.stopping()
+    device.close()
+
+
+def run(path: Path | str, stop: threading.Event) -> None:
+    """Acquire what the configuration at `path` says, until `stop` is set.
+
+    Raises:
+        ConfigError: the configuration is wrong.
+        DeviceError: the adapter is not installed, or another process has the device.
+    """
+    config = load_rig(path)
+    adapter = adapter_for(config.daq.device, config.channels)
+    bus = connect(config, "daq")
+    try:
+        acquire(config, adapter, bus, stop)
+    finally:
+        bus.close()
+
+
+def main(path: Path | str) -> int:
+    """`run` until a signal ends it; the exit code."""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    run(path, stop)
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1]))
+    except RigwatchError as error:
+        sys.exit(f"daq: {error}")

@@ -1,0 +1,121 @@
+"""Raw blocks to messages: counted, stamped, calibrated and judged. No bus or device inside.
+
+    RawBlock ─▶ SequenceTracker ─▶ DeviceClock ─▶ Conditioner ─▶ SampleBlock
+                  └▶ Gap, Event      └▶ Event       └▶ quality ─▶ Watch ─▶ Health, Event
+"""
+
+from collections.abc import Callable, Mapping
+
+from daq.adapter import RawBlock, picked
+from daq.clock import DeviceClock, host_offset_ns
+from daq.conditioning import Conditioner
+from daq.sequence import Hole, Restart, SequenceTracker
+from daq.watch import Link, Watch
+from rigwatch.wire.messages import Event, Gap, Message, SampleBlock, Severity
+from rigwatch.wire.rig_config import RigConfig
+
+LONGEST_BLOCK = 1024
+"""Samples in a block at most, so that no message grows beyond what the bus carries."""
+
+
+class Acquisition:
+    """One device's raw blocks to messages.
+
+    Args:
+        config: the rig.
+        clock_rate: device microseconds in a microsecond of the host, from the adapter.
+        host_offset_ns: Unix time less monotonic time of the host [ns].
+    """
+
+    def __init__(
+        self,
+        config: RigConfig,
+        clock_rate: float = 1.0,
+        host_offset_ns: Callable[[], int] = host_offset_ns,
+    ) -> None:
+        rate = config.rig.sample_rate
+        self.device = config.daq.name
+        self.source = f"daq/{config.daq.name}"
+        self.samples = 0
+        self._host_offset_ns = host_offset_ns
+        self.clock = DeviceClock(rate, clock_rate, host_offset_ns())
+        self.tracker = SequenceTracker(rate)
+        self.conditioner = Conditioner(config.channels, config.daq.name)
+        self.watch = Watch(self.source, rate, config.daq.stale_after, clock_rate)
+
+    def update(self, raw: RawBlock) -> list[Message]:
+        """The messages that `raw` means, in order: samples, and gaps and events between them."""
+        messages: list[Message] = []
+        now_ns = int(raw.arrived_ns[-1]) if len(raw) else 0
+        for step in self.tracker.accept(raw):
+            if isinstance(step, Hole):
+                messages.append(self._gap(step, now_ns))
+            elif isinstance(step, Restart):
+                messages += self._restarted(step, now_ns)
+            else:
+                messages += self._samples(step)
+        return messages
+
+    def tick(self, now_ns: int, link: Link, counters: Mapping[str, float]) -> list[Message]:
+        """What time alone brings: silence noticed, health once a second.
+
+        Args:
+            now_ns: the host's monotonic clock [ns].
+            link: state of the connection.
+            counters: the adapter's own.
+        """
+        stepped = self._wall_clock_step(now_ns)
+        figures = {
+            **counters,
+            "lost_samples": self.tracker.lost,
+            "duplicates": self.tracker.duplicates,
+            "drift_ppm": self.clock.drift_ppm,
+            "clock_jumps": self.clock.jumps,
+        }
+        return [*stepped, *self.watch.tick(now_ns, self.clock.unix_ns(now_ns), link, figures)]
+
+    def patience(self, now_ns: int) -> float:
+        """How long the device may be waited for before `tick` has to look again [s]."""
+        return self.watch.silent_in(now_ns)
+
+    def _wall_clock_step(self, now_ns: int) -> list[Message]:
+        step = self.clock.follow(self._host_offset_ns())
+        if step == 0.0:
+            return []
+        text = f"the host's clock was stepped by {step:+.3f} s"
+        return [self._event(now_ns, "warning", "clock_step", text)]
+
+    def _samples(self, run: RawBlock) -> list[Message]:
+        messages: list[Message] = []
+        for start in range(0, len(run), LONGEST_BLOCK):
+            part = picked(run, slice(start, start + LONGEST_BLOCK))
+            stamps, jump = self.clock.stamp(part)
+            if jump:
+                text = f"the device's clock jumped by {jump:+.6f} s, its time is anchored anew"
+                messages.append(
+                    self._event(int(part.arrived_ns[0]), "warning", "clock_jump", text)
+                )
+            block = self.conditioner.condition(part, stamps)
+            messages.append(self._counted(block, int(part.arrived_ns[-1])))
+        return messages
+
+    def _counted(self, block: SampleBlock, arrived_ns: int) -> SampleBlock:
+        self.samples += len(block)
+        self.watch.saw(block, arrived_ns)
+        return block
+
+    def _restarted(self, restart: Restart, now_ns: int) -> list[Message]:
+        self.clock.restart()
+        if not restart.reason:
+            return []
+        text = f"{restart.reason}: boot {restart.boot:08x} follows {restart.before:08x}"
+        return [self._event(now_ns, "warning", "boot_changed", text)]
+
+    def _gap(self, hole: Hole, now_ns: int) -> Gap:
+        known = hole.last >= hole.first
+        reason = "not received from the device" if known else "the device started anew"
+        t_ns = self.clock.unix_ns(now_ns)
+        return Gap(self.device, hole.boot, hole.first, hole.last, t_ns, self.source, reason)
+
+    def _event(self, now_ns: int, severity: Severity, code: str, text: str) -> Event:
+        return Event(self.source, self.clock.unix_ns(now_ns), severity, code, text)

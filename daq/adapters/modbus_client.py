@@ -1,0 +1,159 @@
+"""Input registers through pymodbus, over TCP or a serial line.
+
+pymodbus takes a reply that is too short for good and hides a silent device behind retries: here lengths are checked,
+nothing is retried and every wait has an end.
+"""
+
+import contextlib
+import logging
+import os
+import select
+from collections.abc import Callable
+from typing import Any
+
+import serial
+from pymodbus import FramerType
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+from pymodbus.exceptions import ConnectionException, ModbusException
+
+from daq.adapters.modbus_poll import ModbusAdapter, RefusedError
+from daq.adapters.serial_line import first_that_opens
+from rigwatch.wire.errors import DeviceError, ModbusError
+from rigwatch.wire.rig_config import ChannelSection, ModbusRtuSection, ModbusSection
+
+logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
+
+_CODES = {
+    1: "illegal function",
+    2: "illegal address",
+    3: "illegal value",
+    4: "device failure",
+    5: "acknowledged, not ready yet",
+    6: "busy",
+    10: "gateway path unavailable",
+    11: "gateway: the unit does not answer",
+}
+_REPEATABLE = (5, 6)
+
+
+class PymodbusRegisters:
+    """Input registers of one unit.
+
+    Args:
+        make: makes and opens a client; `DeviceError` where that fails.
+        unit: unit id.
+        where: names the device in errors.
+    """
+
+    def __init__(self, make: Callable[[], Any], unit: int, where: str) -> None:
+        self._make = make
+        self._unit = unit
+        self._where = where
+        self._client: Any = None
+
+    def open(self) -> None:
+        """Connect.
+
+        Raises:
+            DeviceError: nobody answers there.
+        """
+        self.close()
+        self._client = self._make()
+
+    def read(self, address: int, count: int) -> list[int]:
+        """`count` registers from `address`.
+
+        Raises:
+            RefusedError: exception codes that mean a wrong configuration.
+            ModbusError: no answer in time, a short one, or exception codes 5 and 6.
+            DeviceError: the connection is gone.
+        """
+        if self._client is None:
+            raise DeviceError(f"{self._where}: not connected")
+        try:
+            reply = self._client.read_input_registers(address, count=count, device_id=self._unit)
+        except ConnectionException as error:
+            raise DeviceError(f"{self._where}: the connection was closed") from error
+        except ModbusException as error:
+            raise ModbusError(f"{self._where}: no valid answer in time") from error
+        except (OSError, serial.SerialException) as error:
+            raise DeviceError(f"{self._where}: {error}") from error
+        except Exception as error:
+            # Replies cut short or garbled make pymodbus's decoders raise whatever they meet.
+            raise ModbusError(f"{self._where}: an answer that cannot be decoded") from error
+        self._check(reply, count)
+        return list(reply.registers)
+
+    def close(self) -> None:
+        """Close the connection."""
+        if self._client is not None:
+            with contextlib.suppress(OSError):
+                self._client.close()
+            self._client = None
+
+    def _check(self, reply: Any, count: int) -> None:
+        if reply.isError():
+            code = int(getattr(reply, "exception_code", 0))
+            kind = ModbusError if code in _REPEATABLE else RefusedError
+            raise kind(f"{self._where}: exception code {code}, {_CODES.get(code, 'unknown')}")
+        if len(reply.registers) != count:
+            found = f"a reply of {len(reply.registers)} registers"
+            raise ModbusError(f"{self._where}: {found}, expected {count}")
+
+
+class _RtuClient(ModbusSerialClient):  # type: ignore[misc]
+    """A serial client that waits for bytes instead of looking for them every millisecond."""
+
+    def open_port(self) -> None:
+        """Open the port for this process alone; errors are the operating system's."""
+        params = self.comm_params
+        self.socket = serial.Serial(
+            params.host, params.baudrate, timeout=params.timeout_connect, exclusive=True
+        )
+
+    def recv(self, size: int | None) -> bytes:
+        """The bytes that are there or come in time, none where none come."""
+        if self.socket is None:
+            raise ConnectionException(str(self))
+        try:
+            fd = self.socket.fileno()
+            ready, _, _ = select.select([fd], [], [], self.comm_params.timeout_connect)
+            data = os.read(fd, size or 512) if ready else None
+        except (OSError, serial.SerialException):
+            data = b""
+        if data == b"":
+            self.close()
+            raise ConnectionException(str(self))
+        return data or b""
+
+
+def tcp(section: ModbusSection, channels: tuple[ChannelSection, ...]) -> ModbusAdapter:
+    """Entry point `modbus-tcp` of the group `rigwatch.adapters`."""
+    where = f"{section.host}:{section.port}"
+
+    def make() -> ModbusTcpClient:
+        client = ModbusTcpClient(
+            section.host, port=section.port, timeout=section.timeout, retries=0
+        )
+        if not client.connect():
+            raise DeviceError(f"{where}: nobody answers")
+        return client
+
+    registers = PymodbusRegisters(make, section.unit, where)
+    return ModbusAdapter(registers, len(channels), section.polls, section.word_order)
+
+
+def rtu(section: ModbusRtuSection, channels: tuple[ChannelSection, ...]) -> ModbusAdapter:
+    """Entry point `modbus-rtu` of the group `rigwatch.adapters`."""
+
+    def opened(path: str) -> "_RtuClient":
+        client = _RtuClient(
+            path, framer=FramerType.RTU, baudrate=section.baud, timeout=section.timeout, retries=0
+        )
+        client.open_port()
+        return client
+
+    registers = PymodbusRegisters(
+        lambda: first_that_opens(section.port, opened), section.unit, section.port
+    )
+    return ModbusAdapter(registers, len(channels), section.polls, section.word_order)

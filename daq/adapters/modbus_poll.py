@@ -1,0 +1,178 @@
+"""Polling a Modbus device: header, then the slots that have not been read yet.
+
+    32 times a second:   Registers.read(header) ─▶ how many samples are new ─▶ Registers.read(slots) … ─▶ RawBlock
+
+The same for TCP and RTU, which differ in the `Registers` that is handed in. A poll that fails is counted and the samples
+stay in the device's ring for the next one; after several failures in a row the connection is made anew.
+"""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from daq.adapter import RawBlock
+from rigwatch.wire.errors import DeviceError, ModbusError
+from rigwatch.wire.modbus_map import (
+    HEADER_LENGTH,
+    Header,
+    WordOrder,
+    decode_header,
+    decode_slots,
+)
+
+_FAILURES = 3
+_MARGIN = 8
+"""Slots nearest to being overwritten that are not read any more."""
+_U32 = 1 << 32
+
+
+class Registers(Protocol):
+    """Input registers of one unit."""
+
+    def open(self) -> None:
+        """Connect; `DeviceError` where that fails."""
+
+    def read(self, address: int, count: int) -> list[int]:
+        """`count` registers; `ModbusError` with its cause, `DeviceError` when the link is gone."""
+
+    def close(self) -> None:
+        """Close; harmless when closed."""
+
+
+class RefusedError(ModbusError):
+    """The device answers with an exception code that no repetition cures."""
+
+
+class ModbusAdapter:
+    """Buffered samples of a Modbus device.
+
+    Args:
+        registers: the device.
+        channels: how many channels it must have.
+        polls: polls a second.
+        order: which half of a 32-bit value comes first.
+        clock: monotonic time [ns].
+        sleep: waits some seconds.
+    """
+
+    clock_rate = 1.0
+
+    def __init__(
+        self,
+        registers: Registers,
+        channels: int,
+        polls: float = 32.0,
+        order: WordOrder = "big",
+        clock: Callable[[], int] = time.monotonic_ns,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._registers = registers
+        self._channels = channels
+        self._period_ns = round(1e9 / polls)
+        self._order: WordOrder = order
+        self._clock = clock
+        self._sleep = sleep
+        self._next_poll = 0
+        self._boot: int | None = None
+        self._next_seq = 0
+        self._failed = 0
+        self._backwards = 0
+        self._counts = Counter({"polls": 0, "failed_polls": 0})
+
+    def open(self) -> None:
+        """Connect, and check identification, word order and channels.
+
+        Raises:
+            DeviceError: it cannot be reached.
+            ModbusError: it is not what the configuration says.
+        """
+        self._registers.open()
+        self._failed = 0
+        self._next_poll = self._clock()
+        self._header()
+
+    def read(self, timeout: float) -> Sequence[RawBlock]:
+        """The samples that are new at the next poll; none where that is not due within `timeout` [s].
+
+        Raises:
+            DeviceError: the link is gone, or several polls in a row failed.
+            ModbusError: the device refuses, or is not what the configuration says.
+        """
+        wait = (self._next_poll - self._clock()) * 1e-9
+        self._sleep(min(max(wait, 0.0), timeout))
+        if wait > timeout:
+            return ()
+        self._next_poll = max(self._next_poll + self._period_ns, self._clock())
+        self._counts["polls"] += 1
+        try:
+            blocks = self._poll()
+        except RefusedError:
+            raise
+        except ModbusError as error:
+            self._count_failure(error)
+            return ()
+        self._failed = 0
+        return blocks
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._registers.close()
+
+    def counters(self) -> Mapping[str, float]:
+        """Polls, and how many of them failed."""
+        return dict(self._counts)
+
+    def _count_failure(self, error: ModbusError) -> None:
+        self._counts["failed_polls"] += 1
+        self._failed += 1
+        if self._failed >= _FAILURES:
+            raise DeviceError(f"{self._failed} polls in a row failed, the last: {error}") from error
+
+    def _header(self) -> Header:
+        header = decode_header(self._registers.read(0, HEADER_LENGTH), self._order)
+        if header.channels != self._channels:
+            found = f"the device has {header.channels} channels"
+            raise RefusedError(f"{found}, the configuration has {self._channels}")
+        return header
+
+    def _poll(self) -> list[RawBlock]:
+        header = self._header()
+        new = self._new(header)
+        arrived = self._clock()
+        blocks = []
+        while new > 0:
+            count = min(new, header.slots_a_read, header.slots - self._next_seq % header.slots)
+            blocks.append(self._slots(header, count, arrived))
+            self._next_seq = (self._next_seq + count) % _U32
+            new -= count
+        return blocks
+
+    def _new(self, header: Header) -> int:
+        """Samples to be read, from `_next_seq` on."""
+        if self._boot is None:
+            self._next_seq = (header.samples - min(header.samples, 1)) % _U32
+        elif header.boot != self._boot:
+            self._next_seq = 0
+        self._boot = header.boot
+        new = (header.samples - self._next_seq) % _U32
+        if new > _U32 // 2:
+            self._backwards += 1
+            if self._backwards < _FAILURES - 1:
+                raise ModbusError("the device's count went back: a late reply, or a new count")
+            new = header.samples
+        self._backwards = 0
+        readable = max(header.slots - _MARGIN, 1)
+        if new > readable:
+            new = readable
+        self._next_seq = (header.samples - new) % _U32
+        return new
+
+    def _slots(self, header: Header, count: int, arrived: int) -> RawBlock:
+        first = self._next_seq
+        found = self._registers.read(header.address(first), count * header.slot_length)
+        device_us, codes = decode_slots(found, first, count, header, self._order)
+        seq = (first + np.arange(count)) % _U32
+        return RawBlock(header.boot, seq, device_us, codes, np.full(count, arrived, np.int64))

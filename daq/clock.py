@@ -1,0 +1,147 @@
+"""The device's clock on the host's: which Unix time a sample has, from its device microseconds.
+
+    t = origin + (us - us0)·1000·(1 + drift) + offset
+
+A sample arrives late by what the line and the host take, never early. So of every quarter second the least late sample
+counts, and through those of the last minute a line is laid by the median of slopes (after Theil and Sen), which does not
+care about the seconds in which the host slept. A jump of the device's clock shows within one sample: its microseconds
+move otherwise than its sample numbers, and the host's clock disagrees as well.
+"""
+
+import time
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.adapter import RawBlock
+from rigwatch.wire.messages import IntArray
+
+_BIN_US = 250_000
+_BINS = 240
+_BINS_FOR_DRIFT = 8
+_JUMP_PERIODS = 2.5
+_WALL_STEP_NS = 500_000_000
+
+
+class DeviceClock:
+    """Unix time of samples, strictly increasing.
+
+    Args:
+        rate: nominal sample rate [Hz].
+        clock_rate: device microseconds in a microsecond of the host, other than 1 in a replay.
+        unix_minus_monotonic_ns: difference of the host's two clocks at the start.
+
+    Attributes:
+        drift_ppm: how much faster the device's clock runs than the host's [1e-6].
+        jumps: jumps of the device's clock so far.
+    """
+
+    def __init__(
+        self, rate: float, clock_rate: float = 1.0, unix_minus_monotonic_ns: int = 0
+    ) -> None:
+        self.drift_ppm = 0.0
+        self.jumps = 0
+        self._period_us = 1e6 / rate
+        self._ns_per_us = 1000.0 / clock_rate
+        self._unix_ns = self._wall_ns = unix_minus_monotonic_ns
+        self._last_ns = 0
+        self._last: tuple[int, int] | None = None
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the device's clock, as after it started anew; time still only goes forward."""
+        self._bins: deque[tuple[float, float]] = deque(maxlen=_BINS)
+        self._anchor: tuple[int, int] | None = None
+        self._slope, self._offset, self._centre = 0.0, 0.0, 0.0
+        self._last = None
+
+    def stamp(self, run: RawBlock) -> tuple[IntArray, float]:
+        """Unix time of each sample of `run` [ns], and the last jump of the device's clock in it [s].
+
+        `run` holds consecutive samples, unwrapped, of one boot.
+        """
+        rows = zip(run.seq.tolist(), run.device_us.tolist(), run.arrived_ns.tolist(), strict=True)
+        stamps, jump = [], 0.0
+        for seq, us, arrived in rows:
+            jumped = self._jump(seq, us, arrived)
+            if jumped:
+                jump = jumped
+                self.jumps += 1
+                self.restart()
+            self._learn(us, arrived)
+            self._last = (seq, us)
+            self._last_ns = max(self._last_ns + 1, self._unix_ns + self._host_ns(us))
+            stamps.append(self._last_ns)
+        return np.array(stamps, np.int64), jump
+
+    def follow(self, unix_minus_monotonic_ns: int) -> float:
+        """How far the host's wall clock was stepped since last asked [s], 0 where it was not.
+
+        A step forward is followed. A step back is not: time in a recording only goes forward.
+        """
+        step = unix_minus_monotonic_ns - self._wall_ns
+        if abs(step) < _WALL_STEP_NS:
+            return 0.0
+        self._wall_ns = unix_minus_monotonic_ns
+        self._unix_ns = max(self._unix_ns, unix_minus_monotonic_ns)
+        return step * 1e-9
+
+    def unix_ns(self, monotonic_ns: int) -> int:
+        """Unix time of a moment on the host's monotonic clock [ns]."""
+        return self._unix_ns + monotonic_ns
+
+    def _host_ns(self, us: int) -> int:
+        """Monotonic host time at which the device's clock read `us` [ns]."""
+        us0, ns0 = self._anchor or (us, 0)
+        relative = us - us0
+        late = self._offset + self._slope * (relative - self._centre)
+        return ns0 + round(relative * self._ns_per_us + late)
+
+    def _jump(self, seq: int, us: int, arrived: int) -> float:
+        """Jump of the device's clock before this sample [s], 0 where there was none."""
+        if self._last is None:
+            return 0.0
+        last_seq, last_us = self._last
+        odd_us = us - last_us - (seq - last_seq) * self._period_us
+        if abs(odd_us) < _JUMP_PERIODS * self._period_us:
+            return 0.0
+        late_us = (arrived - self._host_ns(us)) / self._ns_per_us
+        agrees = -late_us * np.sign(odd_us) > 0.5 * abs(odd_us)
+        return odd_us * 1e-6 if agrees else 0.0
+
+    def _learn(self, us: int, arrived: int) -> None:
+        if self._anchor is None:
+            self._anchor = (us, arrived)
+        us0, ns0 = self._anchor
+        relative = us - us0
+        late = arrived - ns0 - relative * self._ns_per_us
+        if self._bins and relative < self._bins[-1][0] // _BIN_US * _BIN_US + _BIN_US:
+            if late < self._bins[-1][1]:
+                self._bins[-1] = (relative, late)
+        else:
+            self._bins.append((relative, late))
+            self._fit()
+        if len(self._bins) < _BINS_FOR_DRIFT:
+            self._offset = min(late for _, late in self._bins)
+
+    def _fit(self) -> None:
+        """Lay the line anew; the newest quarter second has only begun and does not count yet."""
+        if len(self._bins) <= _BINS_FOR_DRIFT:
+            return
+        relative, late = np.array(self._bins)[:-1].T
+        self._slope = _median_slope(relative, late)
+        self._centre = float(relative[-1])
+        self._offset = float(np.median(late - self._slope * (relative - self._centre)))
+        self.drift_ppm = -1e6 * self._slope / self._ns_per_us
+
+
+def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Median of slopes between points half the span apart, which needs n/2 of them and not n²."""
+    half = len(x) // 2
+    return float(np.median((y[half : 2 * half] - y[:half]) / (x[half : 2 * half] - x[:half])))
+
+
+def host_offset_ns() -> int:
+    """Unix time less monotonic time of the host [ns]."""
+    return time.time_ns() - time.monotonic_ns()

@@ -1,0 +1,150 @@
+"""Raw codes to calibrated samples with quality flags, one sample after the other.
+
+    saturated    a rail of the converter for the third sample running, or outside the sensor's range
+    stuck        the same code for `stuck_after` samples while every other channel moves
+    spike        further from the last good sample than the sensor can have moved
+    non-finite   NaN or infinite; the last good value is held in its place
+
+What is decided about a sample depends on it and on those before it, never on how they were cut into blocks. A channel
+"moves" when its code has gone at least a thousandth of the converter's range within the same time: all others must, so
+that a mass that friction holds still is not taken for a dead sensor.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from daq.adapter import RawBlock
+from rigwatch.wire import quality
+from rigwatch.wire.calibration import Calibration
+from rigwatch.wire.messages import ByteArray, Column, FloatArray, IntArray, SampleBlock
+from rigwatch.wire.rig_config import ChannelSection
+
+_MOVES = 1e-3
+_RAIL_RUN = 3
+_SPIKE_RUN = 5
+_STATE = np.dtype(
+    [
+        ("good", np.float64),
+        ("has_good", np.bool_),
+        ("since_good", np.int64),
+        ("code", np.float64),
+        ("equal", np.int64),
+        ("reference", np.float64),
+        ("since_move", np.int64),
+        ("rail", np.int64),
+    ]
+)
+
+
+class Conditioner:
+    """Calibrates and judges the samples of one device.
+
+    Args:
+        channels: the device's channels, in the order of its codes.
+        device: the device's name in messages.
+    """
+
+    def __init__(self, channels: Sequence[ChannelSection], device: str = "rig") -> None:
+        self._channels = tuple(channels)
+        self._device = device
+        self._calibration = Calibration.of(channels)
+        self._stuck_after = np.array([channel.stuck_after for channel in channels], np.int64)
+        steps = [np.inf if c.spike_above is None else c.spike_above for c in channels]
+        self._spike_above = np.array(steps, np.float64)
+        self._boot: int | None = None
+        self._state = np.zeros(len(self._channels), _STATE)
+
+    def condition(self, raw: RawBlock, t_ns: IntArray) -> SampleBlock:
+        """The calibrated block of `raw`, which holds consecutive samples, unwrapped, of one boot.
+
+        Args:
+            raw: n samples.
+            t_ns: shape (n,), Unix time of each [ns].
+        """
+        if raw.boot != self._boot:
+            self._boot = raw.boot
+            self._state = np.zeros(len(self._channels), _STATE)
+            self._state["since_move"] = np.iinfo(np.int64).max // 2
+        values, flags = self._judged(raw)
+        columns = tuple(
+            Column(channel.name, channel.unit, values[:, i].copy(), flags[:, i].copy())
+            for i, channel in enumerate(self._channels)
+        )
+        return SampleBlock(self._device, raw.boot, int(raw.seq[0]), raw.device_us, t_ns, columns)
+
+    def _judged(self, raw: RawBlock) -> tuple[FloatArray, ByteArray]:
+        codes = np.ascontiguousarray(raw.codes, np.float64)
+        if raw.calibrated:
+            values = codes.copy()
+            flags = raw.quality.copy() if len(raw.quality) else np.zeros(codes.shape, np.uint8)
+            _hold_last(values, flags, self._state)
+        else:
+            c = self._calibration
+            values, flags = c.values(codes), np.zeros(codes.shape, np.uint8)
+            limits = np.stack([c.code_low, c.code_high, c.low, c.high, self._spike_above])
+            _judge(codes, values, flags, limits, self._stuck_after, self._state)
+        return values, flags
+
+
+@njit(cache=True)
+def _hold_last(values, flags, state):  # type: ignore[no-untyped-def]
+    for i in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            if np.isfinite(values[i, k]):
+                state[k].good = values[i, k]
+            else:
+                values[i, k] = state[k].good
+                flags[i, k] |= quality.NON_FINITE
+
+
+@njit(cache=True)
+def _follow(code, moves, s):  # type: ignore[no-untyped-def]
+    """Take note of how long a channel's code has been the same, and since when it has not moved."""
+    s.equal = s.equal + 1 if code == s.code else 1
+    s.code = code
+    s.since_move += 1
+    if abs(code - s.reference) >= moves:
+        s.reference = code
+        s.since_move = 0
+
+
+@njit(cache=True)
+def _judge(codes, values, flags, limits, stuck_after, state):  # type: ignore[no-untyped-def]
+    n, channels = codes.shape
+    for i in range(n):
+        for k in range(channels):
+            if np.isfinite(codes[i, k]):
+                _follow(codes[i, k], _MOVES * (limits[1, k] - limits[0, k]), state[k])
+        for k in range(channels):
+            flags[i, k] |= _flags_of(codes[i, k], values[i, k], limits[:, k], state[k])
+            if stuck_after[k] > 0 and state[k].equal >= stuck_after[k]:
+                if _others_move(state, k, stuck_after[k]):
+                    flags[i, k] |= quality.STUCK
+            if flags[i, k] & quality.NON_FINITE:
+                values[i, k] = state[k].good
+
+
+@njit(cache=True)
+def _others_move(state, k, within):  # type: ignore[no-untyped-def]
+    for j in range(len(state)):
+        if j != k and state[j].since_move >= within:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _flags_of(code, value, limits, s):  # type: ignore[no-untyped-def]
+    s.since_good += 1
+    if not np.isfinite(value):
+        return quality.NON_FINITE
+    at_rail = code <= limits[0] or code >= limits[1]
+    s.rail = s.rail + 1 if at_rail else 0
+    if s.rail >= _RAIL_RUN or value < limits[2] or value > limits[3]:
+        return quality.SATURATED
+    step = limits[4] * s.since_good
+    if s.has_good and s.since_good <= _SPIKE_RUN and abs(value - s.good) > step:
+        return quality.SPIKE
+    s.good, s.has_good, s.since_good = value, True, 0
+    return quality.GOOD

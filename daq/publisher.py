@@ -1,0 +1,35 @@
+"""Messages onto the bus, and samples into the ring that readers ask for what they missed. Never waits."""
+
+from collections.abc import Iterable
+
+from rigwatch.wire.bus import Bus
+from rigwatch.wire.messages import Event, Gap, Health, Message, SampleBlock
+from rigwatch.wire.ring import SampleRing
+from rigwatch.wire.topics import EVENTS, GAPS, HEALTH, SAMPLES, Topic
+
+_TOPICS: dict[type[Message], Topic] = {
+    SampleBlock: SAMPLES,
+    Gap: GAPS,
+    Event: EVENTS,
+    Health: HEALTH,
+}
+
+
+class Publisher:
+    """Says what the acquisition has to say.
+
+    Args:
+        bus: where it is said.
+        ring: where samples are kept, served on the bus.
+    """
+
+    def __init__(self, bus: Bus, ring: SampleRing) -> None:
+        self._bus = bus
+        self._ring = ring
+
+    def publish(self, messages: Iterable[Message]) -> None:
+        """Publish messages in order; samples go into the ring first, so that they can be asked for."""
+        for message in messages:
+            if isinstance(message, SampleBlock):
+                self._ring.add(message)
+            self._bus.publish(_TOPICS[type(message)], message)

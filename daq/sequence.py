@@ -1,0 +1,157 @@
+"""Sample numbers of a device: every sample is delivered once, or counted.
+
+Counters of 32 bits are unwrapped, repeated samples dropped and counted, holes told exactly, and a device that starts
+anew is recognised by its boot, or where it keeps that, by a count that went back while its clock did not say so.
+"""
+
+import zlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from daq.adapter import RawBlock, picked
+
+_U32 = 1 << 32
+_REPEATS = 1024
+"""A sample at most so far behind the newest may be a repetition; farther back is a new count."""
+_LONG_HOLE = 1024
+"""From so many missing samples on, the device's clock must agree that so much time has passed."""
+
+_REPEATS_IN_A_ROW = 64
+"""More repetitions than these, one after the other, are a new count."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """Samples `first` to `last` of `boot` never came; `last` < `first` where nobody can say."""
+
+    boot: int
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """The device began a new count: samples carry `boot` from now on."""
+
+    boot: int
+    before: int
+    reason: str
+
+
+Step = RawBlock | Hole | Restart
+_REPEATED: list[Step] = []
+"""Says that a sample has come before; told apart by identity from "nothing to say"."""
+
+
+class SequenceTracker:
+    """Raw blocks in any state to runs of consecutive, unwrapped samples, with holes told.
+
+    Args:
+        rate: nominal sample rate [Hz].
+
+    Attributes:
+        duplicates: samples dropped because they had come before.
+        lost: samples known to be lost.
+    """
+
+    def __init__(self, rate: float) -> None:
+        self.duplicates = 0
+        self.lost = 0
+        self._period_us = 1e6 / rate
+        self._device_boot: int | None = None
+        self._boot = 0
+        self._recounts = 0
+        self._seq = -1
+        self._us = 0
+        self._arrived = 0
+        self._repeats = 0
+
+    def accept(self, raw: RawBlock) -> list[Step]:
+        """The steps that `raw` means, in order: runs, and between them holes and restarts."""
+        steps: list[Step] = []
+        run = _Run(self._boot)
+        rows = zip(
+            raw.seq.tolist(), raw.device_us.tolist(), raw.arrived_ns.tolist(), strict=True
+        )
+        for index, (seq, us, arrived) in enumerate(rows):
+            found = self._place(raw.boot, seq, us, arrived)
+            if found is _REPEATED:
+                continue
+            if found:
+                steps += run.of(raw)
+                steps += found
+                run = _Run(self._boot)
+            run.add(index, self._seq, self._us)
+        return steps + run.of(raw)
+
+    def _place(self, boot: int, seq: int, us: int, arrived: int) -> list[Step]:
+        """Take one sample in; what has to be said before it, or `_REPEATED`."""
+        if boot != self._device_boot:
+            reason = "the device has started anew" if self._device_boot is not None else ""
+            return self._begin(boot, seq, us, arrived, reason)
+        ahead = _signed(seq - self._seq)
+        elapsed_us = (arrived - self._arrived) // 1000
+        later_us = elapsed_us + _signed(us - self._us - elapsed_us)
+        if ahead <= 0 and self._is_repeated(ahead, later_us):
+            return _REPEATED
+        if ahead <= 0 or (ahead > _LONG_HOLE and not self._plausible(ahead, later_us)):
+            return self._begin(boot, seq, us, arrived, f"its counter jumped by {ahead}")
+        hole: list[Step] = []
+        if ahead > 1:
+            self.lost += ahead - 1
+            hole = [Hole(self._boot, self._seq + 1, self._seq + ahead - 1)]
+        self._seq, self._us, self._arrived = self._seq + ahead, self._us + later_us, arrived
+        self._repeats = 0
+        return hole
+
+    def _is_repeated(self, ahead: int, later_us: int) -> bool:
+        same_clock = abs(later_us - ahead * self._period_us) < self._period_us
+        if -ahead >= _REPEATS or not same_clock or self._repeats >= _REPEATS_IN_A_ROW:
+            return False
+        self._repeats += 1
+        self.duplicates += 1
+        return True
+
+    def _plausible(self, ahead: int, later_us: int) -> bool:
+        expected = ahead * self._period_us
+        return 0.2 * expected < later_us < 5.0 * expected
+
+    def _begin(self, boot: int, seq: int, us: int, arrived: int, reason: str) -> list[Step]:
+        """Start a new count; where the device kept its boot, the samples get one made from it."""
+        before, first, last = self._boot, self._seq + 1, self._seq
+        self._recounts = self._recounts + 1 if boot == self._device_boot else 0
+        self._device_boot, self._seq, self._us, self._arrived = boot, seq, us, arrived
+        self._boot = zlib.crc32(f"{boot}/{self._recounts}".encode()) if self._recounts else boot
+        self._repeats = 0
+        if not reason:
+            return [Restart(self._boot, 0, "")]
+        return [Hole(before, first, last), Restart(self._boot, before, reason)]
+
+
+class _Run:
+    """Samples of one block that follow each other."""
+
+    def __init__(self, boot: int) -> None:
+        self._boot = boot
+        self._index: list[int] = []
+        self._seq: list[int] = []
+        self._us: list[int] = []
+
+    def add(self, index: int, seq: int, us: int) -> None:
+        self._index.append(index)
+        self._seq.append(seq)
+        self._us.append(us)
+
+    def of(self, raw: RawBlock) -> list[Step]:
+        """The run as a block, none where it is empty."""
+        if not self._index:
+            return []
+        kept = picked(raw, self._index)
+        seq, us = np.array(self._seq, np.int64), np.array(self._us, np.int64)
+        return [replace(kept, boot=self._boot, seq=seq, device_us=us)]
+
+
+def _signed(difference: int) -> int:
+    """A difference of two counters of 32 bits, of which either may have wrapped."""
+    return (difference + _U32 // 2) % _U32 - _U32 // 2

@@ -1,0 +1,220 @@
+"""How the device is doing: rates, silence, quality and plausibility, said as health and events.
+
+`state` is the first of these that holds:
+
+    reconnecting   the device is not open
+    starting       open, nothing has come yet
+    garbage        more than 1 % of the bytes of the last second belonged to no frame
+    stale          no sample for `stale_after`
+    slow           fewer than 90 % of the nominal rate over the last hundred samples
+    running
+"""
+
+from collections import Counter, deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigwatch.wire import quality
+from rigwatch.wire.messages import Event, Health, Message, SampleBlock, Severity
+
+_SECOND = 1_000_000_000
+_SLOW = 0.9
+_SLOW_OVER = 100
+_GARBAGE = 0.01
+_DRIFT_LIMITS: tuple[tuple[float, Severity], ...] = ((5000.0, "error"), (500.0, "warning"))
+_PLAUSIBLE_AFTER = 256
+_STATE_EVENTS: dict[str, tuple[Severity, str]] = {
+    "reconnecting": ("error", "link_lost"),
+    "garbage": ("error", "garbage"),
+    "stale": ("error", "stale"),
+    "slow": ("warning", "slow"),
+    "running": ("info", "running"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """The connection: whether it stands, what is wrong with it, how often it came back."""
+
+    connected: bool
+    text: str = ""
+    reconnects: int = 0
+
+
+class Watch:
+    """Watches the stream of one device.
+
+    Args:
+        source: who speaks, such as "daq/rig".
+        rate: nominal sample rate [Hz].
+        stale_after: silence that means stale [s].
+        clock_rate: how much faster than real time a replay runs.
+    """
+
+    def __init__(
+        self, source: str, rate: float, stale_after: float, clock_rate: float = 1.0
+    ) -> None:
+        self.state = "starting"
+        self._source = source
+        self._rate = rate
+        self._clock_rate = clock_rate
+        self._stale_ns = round(stale_after * _SECOND)
+        self._flagged: Counter[str] = Counter()
+        self._recent: deque[tuple[int, int]] = deque(maxlen=_SLOW_OVER + 1)
+        self._boot: int | None = None
+        self._samples, self._second_samples = 0, 0
+        self._first_ns: int | None = None
+        self._last_ns: int | None = None
+        self._second_ns: int | None = None
+        self._rates = {"rate_hz": 0.0, "rate_mean_hz": 0.0, "rate_worst_hz": 0.0}
+        self._before: dict[str, float] = {}
+        self._garbage_text = ""
+        self._drift_severity: Severity = "info"
+        self._outside: dict[str, int] = {}
+
+    def saw(self, block: SampleBlock, arrived_ns: int) -> None:
+        """Take note of samples that are published."""
+        self._first_ns = arrived_ns if self._first_ns is None else self._first_ns
+        self._last_ns = arrived_ns
+        if block.boot != self._boot:
+            self._boot = block.boot
+            self._recent.clear()
+        last = block.seq + len(block) - 1
+        self._recent.append((last, int(block.t_ns[-1])))
+        for column in block.channels:
+            self._count_flags(column.name, column.quality)
+        self._samples += len(block)
+
+    def silent_in(self, now_ns: int) -> float:
+        """Time until silence would mean stale [s], never below a millisecond."""
+        if self._last_ns is None or self.state == "stale":
+            return 0.05
+        return float(min(max((self._last_ns + self._stale_ns - now_ns) / _SECOND, 1e-3), 0.05))
+
+    def tick(
+        self, now_ns: int, unix_ns: int, link: Link, counters: Mapping[str, float]
+    ) -> list[Message]:
+        """Events of what changed; the health where a second is over or the state changed."""
+        messages: list[Message] = []
+        second_over = self._second_ns is None or now_ns - self._second_ns >= _SECOND
+        if second_over:
+            messages += self._second(now_ns, unix_ns, counters)
+        state, text = self._judge(now_ns, link)
+        if state != self.state:
+            messages += self._changed(state, text, unix_ns)
+        if second_over or messages:
+            messages.append(self._health(now_ns, unix_ns, text, link, counters))
+        return messages
+
+    def _judge(self, now_ns: int, link: Link) -> tuple[str, str]:
+        if not link.connected:
+            return "reconnecting", link.text
+        if self._garbage_text:
+            return "garbage", self._garbage_text
+        if self._last_ns is None:
+            return "starting", link.text or "nothing has come from the device yet"
+        silence = now_ns - self._last_ns
+        if silence >= self._stale_ns:
+            return "stale", f"no sample for {silence / _SECOND:.1f} s"
+        rate = self._recent_rate()
+        if rate < _SLOW * self._rate:
+            return "slow", f"{rate:.0f} samples a second, expected {self._rate:.0f}"
+        return "running", link.text
+
+    def _recent_rate(self) -> float:
+        """Rate at which the device takes samples, lost ones counted [Hz]."""
+        if len(self._recent) < 2 or self._recent[-1][0] - self._recent[0][0] < _SLOW_OVER:
+            return self._rate
+        (first, start), (last, end) = self._recent[0], self._recent[-1]
+        while len(self._recent) > 2 and last - self._recent[1][0] >= _SLOW_OVER:
+            self._recent.popleft()
+        return (last - first) * 1e9 / max(end - start, 1) / self._clock_rate
+
+    def _changed(self, state: str, text: str, unix_ns: int) -> list[Message]:
+        was, self.state = self.state, state
+        if state == "running" and was == "starting":
+            return []
+        severity, code = _STATE_EVENTS.get(state, ("info", state))
+        said = text or f"{state}, was {was}"
+        return [Event(self._source, unix_ns, severity, code, said)]
+
+    def _second(self, now_ns: int, unix_ns: int, counters: Mapping[str, float]) -> list[Message]:
+        self._update_rates(now_ns)
+        self._garbage_text = self._garbage(counters)
+        self._second_ns, self._before = now_ns, dict(counters)
+        return [*self._drift(unix_ns, counters), *self._implausible(unix_ns)]
+
+    def _update_rates(self, now_ns: int) -> None:
+        if self._second_ns is None or self._first_ns is None:
+            self._second_samples = self._samples
+            return
+        now = (self._samples - self._second_samples) * 1e9 / (now_ns - self._second_ns)
+        whole = self._first_ns <= self._second_ns
+        worst = self._rates["rate_worst_hz"] or np.inf
+        self._rates = {
+            "rate_hz": now,
+            "rate_mean_hz": self._samples * 1e9 / max(now_ns - self._first_ns, 1),
+            "rate_worst_hz": min(worst, now) if whole else self._rates["rate_worst_hz"],
+        }
+        self._second_samples = self._samples
+
+    def _garbage(self, counters: Mapping[str, float]) -> str:
+        skipped, count, good = (
+            counters.get(name, 0.0) - self._before.get(name, 0.0)
+            for name in ("skipped_bytes", "bytes", "good_frames")
+        )
+        if count == 0 or skipped <= _GARBAGE * count:
+            return ""
+        share = f"{100 * skipped / count:.0f} % of {count:.0f} bytes are no frames"
+        return share if good else f"{share}: wrong baud rate, or not a device of rigwatch?"
+
+    def _drift(self, unix_ns: int, counters: Mapping[str, float]) -> list[Message]:
+        drift = counters.get("drift_ppm", 0.0)
+        severity: Severity = next((s for limit, s in _DRIFT_LIMITS if abs(drift) > limit), "info")
+        if severity == self._drift_severity:
+            return []
+        self._drift_severity = severity
+        text = f"the device's clock is off by {drift:+.0f} ppm"
+        return [Event(self._source, unix_ns, severity, "clock_drift", text)]
+
+    def _implausible(self, unix_ns: int) -> list[Message]:
+        """Once, after the first second of samples: channels that are mostly out of range."""
+        if self._samples < _PLAUSIBLE_AFTER or self._outside.get("", 0):
+            return []
+        wrong = [name for name, count in self._outside.items() if count > self._samples // 2]
+        self._outside[""] = 1
+        hint = "mostly outside of its range: wrong unit, gain or order of channels?"
+        return [
+            Event(self._source, unix_ns, "error", "implausible", f"channel {name} is {hint}")
+            for name in wrong
+        ]
+
+    def _count_flags(self, channel: str, flags: np.ndarray) -> None:
+        if not flags.any():
+            return
+        for bit, name in quality.NAMES.items():
+            count = int(np.count_nonzero(flags & bit))
+            self._flagged[name.replace("-", "_")] += count
+            if bit == quality.SATURATED:
+                self._outside[channel] = self._outside.get(channel, 0) + count
+
+    def _health(
+        self,
+        now_ns: int,
+        unix_ns: int,
+        text: str,
+        link: Link,
+        counters: Mapping[str, float],
+    ) -> Health:
+        age = 0 if self._last_ns is None else now_ns - self._last_ns
+        figures = {
+            **self._rates,
+            "samples": float(self._samples),
+            **{name: float(value) for name, value in counters.items()},
+            "reconnects": float(link.reconnects),
+            "silence_ms": age / 1e6,
+            **{f"flagged_{name}": float(count) for name, count in sorted(self._flagged.items())},
+        }
+        return Health(self._source, unix_ns, self.state, text, figures)

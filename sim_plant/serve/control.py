@@ -1,0 +1,110 @@
+"""Talking to the plant while it runs: one line in, one line back, over a UNIX socket.
+
+    set friction=0.4        an effect takes a value at once
+    set friction=0.4 over 5 … or within so many seconds
+    clear                   all effects back to nothing
+    effects                 the present value of every effect
+    fault flip 20           a fault of the line for 20 frames (0: until `heal`)
+    heal                    the line is sound again
+    restart                 the device starts anew: new boot, counter 0
+    clock +0.5              the device's clock jumps
+
+The answer begins with "ok" or "error".
+"""
+
+import contextlib
+import os
+import socket
+import tempfile
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from rigwatch.wire.errors import DeviceError, RigwatchError
+
+_TIMEOUT = 5.0
+Answer = Callable[[str], str]
+
+
+def control_path(rig: str) -> Path:
+    """Where the plant of the rig called `rig` listens."""
+    return Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"rigwatch-{rig}.plant"
+
+
+def ask(path: Path, line: str) -> str:
+    """The running plant's answer to `line`, without its "ok".
+
+    Raises:
+        DeviceError: no plant runs there, or it refuses.
+    """
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as talk:
+            talk.settimeout(_TIMEOUT)
+            talk.connect(str(path))
+            with talk.makefile("rw", encoding="utf-8", newline="\n") as stream:
+                stream.write(line + "\n")
+                stream.flush()
+                answer = stream.readline().strip()
+    except OSError as error:
+        raise DeviceError(f"no simulated rig answers at {path}: {error.strerror or error}") from error
+    status, _, text = answer.partition(" ")
+    if status != "ok":
+        raise DeviceError(text or "the simulated rig did not answer")
+    return text
+
+
+class ControlServer:
+    """Answers lines on a UNIX socket, in a thread of its own.
+
+    Args:
+        path: the socket; one that a dead plant left is replaced.
+        answer: the reply to a line; a `RigwatchError` becomes an "error" line.
+    """
+
+    def __init__(self, path: Path, answer: Answer) -> None:
+        self._path = path
+        self._answer = answer
+        self._socket: socket.socket | None = None
+
+    def __enter__(self) -> "ControlServer":
+        if self._alive():
+            raise DeviceError(f"a simulated rig runs already: it answers at {self._path}")
+        with contextlib.suppress(FileNotFoundError):
+            self._path.unlink()
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket.bind(str(self._path))
+        self._path.chmod(0o600)
+        self._socket.listen(4)
+        threading.Thread(target=self._serve, name="plant-control", daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._socket is not None:
+            self._socket.close()
+        with contextlib.suppress(OSError):
+            self._path.unlink()
+
+    def _alive(self) -> bool:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+            return probe.connect_ex(str(self._path)) == 0
+
+    def _serve(self) -> None:
+        listener = self._socket
+        while listener is not None and listener.fileno() >= 0:
+            try:
+                talk, _ = listener.accept()
+            except OSError:
+                return
+            threading.Thread(target=self._talk, args=(talk,), daemon=True).start()
+
+    def _talk(self, talk: socket.socket) -> None:
+        with contextlib.suppress(OSError), talk, talk.makefile("rw", encoding="utf-8") as stream:
+            for line in stream:
+                stream.write(self._reply(line.strip()) + "\n")
+                stream.flush()
+
+    def _reply(self, line: str) -> str:
+        try:
+            return f"ok {self._answer(line)}".strip()
+        except RigwatchError as error:
+            return f"error {error}"

@@ -1,0 +1,129 @@
+"""The device on Modbus, over TCP or over a pty: samples go into the ring in real time, masters read it."""
+
+import asyncio
+import contextlib
+import logging
+import threading
+from collections.abc import Callable
+
+from pymodbus import FramerType, ModbusDeviceIdentification
+from pymodbus.constants import ExcCodes
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from rigwatch.wire.errors import DeviceError
+from rigwatch.wire.heartbeat import Heartbeat
+from sim_plant.serve.pty_bridge import PtyBridge
+from sim_plant.serve.register_bank import RegisterBank
+from sim_plant.serve.source import Device, Pace
+
+logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
+
+TracePacket = Callable[[bool, bytes], bytes]
+_Server = ModbusTcpServer | ModbusSerialServer
+
+
+class ModbusServer:
+    """Serves the register map of a device until stopped.
+
+    Args:
+        device: what is sampled.
+        bank: its ring.
+        rate: sample rate [Hz].
+        unit: unit id.
+        trace: sees and may change every packet (sending, bytes), for faults of the line.
+        heartbeat: told how many samples were taken, where given.
+
+    Attributes:
+        exception: code with which every request is refused, 0 for none.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        bank: RegisterBank,
+        rate: float = 256.0,
+        unit: int = 1,
+        trace: TracePacket | None = None,
+        heartbeat: Heartbeat | None = None,
+    ) -> None:
+        self.device = device
+        self.exception: int = 0
+        self._bank = bank
+        self._rate = rate
+        self._unit = unit
+        self._trace = trace
+        self._heartbeat = heartbeat or Heartbeat("plant", {})
+
+    def run_tcp(self, host: str, port: int, stop: threading.Event) -> None:
+        """Serve on TCP until `stop` is set.
+
+        Raises:
+            DeviceError: the port cannot be listened on.
+        """
+        asyncio.run(self._serve(lambda: self._tcp(host, port), stop, f"{host}:{port}"))
+
+    def run_rtu(self, bridge: PtyBridge, stop: threading.Event, baud: int = 115200) -> None:
+        """Serve on a serial line made of a pty until `stop` is set."""
+        with bridge:
+            asyncio.run(self._serve(lambda: self._rtu(bridge.device_end, baud), stop, "pty"))
+
+    async def _serve(
+        self, make: Callable[[], _Server], stop: threading.Event, where: str
+    ) -> None:
+        pace = Pace(self._rate)
+        self._bank.add(self.device.advance(max(pace.due(), 1)))
+        server = make()
+        try:
+            await server.serve_forever(background=True)
+        except (RuntimeError, OSError) as error:
+            raise DeviceError(f"{where}: cannot be listened on") from error
+        self._heartbeat.ready(f"Modbus at {where}")
+        taken = 1
+        while not stop.is_set():
+            await asyncio.sleep(pace.until_next())
+            if n := pace.due():
+                self._bank.add(self.device.advance(n))
+                taken += n
+            self._heartbeat.advance(taken)
+        with contextlib.suppress(Exception):
+            await server.shutdown()
+
+    def _sim_device(self) -> SimDevice:
+        registers = SimData(0, values=[0] * self._bank.size, datatype=DataType.REGISTERS)
+        return SimDevice(self._unit, [registers], action=self._fill)
+
+    async def _fill(
+        self,
+        _function: int,
+        start: int,
+        address: int,
+        count: int,
+        registers: list[int],
+        _values: list[int] | list[bool] | None,
+    ) -> ExcCodes | None:
+        if self.exception:
+            return ExcCodes(self.exception)
+        offset = address - start
+        registers[offset : offset + count] = self._bank.read(address, count)
+        return None
+
+    def _tcp(self, host: str, port: int) -> ModbusTcpServer:
+        return ModbusTcpServer(
+            self._sim_device(), address=(host, port), trace_packet=self._trace, identity=_IDENTITY
+        )
+
+    def _rtu(self, port: str, baud: int) -> ModbusSerialServer:
+        return ModbusSerialServer(
+            self._sim_device(),
+            framer=FramerType.RTU,
+            port=port,
+            baudrate=baud,
+            trace_packet=self._trace,
+            identity=_IDENTITY,
+        )
+
+
+_IDENTITY = ModbusDeviceIdentification(
+    info_name={"VendorName": "rigwatch", "ProductCode": "simulated rig"}
+)

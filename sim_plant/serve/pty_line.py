@@ -1,0 +1,102 @@
+"""A serial line made of a pseudo terminal: raw, never waiting for its reader, and pluggable.
+
+The device holds the master's end. A symbolic link gives the other end a name that stays. While nobody has the line open
+its bytes are lost, as on a wire.
+"""
+
+import contextlib
+import os
+import pty
+import select
+import tty
+from pathlib import Path
+
+from rigwatch.wire.errors import DeviceError
+
+
+class PtyLine:
+    """The device's end of a line.
+
+    Args:
+        link: where the symbolic link to the reader's end is made; an older link is replaced.
+
+    Attributes:
+        dropped: bytes lost because nobody read them.
+    """
+
+    def __init__(self, link: Path | str) -> None:
+        self.link = Path(link)
+        self.dropped = 0
+        self._master: int | None = None
+
+    @property
+    def plugged(self) -> bool:
+        """Whether the line exists now."""
+        return self._master is not None
+
+    def fileno(self) -> int:
+        """The master's descriptor, -1 while unplugged."""
+        return -1 if self._master is None else self._master
+
+    def plug(self, link: Path | str | None = None) -> None:
+        """Make the line, under another name where `link` is given.
+
+        Raises:
+            DeviceError: the link cannot be made.
+        """
+        self.unplug()
+        self.link = Path(link or self.link)
+        self._master, slave = pty.openpty()
+        tty.setraw(slave)
+        os.set_blocking(self._master, False)
+        self._make_link(os.ttyname(slave))
+        os.close(slave)
+
+    def unplug(self) -> None:
+        """Take the line away; readers see it close."""
+        if self._master is not None:
+            os.close(self._master)
+            self._master = None
+            with contextlib.suppress(OSError):
+                self.link.unlink()
+
+    def heard(self) -> bool:
+        """Whether somebody has the line open at its other end."""
+        if self._master is None:
+            return False
+        poll = select.poll()
+        poll.register(self._master, select.POLLOUT)
+        return not any(events & select.POLLHUP for _, events in poll.poll(0))
+
+    def write(self, data: bytes) -> None:
+        """Send what there is room for; the rest is lost, and counted. Never waits."""
+        sent = 0
+        if self.heard():
+            with contextlib.suppress(OSError):
+                sent = os.write(self.fileno(), data)
+        self.dropped += len(data) - sent
+
+    def read(self) -> bytes:
+        """What has come from the other end, empty where nothing has."""
+        try:
+            return os.read(self.fileno(), 4096)
+        except OSError:
+            return b""
+
+    def _make_link(self, target: str) -> None:
+        try:
+            if self.link.is_symlink():
+                self.link.unlink()
+            self.link.symlink_to(target)
+        except OSError as error:
+            self.unplug()
+            raise DeviceError(
+                f"{self.link}: cannot link the line here: {error.strerror}"
+            ) from error
+
+    def __enter__(self) -> "PtyLine":
+        self.plug()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.unplug()
