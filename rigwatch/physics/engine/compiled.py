@@ -1,0 +1,147 @@
+"""A system as a compiled kernel, kept on disk so that it is compiled once.
+
+The kernel's source is written to the cache folder under a name made from its own hash; numba keeps
+the machine code beside it.
+"""
+
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.physics.engine.codegen import source
+from rigwatch.physics.engine.system import System
+from rigwatch.wire.errors import ModelError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """Outputs over windows of one length.
+
+    Attributes:
+        outputs: shape (windows, samples, outputs), in the outputs' units.
+        slopes: shape (windows, samples, outputs, free parameters + states): ∂outputs by the free
+            parameters, then by the window's initial states.
+    """
+
+    outputs: FloatArray
+    slopes: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledSystem:
+    """A system that can be simulated."""
+
+    system: System
+    kernel: Callable[..., None]
+
+    @property
+    def parameters(self) -> FloatArray:
+        """Values of all parameters as the model gives them, shape (n_p,)."""
+        return np.array([p.value for p in self.system.parameters.values()])
+
+    def simulate(
+        self,
+        inputs: FloatArray,
+        dt: float,
+        starts: IntArray,
+        length: int,
+        *,
+        initial: FloatArray,
+        parameters: FloatArray,
+        substeps: int = 4,
+    ) -> Simulation:
+        """Simulate windows of the inputs, each from its own initial state.
+
+        Args:
+            inputs: shape (samples, inputs).
+            dt: time between samples [s].
+            starts: first sample of each window, shape (windows,).
+            length: samples in each window.
+            initial: shape (windows, states).
+            parameters: all of them, shape (n_p,).
+            substeps: Runge-Kutta steps between samples.
+
+        Raises:
+            ModelError: a window reaches beyond the inputs, or a shape does not fit.
+        """
+        system = self.system
+        n, m = len(system.states), len(system.free) + len(system.states)
+        if inputs.ndim != 2 or inputs.shape[1] != len(system.model.inputs):
+            raise ModelError(
+                f"{system.model.name}: found inputs of shape {inputs.shape}, expected"
+                f" {len(system.model.inputs)} columns: {', '.join(system.model.inputs)}"
+            )
+        if len(starts) and (starts.min() < 0 or starts.max() + length > len(inputs)):
+            raise ModelError(f"{system.model.name}: found a window beyond the recording's end")
+        outputs = np.empty((len(starts), length, len(system.outputs)))
+        slopes = np.empty((*outputs.shape, m))
+        hold = 1.0 if system.model.hold == "linear" else 0.0
+        initial = np.ascontiguousarray(initial, dtype=np.float64).reshape(len(starts), n)
+        arrays = (np.ascontiguousarray(inputs), dt, substeps, hold, starts, initial)
+        self.kernel(*arrays, np.asarray(parameters, np.float64), outputs, slopes)
+        return Simulation(outputs, slopes)
+
+    def vector(self, values: Mapping[str, float]) -> FloatArray:
+        """All parameters, those in `values` replaced; shape (n_p,).
+
+        Raises:
+            ModelError: a name is no parameter of the system.
+        """
+        names = list(self.system.parameters)
+        vector = self.parameters
+        for name, value in values.items():
+            if name not in names:
+                raise ModelError(
+                    f"{self.system.model.name}: found parameter {name!r}, expected one of"
+                    f" {', '.join(names)}"
+                )
+            vector[names.index(name)] = value
+        return vector
+
+
+def compile_system(system: System) -> CompiledSystem:
+    """The kernel of `system`, from the cache where it has been compiled before."""
+    return CompiledSystem(system, _module(source(system)).simulate)
+
+
+def cache_folder() -> Path:
+    """Where kernels are kept: below $RIGWATCH_CACHE, else the user's cache folder."""
+    base = os.environ.get("RIGWATCH_CACHE") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    return Path(base).expanduser() / "rigwatch" / "kernels"
+
+
+def _module(text: str) -> ModuleType:
+    name = f"kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    path = cache_folder() / f"{name}.py"
+    if not path.exists():
+        _write_whole(path, text)
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ModelError(f"{path}: cannot be loaded as a kernel")
+    module = importlib.util.module_from_spec(spec)
+    # numba looks the module up by its name when it loads the machine code.
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write under another name first, so that a reader never sees half a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False) as file:
+        file.write(text)
+    Path(file.name).replace(path)

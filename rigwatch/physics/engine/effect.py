@@ -1,0 +1,95 @@
+"""An effect: physics that a model may be missing, as an expression at a port.
+
+Each is a short declaration in a TOML file. At a force port the expression is the force that is
+added, in the port's `x` and `v`; at an actuator or sensor it is the signal that leaves, in the
+signal `u` that arrives. The parameter with role "strength" makes the effect vanish at its neutral
+value.
+
+Units are written with the port's own: `{F}`, `{x}`, `{v}` at a force, `{u}` at a signal, so that
+one declaration serves a mass on a table and an electronic oscillator.
+"""
+
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+from msgspec import Meta, field
+
+from rigwatch.wire.config import Section, load, parse
+
+Text = Annotated[str, Meta(min_length=1)]
+
+
+class EffectParameter(Section, frozen=True, kw_only=True):
+    """A number of an effect."""
+
+    unit: Annotated[str, Meta(description="its unit, may name the port's units in braces")]
+    value: Annotated[float, Meta(description="where a fit starts, as a share of `scale`")] = 0.0
+    low: Annotated[float, Meta(description="lower bound")] = float("-inf")
+    high: Annotated[float, Meta(description="upper bound")] = float("inf")
+    role: Annotated[
+        Literal["strength", "shape", "constant"],
+        Meta(description="strength vanishes with the effect, a constant is never fitted"),
+    ] = "shape"
+    neutral: Annotated[float, Meta(description="strength at which the effect is absent")] = 0.0
+    tried: Annotated[
+        tuple[float, ...], Meta(description="shape values that the score test tries")
+    ] = ()
+
+
+class EffectState(Section, frozen=True, kw_only=True):
+    """Memory of an effect."""
+
+    unit: Annotated[str, Meta(description="its unit")]
+    derivative: Annotated[Text, Meta(description="its rate of change")]
+    start: Annotated[float, Meta(description="value to start from")] = 0.0
+
+
+class Effect(Section, frozen=True, kw_only=True):
+    """One effect of the library."""
+
+    port: Annotated[Literal["force", "actuator", "sensor", "signal"], Meta(description="where")]
+    expression: Annotated[Text, Meta(description="force added, or signal that leaves")]
+    direction: Annotated[
+        str, Meta(description="derivative by the strength at neutral, where it is no expression")
+    ] = ""
+    physics: Annotated[Text, Meta(description="the physics in a sentence")]
+    source: Annotated[Text, Meta(description="where it is from")]
+    parameters: dict[str, EffectParameter]
+    states: dict[str, EffectState] = field(default_factory=dict)
+
+    def fits(self, kind: str) -> bool:
+        """Whether it may stand at a port of this kind."""
+        return self.port == kind or (self.port == "signal" and kind in ("actuator", "sensor"))
+
+    @property
+    def strength(self) -> str:
+        """Name of the strength."""
+        return next(name for name, p in self.parameters.items() if p.role == "strength")
+
+
+class EffectFile(Section, frozen=True, kw_only=True):
+    """A file of effects."""
+
+    effects: dict[str, Effect]
+
+
+def load_effects(path: Path | str) -> dict[str, Effect]:
+    """The effects of the file at `path`, by name.
+
+    Raises:
+        ConfigError: the file does not fit.
+    """
+    return load(path, EffectFile).effects
+
+
+@cache
+def library() -> dict[str, Effect]:
+    """The effects that ship with rigwatch, by name."""
+    found: dict[str, Effect] = {}
+    folder = resources.files("rigwatch.physics") / "effects"
+    for file in sorted(folder.iterdir(), key=lambda entry: entry.name):
+        if file.name.endswith(".toml"):
+            found |= parse(file.read_text("utf-8"), EffectFile, file.name).effects
+    return found

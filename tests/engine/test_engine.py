@@ -1,0 +1,154 @@
+"""The engine: exact sensitivities, fits that recover what was put in, errors that help."""
+
+import numpy as np
+import pytest
+import scipy.signal
+from msgspec.structs import replace
+
+from rigwatch.physics.engine.compiled import compile_system
+from rigwatch.physics.engine.dimension import describe, dimension
+from rigwatch.physics.engine.effect import library
+from rigwatch.physics.engine.fit import Recording, evaluate, fit
+from rigwatch.physics.engine.model import Model, shipped_models
+from rigwatch.physics.engine.system import Placement, compose
+from rigwatch.wire.config import parse
+from rigwatch.wire.errors import ModelError
+
+MASS_SPRING_DAMPER = shipped_models()["mass-spring-damper"]
+DT = 1 / 256
+SAMPLES = 600
+TRUE = {"m": 0.8, "c": 1.5, "k": 60.0}
+
+
+def excitation(seed: int = 1, samples: int = SAMPLES) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    time, band = np.arange(samples) * DT, np.arange(0.5, 8, 0.5)
+    waves = np.cos(2 * np.pi * np.outer(time, band) + rng.uniform(0, 2 * np.pi, len(band)))
+    return 4.0 * waves.sum(axis=1, keepdims=True)
+
+
+def simulated(compiled, values, u, noise=0.0, seed=0):
+    run = compiled.simulate(
+        u, DT, np.array([0]), len(u), initial=np.zeros((1, len(compiled.system.states))),
+        parameters=compiled.vector(values),
+    )  # fmt: skip
+    clean = run.outputs[0]
+    noisy = clean + noise * clean.std(axis=0) * np.random.default_rng(seed).normal(size=clean.shape)
+    return Recording(DT, u, noisy)
+
+
+@pytest.mark.parametrize("name", sorted(library()))
+def test_sensitivities_agree_with_finite_differences(name):
+    effect = library()[name]
+    port = next(n for n, p in MASS_SPRING_DAMPER.ports.items() if effect.fits(p.kind))
+    compiled = compile_system(compose(MASS_SPRING_DAMPER, [Placement(name, effect, port)]))
+    system, u = compiled.system, excitation()
+    strength = f"{port}_{name}_{effect.strength}"
+    gentle = {"vs": 0.05, "s": 50.0}
+    shape = {f"{port}_{name}_{n}": value for n, value in gentle.items() if n in effect.parameters}
+    base = compiled.vector({**TRUE, strength: 0.4, **shape})
+    initial = np.full((1, len(system.states)), 0.01)
+
+    def outputs(parameters):
+        run = compiled.simulate(
+            u, DT, np.array([0]), SAMPLES, initial=initial, parameters=parameters
+        )
+        return run.outputs, run.slopes
+
+    _, slopes = outputs(base)
+    for column, parameter in enumerate(system.free):
+        index = list(system.parameters).index(parameter)
+        step = np.zeros(len(base))
+        step[index] = 1e-5 * max(abs(base[index]), 1e-2)
+        difference = (outputs(base + step)[0] - outputs(base - step)[0]) / (2 * step[index])
+        scale = np.abs(difference).max()
+        assert np.abs(slopes[..., column] - difference).max() <= 2e-4 * scale, parameter
+
+
+def test_simulation_agrees_with_the_closed_form():
+    compiled = compile_system(compose(MASS_SPRING_DAMPER))
+    u = excitation()
+    ours = simulated(compiled, TRUE, u).outputs[:, 0]
+    plant = scipy.signal.lti([1.0], [TRUE["m"], TRUE["c"], TRUE["k"]])
+    _, theirs, _ = scipy.signal.lsim(plant, u[:, 0], np.arange(SAMPLES) * DT)
+    assert np.abs(ours - theirs).max() < 1e-6 * np.abs(theirs).max()
+
+
+def test_a_fit_recovers_parameters_within_their_deviations():
+    compiled = compile_system(compose(MASS_SPRING_DAMPER))
+    found = fit(compiled, simulated(compiled, TRUE, excitation(), noise=0.01), horizon=128)
+    for name, deviation in found.deviations().items():
+        assert abs(found.values()[name] - TRUE[name]) < 5 * deviation
+
+
+def test_adding_the_missing_effect_lowers_the_error_on_other_data():
+    friction = Placement("coulomb", library()["coulomb"], "load")
+    plant = compile_system(compose(MASS_SPRING_DAMPER, [friction]))
+    truth = TRUE | {"load_coulomb_Fc": 0.8}
+    train = simulated(plant, truth, excitation(1), noise=0.005, seed=1)
+    held_out = simulated(plant, truth, excitation(2), noise=0.005, seed=2)
+    without = fit(compile_system(compose(MASS_SPRING_DAMPER)), train, horizon=128)
+    added = fit(plant, train, horizon=128)
+    error = [evaluate(found, held_out, horizon=128).rms[1] for found in (without, added)]
+    assert error[1] < 0.3 * error[0]
+    assert added.values()["load_coulomb_Fc"] == pytest.approx(0.8, rel=0.05)
+
+
+def test_samples_that_are_not_numbers_are_left_out():
+    compiled = compile_system(compose(MASS_SPRING_DAMPER))
+    recording = simulated(compiled, TRUE, excitation())
+    recording.outputs[100:120] = np.nan
+    found = fit(compiled, recording, horizon=128)
+    assert found.values()["k"] == pytest.approx(TRUE["k"], rel=1e-4)
+
+
+MISTAKES = [
+    ("k*x", "k*y", "state v: found the unknown name 'y'"),
+    ("k*x", "k*v", "state v: found 'drive - k * v' with units"),
+    ("k*x", "k*x*(", "breaks off"),
+    ("- c*v", "- exp(c)*v", "expected a pure number"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong", "said"), MISTAKES, ids=[m[1] for m in MISTAKES])
+def test_a_wrong_equation_is_named(right, wrong, said):
+    state = MASS_SPRING_DAMPER.states["v"]
+    broken = replace(state, derivative=state.derivative.replace(right, wrong))
+    model = replace(MASS_SPRING_DAMPER, states=MASS_SPRING_DAMPER.states | {"v": broken})
+    with pytest.raises(ModelError, match=r"state v|expected") as error:
+        compose(model)
+    assert said in str(error.value)
+
+
+def test_an_effect_at_the_wrong_port_is_refused():
+    coulomb = library()["coulomb"]
+    with pytest.raises(ModelError, match="of kind actuator, expected kind force"):
+        compose(MASS_SPRING_DAMPER, [Placement("coulomb", coulomb, "drive")])
+    with pytest.raises(ModelError, match="expected one of drive, load"):
+        compose(MASS_SPRING_DAMPER, [Placement("coulomb", coulomb, "laod")])
+
+
+def test_a_model_without_states_is_a_regression():
+    text = """
+name = "line"
+summary = "a line"
+inputs.u = { unit = "V" }
+parameters.slope = { value = 1.0, unit = "1" }
+outputs.y = { unit = "V", expression = "slope*u" }
+"""
+    u = excitation()
+    found = fit(compile_system(compose(parse(text, Model, "line"))), Recording(DT, u, 3 * u), 100)
+    assert found.values()["slope"] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), [("N s/m", "N/(m/s)"), ("Pa", "N/m^2"), ("J", "N m"), ("1/s", "Hz")]
+)
+def test_units_that_are_the_same_have_one_dimension(one, other):
+    assert dimension(one) == dimension(other)
+
+
+def test_an_unknown_unit_is_named():
+    with pytest.raises(ModelError, match="'furlong'"):
+        dimension("furlong")
+    assert describe(dimension("m/s^2")) == "m s^-2"
