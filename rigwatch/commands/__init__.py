@@ -25,6 +25,7 @@ COMMANDS: dict[str, str] = {
     # name on the command line: module below rigwatch.commands
     "up": "up",
     "doctor": "doctor",
+    "dashboard": "dashboard",
     "info": "info",
     "trim": "trim",
     "recover": "recover",

@@ -3,8 +3,8 @@
     messages ──▶ Dashboard.show ──▶ batches ──flush──▶ Rerun viewer
                      └─▶ AlarmBook, Survey ──▶ status text, layout
 
-Only this package knows Rerun, and nothing here is imported by the other processes. Call `require_rerun` before
-importing a module of this package that draws.
+Only this package knows Rerun, and nothing here is imported by the other processes. Call
+`require_rerun` before importing a module of this package that draws.
 """
 
 import importlib.util

@@ -1,4 +1,4 @@
-"""What the alarms say at the moment: their states, the worst of them, and the verdict in plain words.
+"""What the alarms say at the moment: their states, and which of them matters most.
 
 Fed with transitions in the order in which they come; no clock, no bus, no drawing.
 """
@@ -13,7 +13,7 @@ LANES: dict[str, str] = {
     "stiction": "stiction",
     "other_fault": "other fault",
 }
-"""Alarms that have a lane on the timeline from the start, with the words for people; others get one when they come."""
+"""Alarms that have a lane from the start, with the words for people; others get one later."""
 _SEVERITIES = ("info", "warning", "error", "critical")
 
 
@@ -46,7 +46,7 @@ class AlarmBook:
         return before is None or before.state != alarm.state
 
     def faults(self) -> list[Alarm]:
-        """Alarms that stand and mean a fault: the worst first, then the first-out, then the oldest."""
+        """Alarms that stand and mean a fault: worst first, then first-out, then oldest."""
         standing = [a for a in self.last.values() if is_active(a) and a.severity != "info"]
         return sorted(standing, key=_rank)
 

@@ -1,6 +1,7 @@
 """Samples on their way to the viewer: gathered by plot, sent as one batch of columns a plot.
 
-Drawing sample by sample costs ten times as much of a core, and many small chunks make the viewer lag by seconds.
+Drawing sample by sample costs ten times as much of a core, and many small chunks make the viewer
+lag by seconds.
 """
 
 from collections.abc import Iterable

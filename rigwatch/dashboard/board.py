@@ -1,7 +1,8 @@
 """The drawing core: messages in, drawings out; no bus, no clock, no viewer of its own.
 
-`Dashboard.show` takes one message and draws at most a few words; samples wait in batches until `flush`.
-Live, the process calls `flush` a few times a second; for a recording it is called once in a while.
+`Dashboard.show` takes one message and draws at most a few words; samples wait in batches until
+`flush`. Live, the process calls `flush` a few times a second; for a recording it is called once in
+a while.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What is known of the rig at the moment, as far as people are told: no drawing, no bus, no clock."""
+"""What is known of the rig now, as far as people are told: no drawing, no bus, no clock."""
 
 from dataclasses import dataclass, field
 

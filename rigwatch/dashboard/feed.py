@@ -1,6 +1,7 @@
 """What the bus says, as far as it is drawn: a bounded queue a topic, emptied a few times a second.
 
-A screen may leave something out, so that nothing is asked of anybody twice: what a full queue drops is counted and shown.
+A screen may leave something out, so that nothing is asked of anybody twice: what a full queue
+drops is counted and shown.
 """
 
 from rigwatch.wire.bus import Bus

@@ -1,10 +1,10 @@
 """Where everything stands on the screen: the blueprint of the viewer.
 
-    Watch    signals and residual on the left, verdict, alarm states and friction estimates on the right
-    Health   what the processes report: rates, losses, errors, latency
+    Watch    signals and residual on the left, verdict, alarm states and friction estimates on the
+    right Health   what the processes report: rates, losses, errors, latency
 
-Short windows follow the cursor for signals, long ones for estimates and alarms, so that both the motion and the
-history can be read.
+Short windows follow the cursor for signals, long ones for estimates and alarms, so that both the
+motion and the history can be read.
 """
 
 from collections.abc import Sequence
@@ -20,9 +20,9 @@ _TITLES = {
     quantities.VOLTAGE.path: "Servo voltage",
     quantities.FORCE.path: "Force",
     quantities.POSITION.path: "Position",
-    quantities.RESIDUAL.path: "Acceleration residual: measured minus modelled, with limits",
-    quantities.THETA1.path: "Coulomb friction θ1, with thresholds and signature",
-    quantities.THETA2.path: "Viscous friction θ2, with thresholds and signature",
+    quantities.RESIDUAL.path: "Residual acceleration with limits",
+    quantities.THETA1.path: "Coulomb friction θ1 with thresholds and signature",
+    quantities.THETA2.path: "Viscous friction θ2 with thresholds and signature",
 }
 FRICTION = (quantities.THETA1.path, quantities.THETA2.path)
 ACCELERATION_TITLE = "Acceleration, measured and modelled"
@@ -67,7 +67,8 @@ def title_of(plan: PlotPlan) -> str:
 
 
 def _in(unit: str) -> str:
-    return f" [{unit}]" if unit not in ("", "1") else ""
+    shown = unit.replace("^2", "²").replace("^3", "³")
+    return f" [{shown}]" if unit not in ("", "1") else ""
 
 
 def _watch(plan: Sequence[PlotPlan], windows: Windows) -> rrb.Container:

@@ -1,4 +1,4 @@
-"""Which viewer is opened: a window where there is a display, else a page for a browser on this machine."""
+"""Which viewer is opened: a window where there is a display, else a page for a browser here."""
 
 import threading
 from collections.abc import Callable

@@ -1,6 +1,7 @@
-"""One colour a quantity, everywhere: in plots, in tests and in the manual. Chosen for a dark background.
+"""One colour a quantity, in plots, tests and manual, chosen for a dark background.
 
-Colours are (red, green, blue) from 0 to 255. Measured things are warm or saturated, modelled ones pale, limits red.
+Colours are (red, green, blue) from 0 to 255. Measured things are warm or saturated, modelled ones
+pale, limits red.
 """
 
 from rigwatch.wire.messages import AlarmState

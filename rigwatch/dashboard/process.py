@@ -3,8 +3,8 @@
     bus ──▶ Feed ──▶ Drawer (thread) ──▶ viewer (process)
                         this loop watches both and speaks of them
 
-Nothing waits for the dashboard: its queues are bounded, and it asks nobody for anything. A viewer that
-dies or takes no data is started again; a window that was closed by a person ends the process.
+Nothing waits for the dashboard: its queues are bounded, and it asks nobody for anything. A viewer
+that dies or takes no data is started again; a window that was closed by a person ends the process.
 """
 
 import threading

@@ -1,8 +1,8 @@
 """Which column of a message is drawn where: one row a plot, one line a series.
 
-A plot is one entity with several scalars, so that one batch a plot travels to the viewer. Its last series, which is drawn
-on top, decides whether the plot exists; a message without the others leaves them out (NaN). Channels without a row of their own get a
-plot each under `signals/other`.
+A plot is one entity with several scalars, so that one batch a plot travels to the viewer. Its last
+series, which is drawn on top, decides whether the plot exists; a message without the others leaves
+them out (NaN). Channels without a row of their own get a plot each under `signals/other`.
 """
 
 from collections.abc import Iterable

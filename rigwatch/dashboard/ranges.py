@@ -1,7 +1,7 @@
-"""Axis ranges that stand still: learnt from what was seen, in steps of 1, 2 and 5, growing only when needed.
+"""Axis ranges that stand still: learnt from what was seen, growing in round steps when needed.
 
-A range that follows every sample makes noise look like motion; one that is set by the sensor's range makes motion
-look like noise.
+A range that follows every sample makes noise look like motion; one that is set by the sensor's
+range makes motion look like noise.
 """
 
 import math
@@ -21,7 +21,7 @@ def nice_above(value: float) -> float:
 
 
 def symmetric(peak: float) -> Range | None:
-    """A round range around zero that holds `peak` with a margin; None where there is nothing to hold."""
+    """A round range around zero that holds `peak` with a margin; None where that is nothing."""
     if not math.isfinite(peak) or peak <= 0:
         return None
     edge = nice_above(1.1 * peak)
@@ -29,10 +29,10 @@ def symmetric(peak: float) -> Range | None:
 
 
 def around_signature(signature: float, low: float, high: float) -> Range | None:
-    """A range that holds zero, the thresholds and the signature of a fault, whatever the estimate does.
+    """A range that holds zero, thresholds and signature of a fault, whatever the estimate does.
 
-    Estimates have no physical meaning before a fault and may be huge when the rig hardly moves; the plot is about how
-    they stand to thresholds and signature.
+    Estimates have no physical meaning before a fault and may be huge when the rig hardly moves;
+    the plot is about how they stand to thresholds and signature.
     """
     marks = [value for value in (0.0, signature, low, high) if math.isfinite(value)]
     span = max(marks) - min(marks)

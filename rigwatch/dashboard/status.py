@@ -28,6 +28,10 @@ def advice(facts: Facts) -> str:
     if unseen:
         text = f"{_sentence(unseen[0].cause)} It has gone, and nobody has acknowledged it."
         return _paragraphs(f"# Over: {title(unseen[0].name)}", text, _friction(facts))
+    return _calm(facts, remarks)
+
+
+def _calm(facts: Facts, remarks: Sequence[Alarm]) -> str:
     if remarks:
         return _paragraphs("# No verdict now", _sentence(remarks[0].cause), remarks[0].guidance)
     if not facts.figures:

@@ -1,6 +1,7 @@
-"""What has been seen so far, as far as the layout depends on it: channels, units, and how far the axes must reach.
+"""What has been seen, as far as the layout depends on it: plots, units, reach of the axes.
 
-The layout is sent anew when `Survey.plan` changes; its ranges move in wide steps, so that this is rare.
+The layout is sent anew when `Survey.plan` changes; its ranges move in wide steps, so that this is
+rare.
 """
 
 from collections.abc import Iterable

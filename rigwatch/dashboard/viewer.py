@@ -1,13 +1,12 @@
 """Rerun's viewer as a process of its own: started, asked whether it lives, ended.
 
-It listens on 127.0.0.1 only, drops its oldest data at a memory limit, ends with the process that started it,
-and neither reports its use nor looks for examples on the network.
+It listens on 127.0.0.1 only, drops its oldest data at a memory limit, ends with the process that
+started it, and neither reports its use nor looks for examples on the network.
 """
 
-import ctypes
 import importlib.util
 import os
-import signal
+import shutil
 import socket
 import subprocess
 import tempfile
@@ -23,8 +22,6 @@ MEMORY_LIMIT = "1GiB"
 SERVER_MEMORY_LIMIT = "256MiB"
 _START_TIMEOUT = 30.0
 _STOP_TIMEOUT = 3.0
-_SET_DEATH_SIGNAL = 1
-_LIBC = ctypes.CDLL(None, use_errno=True)
 
 Kind = Literal["native", "web", "headless"]
 
@@ -53,12 +50,11 @@ class Viewer:
             raise ViewerError(f"port {taken} is taken: end what listens there or configure another")
         self._words: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
         self._process = subprocess.Popen(
-            [str(_binary()), *self._options()],
+            [*_dying_with_parent(), str(_binary()), *self._options()],
             env=_environment(),
             stdin=subprocess.DEVNULL,
             stdout=self._words,
             stderr=self._words,
-            preexec_fn=_die_with_parent,
         )
 
     @property
@@ -168,5 +164,7 @@ def _environment() -> dict[str, str]:
     return {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true", "RUST_LOG": "warn"}
 
 
-def _die_with_parent() -> None:
-    _LIBC.prctl(_SET_DEATH_SIGNAL, signal.SIGTERM)
+def _dying_with_parent() -> list[str]:
+    """What lets the viewer end when its starter is killed; nothing where there is no such tool."""
+    tool = shutil.which("setpriv")
+    return [tool, "--pdeathsig", "TERM", "--"] if tool else []

@@ -1,4 +1,4 @@
-"""A rig that moves, then rubs: the messages that daq and monitor would say, without either of them."""
+"""A rig that moves, then rubs: what daq and monitor would say, without either of them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

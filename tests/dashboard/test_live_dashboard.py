@@ -1,0 +1,174 @@
+"""The dashboard process over a real router: it shows the rig, and its death hurts nobody."""
+
+import contextlib
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rigwatch.dashboard import palette
+from rigwatch.dashboard.viewer import answers, free_port
+from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus_zenoh import open_router
+from rigwatch.wire.messages import Alarm, EstimateBlock, Health, Message, SampleBlock
+from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.topics import ALARMS, ESTIMATES, HEALTH, SAMPLES
+from tests.dashboard.rig_messages import RATE, Rig
+from tests.dashboard.screen import Screen, until
+
+TOPIC_OF = {SampleBlock: SAMPLES, EstimateBlock: ESTIMATES, Alarm: ALARMS, Health: HEALTH}
+CONFIG = """
+[rig]
+id = "bench"
+[bus]
+router = "tcp/127.0.0.1:{bus}"
+listen = "tcp/127.0.0.1:{bus}"
+[[channels]]
+name = "voltage"
+unit = "V"
+gain = 1e-3
+[daq.device]
+adapter = "serial"
+port = "unused"
+[dashboard]
+grpc_port = {grpc}
+web_port = {web}
+update_rate = 8.0
+"""
+
+
+@pytest.fixture(scope="module")
+def config_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("rig") / "rig.toml"
+    path.write_text(CONFIG.format(bus=free_port(), grpc=free_port(), web=free_port()))
+    return path
+
+
+@pytest.fixture(scope="module")
+def config(config_file: Path) -> RigConfig:
+    return load_rig(config_file)
+
+
+@pytest.fixture(scope="module")
+def bus(config: RigConfig) -> Iterator[Bus]:
+    close = open_router(config.bus.listen)
+    bus = connect(config, "rig", timeout=10)
+    yield bus
+    bus.close()
+    close()
+
+
+class Player(threading.Thread):
+    """Says a rig's messages on the bus in real time, until stopped; notes how long a put took."""
+
+    def __init__(self, bus: Bus, rig: Rig) -> None:
+        super().__init__(daemon=True)
+        self.bus, self.rig = bus, rig
+        self.stopped = threading.Event()
+        self.sent = 0
+        self.slowest = 0.0
+
+    def run(self) -> None:
+        began = time.monotonic()
+        for message in self.rig.messages(600.0):
+            if isinstance(message, SampleBlock):
+                due = began + message.seq / RATE
+                if self.stopped.wait(max(0.0, due - time.monotonic())):
+                    return
+                self.sent += len(message)
+            self.put(message)
+
+    def put(self, message: Message) -> None:
+        before = time.monotonic()
+        self.bus.publish(TOPIC_OF[type(message)], message)
+        self.slowest = max(self.slowest, time.monotonic() - before)
+
+
+@contextlib.contextmanager
+def playing(bus: Bus) -> Iterator[Player]:
+    player = Player(bus, Rig(friction_at=3.0, start_ns=time.time_ns()))
+    player.start()
+    yield player
+    player.stopped.set()
+    player.join()
+
+
+@contextlib.contextmanager
+def dashboard(config_file: Path, viewer: str) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-m", "rigwatch", "dashboard", str(config_file), "--viewer", viewer]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    yield process
+    process.terminate()
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(10)
+    process.kill()
+
+
+def test_the_screen_shows_the_rig_and_its_friction(
+    bus: Bus, config_file: Path, config: RigConfig
+) -> None:
+    assert config.dashboard is not None
+    port = config.dashboard.grpc_port
+    with dashboard(config_file, "headless") as process, playing(bus):
+        until(lambda: answers(port) or process.poll() is not None, "the viewer answers")
+        screen = Screen(f"rerun+http://127.0.0.1:{port}/proxy")
+        until(lambda: red_verdict(screen), "the verdict turns red")
+        end = screen.timeline_end()
+        until(lambda: screen.timeline_end() - end > 1.5e9, "time goes on")
+        check_views(screen)
+        check_colours(screen)
+        assert screen.errors() == []
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(15) == 0
+        until(lambda: not answers(port), "the viewer ends with the dashboard", 10.0)
+
+
+def red_verdict(screen: Screen) -> bool:
+    if "Verdict" not in screen.views():
+        return False
+    return screen.lane("Verdict", palette.VERDICTS["dry_friction"][1]).pixels > 200
+
+
+def check_views(screen: Screen) -> None:
+    expected = {
+        "Verdict",
+        "What to do",
+        "Status",
+        "Alarms over time",
+        "Alarm log",
+        "Servo voltage [V]",
+        "Position [mm]",
+        "Acceleration, measured and modelled [m/s²]",
+        "Residual acceleration with limits [m/s²]",
+        "Coulomb friction θ1 with thresholds and signature",
+        "Viscous friction θ2 with thresholds and signature",
+        "Rates [Hz]",
+    }
+    assert expected <= set(screen.views())
+    assert screen.reports() == []
+
+
+def check_colours(screen: Screen) -> None:
+    for title, colour in (
+        ("Servo voltage [V]", palette.VOLTAGE),
+        ("Position [mm]", palette.POSITION),
+        ("Acceleration, measured and modelled [m/s²]", palette.ACCELERATION),
+        ("Acceleration, measured and modelled [m/s²]", palette.MODEL),
+        ("Residual acceleration with limits [m/s²]", palette.RESIDUAL),
+        ("Residual acceleration with limits [m/s²]", palette.LIMIT),
+    ):
+        patch = screen.patch(title, colour)
+        assert patch.pixels > 300, (title, patch)
+        assert patch.spread > 0.5, (title, patch)
+    for title, colour in (
+        ("Coulomb friction θ1 with thresholds and signature", palette.THETA1),
+        ("Viscous friction θ2 with thresholds and signature", palette.THETA2),
+    ):
+        assert screen.patch(title, colour).pixels > 60, title
+    assert screen.lane("Alarms over time", palette.STATES["unacknowledged"][1]).pixels > 100
+    assert screen.lane("Alarms over time", palette.STATES["normal"][1]).pixels > 100
