@@ -17,6 +17,7 @@ EXCITATION_CHANGED = "excitation_changed"
 NOT_OBSERVABLE = "not_observable"
 ILL_CONDITIONED = "ill_conditioned"
 GAP = "gap"
+SENSOR_INVALID = "sensor_invalid"
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,15 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
         GAP,
         "samples missing before this one",
         "1",
-        "samples are missing, the window was restarted",
+        "samples are missing before this one",
         False,
+    ),
+    ConditionKind(
+        SENSOR_INVALID,
+        "samples in a row without a valid reading of a channel that the residual needs",
+        "1",
+        "a channel has been invalid for longer than can be predicted through",
+        True,
     ),
 )
 

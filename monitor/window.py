@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_HEAD, _FILL, _FRONT_LEFT = 0, 1, 2
+HEAD, FILL, FRONT_LEFT, LENGTH = 0, 1, 2, 3
 
 
 class Window(NamedTuple):
@@ -30,7 +30,7 @@ class Window(NamedTuple):
         rows: ring of the stored rows, shape (N, p + 1).
         front: sums of the older samples, shape (N + 1, m), m = (p + 1)(p + 2)/2.
         back: sum of the newer samples, shape (m,).
-        place: head of the ring, samples in it, older samples left in `front`.
+        place: head of the ring, samples in it, older samples left in `front`, N itself.
     """
 
     rows: FloatArray
@@ -44,43 +44,51 @@ def new_window(length: int, parameters: int) -> Window:
     width = parameters + 1
     sums = width * (width + 1) // 2
     return Window(
-        np.zeros((length, width)), np.zeros((length + 1, sums)), np.zeros(sums), np.zeros(3, np.int64)
+        np.zeros((length, width)),
+        np.zeros((length + 1, sums)),
+        np.zeros(sums),
+        np.array([0, 0, 0, length], np.int64),
     )
 
 
-def clear(window: Window) -> None:
-    """Forget every sample."""
-    for part in window:
-        part[...] = 0
+@njit(cache=True)
+def restart_window(window: Window, length: int) -> None:
+    """Forget every sample; from now on the window spans `length` samples, at most what it was made for."""
+    window.place[HEAD] = 0
+    window.place[FILL] = 0
+    window.place[FRONT_LEFT] = 0
+    window.place[LENGTH] = length
+    window.front[0, :] = 0.0
+    window.back[:] = 0.0
 
 
 @njit(cache=True)
 def push(window: Window, row: FloatArray) -> None:
     """Take one row in, and the oldest out when the window is full."""
-    rows, front, back, place = window
-    length, width = rows.shape
-    head = place[0]
-    if place[1] == length:
-        if place[2] == 0:
+    rows, _, back, place = window
+    width, length = rows.shape[1], place[LENGTH]
+    head = place[HEAD]
+    if place[FILL] == length:
+        if place[FRONT_LEFT] == 0:
             _refill(window)
-        place[2] -= 1
+        place[FRONT_LEFT] -= 1
     else:
-        place[1] += 1
+        place[FILL] += 1
     k = 0
     for i in range(width):
         rows[head, i] = row[i]
         for j in range(i, width):
             back[k] += row[i] * row[j]
             k += 1
-    place[0] = head + 1 if head + 1 < length else 0
+    place[HEAD] = head + 1 if head + 1 < length else 0
 
 
 @njit(cache=True)
 def _refill(window: Window) -> None:
     """Move everything from `back` to `front`: suffix sums from the newest sample to the oldest."""
     rows, front, back, place = window
-    length, width = rows.shape
-    newest = place[0] - 1
+    width, length = rows.shape[1], place[LENGTH]
+    newest = place[HEAD] - 1
     front[0, :] = 0.0
     for n in range(length):
         at = newest - n
@@ -92,7 +100,7 @@ def _refill(window: Window) -> None:
                 front[n + 1, k] = front[n, k] + rows[at, i] * rows[at, j]
                 k += 1
     back[:] = 0.0
-    place[2] = length
+    place[FRONT_LEFT] = length
 
 
 @njit(cache=True)
@@ -100,7 +108,7 @@ def sums(window: Window, out: FloatArray) -> None:
     """Sums of products over the window into `out`, shape (m,)."""
     _, front, back, place = window
     for k in range(back.size):
-        out[k] = front[place[2], k] + back[k]
+        out[k] = front[place[FRONT_LEFT], k] + back[k]
 
 
 @njit(cache=True)

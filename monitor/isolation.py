@@ -1,0 +1,173 @@
+"""What kind of change it is: dry friction, or one of its rivals.
+
+The change of the residual since its onset is put before two explanations over the same samples:
+
+    friction   y = θ1·Ge[sgn v] + θ2·Ge[v]                                                 (5.33)
+    rivals     any change that is linear in the healthy motion: gain, lag, delay, lost pressure, spring, mass,
+               damping, bias; as  A, dA, X, dX, 1  and the first two growing in time,
+               with A and X one healthy period of acceleration and position, d a difference of neighbours
+
+Smooth faults are linear in the healthy motion or nearly so. Dry friction is not: it jumps where the velocity turns. So the
+question is what the jump explains that no rival can,
+
+    share = (part of y that Ge[sgn v] explains beyond the rivals)² / y²,   ρ = the same over what the rivals leave,
+
+with the sign that takes energy out (θ1 > 0). A mass that stands still where the healthy one moves, by position and
+acceleration alike, is stick; no smooth fault does that either.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from monitor.reference import PERIOD, Reference, place_in_period
+from rigwatch.physics.transfer_function import FloatArray, filter_sample
+
+HISTORY = 512
+"""Samples that are kept for judging."""
+Y, SIGN_PART, SPEED_PART, SPEED, AT_REST = range(5)
+"""Columns of the history: change of the residual, g1, g2, velocity, 1 at rest."""
+_RIVALS = 7
+
+
+class History(NamedTuple):
+    """Ring of the newest samples, with the friction filter for judging from the onset on."""
+
+    rows: FloatArray
+    head: NDArray[np.int64]
+    b: FloatArray
+    a: FloatArray
+
+
+class Evidence(NamedTuple):
+    """What the samples since the onset say.
+
+    Args:
+        explained: share of y² that friction explains.
+        share: share of y² that the jump explains beyond the rivals, negative where it would put energy in.
+        rho: correlation of the jump with what the rivals leave.
+        rest: share of the samples at rest.
+        rivals: share of y² that the rivals explain.
+        jump: energy explained by the jump beyond the rivals [(m/s^2)^2].
+    """
+
+    explained: float
+    share: float
+    rho: float
+    rest: float
+    rivals: float
+    jump: float
+
+
+def new_history(b: FloatArray, a: FloatArray) -> History:
+    """An empty history for the friction filter b/a, padded to one length."""
+    return History(np.zeros((HISTORY, 5)), np.zeros(1, np.int64), b, a)
+
+
+@njit(cache=True)
+def remember(
+    history: History, y: float, g1: float, g2: float, speed: float, rest: float
+) -> None:
+    """Keep one sample."""
+    row = history.rows[history.head[0]]
+    row[Y], row[SIGN_PART], row[SPEED_PART], row[SPEED], row[AT_REST] = y, g1, g2, speed, rest
+    history.head[0] = (history.head[0] + 1) % HISTORY
+
+
+@njit(cache=True)
+def weigh(history: History, ref: Reference, seq: int, since: int, count: int) -> Evidence:
+    """Evidence of the newest `count` samples.
+
+    Args:
+        history: the newest samples, the last of them number `seq`.
+        ref: one period of the healthy rig.
+        since: samples since the onset of the change, the regressors start from rest there where it is kept.
+        count: samples that are judged, at most HISTORY and `since`.
+    """
+    n = min(count, HISTORY)
+    data = np.zeros((n, _RIVALS + 3))
+    _fill_rivals(data, ref, seq, n)
+    _fill_friction(data, history, since, n)
+    rest = 0.0
+    for k in range(n):
+        at = (history.head[0] - n + k) % HISTORY
+        data[k, _RIVALS + 2] = history.rows[at, Y]
+        rest += history.rows[at, AT_REST] / n
+    gram = data.T @ data
+    return _compare(gram, rest)
+
+
+@njit(cache=True)
+def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
+    period = ref.number[PERIOD]
+    for k in range(n):
+        place = place_in_period(ref, seq - n + 1 + k)
+        later, earlier = (place + 1) % period, (place - 1) % period
+        data[k, 0] = ref.template[2, place]
+        data[k, 1] = ref.template[2, later] - ref.template[2, earlier]
+        data[k, 2] = ref.template[1, place]
+        data[k, 3] = ref.template[1, later] - ref.template[1, earlier]
+        data[k, 4] = 1.0
+        time = (k + 0.5) / n - 0.5
+        data[k, 5] = time * data[k, 0]
+        data[k, 6] = time * data[k, 1]
+
+
+@njit(cache=True)
+def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> None:
+    rows, head = history.rows, history.head[0]
+    if since >= HISTORY:
+        for k in range(n):
+            at = (head - n + k) % HISTORY
+            data[k, _RIVALS] = rows[at, SIGN_PART]
+            data[k, _RIVALS + 1] = rows[at, SPEED_PART]
+        return
+    order = max(history.b.size - 1, 1)
+    sign_state, speed_state = np.zeros(order), np.zeros(order)
+    for k in range(since):
+        speed = rows[(head - since + k) % HISTORY, SPEED]
+        sign = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
+        g1 = filter_sample(history.b, history.a, sign_state, sign)
+        g2 = filter_sample(history.b, history.a, speed_state, speed)
+        place = k - (since - n)
+        if place >= 0:
+            data[place, _RIVALS], data[place, _RIVALS + 1] = g1, g2
+
+
+@njit(cache=True)
+def _compare(gram: FloatArray, rest: float) -> Evidence:
+    size = gram.shape[0]
+    y, g1, g2 = size - 1, _RIVALS, _RIVALS + 1
+    yy = max(gram[y, y], 1e-30)
+    determinant = gram[g1, g1] * gram[g2, g2] - gram[g1, g2] ** 2
+    explained = 0.0
+    if determinant > 1e-12 * gram[g1, g1] * gram[g2, g2]:
+        theta1 = (gram[g2, g2] * gram[g1, y] - gram[g1, g2] * gram[g2, y]) / determinant
+        theta2 = (gram[g1, g1] * gram[g2, y] - gram[g1, g2] * gram[g1, y]) / determinant
+        explained = (theta1 * gram[g1, y] + theta2 * gram[g2, y]) / yy
+    left = gram.copy()
+    for i in range(_RIVALS):
+        _eliminate(left, i, 1e-9 * gram[i, i])
+    remains = max(left[y, y], 0.0)
+    jump = 0.0
+    if left[g1, g1] > 1e-9 * max(gram[g1, g1], 1e-30) and remains > 0.0:
+        jump = left[g1, y] ** 2 / left[g1, g1]
+    sign = 1.0 if left[g1, y] > 0.0 else -1.0
+    rho = sign * np.sqrt(min(jump / remains, 1.0)) if remains > 0.0 else 0.0
+    return Evidence(explained, sign * jump / yy, rho, rest, 1.0 - remains / yy, jump)
+
+
+@njit(cache=True)
+def _eliminate(gram: FloatArray, pivot: int, least: float) -> None:
+    """Take out of every column what column `pivot` explains; a column that others explained already is skipped."""
+    strength = gram[pivot, pivot]
+    if strength <= least or strength <= 0.0:
+        return
+    size = gram.shape[0]
+    row = gram[pivot].copy()
+    for i in range(size):
+        factor = row[i] / strength
+        for j in range(size):
+            gram[i, j] -= factor * row[j]

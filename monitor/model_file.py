@@ -1,0 +1,204 @@
+"""The model file: all that commissioning found out about a rig, as one TOML file that people can read.
+
+`load_model` reads it, `model_text` prints it. Numbers are printed with all their digits, so a file read back gives the same
+estimates to the last bit.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from msgspec import Meta, field, structs
+
+from rigwatch.physics.transfer_function import TransferFunction
+from rigwatch.wire.config import Section, load
+from rigwatch.wire.errors import ConfigError
+
+Floats = tuple[float, ...]
+Positive = Annotated[float, Meta(gt=0)]
+
+
+class FunctionSection(Section):
+    """B(q⁻¹)/A(q⁻¹), ascending powers of q⁻¹."""
+
+    b: Annotated[Floats, Meta(min_length=1, description="numerator")]
+    a: Annotated[Floats, Meta(min_length=1, description="denominator, begins with 1")]
+
+    def function(self) -> TransferFunction:
+        """The transfer function."""
+        return TransferFunction.of(self.b, self.a)
+
+
+class TransferPlant(FunctionSection, tag="transfer_function", tag_field="kind"):
+    """[plant] kind = "transfer_function": voltage [V] to position [m], (5.16)."""
+
+    shift: Annotated[
+        int, Meta(ge=0, le=8, description="samples by which the second difference is advanced")
+    ] = 1
+
+
+class InertiaPlant(Section, tag="inertia", tag_field="kind"):
+    """[plant] kind = "inertia": M·q̈ = force + offset."""
+
+    mass: Annotated[float, Meta(gt=0, description="moving mass M [kg]")]
+    offset: Annotated[float, Meta(description="constant force [N]")] = 0.0
+    half_width: Annotated[
+        int, Meta(ge=2, description="half length of the differentiating filter [samples]")
+    ] = 20
+
+
+Plant = TransferPlant | InertiaPlant
+
+
+class VelocitySection(Section):
+    """[velocity] — velocity from the accelerometer (theory 1.3)."""
+
+    corner: Annotated[float, Meta(gt=0, description="corner of the high-pass [Hz]")] = 0.5
+    sensor_corner: Annotated[
+        float, Meta(ge=0, description="corner of the accelerometer's own high-pass [Hz]")
+    ] = 0.0
+
+
+class FrictionSection(FunctionSection):
+    """[friction] — friction filter Ge and signature (5.29)."""
+
+    gamma: Annotated[float, Meta(ge=0, description="signature (1, gamma) [s/m]")]
+    explained: Annotated[float, Meta(le=1, description="share of the known fault explained")] = 0.0
+
+
+class WindowSection(Section):
+    """[window] — windowed least squares (5.39)."""
+
+    length: Annotated[
+        int, Meta(ge=8, description="samples; rounded up to whole periods of the excitation")
+    ] = 32
+    hop: Annotated[int, Meta(ge=1, description="samples between estimates")] = 1
+
+
+class NoiseSection(Section):
+    """[noise] — what a healthy rig leaves unexplained, standard deviations."""
+
+    residual: Annotated[float, Meta(gt=0, description="acceleration residual [m/s^2]")]
+    position: Annotated[float, Meta(gt=0, description="position [m]")] = 1e-5
+    voltage: Annotated[float, Meta(gt=0, description="voltage [V]")] = 1e-3
+
+
+class DecisionSection(Section):
+    """[decision] — when an estimate has left, and what counts as friction."""
+
+    false_alarm: Annotated[
+        float, Meta(gt=0, lt=1, description="allowed chance of a false alarm in a year")
+    ] = 1e-3
+    settle: Annotated[int, Meta(ge=0, description="samples after a start that are not judged")] = 128
+    learn: Annotated[int, Meta(ge=16, description="samples the run's own reference takes")] = 256
+    longest_period: Annotated[int, Meta(ge=4, description="samples a period may have")] = 1024
+    longest_hold: Annotated[int, Meta(ge=0, description="samples predicted through")] = 8
+    least_velocity: Annotated[
+        float, Meta(ge=0, description="rms below which friction is not observable [m/s]")
+    ] = 0.005
+    worst_condition: Annotated[float, Meta(gt=1, description="of the normal matrix")] = 1e8
+
+
+class BandSection(Section):
+    """[band] — fixed limits of the estimates, for plants whose healthy state has friction."""
+
+    low: Annotated[tuple[float, float], Meta(description="of (theta1, theta2)")]
+    high: Annotated[tuple[float, float], Meta(description="of (theta1, theta2)")]
+
+
+class ReferenceSection(Section):
+    """[[reference]] — one period of the healthy rig under one excitation."""
+
+    periods: Annotated[int, Meta(ge=1, description="periods that were averaged")]
+    scale: Annotated[float, Meta(description="amplitude scale, measured over modelled")]
+    voltage: Annotated[Floats, Meta(description="[V]")]
+    position: Annotated[Floats, Meta(description="[m]")]
+    acceleration: Annotated[Floats, Meta(description="measured [m/s^2]")]
+    modelled: Annotated[Floats, Meta(description="modelled, before the scale [m/s^2]")]
+
+
+class RecordingSection(Section):
+    """[[recording]] — what the model was made from."""
+
+    role: Annotated[str, Meta(description="chirp, healthy or friction")]
+    name: Annotated[str, Meta(description="file name")]
+    sha256: Annotated[str, Meta(description="hash of the file or of its samples")] = ""
+
+
+class RigModel(Section):
+    """The whole model file."""
+
+    sample_rate: Annotated[float, Meta(gt=0, description="[Hz]")]
+    channels: Annotated[tuple[str, ...], Meta(min_length=2, description="input, position, …")]
+    plant: Plant
+    friction: FrictionSection
+    noise: NoiseSection
+    velocity: VelocitySection = field(default_factory=VelocitySection)
+    window: WindowSection = field(default_factory=WindowSection)
+    decision: DecisionSection = field(default_factory=DecisionSection)
+    band: BandSection | None = None
+    reference: tuple[ReferenceSection, ...] = ()
+    recording: tuple[RecordingSection, ...] = ()
+
+    @property
+    def signature(self) -> tuple[float, float]:
+        """(θ1, θ2) of the fault the filter was made with: (1, γf)."""
+        return 1.0, self.friction.gamma
+
+
+def load_model(path: Path | str) -> RigModel:
+    """The model at `path`.
+
+    Raises:
+        ConfigError: the file cannot be read or does not fit.
+    """
+    model = load(path, RigModel)
+    for index, reference in enumerate(model.reference):
+        lengths = {len(getattr(reference, name)) for name in _COLUMNS}
+        if len(lengths) != 1 or 0 in lengths:
+            key = f"reference[{index}]"
+            raise ConfigError(path, key, f"columns of {sorted(lengths)} samples", "one length")
+    if isinstance(model.plant, TransferPlant) and not model.plant.function().is_stable:
+        raise ConfigError(path, "plant.a", "poles outside the unit circle", "a stable model")
+    if not model.friction.function().is_stable:
+        raise ConfigError(path, "friction.a", "poles outside the unit circle", "a stable filter")
+    return model
+
+
+_COLUMNS = ("voltage", "position", "acceleration", "modelled")
+
+
+def model_text(model: RigModel) -> str:
+    """The model as TOML."""
+    lines = ["# Made by `rigwatch commission`; read by `rigwatch monitor` and `rigwatch replay`.", ""]
+    tables: list[str] = []
+    for key, value in structs.asdict(model).items():
+        if value is None:
+            continue
+        if isinstance(value, Section):
+            tables += ["", f"[{key}]", *_table(value)]
+        elif isinstance(value, tuple) and value and isinstance(value[0], Section):
+            for item in value:
+                tables += ["", f"[[{key}]]", *_table(item)]
+        elif not (isinstance(value, tuple) and not value):
+            lines.append(f"{key} = {_toml(value)}")
+    return "\n".join(lines + tables) + "\n"
+
+
+def _table(section: Section) -> list[str]:
+    tag = section.__struct_config__.tag
+    head = [f'kind = "{tag}"'] if tag else []
+    return head + [f"{name} = {_toml(value)}" for name, value in structs.asdict(section).items()]
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, tuple):
+        parts = [_toml(item) for item in value]
+        if len(parts) <= 6:
+            return "[" + ", ".join(parts) + "]"
+        rows = [", ".join(parts[i : i + 4]) for i in range(0, len(parts), 4)]
+        return "[\n    " + ",\n    ".join(rows) + ",\n]"
+    return repr(float(value)) if isinstance(value, float) else str(value)

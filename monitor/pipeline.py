@@ -1,0 +1,182 @@
+"""The monitor as one pure object: sample blocks in, estimates and conditions out.
+
+    SampleBlock ─▶ admission ─▶ residual ─▶ watch (reference, estimates, departure, verdict) ─▶ Result
+
+It knows no clock, bus or file, and every stage goes sample by sample with carried state: the same samples give the same
+numbers to the last bit, live or replayed, however they are cut into blocks.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from monitor import conditions as kinds
+from monitor import watch as w
+from monitor.admission import Admission, Admitted
+from monitor.conditions import Condition
+from monitor.energies import new_energies
+from monitor.isolation import new_history
+from monitor.limits import rules_for
+from monitor.model_file import RigModel, TransferPlant
+from monitor.reference import ReferenceRules, new_reference
+from monitor.residual import TransferResidual
+from monitor.window import new_window
+from rigwatch.physics.transfer_function import FloatArray
+from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+
+PUBLISHED: tuple[tuple[str, str, int], ...] = (
+    ("modelled_acceleration", "m/s^2", w.MODELLED),
+    ("residual", "m/s^2", w.RESIDUAL),
+    ("change", "m/s^2", w.CHANGE),
+    ("velocity", "m/s", w.SPEED),
+    ("theta1", "", w.THETA1),
+    ("theta2", "s/m", w.THETA2),
+    ("theta1_low", "", w.LOW1),
+    ("theta1_high", "", w.HIGH1),
+    ("theta2_low", "s/m", w.LOW2),
+    ("theta2_high", "s/m", w.HIGH2),
+    ("observable", "", w.OBSERVABLE),
+    ("armed", "", w.ARMED_FLAG),
+    ("deviation", "", w.DEVIATION),
+    ("friction_fit", "", w.EXPLAINED),
+    ("friction_share", "", w.SHARE),
+    ("rest", "", w.REST),
+    ("verdict", "", w.VERDICT),
+)
+"""Columns of an estimate block: name, unit, place in the kernel's output."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What one sample block gave.
+
+    Args:
+        estimates: the published columns, one row a sample of the block that had not been seen before.
+        conditions: one of each of `conditions.CONDITION_KINDS`, of the same length.
+    """
+
+    estimates: EstimateBlock
+    conditions: tuple[Condition, ...]
+
+
+class Monitor:
+    """The friction scheme, running.
+
+    Args:
+        model: what commissioning found.
+
+    Raises:
+        KeyError: at `update`, where a block lacks one of the model's channels.
+    """
+
+    def __init__(self, model: RigModel) -> None:
+        self.model = model
+        self.rules = rules_for(model)
+        needed = tuple(name for place, name in enumerate(model.channels) if place != 1)
+        self._admission = Admission(model.channels, needed, model.decision.longest_hold)
+        self._residual = TransferResidual(model)
+        self._arming = _arming_rules(model)
+        self._reference = new_reference(self._arming, _known(model))
+        self._state = _new_state(model)
+
+    def update(self, block: SampleBlock) -> Result | None:
+        """Take the next block; None where it holds nothing new."""
+        admitted = self._admission.admit(block)
+        if admitted is None:
+            return None
+        data = self._residual.update(admitted.signals, admitted.code)
+        out = np.zeros((len(data), w.OUTPUTS))
+        w.watch_block(
+            data,
+            admitted.code,
+            admitted.position_valid,
+            int(admitted.seq[0]),
+            self.rules,
+            self._arming,
+            self._reference,
+            self._state,
+            out,
+        )
+        return self._result(block, admitted, out)
+
+    def _result(self, block: SampleBlock, admitted: Admitted, out: FloatArray) -> Result:
+        kept = out[admitted.padding :]
+        run = admitted.invalid_run[admitted.padding :]
+        estimates = EstimateBlock(
+            device=block.device,
+            boot=block.boot,
+            seq=int(admitted.seq[admitted.padding]),
+            t_ns=block.t_ns[len(block) - len(kept) :],
+            columns=tuple(Column(name, unit, kept[:, k].copy()) for name, unit, k in PUBLISHED),
+        )
+        return Result(estimates, self._conditions(kept, run, admitted.missing))
+
+    def _conditions(
+        self, out: FloatArray, run: NDArray[np.int64], missing: int
+    ) -> tuple[Condition, ...]:
+        rules, decision = self.rules, self.model.decision
+        armed = out[:, w.ARMED_FLAG] > 0.0
+        verdict = out[:, w.VERDICT]
+        lost = np.zeros(len(out))
+        lost[0] = missing
+        invalid = run.astype(np.float64)
+        sticks = verdict == w.STICKING
+        moving = ~armed | (out[:, w.SPEED_RMS] >= decision.least_velocity)
+        return (
+            _above(kinds.DEPARTURE, armed & (out[:, w.DEVIATION] > rules.factor), out[:, w.DEVIATION], rules.factor),
+            _above(kinds.DRY_FRICTION, armed & ((verdict == w.FRICTION) | sticks), out[:, w.THETA1], 0.0),
+            _above(kinds.STICTION, armed & sticks, out[:, w.REST], 0.5),
+            _above(kinds.OTHER_FAULT, armed & (verdict == w.OTHER), out[:, w.EXPLAINED], np.inf),
+            _above(kinds.EXCITATION_CHANGED, armed & (verdict == w.NEW_EXCITATION), out[:, w.MOVED_VOLTAGE], 0.1),
+            _below(kinds.NOT_OBSERVABLE, ~moving, out[:, w.SPEED_RMS], decision.least_velocity),
+            _above(
+                kinds.ILL_CONDITIONED,
+                armed & (out[:, w.CONDITION] > decision.worst_condition),
+                out[:, w.CONDITION],
+                decision.worst_condition,
+            ),
+            _above(kinds.GAP, lost != 0.0, lost, 0.0),
+            _above(kinds.SENSOR_INVALID, run > decision.longest_hold, invalid, decision.longest_hold),
+        )
+
+
+def _above(name: str, active: NDArray[np.bool_], value: FloatArray, high: float) -> Condition:
+    n = active.size
+    return Condition(name, active.astype(np.uint8), value.copy(), np.full(n, -np.inf), np.full(n, float(high)))
+
+
+def _below(name: str, active: NDArray[np.bool_], value: FloatArray, low: float) -> Condition:
+    n = active.size
+    return Condition(name, active.astype(np.uint8), value.copy(), np.full(n, low), np.full(n, np.inf))
+
+
+def _arming_rules(model: RigModel) -> ReferenceRules:
+    return ReferenceRules(
+        settle=model.decision.settle,
+        learn=model.decision.learn,
+        longest_period=model.decision.longest_period,
+        residual_noise=model.noise.residual,
+        position_noise=model.noise.position,
+        voltage_noise=model.noise.voltage,
+    )
+
+
+def _known(model: RigModel) -> list[tuple[FloatArray, float, int]]:
+    return [
+        (np.array([r.voltage, r.position, r.acceleration, r.modelled]), r.scale, r.periods)
+        for r in model.reference
+    ]
+
+
+def _new_state(model: RigModel) -> w.WatchState:
+    longest = max(model.decision.longest_period, model.window.length)
+    b, a = model.friction.function().padded()
+    return w.WatchState(
+        new_window(longest, 2),
+        new_energies(64, 5),
+        new_history(b, a),
+        np.zeros(8, np.int64),
+        np.zeros(w.OUTPUTS),
+        np.zeros(8),
+    )

@@ -1,0 +1,323 @@
+"""The healthy rig under the present excitation: one period of each signal, and how much they scatter about it.
+
+A linear model leaves about a tenth of the acceleration of a pneumatic rig unexplained. That part is no noise: it repeats with
+the excitation. Its average over whole periods is subtracted, so that what remains is the change of the residual
+
+    y(φ) = [ a(φ) - s·am(φ) ] - [ A(φ) - s·AM(φ) ],   s = Σ A·AM / Σ AM²
+
+with φ the place in the period, A and AM the averages of measured and modelled acceleration, s the amplitude scale.
+The average comes from the model file where that holds this very excitation, else from the first second of the run, and it
+goes on growing while the rig is plainly healthy.
+
+    SETTLING ──settled, period found──▶ LEARNING ──enough periods, quiet──▶ ARMED
+        ▲    ──a reference of the model file fits and agrees─────────────────▲
+        └─────────── another excitation, or a new boot ────────────────────────┘
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigwatch.physics.transfer_function import FloatArray
+
+SETTLING, LEARNING, ARMED, RESUMING = 0, 1, 2, 3
+NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC = 0, 1, 2, 3
+
+MODE, SOURCE, SINCE, PERIOD, ANCHOR, LEARNT, RING_FILL, RING_HEAD, DEPTH = range(9)
+"""Integers of the state: mode, where the reference is from, samples since the last restart, period [samples], sample number of
+its first place, samples learnt, fill and head of the voltage ring, periods averaged."""
+SCALE, NOISE, POSITION_NOISE, VOLTAGE_NOISE, SWING, POSITION_SWING, ACCELERATION_SWING = range(7)
+"""Floats: amplitude scale; noise of y, x, V; rms of the periodic part of V, x, a."""
+
+LONGEST_AVERAGE = 512
+"""Periods after which the reference is complete."""
+
+
+class Reference(NamedTuple):
+    """State. Templates and sums have one row a signal (V, x, a, am) and one column a place in the period."""
+
+    number: NDArray[np.int64]
+    value: FloatArray
+    template: FloatArray
+    sums: FloatArray
+    products: FloatArray
+    ring: FloatArray
+    known: FloatArray
+    known_period: NDArray[np.int64]
+    known_scale: FloatArray
+    known_depth: NDArray[np.int64]
+
+
+class ReferenceRules(NamedTuple):
+    """What arming goes by; see `DecisionSection` and `NoiseSection` for units."""
+
+    settle: int
+    learn: int
+    longest_period: int
+    residual_noise: float
+    position_noise: float
+    voltage_noise: float
+
+
+def new_reference(
+    rules: ReferenceRules, known: list[tuple[FloatArray, float, int]]
+) -> Reference:
+    """A state that knows the model file's references: ((4, P) signals, scale, periods averaged)."""
+    longest = max([rules.longest_period, *[signals.shape[1] for signals, _, _ in known]])
+    stored = np.zeros((len(known), 4, longest))
+    for place, (signals, _, _) in enumerate(known):
+        stored[place, :, : signals.shape[1]] = signals
+    number, value = np.zeros(9, np.int64), np.zeros(7)
+    value[SCALE] = 1.0
+    return Reference(
+        number,
+        value,
+        np.zeros((4, longest)),
+        np.zeros((4, longest)),
+        np.zeros(6),
+        np.zeros(2 * rules.longest_period),
+        stored,
+        np.array([signals.shape[1] for signals, _, _ in known], np.int64),
+        np.array([scale for _, scale, _ in known], np.float64),
+        np.array([depth for _, _, depth in known], np.int64),
+    )
+
+
+@njit(cache=True)
+def restart(ref: Reference, new_boot: bool) -> None:
+    """Filters have been reset: settle again, and forget the reference where its phase is lost."""
+    ref.number[SINCE] = 0
+    ref.number[RING_FILL] = 0
+    ref.number[RING_HEAD] = 0
+    ref.number[LEARNT] = 0
+    keeps = ref.number[MODE] == ARMED or ref.number[MODE] == RESUMING
+    ref.number[MODE] = RESUMING if keeps and not new_boot else SETTLING
+    if ref.number[MODE] == SETTLING:
+        ref.number[SOURCE] = NO_REFERENCE
+
+
+@njit(cache=True)
+def place_in_period(ref: Reference, seq: int) -> int:
+    """φ of sample number `seq`."""
+    return (seq - ref.number[ANCHOR]) % ref.number[PERIOD]
+
+
+@njit(cache=True)
+def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
+    """Take one good sample (V, x, a, am) before the reference is armed; may arm it."""
+    number = ref.number
+    number[SINCE] += 1
+    _remember(ref, row[0])
+    if number[MODE] == RESUMING:
+        if number[SINCE] >= rules.settle:
+            number[MODE] = ARMED
+    elif number[MODE] == SETTLING:
+        if number[SINCE] >= rules.settle and number[SINCE] % 16 == 0:
+            _look_for_period(ref, rules, seq)
+    elif number[MODE] == LEARNING:
+        _learn(ref, rules, seq, row)
+
+
+@njit(cache=True)
+def _remember(ref: Reference, voltage: float) -> None:
+    size = ref.ring.size
+    ref.ring[ref.number[RING_HEAD]] = voltage
+    ref.number[RING_HEAD] = (ref.number[RING_HEAD] + 1) % size
+    ref.number[RING_FILL] = min(ref.number[RING_FILL] + 1, size)
+
+
+@njit(cache=True)
+def _past(ref: Reference, ago: int) -> float:
+    """Voltage `ago` samples before the newest."""
+    return ref.ring[(ref.number[RING_HEAD] - 1 - ago) % ref.ring.size]
+
+
+@njit(cache=True)
+def _swing(ref: Reference, count: int) -> float:
+    mean = 0.0
+    for n in range(count):
+        mean += _past(ref, n)
+    mean /= count
+    square = 0.0
+    for n in range(count):
+        square += (_past(ref, n) - mean) ** 2
+    return np.sqrt(square / count)
+
+
+@njit(cache=True)
+def _look_for_period(ref: Reference, rules: ReferenceRules, seq: int) -> None:
+    count = ref.number[RING_FILL]
+    swing = _swing(ref, count)
+    if swing < 10.0 * rules.voltage_noise:
+        return
+    tolerance = (0.006 * swing) ** 2 + (3.0 * rules.voltage_noise) ** 2
+    for period in range(4, min(count // 2, rules.longest_period) + 1):
+        if _repeats(ref, period, count - period, tolerance):
+            _found(ref, rules, seq, period, swing)
+            return
+    if count >= 2 * rules.longest_period:
+        _found(ref, rules, seq, 1, swing)
+        ref.number[SOURCE] = APERIODIC
+
+
+@njit(cache=True)
+def _repeats(ref: Reference, period: int, count: int, tolerance: float) -> bool:
+    """Whether the voltage repeats after `period`; gives up as soon as it cannot."""
+    total = 0.0
+    for n in range(count):
+        total += (_past(ref, n) - _past(ref, n + period)) ** 2
+        if total > tolerance * count:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: float) -> None:
+    number, value = ref.number, ref.value
+    number[PERIOD], number[ANCHOR] = period, seq + 1
+    number[LEARNT], number[DEPTH] = 0, 0
+    value[SWING] = swing
+    value[NOISE] = rules.residual_noise
+    value[POSITION_NOISE] = rules.position_noise
+    value[VOLTAGE_NOISE] = rules.voltage_noise
+    ref.sums[:, :] = 0.0
+    ref.products[:] = 0.0
+    number[MODE] = LEARNING
+    number[SOURCE] = FROM_RUN
+    for index in range(ref.known_period.size):
+        if ref.known_period[index] == period and period > 1:
+            turn = _turn(ref, index, period, swing)
+            if turn >= 0:
+                _take_known(ref, index, period, turn, seq)
+                return
+
+
+@njit(cache=True)
+def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
+    """Place in the known period that the newest voltage belongs to, -1 where it is another excitation."""
+    best, best_turn = (0.02 * swing) ** 2 * period, -1
+    for turn in range(period):
+        total = 0.0
+        for n in range(period):
+            total += (_past(ref, n) - ref.known[index, 0, (turn - n) % period]) ** 2
+            if total >= best:
+                break
+        if total < best:
+            best, best_turn = total, turn
+    return best_turn
+
+
+@njit(cache=True)
+def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) -> None:
+    """The model file's reference holds for this run: no learning, and a fault from the start shows."""
+    for row in range(4):
+        for place in range(period):
+            ref.template[row, place] = ref.known[index, row, place]
+    ref.number[ANCHOR] = seq - turn
+    ref.number[DEPTH] = ref.known_depth[index]
+    ref.value[SCALE] = ref.known_scale[index]
+    ref.number[SOURCE] = FROM_MODEL
+    _measure_swings(ref)
+    ref.number[MODE] = ARMED
+
+
+@njit(cache=True)
+def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
+    number, period = ref.number, ref.number[PERIOD]
+    place = place_in_period(ref, seq)
+    for i in range(4):
+        ref.sums[i, place] += row[i]
+    ref.products[0] += row[2] * row[2]
+    ref.products[1] += row[2] * row[3]
+    ref.products[2] += row[3] * row[3]
+    ref.products[3] += row[1] * row[1]
+    ref.products[4] += row[0] * row[0]
+    number[LEARNT] += 1
+    wanted = max(4, (rules.learn + period - 1) // period) * period
+    if number[LEARNT] >= wanted:
+        _finish_learning(ref, rules, wanted // period)
+
+
+@njit(cache=True)
+def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
+    """Averages, amplitude scale and scatter; start over where the scatter says that the rig has not settled."""
+    number, value, period = ref.number, ref.value, ref.number[PERIOD]
+    for i in range(4):
+        for place in range(period):
+            ref.template[i, place] = ref.sums[i, place] / depth
+    number[DEPTH] = depth
+    aa = am = mm = xx = vv = 0.0
+    for place in range(period):
+        aa += ref.template[2, place] ** 2
+        am += ref.template[2, place] * ref.template[3, place]
+        mm += ref.template[3, place] ** 2
+        xx += ref.template[1, place] ** 2
+        vv += ref.template[0, place] ** 2
+    if period == 1:
+        _arm_aperiodic(ref)
+        return
+    scale = am / mm if mm > 0.0 else 0.0
+    freedom = period * (depth - 1)
+    p = ref.products
+    scatter = (p[0] - depth * aa) - 2.0 * scale * (p[1] - depth * am)
+    scatter += scale**2 * (p[2] - depth * mm)
+    noise = np.sqrt(max(scatter, 0.0) / freedom)
+    value[SCALE] = scale
+    value[NOISE] = max(noise, rules.residual_noise)
+    value[POSITION_NOISE] = max(
+        np.sqrt(max(p[3] - depth * xx, 0.0) / freedom), rules.position_noise
+    )
+    value[VOLTAGE_NOISE] = max(np.sqrt(max(p[4] - depth * vv, 0.0) / freedom), rules.voltage_noise)
+    _measure_swings(ref)
+    quiet = noise <= 1.5 * rules.residual_noise
+    if quiet:
+        number[MODE] = ARMED
+    else:
+        number[LEARNT] = 0
+        ref.sums[:, :] = 0.0
+        ref.products[:] = 0.0
+
+
+@njit(cache=True)
+def _arm_aperiodic(ref: Reference) -> None:
+    """Nothing repeats: the residual itself is judged, against its own size while learning."""
+    p, learnt = ref.products, ref.number[LEARNT]
+    scale = p[1] / p[2] if p[2] > 0.0 else 0.0
+    ref.template[:, :] = 0.0
+    size = np.sqrt(max(p[0] - 2.0 * scale * p[1] + scale**2 * p[2], 0.0) / learnt)
+    ref.value[SCALE] = scale
+    ref.value[NOISE] = max(ref.value[NOISE], size)
+    ref.value[SWING] = np.sqrt(p[4] / learnt)
+    ref.value[POSITION_SWING] = np.sqrt(p[3] / learnt)
+    ref.value[ACCELERATION_SWING] = np.sqrt(p[0] / learnt)
+    ref.number[SOURCE] = APERIODIC
+    ref.number[MODE] = ARMED
+
+
+@njit(cache=True)
+def _measure_swings(ref: Reference) -> None:
+    period = ref.number[PERIOD]
+    for i, place in ((0, SWING), (1, POSITION_SWING), (2, ACCELERATION_SWING)):
+        mean = 0.0
+        for k in range(period):
+            mean += ref.template[i, k] / period
+        square = 0.0
+        for k in range(period):
+            square += (ref.template[i, k] - mean) ** 2 / period
+        ref.value[place] = np.sqrt(square)
+
+
+@njit(cache=True)
+def refine(ref: Reference, seq: int, row: FloatArray) -> None:
+    """Let one plainly healthy sample into the average, while that is still growing."""
+    period = ref.number[PERIOD]
+    if period == 1 or ref.number[SOURCE] != FROM_RUN or ref.number[DEPTH] >= LONGEST_AVERAGE:
+        return
+    place = place_in_period(ref, seq)
+    gain = 1.0 / (ref.number[DEPTH] + 1)
+    for i in range(4):
+        ref.template[i, place] += gain * (row[i] - ref.template[i, place])
+    if place == period - 1:
+        ref.number[DEPTH] += 1

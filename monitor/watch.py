@@ -1,0 +1,338 @@
+"""Sample by sample: change of the residual, estimates, departure, verdict (theory 1.4).
+
+    D² = Σ explained / (σ²·(1 + 4/depth)),   θ leaves its thresholds where D > k
+
+D is how far (θ1, θ2) lies from healthy in standard deviations, both taken together: the thresholds are the ellipse that the
+normal matrix gives, and the printed limits ±k·sd its half axes. `depth` is the number of periods in the healthy average,
+whose own error does not average out. Beside the estimates stand the change's energy over 8 and 64 samples, and how far
+position and voltage have moved from the healthy period: a fault of one sensor shows in one channel alone.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from monitor.admission import DEAD, GOOD, HELD, NEW_BOOT, RESTART, Codes
+from monitor.energies import Energies, add, energy, recent_energy, restart_energies
+from monitor.isolation import HISTORY, History, remember, weigh
+from monitor.reference import (
+    ACCELERATION_SWING,
+    APERIODIC,
+    ARMED,
+    DEPTH,
+    FROM_RUN,
+    MODE,
+    NO_REFERENCE,
+    NOISE,
+    PERIOD,
+    POSITION_NOISE,
+    POSITION_SWING,
+    SCALE,
+    SETTLING,
+    SOURCE,
+    SWING,
+    VOLTAGE_NOISE,
+    Reference,
+    ReferenceRules,
+    observe,
+    place_in_period,
+    refine,
+    restart,
+)
+from monitor.window import FILL, Window, push, restart_window, solve_two, sums
+from rigwatch.physics.transfer_function import FloatArray
+
+NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
+
+(
+    MODELLED, RESIDUAL, CHANGE, SPEED, THETA1, THETA2, LOW1, HIGH1, LOW2, HIGH2,
+    OBSERVABLE, ARMED_FLAG, DEVIATION, EXPLAINED, SHARE, RHO, REST, VERDICT, CONDITION, MOVED_VOLTAGE, SPEED_RMS,
+) = range(21)  # fmt: skip
+OUTPUTS = 21
+
+_SINCE, _QUIET, _LAST_VERDICT, _HOP, _EXCITED = range(5)
+_Y, _X, _V, _A, _S = range(5)
+
+
+class Rules(NamedTuple):
+    """Everything the kernel decides by; see `limits.py` for where the figures come from."""
+
+    window: int
+    hop: int
+    factor: float
+    limit_8: float
+    limit_64: float
+    least_velocity: float
+    worst_condition: float
+    position_floor: float
+    voltage_floor: float
+
+
+class WatchState(NamedTuple):
+    """All that is carried from sample to sample."""
+
+    window: Window
+    energies: Energies
+    history: History
+    number: NDArray[np.int64]
+    held: FloatArray
+    recent: FloatArray
+
+
+@njit(cache=True)
+def watch_block(
+    data: FloatArray,
+    code: Codes,
+    position_valid: NDArray[np.uint8],
+    first: int,
+    rules: Rules,
+    arming: ReferenceRules,
+    ref: Reference,
+    state: WatchState,
+    out: FloatArray,
+) -> None:
+    """Take the residual stage's columns for samples `first`, `first` + 1, … and fill `out`, shape (n, OUTPUTS)."""
+    row = np.empty(4)
+    for k in range(code.size):
+        seq = first + k
+        if code[k] == RESTART or code[k] == NEW_BOOT:
+            restart(ref, code[k] == NEW_BOOT)
+            _forget(state, rules.window)
+        good = code[k] == GOOD or code[k] == RESTART or code[k] == NEW_BOOT
+        if good:
+            row[0], row[1], row[2], row[3] = data[k, 0], data[k, 1], data[k, 2], data[k, 3]
+            if ref.number[MODE] != ARMED:
+                observe(ref, arming, seq, row)
+                if ref.number[MODE] == ARMED:
+                    _forget(state, _window_length(rules.window, ref, state.window))
+            else:
+                _judge(data[k], row, seq, position_valid[k], rules, ref, state)
+        elif code[k] == HELD and ref.number[MODE] == ARMED:
+            _skip(state)
+        _write(data[k], code[k], ref, state, out[k])
+
+
+@njit(cache=True)
+def _window_length(wanted: int, ref: Reference, window: Window) -> int:
+    """Whole periods of the excitation, at least what was wanted, at most what there is room for."""
+    period = ref.number[PERIOD]
+    room = window.rows.shape[0]
+    return min(((wanted + period - 1) // period) * period, (room // period) * period)
+
+
+@njit(cache=True)
+def _forget(state: WatchState, length: int) -> None:
+    restart_window(state.window, length)
+    restart_energies(state.energies)
+    state.history.rows[:, :] = 0.0
+    state.number[:] = 0
+    state.held[:] = 0.0
+    state.recent[:] = 0.0
+
+
+@njit(cache=True)
+def _skip(state: WatchState) -> None:
+    """A sample that counts in nothing, so that the windows stay stretches of time."""
+    push(state.window, np.zeros(3))
+    add(state.energies, np.zeros(5))
+    remember(state.history, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if state.number[_SINCE] > 0:
+        state.number[_SINCE] += 1
+
+
+@njit(cache=True)
+def _judge(
+    data: FloatArray,
+    row: FloatArray,
+    seq: int,
+    position_valid: int,
+    rules: Rules,
+    ref: Reference,
+    state: WatchState,
+) -> None:
+    """One good sample while armed."""
+    place = place_in_period(ref, seq)
+    acceleration = row[2] - ref.template[2, place]
+    y = acceleration - ref.value[SCALE] * (row[3] - ref.template[3, place])
+    signals = np.empty(5)
+    signals[_Y], signals[_A], signals[_S] = y, acceleration, data[4]
+    signals[_X] = row[1] - ref.template[1, place] if position_valid else 0.0
+    signals[_V] = row[0] - ref.template[0, place]
+    add(state.energies, signals)
+    regressors = np.empty(3)
+    regressors[0], regressors[1], regressors[2] = data[5], data[6], y
+    push(state.window, regressors)
+    remember(state.history, y, data[5], data[6], data[4], _at_rest(row, ref, state))
+    state.held[CHANGE] = y
+    state.number[_HOP] += 1
+    if state.number[_HOP] >= rules.hop:
+        state.number[_HOP] = 0
+        _estimate(rules, ref, state)
+    departed = _departure(rules, ref, state)
+    _follow(departed, seq, row, rules, ref, state)
+
+
+@njit(cache=True)
+def _at_rest(row: FloatArray, ref: Reference, state: WatchState) -> float:
+    """1.0 where position and acceleration have stood still over four samples."""
+    recent = state.recent
+    for n in range(3):
+        recent[n], recent[n + 4] = recent[n + 1], recent[n + 5]
+    recent[3], recent[7] = row[1], row[2]
+    spread = max(max(recent[0], recent[1]), max(recent[2], recent[3]))
+    spread -= min(min(recent[0], recent[1]), min(recent[2], recent[3]))
+    shaken = max(max(recent[4], recent[5]), max(recent[6], recent[7]))
+    shaken -= min(min(recent[4], recent[5]), min(recent[6], recent[7]))
+    still = spread < 6.0 * ref.value[POSITION_NOISE] and shaken < 10.0 * ref.value[NOISE]
+    return 1.0 if still else 0.0
+
+
+@njit(cache=True)
+def _spread(ref: Reference) -> float:
+    """Standard deviation of the change of the residual, error of the healthy average included."""
+    extra = 9.0 if ref.number[SOURCE] == APERIODIC else 4.0 / max(ref.number[DEPTH], 1)
+    return ref.value[NOISE] * np.sqrt(1.0 + extra)
+
+
+@njit(cache=True)
+def _estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
+    """θ, its limits, D and whether friction can be seen at all."""
+    held, s = state.held, np.empty(6)
+    sums(state.window, s)
+    theta1, theta2, condition = solve_two(s)
+    speed = np.sqrt(energy(state.energies, _S) / max(state.energies.place[FILL], 1))
+    held[CONDITION], held[SPEED_RMS] = condition, speed
+    observable = speed >= rules.least_velocity and state.window.place[FILL] >= 8
+    held[OBSERVABLE] = 1.0 if observable else 0.0
+    if not observable or not condition < rules.worst_condition:
+        held[DEVIATION] = 0.0
+        return
+    spread = _spread(ref)
+    determinant = s[0] * s[3] - s[1] * s[1]
+    reach1 = rules.factor * spread * np.sqrt(s[3] / determinant)
+    reach2 = rules.factor * spread * np.sqrt(s[0] / determinant)
+    held[THETA1], held[THETA2] = theta1, theta2
+    held[LOW1], held[HIGH1], held[LOW2], held[HIGH2] = -reach1, reach1, -reach2, reach2
+    held[DEVIATION] = np.sqrt(max(theta1 * s[2] + theta2 * s[4], 0.0)) / spread
+
+
+@njit(cache=True)
+def _moved(energies: Energies, signal: int, count: int) -> float:
+    """Root mean square of the newest `count` samples."""
+    if count >= energies.rows.shape[0]:
+        return np.sqrt(energy(energies, signal) / max(energies.place[FILL], 1))
+    return np.sqrt(recent_energy(energies, signal, count) / max(count, 1))
+
+
+@njit(cache=True)
+def _position_limit(rules: Rules, ref: Reference) -> float:
+    return max(6.0 * ref.value[POSITION_NOISE], rules.position_floor * ref.value[POSITION_SWING])
+
+
+@njit(cache=True)
+def _voltage_limit(rules: Rules, ref: Reference) -> float:
+    return max(6.0 * ref.value[VOLTAGE_NOISE], rules.voltage_floor * ref.value[SWING])
+
+
+@njit(cache=True)
+def _departure(rules: Rules, ref: Reference, state: WatchState) -> bool:
+    """Whether anything has left its limits; the largest of all goes into the deviation, in units of k."""
+    held, energies = state.held, state.energies
+    variance = _spread(ref) ** 2
+    largest = held[DEVIATION] / rules.factor
+    largest = max(largest, np.sqrt(recent_energy(energies, _Y, 8) / variance / rules.limit_8))
+    if energies.place[FILL] >= 64:
+        largest = max(largest, np.sqrt(energy(energies, _Y) / variance / rules.limit_64))
+    if ref.number[SOURCE] != APERIODIC:
+        largest = max(largest, _moved(energies, _X, 64) / _position_limit(rules, ref))
+        voltage = _moved(energies, _V, 64)
+        held[MOVED_VOLTAGE] = voltage / max(ref.value[SWING], 1e-12)
+        largest = max(largest, voltage / _voltage_limit(rules, ref))
+    held[DEVIATION] = largest * rules.factor
+    return largest > 1.0
+
+
+@njit(cache=True)
+def _follow(
+    departed: bool, seq: int, row: FloatArray, rules: Rules, ref: Reference, state: WatchState
+) -> None:
+    """Onset and end of an episode, its verdict, and the healthy average between episodes."""
+    number, held = state.number, state.held
+    if departed:
+        number[_QUIET] = 0
+        number[_SINCE] += 1
+    elif number[_SINCE] > 0:
+        number[_QUIET] += 1
+        number[_SINCE] += 1
+        if number[_QUIET] >= 64:
+            number[_SINCE] = number[_QUIET] = 0
+            held[VERDICT] = NO_VERDICT
+            held[EXPLAINED] = held[SHARE] = held[RHO] = held[REST] = 0.0
+    if number[_SINCE] == 0:
+        if held[DEVIATION] < 0.6 * rules.factor:
+            refine(ref, seq, row)
+    elif number[_SINCE] >= 12 and seq % 4 == 0:
+        _decide(seq, rules, ref, state)
+
+
+@njit(cache=True)
+def _decide(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
+    """Which channels have moved, what the residual follows, and what that makes it."""
+    held, energies, since = state.held, state.energies, state.number[_SINCE]
+    count = min(since, 64)
+    spread = _spread(ref)
+    moved_v = _moved(energies, _V, count)
+    moved_x = _moved(energies, _X, count) > _position_limit(rules, ref)
+    moved_a = _moved(energies, _A, count) > max(
+        3.0 * spread, 0.002 * ref.value[ACCELERATION_SWING]
+    )
+    span = max(32, min(ref.number[PERIOD], 256))
+    evidence = weigh(state.history, ref, seq, min(since, HISTORY), min(since, 2 * span))
+    held[EXPLAINED], held[SHARE] = evidence.explained, evidence.share
+    held[RHO], held[REST] = evidence.rho, evidence.rest
+    held[VERDICT] = _verdict(
+        held[VERDICT], since, span, moved_v, moved_x, moved_a, rules, ref, state, evidence, spread
+    )
+
+
+@njit(cache=True)
+def _verdict(
+    before, since, span, moved_v, moved_x, moved_a, rules, ref, state, evidence, spread
+):  # type: ignore[no-untyped-def]
+    """The verdict after one more look; dry friction, once found, stays until the episode ends."""
+    limit_v = _voltage_limit(rules, ref)
+    if moved_v > limit_v and not moved_a:
+        return OTHER
+    if moved_v > 0.1 * ref.value[SWING] and moved_a:
+        return NEW_EXCITATION
+    jumps = (
+        evidence.share > 0.004
+        and evidence.rho > 0.35
+        and evidence.jump > 30.0 * spread**2
+    )
+    slips = 0.06 < evidence.rest
+    friction = moved_a and moved_x and (jumps or slips)
+    if before == FRICTION or before == STICKING or (friction and since >= span):
+        return STICKING if evidence.rest >= 0.5 and moved_a else FRICTION
+    if since >= 2 * span + 64:
+        return OTHER
+    return before
+
+
+@njit(cache=True)
+def _write(
+    data: FloatArray, code: int, ref: Reference, state: WatchState, out: FloatArray
+) -> None:
+    for i in range(out.size):
+        out[i] = state.held[i]
+    scale = ref.value[SCALE]
+    out[MODELLED] = scale * data[3]
+    out[RESIDUAL] = data[2] - scale * data[3]
+    out[SPEED] = data[4]
+    armed = ref.number[MODE] == ARMED and code != DEAD
+    out[ARMED_FLAG] = 1.0 if armed else 0.0
+    if not armed:
+        out[DEVIATION] = 0.0
+        out[OBSERVABLE] = 0.0
