@@ -1,0 +1,75 @@
+"""Statistical tests of an innovation sequence: is the model still right?
+
+With the right model the innovations ν are white and νᵀ·S⁻¹·ν is chi-square with m degrees of
+freedom (Mehra and Peschon 1971; Bar-Shalom, Li and Kirubarajan 2001, section 5.4).
+
+    sum of N of them > χ²(N·m; 1 - α)      mean or size of the innovations is wrong
+    n·Σ ρ(l)² > χ²(L; 1 - α)               they are not white; ρ(l): autocorrelation
+
+α is the probability of a false alarm in one window. The window slides; windows that do not overlap
+are independent.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from rigwatch.physics.transfer_function import FloatArray
+
+
+class NisWindow(NamedTuple):
+    """The last N normalised innovations squared.
+
+    Attributes:
+        values: ring, shape (N,).
+        total: their sum, shape (1,).
+        place: next place in the ring; how many are in it, shape (2,).
+    """
+
+    values: FloatArray
+    total: FloatArray
+    place: NDArray[np.int64]
+
+
+def new_nis_window(length: int) -> NisWindow:
+    """An empty window over `length` samples."""
+    return NisWindow(np.zeros(length), np.zeros(1), np.zeros(2, np.int64))
+
+
+@njit(cache=True)
+def push_nis(window: NisWindow, nis: float) -> float:
+    """Take one in; the sum over the window, NaN until it is full.
+
+    The sum is formed anew at each turn of the ring, so that no rounding is carried for ever.
+    """
+    values, total, place = window
+    total[0] += nis - values[place[0]]
+    values[place[0]] = nis
+    place[0] += 1
+    place[1] = min(place[1] + 1, values.size)
+    if place[0] == values.size:
+        place[0] = 0
+        total[0] = values.sum()
+    return float(total[0]) if place[1] == values.size else np.nan
+
+
+def nis_limit(length: int, measurements: int, false_alarm: float) -> float:
+    """Limit of the sum over `length` samples of `measurements` each, at `false_alarm`."""
+    return float(chi2.isf(false_alarm, length * measurements))
+
+
+def whiteness(innovations: FloatArray, lags: int) -> tuple[float, float]:
+    """Statistic n·Σ ρ(l)² over lags 1 … `lags` and its p-value under whiteness.
+
+    Args:
+        innovations: one measurement's, shape (n,), n well above `lags`.
+        lags: L [1].
+    """
+    centred = innovations - innovations.mean()
+    power = float(centred @ centred)
+    correlations = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / power
+    statistic = float(innovations.size * np.sum(correlations**2))
+    return statistic, float(chi2.sf(statistic, lags))

@@ -1,0 +1,128 @@
+"""One step of the Kalman filters: the extended one, and the generalised one for unknown inputs.
+
+    x(k+1) = f(x(k), u(k)) + F·ξ(k) + w(k)        y(k) = H·x(k) + G·η(k) + v(k)    (thesis
+    2.54)-(2.55)
+
+    x   state, shape (n,)            ξ   unknown input of the state, F of shape (n, q)
+    u   known input                  η   unknown input of the measurement, G of shape (m, p)
+    y   measurement, shape (m,)      Φ   Jacobian of f, shape (n, n)
+    w   state noise, covariance W    v   measurement noise, covariance V
+
+The generalised filter (Nowakowski, Boutayeb and Darouach 1993) knows nothing of ξ and η: they join
+the state, x̄ = (x, η, ξ of the step before), and with E = [I 0 -F], C = [H G 0] one least-squares
+step gives them all:
+
+    P(k+1) = [ Eᵀ·(W + Φ·P·Φᵀ)⁻¹·E + Cᵀ·V⁻¹·C ]⁻¹                                    (thesis 2.61)
+    x̄(k+1) = P(k+1)·[ Eᵀ·(W + Φ·P·Φᵀ)⁻¹·f(x(k), u(k)) + Cᵀ·V⁻¹·y(k+1) ]             (thesis 2.60)
+
+It exists where [E; C] has full column rank: every unknown shows in something that is measured.
+
+The steps take a prediction and its covariance, so that they serve linear and nonlinear models
+alike.
+"""
+
+import numpy as np
+from numba import njit
+
+from monitor.detectors.small_matrices import (
+    inverse,
+    product,
+    product_transposed,
+    times,
+    transposed_product,
+)
+from rigwatch.physics.transfer_function import FloatArray
+from rigwatch.wire.errors import ModelError
+
+
+@njit(cache=True)
+def kalman_update(
+    x: FloatArray, p: FloatArray, h: FloatArray, v: FloatArray, y: FloatArray
+) -> float:
+    """Take a measurement into the predicted `x` and `p`, in place (thesis 2.40-2.42).
+
+    Returns the normalised innovation squared νᵀ·S⁻¹·ν, ν = y - H·x, S = H·P·Hᵀ + V: chi-square with
+    m degrees of freedom where model and noise are right; NaN where S is singular, and nothing is
+    changed.
+    """
+    innovation = y - times(h, x)
+    ph = product_transposed(p, h)
+    s = product(h, ph) + v
+    s_inverse = np.empty_like(s)
+    if not inverse(s, s_inverse):
+        return np.nan
+    gain = product(ph, s_inverse)
+    keep = np.eye(x.size) - product(gain, h)
+    noise = product_transposed(product(gain, v), gain)
+    p[:, :] = product_transposed(product(keep, p), keep) + noise
+    x[:] = x + times(gain, innovation)
+    weighted = times(s_inverse, innovation)
+    total = 0.0
+    for i in range(innovation.size):
+        total += innovation[i] * weighted[i]
+    return total
+
+
+@njit(cache=True)
+def generalised_update(
+    x: FloatArray,
+    p: FloatArray,
+    e: FloatArray,
+    c: FloatArray,
+    v_inverse: FloatArray,
+    y: FloatArray,
+    augmented: FloatArray,
+) -> bool:
+    """Take a measurement into the predicted `x` and `p`, in place (thesis 2.60-2.61).
+
+    Args:
+        x: prediction f(x, u), shape (n,); becomes the new state.
+        p: its covariance W + Φ·P·Φᵀ, shape (n, n); becomes the state's part of the new one.
+        e: E, shape (n, n + p + q).
+        c: C, shape (m, n + p + q).
+        v_inverse: V⁻¹, shape (m, m).
+        y: measurement, shape (m,).
+        augmented: receives x̄, shape (n + p + q,).
+
+    Returns whether the step was possible; if not nothing is changed.
+    """
+    n = x.size
+    p_inverse = np.empty_like(p)
+    if not inverse(p, p_inverse):
+        return False
+    prior, measured = transposed_product(e, p_inverse), transposed_product(c, v_inverse)
+    information = product(prior, e) + product(measured, c)
+    covariance = np.empty_like(information)
+    if not inverse(information, covariance):
+        return False
+    augmented[:] = times(covariance, times(prior, x) + times(measured, y))
+    x[:] = augmented[:n]
+    p[:, :] = covariance[:n, :n]
+    return True
+
+
+def augmented_matrices(
+    h: FloatArray, f: FloatArray, g: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(E, C) of thesis (2.58)-(2.59) for measurement matrix H, unknown inputs F and G.
+
+    Args:
+        h: shape (m, n).
+        f: shape (n, q), q may be 0.
+        g: shape (m, p), p may be 0.
+
+    Raises:
+        ModelError: the unknown inputs cannot be told from what is measured.
+    """
+    (m, n), q, unknown = h.shape, f.shape[1], g.shape[1]
+    e = np.hstack([np.eye(n), np.zeros((n, unknown)), -f])
+    c = np.hstack([h, g, np.zeros((m, q))])
+    columns = n + unknown + q
+    stacked = np.vstack([e, c / np.maximum(np.abs(c).max(axis=1, keepdims=True), 1e-300)])
+    rank = int(np.linalg.matrix_rank(stacked))
+    if rank < columns:
+        raise ModelError(
+            f"unknown-input Kalman filter: found rank {rank} of [E; C], expected {columns}: "
+            "an unknown input does not show in any measurement"
+        )
+    return np.ascontiguousarray(e), np.ascontiguousarray(c)

@@ -1,0 +1,263 @@
+"""A bias on the position sensor, detected by a Kalman filter and estimated by one that allows for
+it.
+
+Two filters run side by side on the same model (Nowakowski, Boutayeb and Darouach 1993, thesis
+2.54-2.61):
+
+* the plain one believes the position sensor. Its innovations are white and of known size while that
+is right; a sliding chi-square test of them detects the fault (`innovation_test.py`); * the
+generalised one takes the sensor's bias η as an unknown input of the measurement, y = H·x + G·η, and
+so gives the fault-free states and the bias whatever it is.
+
+On the rig the model is the transfer function with W = q·B·Bᵀ + s·I: errors of a linear model of a
+nonlinear plant act like an unknown drive of variance q [input unit²]; s [output unit²] keeps W
+regular. Measured are the position and, where there is one, the acceleration one sample ago, which
+tells a moved sensor from a moved mass.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from monitor.admission import DEAD, HELD, NEW_BOOT, RESTART
+from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
+from monitor.detectors.innovation_test import NisWindow, new_nis_window, push_nis
+from monitor.detectors.kalman import (
+    augmented_matrices,
+    generalised_update,
+    kalman_update,
+)
+from monitor.detectors.small_matrices import inverse, product, product_transposed, times
+from monitor.detectors.state_space import state_space
+from rigwatch.physics.transfer_function import FloatArray, TransferFunction
+from rigwatch.wire.errors import ModelError
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseModel:
+    """Variances of the filters and limit of the test.
+
+    Attributes:
+        input: q, variance of the model's error as a drive [input unit²].
+        state: s, variance that keeps W regular [output unit²].
+        position: variance of the position reading [m²].
+        acceleration: variance of the acceleration reading [m²/s⁴].
+        window: samples whose innovations are tested together [1].
+        limit: of their sum [1].
+        settle: samples after a start that are not judged [1].
+    """
+
+    input: float
+    state: float
+    position: float
+    acceleration: float
+    window: int
+    limit: float
+    settle: int
+
+
+class FilterModel(NamedTuple):
+    """Constant matrices of both filters, as in `kalman.py`."""
+
+    a: FloatArray
+    b: FloatArray
+    w: FloatArray
+    h: FloatArray
+    v: FloatArray
+    v_inverse: FloatArray
+    e: FloatArray
+    c: FloatArray
+
+
+class FilterState(NamedTuple):
+    """Carried state.
+
+    Attributes:
+        plain, plain_p: state and covariance of the plain filter.
+        general, general_p: the same of the generalised one.
+        augmented: x̄ of the generalised one, its last entry is the bias.
+        last: (u, acceleration) of the sample before.
+        window: normalised innovations.
+        counts: samples since the start; resets so far.
+    """
+
+    plain: FloatArray
+    plain_p: FloatArray
+    general: FloatArray
+    general_p: FloatArray
+    augmented: FloatArray
+    last: FloatArray
+    window: NisWindow
+    counts: NDArray[np.int64]
+
+
+def filter_model(
+    function: TransferFunction, noise: NoiseModel, sample_rate: float, *, with_acceleration: bool
+) -> FilterModel:
+    """Matrices for position, and acceleration where `with_acceleration`.
+
+    Raises:
+        ModelError: the model has no delay, or the bias would not show.
+    """
+    model = state_space(function)
+    rows = [model.position_row()]
+    variances = [noise.position]
+    if with_acceleration:
+        rows.append(model.acceleration_row(sample_rate))
+        variances.append(noise.acceleration)
+    h, v = np.array(rows), np.diag(variances)
+    w = noise.input * np.outer(model.b, model.b) + noise.state * np.eye(model.b.size)
+    bias = np.eye(len(rows), 1)
+    e, c = augmented_matrices(h, np.zeros((model.b.size, 0)), bias)
+    v_inverse = np.diag(1.0 / np.array(variances))
+    return FilterModel(model.a, model.b, w, h, v, v_inverse, e, c)
+
+
+def new_filter_state(model: FilterModel, window: int) -> FilterState:
+    """Filters that have seen nothing."""
+    n = model.b.size
+    return FilterState(
+        np.zeros(n),
+        np.zeros((n, n)),
+        np.zeros(n),
+        np.zeros((n, n)),
+        np.zeros(model.e.shape[1]),
+        np.zeros(2),
+        new_nis_window(window),
+        np.zeros(2, np.int64),
+    )
+
+
+@njit(cache=True)
+def _start(model: FilterModel, state: FilterState, u: float, y: FloatArray) -> None:
+    """Begin at the position that is measured, not knowing how it moves."""
+    outputs = model.b.size
+    for x in (state.plain, state.general):
+        x[:] = y[0]
+    spread = 1e4 * model.v[0, 0] + 1e4 * model.w[0, 0]
+    state.plain_p[:, :] = spread * np.eye(outputs)
+    state.general_p[:, :] = spread * np.eye(outputs)
+    state.window.values[:] = 0.0
+    state.window.total[0] = 0.0
+    state.window.place[:] = 0
+    state.last[0] = u
+    state.last[1] = y[y.size - 1]
+    state.counts[0] = 0
+
+
+@njit(cache=True)
+def _predict(model: FilterModel, x: FloatArray, p: FloatArray, u: float) -> None:
+    x[:] = times(model.a, x) + model.b * u
+    p[:, :] = product_transposed(product(model.a, p), model.a) + model.w
+
+
+@njit(cache=True)
+def _step(model: FilterModel, state: FilterState, y: FloatArray) -> float:
+    """Update both filters; normalised innovation squared, NaN where a filter broke down."""
+    nis = kalman_update(state.plain, state.plain_p, model.h, model.v, y)
+    ok = generalised_update(
+        state.general, state.general_p, model.e, model.c, model.v_inverse, y, state.augmented
+    )
+    whole = ok and np.isfinite(state.plain).all() and np.isfinite(state.general).all()
+    return nis if whole else np.nan
+
+
+@njit(cache=True)
+def unknown_input_block(
+    model: FilterModel,
+    state: FilterState,
+    settle: int,
+    signals: FloatArray,
+    code: NDArray[np.int64],
+) -> tuple[FloatArray, FloatArray]:
+    """Bias [output unit] and sum of normalised innovations [1]; NaN where nothing is judged.
+
+    Args:
+        model: constant matrices.
+        state: carried on.
+        settle: samples after a start that are not judged.
+        signals: input, position and, with two measurements, acceleration; shape (n, 2 or 3).
+        code: of admission, shape (n,).
+    """
+    bias, total = np.full(code.size, np.nan), np.full(code.size, np.nan)
+    y = np.empty(model.h.shape[0])
+    for k in range(code.size):
+        if code[k] == DEAD:
+            continue
+        y[0] = signals[k, 1]
+        if y.size > 1:
+            y[1] = state.last[1]
+            state.last[1] = signals[k, 2]
+        if code[k] == RESTART or code[k] == NEW_BOOT:
+            _start(model, state, signals[k, 0], signals[k, 1:])
+            continue
+        _predict(model, state.plain, state.plain_p, state.last[0])
+        _predict(model, state.general, state.general_p, state.last[0])
+        state.last[0] = signals[k, 0]
+        state.counts[0] += 1
+        if code[k] == HELD:
+            continue
+        nis = _step(model, state, y)
+        if np.isnan(nis):
+            _start(model, state, signals[k, 0], signals[k, 1:])
+            state.counts[1] += 1
+            continue
+        if state.counts[0] > settle:
+            total[k] = push_nis(state.window, nis)
+            bias[k] = state.augmented[model.b.size]
+    return bias, total
+
+
+class UnknownInputDetector(SampleDetector):
+    """The two filters on a rig's transfer function.
+
+    Args:
+        function: the model from input to output, at least one sample of delay.
+        noise: variances and the test's limit.
+        channels: input, output and, unless "", acceleration.
+        sample_rate: [Hz].
+
+    Raises:
+        ModelError: the model or the noise does not allow it.
+    """
+
+    def __init__(
+        self,
+        function: TransferFunction,
+        noise: NoiseModel,
+        channels: Channels,
+        sample_rate: float,
+    ) -> None:
+        with_acceleration = bool(channels.acceleration)
+        names = (channels.input, channels.output)
+        super().__init__(
+            "unknown_input", (*names, channels.acceleration) if with_acceleration else names
+        )
+        self._noise = noise
+        self._model = filter_model(
+            function, noise, sample_rate, with_acceleration=with_acceleration
+        )
+        if not inverse(self._model.w, np.empty_like(self._model.w)):
+            raise ModelError("unknown-input Kalman filter: found a singular state covariance")
+        self._state = new_filter_state(self._model, noise.window)
+
+    @property
+    def resets(self) -> int:
+        """How often the filters broke down and were started again."""
+        return int(self._state.counts[1])
+
+    def judge(self, signals: FloatArray, code: NDArray[np.int64]) -> Judgement:
+        """Sum of normalised innovations against its limit, and the bias."""
+        bias, total = unknown_input_block(
+            self._model, self._state, self._noise.settle, signals, code
+        )
+        limit = np.where(np.isnan(total), np.nan, self._noise.limit)
+        series = (
+            Series("unknown_input_bias", "m", bias),
+            Series("unknown_input_nis", "", total),
+            Series("unknown_input_limit", "", limit),
+        )
+        return Judgement(series, total, np.full(code.size, -np.inf), limit)
