@@ -3,10 +3,10 @@
     Bus             what processes use: messages in and out, encoded and checked here
      └ Transport    what carries the bytes: Zenoh (`bus_zenoh.py`) or memory (`bus_memory.py`)
 
-Publishing never waits for a reader: where a reader or the link is too slow, messages are dropped, and
-readers that cannot afford that ask a ring (`ring.py`) for what they miss. A receiving callback only puts
-bytes into a bounded queue; they are decoded in the thread that takes them out, so that a bad message is
-counted there and hurts nobody.
+Publishing never waits for a reader: where a reader or the link is too slow, messages are dropped,
+and readers that cannot afford that ask a ring (`ring.py`) for what they miss. A receiving callback
+only puts bytes into a bounded queue; they are decoded in the thread that takes them out, so that a
+bad message is counted there and hurts nobody.
 """
 
 import contextlib
@@ -200,20 +200,16 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
     Args:
         config: the rig's configuration.
         process: name of the process, such as "daq".
-        timeout: how long the router may take to be reached [s]; None returns at once and keeps
-            trying in the background, so that processes can be started in any order.
+        timeout: how long the router may take to be reached [s]; None waits for ever, so that
+            processes can be started in any order. Once reached, a lost router is found again
+            in the background.
 
     Raises:
         BusError: the router was not reached within `timeout`, or its endpoint is wrong.
     """
     from rigwatch.wire.bus_zenoh import ZenohTransport  # slow to import, not needed in memory
 
-    bus = Bus(ZenohTransport.client(config.bus.router), config.rig.id, process)
-    if timeout is not None and not wait_until(bus.connected, timeout):
-        bus.close()
-        remedy = "start `rigwatch router` or correct bus.router"
-        raise BusError(f"no router answers at {config.bus.router}: {remedy}")
-    return bus
+    return Bus(ZenohTransport.client(config.bus.router, timeout), config.rig.id, process)
 
 
 def answered(answer: Answer, question: bytes) -> list[bytes]:

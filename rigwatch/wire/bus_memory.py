@@ -1,7 +1,7 @@
 """The bus within one process: the same bytes, queues and refusals as over Zenoh.
 
-All transports made from one `MemoryNetwork` hear each other. Payloads arrive in the thread that puts
-them.
+All transports made from one `MemoryNetwork` hear each other. Payloads arrive in the thread that
+puts them.
 """
 
 import fnmatch
@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from rigwatch.wire.bus import MAX_PAYLOAD, Answer, Bus, Close, answered
-
 
 T = TypeVar("T")
 

@@ -11,7 +11,9 @@ What the settings are for:
 
 import contextlib
 import json
+import logging
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -22,6 +24,9 @@ from rigwatch.wire.bus import MAX_PAYLOAD, Answer, Close, answered
 from rigwatch.wire.errors import BusError
 
 RETRY_MS = (100, 200)
+ATTEMPT_MS = 300
+"""One attempt at reaching the router; short, since a signal is only seen between attempts [ms]."""
+_log = logging.getLogger(__name__)
 
 
 def _common_settings() -> dict[str, Any]:
@@ -34,7 +39,7 @@ def _common_settings() -> dict[str, Any]:
     return {
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
-        "connect/timeout_ms": -1,
+        "connect/timeout_ms": ATTEMPT_MS,
         "connect/exit_on_failure": False,
         "connect/retry": retry,
     }
@@ -64,16 +69,15 @@ def _router_settings(endpoint: str) -> dict[str, Any]:
     }
 
 
-def _open(settings: dict[str, Any], endpoint: str) -> Any:
+def _configured(settings: dict[str, Any], endpoint: str) -> Any:
+    config = zenoh.Config()
     try:
-        config = zenoh.Config()
         for key, value in settings.items():
             config.insert_json5(key, json.dumps(value))
-        return zenoh.open(config)
-    except zenoh.ZError as error:
-        reason = str(error).splitlines()[0]
-        expected = "expected an endpoint such as tcp/127.0.0.1:7447 that is free and reachable"
-        raise BusError(f"bus endpoint {endpoint}: {reason}; {expected}") from None
+    except zenoh.ZError:
+        expected = "expected an endpoint such as tcp/127.0.0.1:7447"
+        raise BusError(f"bus: found {endpoint!r}, {expected}") from None
+    return config
 
 
 def open_router(endpoint: str) -> Close:
@@ -82,9 +86,30 @@ def open_router(endpoint: str) -> Close:
     Raises:
         BusError: the endpoint is not well formed or already taken.
     """
-    session = _open(_router_settings(endpoint), endpoint)
+    config = _configured(_router_settings(endpoint), endpoint)
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError:
+        taken = "is the address this machine's own, and free?"
+        raise BusError(f"no router can listen at {endpoint}: {taken}") from None
     close: Close = session.close
     return close
+
+
+def _reach(endpoint: str, timeout: float | None) -> Any:
+    """A session with the router at `endpoint`, tried again and again."""
+    started, told = time.monotonic(), False
+    while True:
+        try:
+            return zenoh.open(_configured(_client_settings(endpoint), endpoint))
+        except zenoh.ZError:
+            waited = time.monotonic() - started
+        if timeout is not None and waited >= timeout:
+            remedy = "start `rigwatch router` or correct bus.router"
+            raise BusError(f"no router answers at {endpoint}: {remedy}")
+        if waited > 2.0 and not told:
+            _log.warning("waiting for the router at %s", endpoint)
+            told = True
 
 
 class ZenohTransport:
@@ -97,13 +122,13 @@ class ZenohTransport:
         self._kept: list[Any] = []
 
     @classmethod
-    def client(cls, endpoint: str) -> "ZenohTransport":
-        """A client of the router at `endpoint`, which need not be there yet.
+    def client(cls, endpoint: str, timeout: float | None = None) -> "ZenohTransport":
+        """A client of the router at `endpoint`, awaited for `timeout` [s], None for ever.
 
         Raises:
-            BusError: the endpoint is not well formed.
+            BusError: the endpoint is not well formed, or no router answers there.
         """
-        return cls(_open(_client_settings(endpoint), endpoint))
+        return cls(_reach(endpoint, timeout))
 
     def put(self, key: str, payload: bytes) -> None:
         """Send without waiting; dropped where the link is full or down."""
