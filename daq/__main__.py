@@ -18,6 +18,7 @@ from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.heartbeat import Heartbeat
 from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.ring import SampleRing
 
 
 def acquire(config: RigConfig, adapter: Adapter, bus: Bus, stop: threading.Event) -> None:
@@ -28,7 +29,7 @@ def acquire(config: RigConfig, adapter: Adapter, bus: Bus, stop: threading.Event
     """
     device = Supervisor(adapter)
     acquisition = Acquisition(config, adapter.clock_rate)
-    publisher = Publisher(bus, config)
+    publisher = Publisher(bus, SampleRing(bus, config.daq.ring))
     heartbeat = Heartbeat("daq")
     device.start()
     heartbeat.ready()

@@ -24,6 +24,8 @@ from rigwatch.wire.errors import RigwatchError
 COMMANDS: dict[str, str] = {
     # name on the command line: module below rigwatch.commands
     "up": "up",
+    "plant": "plant",
+    "daq": "daq",
     "doctor": "doctor",
     "dashboard": "dashboard",
     "info": "info",

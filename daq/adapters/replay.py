@@ -1,0 +1,159 @@
+"""A recorded session in place of a device, at any speed.
+
+Samples come when they are due by the recording's own clock, calibrated and judged as they were recorded. Their numbers are
+those of the recording; each turn of a loop has a boot of its own.
+"""
+
+import time
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from daq.adapter import RawBlock, picked
+from rigwatch.wire.errors import DeviceError, SessionError
+from rigwatch.wire.messages import Column, SampleBlock
+from rigwatch.wire.rig_config import ChannelSection, ReplaySection
+from rigwatch.wire.session import open_session
+
+
+class ReplayAdapter:
+    """Plays a session.
+
+    Args:
+        session: file or folder.
+        channels: the channels to deliver, by name, in this order.
+        speed: times real time.
+        loop: begin again at the end.
+        clock: monotonic time [ns].
+        sleep: waits some seconds.
+    """
+
+    def __init__(
+        self,
+        session: Path | str,
+        channels: Sequence[ChannelSection],
+        speed: float = 1.0,
+        loop: bool = False,
+        clock: Callable[[], int] = time.monotonic_ns,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.clock_rate = speed
+        self._session = Path(session)
+        self._channels = tuple(channels)
+        self._loop = loop
+        self._clock = clock
+        self._sleep = sleep
+        self._turn = 0
+        self._blocks: Iterator[SampleBlock] = iter(())
+        self._rest: RawBlock | None = None
+        self._start_ns = 0
+        self._start_us = 0
+        self._played = 0
+
+    def open(self) -> None:
+        """Begin at the session's first sample.
+
+        Raises:
+            DeviceError: there is no such session, or it holds no samples.
+        """
+        self._blocks = self._opened()
+        self._rest = self._next()
+        if self._rest is None:
+            raise DeviceError(f"{self._session}: no samples to replay")
+        self._start_ns, self._start_us = self._clock(), int(self._rest.device_us[0])
+
+    def read(self, timeout: float) -> Sequence[RawBlock]:
+        """The samples that are due, or become due within `timeout` [s].
+
+        Raises:
+            DeviceError: the session lacks a channel or has it in another unit.
+        """
+        if self._rest is None:
+            self._sleep(timeout)
+            return ()
+        wait = (self._due_ns(int(self._rest.device_us[0])) - self._clock()) * 1e-9
+        self._sleep(min(max(wait, 0.0), timeout))
+        elapsed_us = (self._clock() - self._start_ns) * 1e-3 * self.clock_rate
+        due = int(np.searchsorted(self._rest.device_us, self._start_us + elapsed_us, "right"))
+        if due == 0:
+            return ()
+        part = picked(self._rest, slice(0, due))
+        self._played += due
+        self._rest = picked(self._rest, slice(due, None)) if due < len(self._rest) else None
+        if self._rest is None:
+            self._rest = self._next() or self._again()
+        return (_arrived(part, self._clock()),)
+
+    def close(self) -> None:
+        """Stop playing."""
+        self._blocks, self._rest = iter(()), None
+
+    def counters(self) -> Mapping[str, float]:
+        """Samples played, and how often from the start."""
+        return {"played": self._played, "turns": self._turn + 1}
+
+    def _due_ns(self, us: int) -> int:
+        return self._start_ns + round((us - self._start_us) * 1e3 / self.clock_rate)
+
+    def _opened(self) -> Iterator[SampleBlock]:
+        try:
+            return open_session(self._session).samples()
+        except SessionError as error:
+            raise DeviceError(str(error)) from error
+
+    def _next(self) -> RawBlock | None:
+        try:
+            block = next(self._blocks, None)
+        except SessionError as error:
+            raise DeviceError(str(error)) from error
+        return None if block is None else self._raw(block)
+
+    def _again(self) -> RawBlock | None:
+        if not self._loop:
+            return None
+        self._turn += 1
+        self._blocks = self._opened()
+        first = self._next()
+        if first is not None:
+            self._start_ns, self._start_us = self._clock(), int(first.device_us[0])
+        return first
+
+    def _raw(self, block: SampleBlock) -> RawBlock:
+        columns = [self._column(block, channel) for channel in self._channels]
+        boot = zlib.crc32(f"{block.boot}/{self._turn}".encode()) if self._turn else block.boot
+        n = len(block)
+        return RawBlock(
+            boot=boot,
+            seq=np.arange(block.seq, block.seq + n),
+            device_us=block.device_us if len(block.device_us) else block.t_ns // 1000,
+            codes=np.stack([column.values for column in columns], axis=1),
+            arrived_ns=np.zeros(n, np.int64),
+            calibrated=True,
+            quality=np.stack([_quality(column, n) for column in columns], axis=1),
+        )
+
+    def _column(self, block: SampleBlock, channel: ChannelSection) -> Column:
+        found = {column.name: column for column in block.channels}.get(channel.name)
+        if found is None:
+            names = ", ".join(column.name for column in block.channels)
+            raise DeviceError(f"{self._session}: no channel {channel.name!r}, found {names}")
+        if found.unit != channel.unit:
+            units = f"channel {channel.name!r} is in [{found.unit}]"
+            raise DeviceError(f"{self._session}: {units}, expected [{channel.unit}]")
+        return found
+
+
+def _quality(column: Column, n: int) -> np.ndarray:
+    return column.quality if len(column.quality) else np.zeros(n, np.uint8)
+
+
+def _arrived(raw: RawBlock, now_ns: int) -> RawBlock:
+    raw.arrived_ns[:] = now_ns
+    return raw
+
+
+def from_section(section: ReplaySection, channels: tuple[ChannelSection, ...]) -> ReplayAdapter:
+    """Entry point `replay` of the group `rigwatch.adapters`."""
+    return ReplayAdapter(section.session, channels, section.speed, section.loop)
