@@ -81,7 +81,7 @@ _PNEUMATICS: tuple[Effect, ...] = (
     Effect("chamber_leak", "mm^2", "pneumatics", "hole in the piston's seal", 0.02),
     Effect("leak_1", "mm^2", "pneumatics", "hole from chamber 1 to the room", 0.01),
     Effect("leak_2", "mm^2", "pneumatics", "hole from chamber 2 to the room", 0.01),
-    Effect("port_blockage", "1", "pneumatics", "blocked share of both ports", 0.4, high=0.99),
+    Effect("port_blockage", "1", "pneumatics", "blocked share of both lines", 0.4, high=0.99),
 )  # fmt: skip
 
 DYNAMIC = _FRICTION + _FORCES + _ACTUATOR + _PNEUMATICS

@@ -168,11 +168,12 @@ class Recorded(Shape, frozen=True, kw_only=True, tag="recorded"):
         if not self.file:
             return np.array(self.samples)
         try:
-            recorded = np.loadtxt(Path(self.file), dtype=np.float64, ndmin=1, delimiter=",")
+            lines = Path(self.file).read_text(encoding="utf-8").split()
+            recorded = np.array([float(line) for line in lines])
         except (OSError, ValueError) as error:
             raise ConfigError(self.file, "", str(error), "one number a line") from error
-        if recorded.ndim != 1 or recorded.size == 0 or not np.isfinite(recorded).all():
-            raise ConfigError(self.file, "", f"shape {recorded.shape}", "one finite number a line")
+        if recorded.size == 0 or not np.isfinite(recorded).all():
+            raise ConfigError(self.file, "", "none, or not finite", "one finite number a line")
         return recorded
 
 

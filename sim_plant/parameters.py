@@ -40,7 +40,7 @@ class RigParameters(Section, frozen=True, kw_only=True):
     piston_mass: Annotated[float, _positive("piston and rod [kg]")] = 0.0113
     load_mass: Annotated[float, _positive("air-bearing mass [kg]")] = 0.2201
     dead_volume: Annotated[float, _positive("fittings and hose at each chamber, chosen [m^3]")] = (
-        1.3e-6
+        1.15e-6
     )
     piston_viscous: Annotated[
         float, _not_negative("viscous friction of the piston, chosen [N s/m]")

@@ -176,7 +176,8 @@ def advance_plant(  # noqa: PLR0915, PLR0917
     hn = h * p.heat_capacity_ratio
     area_1, area_2 = p.piston_area, p.annulus_area
     half = 0.5 * p.stroke
-    port = orifice(p.port_area, p) * (1.0 - e.port_blockage)
+    clear = 1.0 - e.port_blockage
+    port, resistance = orifice(p.port_area, p) * clear, p.port_resistance / clear**2
     leak = orifice(p.piston_leak + e.chamber_leak, p)
     leak_1, leak_2 = orifice(e.leak_1, p), orifice(e.leak_2, p)
     supply = 1.0 - e.supply_drop
@@ -244,8 +245,8 @@ def advance_plant(  # noqa: PLR0915, PLR0917
                 x += h * v
 
             across = flow(p1, p2, leak, p.leak_resistance)
-            into_1 = flow(pu1, p1, port, p.port_resistance) - across
-            into_2 = flow(pu2, p2, port, p.port_resistance) + across
+            into_1 = flow(pu1, p1, port, resistance) - across
+            into_2 = flow(pu2, p2, port, resistance) + across
             if leak_1 > 0.0:
                 into_1 -= flow(p1, p.atmosphere, leak_1, p.leak_resistance)
             if leak_2 > 0.0:
@@ -264,12 +265,13 @@ def advance_plant(  # noqa: PLR0915, PLR0917
 @njit(cache=True, error_model="numpy")
 def _upstream(pressure: float, wanted: float, port: float, p: Record) -> float:
     """Upstream pressure that drives the flow `wanted` into a chamber at `pressure` [Pa]."""
-    low, high = 0.5 * pressure, 2.0 * pressure
+    found = pressure
     for _ in range(100):
-        middle = 0.5 * (low + high)
-        enough = flow(middle, pressure, port, p.port_resistance) > wanted
-        low, high = (low, middle) if enough else (middle, high)
-    return 0.5 * (low + high)
+        downstream = pressure if wanted > 0.0 else found
+        drop = abs(wanted) * p.port_resistance * 2.0 / (pressure + found)
+        drop += (wanted / port) ** 2 / downstream
+        found = pressure + math.copysign(drop, wanted)
+    return found
 
 
 @njit(cache=True, error_model="numpy")

@@ -56,6 +56,8 @@ class _Ramp:
     def value(self, sample: int) -> float:
         if sample >= self.stop:
             return self.high
+        # On the grid, not where a call happens to begin.
+        sample = max(sample - sample % RAMP_GRID, self.start)
         return self.low + (self.high - self.low) * (sample - self.start) / (self.stop - self.start)
 
 

@@ -11,6 +11,7 @@ friction. It is of second order and sticks exactly.
 # numba's functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,11 +115,10 @@ def _noisy(signal: Floats, time: Floats, random: np.random.Generator) -> Floats:
 
 
 @njit(cache=True)
-def _braked(velocity: float, impulse: float) -> float:
-    """The velocity after an impulse of dry friction that cannot turn it round."""
-    if abs(velocity) <= impulse:
-        return 0.0
-    return velocity - impulse if velocity > 0.0 else velocity + impulse
+def _braked(velocity: float, impulse: float) -> tuple[float, float]:
+    """The velocity after dry friction that cannot turn it round, and what is left of `impulse`."""
+    used = min(abs(velocity), impulse)
+    return velocity - math.copysign(used, velocity), impulse - used
 
 
 @njit(cache=True)
@@ -143,8 +143,10 @@ def _run(  # noqa: PLR0917
         out[sample, 0], out[sample, 1], out[sample, 2] = x, v, (force - friction) / mass
         for sub in range(fine):
             u = middles[sample * fine + sub]
-            v = _braked(v, impulse)
+            v, left = _braked(v, impulse)
             moved = matrix[0, 0] * x + matrix[0, 1] * v + gain[0] * u
-            v = _braked(matrix[1, 0] * x + matrix[1, 1] * v + gain[1] * u, impulse)
+            v = matrix[1, 0] * x + matrix[1, 1] * v + gain[1] * u
+            # A mass at rest has spent nothing in the first half: the whole impulse holds it.
+            v, left = _braked(v, impulse + left)
             x = moved
     state[0], state[1] = x, v
