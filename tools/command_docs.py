@@ -13,8 +13,8 @@ HEAD = """<!-- Printed by `make docs` from the commands' own help. -->
 
 # Commands
 
-Each has `--help` with all its options, `--json` for results that programs read, says an error in one
-plain line and then ends with a code other than 0.
+Each has `--help` with all its options and `--json` for results that programs read, says an error in
+one plain line and then ends with a code other than 0.
 """
 
 

@@ -10,12 +10,14 @@ from rigwatch.doctor.finding import Finding
 from rigwatch.doctor.machine import check_machine
 from rigwatch.doctor.rig import check_rig
 from rigwatch.doctor.viewer import check_viewer
-from rigwatch.wire.errors import RigwatchError
+from rigwatch.supervisor.plan import PROCESSES
+from rigwatch.wire.errors import ConfigError, RigwatchError
 from rigwatch.wire.rig_config import load_rig
 
 HELP = "check the installation, ports, devices and a configuration"
 EXAMPLE = """  rigwatch doctor
-  rigwatch doctor configs/demo.toml"""
+  rigwatch doctor configs/demo.toml
+  rigwatch doctor configs/demo.toml --alive daq"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,18 +25,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "config", type=Path, nargs="?", metavar="CONFIG", help="configuration to check as well"
     )
+    parser.add_argument(
+        "--alive",
+        choices=PROCESSES,
+        metavar="PROCESS",
+        help=f"only ask this running process how it is: {', '.join(PROCESSES)}",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print every finding; 1 where one of them keeps rigwatch from running."""
     findings = []
-    for finding in _findings(arguments.config):
+    for finding in _asked(arguments):
         findings.append(finding)
         if not arguments.json:
             print(_line(finding), flush=True)
     if arguments.json:
         print(json.dumps([asdict(finding) for finding in findings], indent=1))
     return 1 if any(finding.level == "fail" for finding in findings) else 0
+
+
+def _asked(arguments: argparse.Namespace) -> Iterator[Finding]:
+    if arguments.alive is None:
+        yield from _findings(arguments.config)
+        return
+    if arguments.config is None:
+        raise ConfigError("rigwatch doctor", "--alive", "no CONFIG", "the rig's configuration")
+    from rigwatch.doctor.alive import check_alive  # the bus is not needed otherwise
+
+    yield check_alive(load_rig(arguments.config), arguments.alive)
 
 
 def _findings(config: Path | None) -> Iterator[Finding]:

@@ -1,0 +1,52 @@
+"""`rigwatch demo`: a simulated rig from commissioning to an alarm that names friction."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+HELP = "watch a simulated rig: friction appears, an alarm names it, a recording is left"
+EXAMPLE = """  rigwatch demo
+  rigwatch demo --headless --seconds 35
+  rigwatch demo --commission-only"""
+HEADLESS_SECONDS = 35.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "--headless",
+        action="store_true",
+        help=f"no window; ends after {HEADLESS_SECONDS:g} s, with 0 only if the fault was named",
+    )
+    parser.add_argument("--seconds", type=float, metavar="N", help="end after this long [s]")
+    parser.add_argument(
+        "--folder", type=Path, default=Path("demo-session"), help="where everything is written"
+    )
+    parser.add_argument(
+        "--commission-only", action="store_true", help="make the model of the simulated rig and end"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the demonstration did what it is for."""
+    from rigwatch.demo.commissioning import ensure_model
+    from rigwatch.demo.rig_file import find_config, write_rig_file
+    from rigwatch.demo.show import Show
+
+    folder: Path = arguments.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    viewer = "web" if arguments.headless else "auto"
+    rig = write_rig_file(find_config("demo.toml"), folder, viewer)
+    ensure_model(rig, folder, _remark)
+    if arguments.commission_only:
+        return 0
+    seconds = arguments.seconds or (HEADLESS_SECONDS if arguments.headless else None)
+    outcome = Show(rig, folder, _remark).play(seconds)
+    if arguments.json:
+        print(json.dumps(outcome.as_dict(), indent=1))
+    return 1 if arguments.headless and outcome.complaints else 0
+
+
+def _remark(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

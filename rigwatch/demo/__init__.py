@@ -1,0 +1,7 @@
+"""The demonstration: a simulated rig on a real serial line, from commissioning to a named fault.
+
+rig_file.py      the rig's configuration with everything it writes in one folder
+commissioning.py recordings of the simulated rig, and the monitor's model made from them
+narrator.py      what happens, in plain words, as it happens
+verdict.py       whether the fault was found and named, and whether the recording is whole
+"""

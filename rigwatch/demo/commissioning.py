@@ -1,0 +1,84 @@
+"""The monitor's model for the demonstration, made as on a real rig: record, then commission.
+
+The commands are shown as they run. What they make is kept, under a hash of everything it was made
+from.
+"""
+
+import hashlib
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import daq
+import monitor
+import rigwatch
+import sim_plant
+from rigwatch.demo.rig_file import MODEL, find_config, relative
+from rigwatch.wire.errors import ModelError
+
+RECORDINGS = {
+    "chirp": "scenarios/commissioning_chirp.toml",
+    "healthy": "scenarios/healthy_sine_8hz_1v4.toml",
+    "friction": "scenarios/known_friction.toml",
+}
+"""The recordings that commissioning asks for, by role, and the scenario that each is of."""
+
+
+def ensure_model(rig: Path, folder: Path, say: Callable[[str], None]) -> Path:
+    """The model for the simulated rig of the file `rig`, made anew where anything has changed.
+
+    Raises:
+        ModelError: a step failed.
+    """
+    model, stamp = folder / MODEL, folder / "model.made-from"
+    made_from = _made_from(rig)
+    if model.is_file() and stamp.is_file() and stamp.read_text(encoding="utf-8") == made_from:
+        say(f"model of the rig: {relative(model)}, made in an earlier run")
+        return model
+    say("commissioning: the model is made from three recordings, as on a real rig")
+    sessions = {role: folder / "commissioning" / f"{role}.mcap" for role in RECORDINGS}
+    for role, session in sessions.items():
+        session.parent.mkdir(parents=True, exist_ok=True)
+        session.unlink(missing_ok=True)
+        scenario = find_config(RECORDINGS[role])
+        _run(["plant", rig, "--session", session, "--scenario", scenario], say)
+    roles = [part for role, session in sessions.items() for part in (f"--{role}", session)]
+    _run(["commission", *roles, "--output", model], say)
+    stamp.write_text(made_from, encoding="utf-8")
+    return model
+
+
+def _run(arguments: list[str | Path], say: Callable[[str], None]) -> None:
+    words = [relative(word) if isinstance(word, Path) else word for word in arguments]
+    say(f"  $ rigwatch {shlex.join(words)}")
+    command = [sys.executable, "-m", "rigwatch", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        reason = (done.stderr or done.stdout).strip().splitlines() or ["no reason given"]
+        raise ModelError(f"rigwatch {words[0]} failed: {reason[-1]}")
+
+
+def _made_from(rig: Path) -> str:
+    """A hash of the configuration, the scenarios and the code that the model comes from."""
+    parts = [find_config(name) for name in RECORDINGS.values()]
+    found = hashlib.sha256(_calibration(rig))
+    for path in [*parts, *_sources()]:
+        found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+def _calibration(rig: Path) -> bytes:
+    """The configuration without what differs from run to run: ports and viewer."""
+    text = rig.read_text(encoding="utf-8")
+    return text.partition("[[channels]]")[2].partition("[daq]")[0].encode()
+
+
+def _sources() -> Iterator[Path]:
+    for package in (daq, monitor, sim_plant, rigwatch):
+        assert package.__file__ is not None
+        root = Path(package.__file__).parent
+        folders = [root] if package is not rigwatch else [root / "physics", root / "wire"]
+        for folder in folders:
+            yield from sorted(folder.rglob("*.py"))

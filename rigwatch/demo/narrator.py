@@ -1,0 +1,93 @@
+"""What happens in the demonstration, in plain words.
+
+Told are what is done to the rig, which the monitor does not know, and what the monitor says.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from rigwatch.wire.messages import Alarm
+from sim_plant.scenario import Scenario
+
+ACTS = {
+    "coulomb": ("dry friction of {value:g} N begins", "the friction ends"),
+    "actuator_gain": ("the valve's gain falls to {value:.0%}", "the valve's gain is whole again"),
+}
+NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Act:
+    """One thing that is done to the simulated rig: at which sample, and in words."""
+
+    seq: int
+    effect: str
+    value: float
+    text: str
+
+
+def acts(scenario: Scenario) -> Iterator[Act]:
+    """All that happens to the rig, cycle after cycle, without end where the scenario repeats."""
+    rate, cycle = scenario.plant.sample_rate, 0.0
+    while scenario.events:
+        for event in sorted(scenario.events, key=lambda event: event.at_s):
+            words = f"{event.effect} becomes {{value:g}}"
+            begins, ends = ACTS.get(event.effect, (words, words))
+            text = ends if event.value == NEUTRAL.get(event.effect) else begins
+            seq = round((cycle + event.at_s) * rate)
+            yield Act(seq, event.effect, event.value, text.format(value=event.value))
+        if not scenario.cycle_s:
+            return
+        cycle += scenario.cycle_s
+
+
+class Narrator:
+    """Tells the acts as the samples reach them, and the alarms as they come.
+
+    Args:
+        scenario: what is done to the rig.
+        say: takes a line.
+
+    Attributes:
+        alarms: raised so far.
+    """
+
+    def __init__(self, scenario: Scenario, say: Callable[[str], None]) -> None:
+        self.alarms: list[Alarm] = []
+        self._say = say
+        self._rate = scenario.plant.sample_rate
+        self._acts = acts(scenario)
+        self._next = next(self._acts, None)
+        self._last: Act | None = None
+
+    def samples(self, seq: int) -> None:
+        """The rig has come to this sample."""
+        while self._next is not None and seq >= self._next.seq:
+            self._last = self._next
+            self._say(f"{self._time(self._last.seq)} the rig: {self._last.text}")
+            self._next = next(self._acts, None)
+
+    def alarm(self, alarm: Alarm) -> None:
+        """An alarm has changed."""
+        if alarm.seq >= 0:
+            self.samples(alarm.seq)
+        if alarm.state == "unacknowledged":
+            self.alarms.append(alarm)
+            self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
+            self._say(f"            what to do: {alarm.guidance}")
+        elif alarm.state in ("normal", "cleared_unacknowledged"):
+            name = alarm.name.replace("_", " ")
+            self._say(f"{self._time(alarm.seq)} {name}: the condition has gone")
+
+    def _delay(self, alarm: Alarm) -> str:
+        if self._last is None or alarm.seq < self._last.seq:
+            return ""
+        late = alarm.seq - self._last.seq
+        onset = max(0, alarm.onset_seq - self._last.seq)
+        return (
+            f" (noticed {onset / self._rate * 1e3:.0f} ms after it began, "
+            f"named after {late / self._rate * 1e3:.0f} ms)"
+        )
+
+    def _time(self, seq: int) -> str:
+        return f"{seq / self._rate:8.2f} s " if seq >= 0 else " " * 10 + " "

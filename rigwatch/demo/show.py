@@ -1,0 +1,151 @@
+"""The demonstration itself: `rigwatch up` runs the rig, and what happens is told as it happens."""
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rigwatch.demo.narrator import Narrator
+from rigwatch.demo.rig_file import relative
+from rigwatch.demo.verdict import Recording, complaints, newest_session, read_recording
+from rigwatch.wire.bus import connect, unique_process
+from rigwatch.wire.errors import DeviceError
+from rigwatch.wire.messages import Alarm, SampleBlock
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.topics import ALARMS, SAMPLES
+from sim_plant.scenario import load_scenario
+
+START_TIMEOUT = 180.0
+STOP_TIMEOUT = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a demonstration."""
+
+    alarms: tuple[Alarm, ...]
+    recording: Recording
+    complaints: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For `--json`."""
+        return {
+            "recording": str(self.recording.path),
+            "samples": self.recording.samples,
+            "alarms": [{"name": a.name, "seq": a.seq, "cause": a.cause} for a in self.alarms],
+            "complaints": list(self.complaints),
+        }
+
+
+class Show:
+    """One run of the demonstration.
+
+    Args:
+        rig: configuration of the rig.
+        folder: where its files are.
+        say: takes lines for people.
+    """
+
+    def __init__(self, rig: Path, folder: Path, say: Callable[[str], None]) -> None:
+        self._rig, self._folder, self._say = rig, folder, say
+        self._config = load_rig(rig)
+        assert self._config.plant is not None
+        self._narrator = Narrator(load_scenario(self._config.plant.scenario), say)
+        self._seen = 0
+        self._up: subprocess.Popen[str] | None = None
+
+    def play(self, seconds: float | None) -> Outcome:
+        """Run for `seconds` of the rig's time, or until Ctrl-C; then judge what was recorded."""
+        self._say(f"starting the rig: $ rigwatch up {relative(self._rig)}")
+        self._up = subprocess.Popen(
+            [sys.executable, "-m", "rigwatch", "up", str(self._rig), "--json"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            process_group=0,
+        )
+        threading.Thread(target=self._relay, name="relay", daemon=True).start()
+        try:
+            with suppress(KeyboardInterrupt):
+                self._watch(seconds)
+        finally:
+            self._stop()
+        return self._judge()
+
+    def _watch(self, seconds: float | None) -> None:
+        bus = connect(self._config, unique_process("demo"))
+        samples, alarms = bus.subscribe(SAMPLES), bus.subscribe(ALARMS)
+        rate = self._config.rig.sample_rate
+        give_up = time.monotonic() + START_TIMEOUT
+        try:
+            while seconds is None or self._seen < seconds * rate:
+                self._check_running(give_up)
+                alarm: Alarm | None = alarms.get(timeout=0.1)
+                if alarm is not None:
+                    self._narrator.alarm(alarm)
+                blocks: list[SampleBlock] = samples.drain()
+                if blocks:
+                    self._first_samples()
+                    self._seen = blocks[-1].seq + len(blocks[-1])
+                    self._narrator.samples(self._seen)
+                    give_up = time.monotonic() + START_TIMEOUT
+        finally:
+            bus.close()
+
+    def _first_samples(self) -> None:
+        if not self._seen:
+            self._say("samples arrive: the rig moves, healthy so far")
+
+    def _check_running(self, give_up: float) -> None:
+        assert self._up is not None
+        if self._up.poll() is not None:
+            raise DeviceError(f"rigwatch up ended with code {self._up.returncode}")
+        if time.monotonic() > give_up:
+            raise DeviceError(f"no samples for {START_TIMEOUT:g} s")
+
+    def _relay(self) -> None:
+        """Pass on what people should see of the supervisor's events."""
+        assert self._up is not None
+        assert self._up.stdout is not None
+        for line in self._up.stdout:
+            try:
+                event = json.loads(line)
+            except ValueError:
+                self._say(line.rstrip())
+                continue
+            if event["event"] in ("says", "ill", "ended", "restarting"):
+                self._say(f"  {event['process']}: {event['text']}")
+
+    def _stop(self) -> None:
+        assert self._up is not None
+        self._say("stopping the rig; the recording is closed")
+        self._up.send_signal(signal.SIGTERM)
+        # A second Ctrl-C must not leave a half written file behind.
+        previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            self._up.wait(STOP_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self._up.kill()
+            self._up.wait()
+        finally:
+            signal.signal(signal.SIGINT, previous)
+
+    def _judge(self) -> Outcome:
+        recording = read_recording(newest_session(self._folder / "sessions"))
+        found = complaints(self._narrator.alarms, recording)
+        seconds = recording.samples / self._config.rig.sample_rate
+        whole = "; ".join(recording.faults) or "none missing"
+        session = relative(recording.path)
+        self._say(f"recording: {session}, {recording.samples} samples ({seconds:.0f} s), {whole}")
+        for complaint in found:
+            self._say(f"demo: {complaint}")
+        self._say(f"look into it:  rigwatch info {session}")
+        self._say(f"replay it:     rigwatch replay {session}")
+        return Outcome(tuple(self._narrator.alarms), recording, tuple(found))

@@ -1,0 +1,90 @@
+"""Whether the demonstration did what it is for: the fault named, the recording whole."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import Alarm
+from rigwatch.wire.session.reader import open_session
+
+ALARM = "dry_friction"
+WORDS = "dry friction"
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What a session file holds of the run.
+
+    Attributes:
+        path: the session.
+        samples: how many of the rig's samples are in it.
+        estimates: how many samples the monitor's estimates cover.
+        alarms: names of the alarms raised in it.
+        faults: what is wrong with it, in words.
+    """
+
+    path: Path
+    samples: int
+    estimates: int
+    alarms: tuple[str, ...]
+    faults: tuple[str, ...]
+
+
+def newest_session(folder: Path) -> Path:
+    """The session begun last below `folder`.
+
+    Raises:
+        SessionError: there is none.
+    """
+    found = sorted(folder.glob("*/*.mcap"), key=lambda path: path.stat().st_mtime)
+    if not found:
+        raise SessionError(f"{folder}: no recording was left")
+    return found[-1].parent
+
+
+def read_recording(path: Path) -> Recording:
+    """Read the whole session and find out whether any sample is missing.
+
+    Raises:
+        SessionError: it cannot be read.
+    """
+    session = open_session(path)
+    blocks = [(block.boot, block.seq, len(block)) for block in session.samples()]
+    estimates = sum(len(block) for block in session.estimates())
+    raised = (r.message for r in session.messages(["alarms"]))
+    alarms = tuple(m.name for m in raised if isinstance(m, Alarm) and m.state == "unacknowledged")
+    faults = [f"damaged: {span.reason}" for span in session.lost]
+    faults += ["not closed"] if session.unclosed else []
+    faults += list(_missing(blocks))
+    return Recording(path, sum(n for _, _, n in blocks), estimates, alarms, tuple(faults))
+
+
+def _missing(blocks: Sequence[tuple[int, int, int]]) -> Iterator[str]:
+    if not blocks:
+        yield "holds no samples"
+        return
+    if blocks[0][1] != 0:
+        yield f"the first {blocks[0][1]} samples are missing"
+    for (boot, seq, n), (next_boot, next_seq, _) in pairwise(blocks):
+        if next_boot != boot:
+            yield f"the device started again after sample {seq + n - 1}"
+        elif next_seq != seq + n:
+            yield f"samples {seq + n} to {next_seq - 1} are missing"
+
+
+def complaints(alarms: Sequence[Alarm], recording: Recording) -> list[str]:
+    """Why the demonstration failed; empty where it did what it is for."""
+    found = list(recording.faults)
+    named = [alarm for alarm in alarms if alarm.name == ALARM]
+    if not named:
+        others = ", ".join(alarm.name for alarm in alarms) or "none at all"
+        found.append(f"no alarm named dry friction; alarms: {others}")
+    elif WORDS not in named[0].cause.lower():
+        found.append(f"the alarm does not say dry friction: {named[0].cause}")
+    if ALARM not in recording.alarms:
+        found.append("the alarm is not in the recording")
+    if recording.estimates == 0:
+        found.append("no estimates are in the recording")
+    return found
