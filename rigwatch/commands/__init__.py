@@ -23,6 +23,7 @@ from rigwatch.wire.errors import RigwatchError
 
 COMMANDS: dict[str, str] = {
     # name on the command line: module below rigwatch.commands
+    "demo": "demo",
     "up": "up",
     "plant": "plant",
     "daq": "daq",
@@ -31,6 +32,8 @@ COMMANDS: dict[str, str] = {
     "info": "info",
     "trim": "trim",
     "recover": "recover",
+    "import": "import_",
+    "export": "export",
 }
 """One row a command; keep the rows sorted by what a newcomer needs first."""
 

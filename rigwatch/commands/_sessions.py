@@ -39,6 +39,26 @@ def add_session_and_target(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("target", type=Path, help="the new session file (.mcap)")
 
 
+def add_span(parser: argparse.ArgumentParser) -> None:
+    """Options `--start` and `--end`."""
+    kind = "seconds from the first sample, or ISO time (UTC where it names no zone)"
+    parser.add_argument("--start", metavar="TIME", help=f"first time that is kept: {kind}")
+    parser.add_argument("--end", metavar="TIME", help="first time that is not kept any more")
+
+
+def span_of(arguments: argparse.Namespace, session: "Session") -> tuple[int | None, int | None]:
+    """What `--start` and `--end` say [ns], None where they are not given.
+
+    Raises:
+        SessionError: one of them is no time.
+    """
+    start, end = arguments.start, arguments.end
+    return (
+        None if start is None else point_in_time(start, session, "--start"),
+        None if end is None else point_in_time(end, session, "--end"),
+    )
+
+
 def point_in_time(text: str, session: "Session", option: str) -> int:
     """Unix time [ns] of `text`: seconds from the session's first sample, or an ISO time.
 
@@ -51,10 +71,19 @@ def point_in_time(text: str, session: "Session", option: str) -> int:
         return first_time(session) + round(float(text) * 1e9)
     except (ValueError, OverflowError):
         pass
+    return unix_time(text, option, "seconds from the start, or ")
+
+
+def unix_time(text: str, option: str, alternative: str = "") -> int:
+    """Unix time [ns] of an ISO time; UTC where it names no zone.
+
+    Raises:
+        SessionError: it is none; `alternative` is what would have been right, too.
+    """
     try:
         moment = datetime.fromisoformat(text)
     except ValueError:
-        expected = "seconds from the start, or a time such as 2026-05-01T12:00:00Z"
+        expected = f"{alternative}a time such as 2026-05-01T12:00:00Z"
         raise SessionError(f"{option}: found {text!r}, expected {expected}") from None
     moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
     return round(moment.timestamp() * 1e6) * 1000

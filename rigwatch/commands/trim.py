@@ -2,7 +2,12 @@
 
 import argparse
 
-from rigwatch.commands._sessions import add_session_and_target, point_in_time, report_written
+from rigwatch.commands._sessions import (
+    add_session_and_target,
+    add_span,
+    report_written,
+    span_of,
+)
 
 HELP = "cut a session by time into a new file"
 EXAMPLE = """\
@@ -13,9 +18,7 @@ EXAMPLE = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     add_session_and_target(parser)
-    kind = "seconds from the first sample, or ISO time (UTC where it names no zone)"
-    parser.add_argument("--start", metavar="TIME", help=f"first time that is kept: {kind}")
-    parser.add_argument("--end", metavar="TIME", help="first time that is not kept any more")
+    add_span(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -24,9 +27,6 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.wire.session.edit import trim
 
     session = open_session(arguments.session)
-    start, end = (
-        None if text is None else point_in_time(text, session, f"--{option}")
-        for option, text in (("start", arguments.start), ("end", arguments.end))
-    )
+    start, end = span_of(arguments, session)
     report_written(trim(session, arguments.target, start, end), arguments.json)
     return 0

@@ -123,7 +123,7 @@ def _extend(summary: Summary, message: Message) -> None:
     first = last = message_time(message)
     if isinstance(message, SampleBlock | EstimateBlock):
         last = int(message.t_ns[-1]) if len(message) else first
-    summary.start_ns = min(summary.start_ns or first, first)
+    summary.start_ns = first if not summary.end_ns else min(summary.start_ns, first)
     summary.end_ns = max(summary.end_ns, last)
 
 

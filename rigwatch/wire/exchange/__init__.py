@@ -1,0 +1,1 @@
+"""Sessions from and to the files of other tools: CSV, MAT and Parquet."""

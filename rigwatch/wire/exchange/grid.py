@@ -1,0 +1,87 @@
+"""Puts jittered samples onto a uniform grid, and says which of its points had no data near.
+
+t_k = t_0 + k / rate        linear interpolation between the neighbours
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.wire.errors import ImportDataError
+from rigwatch.wire.messages import FloatArray
+
+JITTER = 0.1
+"""Time stamps this far from a uniform grid, in sample periods, are still taken for uniform."""
+RATE_TOLERANCE = 0.02
+"""A given rate may differ from that of the time stamps by this share."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Uniform times for a recording.
+
+    Attributes:
+        rate_hz: sample rate [Hz].
+        times: shape (n,) [s].
+        jittered: the recording's own time stamps are not uniform, its values must be interpolated.
+        in_hole: shape (n,), points where the recording has no sample near enough.
+        steps_s: shortest and longest step of the time stamps [s].
+    """
+
+    rate_hz: float
+    times: FloatArray
+    jittered: bool
+    in_hole: NDArray[np.bool_]
+    steps_s: tuple[float, float]
+
+
+def fit_grid(times: FloatArray, rate: float | None, max_hole: float) -> Grid:
+    """The uniform grid of a recording's time stamps.
+
+    Args:
+        times: shape (n,), increasing [s].
+        rate: nominal rate [Hz], None to take the median step.
+        max_hole: sample periods without data that are bridged.
+
+    Raises:
+        ImportDataError: the rate is not that of the time stamps.
+    """
+    period = float(np.median(np.diff(times))) if len(times) > 1 else 1.0 / (rate or 1.0)
+    if rate is not None and abs(period * rate - 1) > RATE_TOLERANCE:
+        found = f"found {1 / period:.6g} Hz in the time stamps, expected {rate:.6g} Hz"
+        raise ImportDataError(f"rate: {found} (is the unit of the time right?)")
+    span, steps = (
+        float(times[-1] - times[0]),
+        np.diff(times) if len(times) > 1 else np.array([period]),
+    )
+    extremes = float(steps.min()), float(steps.max())
+    if _is_uniform(times, period):
+        rate_hz = rate or _rounded((len(times) - 1) / span if span else 1 / period)
+        return Grid(rate_hz, times, False, np.zeros(len(times), bool), extremes)
+    rate_hz = rate or _rounded(1 / period)
+    count = int(np.floor(span * rate_hz * (1 + 1e-12))) + 1
+    grid = times[0] + np.arange(count) / rate_hz
+    return Grid(rate_hz, grid, True, _holes(times, grid, max_hole / rate_hz), extremes)
+
+
+def _is_uniform(times: FloatArray, period: float) -> bool:
+    """Whether no time stamp lies far from the straight line through the first and the last."""
+    steps = len(times) - 1
+    span = float(times[-1] - times[0])
+    line = times[0] + np.arange(steps + 1) * (span / max(1, steps))
+    mean_is_median = abs(span - steps * period) <= RATE_TOLERANCE * span
+    return bool(np.abs(times - line).max() <= JITTER * period and mean_is_median)
+
+
+def _rounded(rate: float) -> float:
+    """The rate to six digits: more would be rounding errors of the time stamps."""
+    return float(f"{rate:.6g}")
+
+
+def _holes(times: FloatArray, grid: FloatArray, longest: float) -> NDArray[np.bool_]:
+    """Points of the grid that lie inside a step of `times` longer than `longest` [s]."""
+    after = np.clip(np.searchsorted(times, grid, side="left"), 1, len(times) - 1)
+    before = after - 1
+    on_sample = (np.abs(times[after] - grid) < 1e-9) | (np.abs(times[before] - grid) < 1e-9)
+    return (times[after] - times[before] > longest) & ~on_sample

@@ -1,0 +1,200 @@
+"""Foreign recordings as sessions: columns become channels in SI units on a uniform grid of time."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.wire import blocks, quality
+from rigwatch.wire.errors import ImportDataError
+from rigwatch.wire.exchange.grid import Grid, fit_grid
+from rigwatch.wire.exchange.mapping import ImportMapping, Source, parse_source
+from rigwatch.wire.exchange.native import is_native, native_blocks
+from rigwatch.wire.exchange.tables import Table, read_table
+from rigwatch.wire.exchange.units import conversion
+from rigwatch.wire.messages import Column, EstimateBlock, FloatArray, SampleBlock
+from rigwatch.wire.session.writer import LARGEST_BLOCK, SessionWriter, run_info
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """What an import made.
+
+    Attributes:
+        path: the new session.
+        samples: how many samples (or estimates) it has.
+        rate_hz: their rate [Hz].
+        channels: unit of each channel.
+        remarks: what was done to the data, in words; also in the session's notes.
+    """
+
+    path: Path
+    samples: int
+    rate_hz: float
+    channels: dict[str, str]
+    remarks: tuple[str, ...]
+
+
+def import_file(source: Path, target: Path, mapping: ImportMapping, start_ns: int = 0) -> Imported:
+    """A session at `target` of the CSV, MAT or Parquet file at `source`.
+
+    A file that `rigwatch export` made, with no channels mapped, comes back sample for sample.
+
+    Args:
+        source: the foreign file.
+        target: the session to be made.
+        mapping: which columns become which channels.
+        start_ns: added to the file's times [ns].
+
+    Raises:
+        ImportDataError: the data do not fit the mapping; file, line and column are named.
+        SessionError: the target exists or cannot be written.
+    """
+    table = read_table(source, mapping)
+    if not mapping.channels and is_native(table):
+        whole = native_blocks(table, mapping.device)
+        rate = mapping.rate or _rate_of(whole)
+        return _write(whole, target, mapping, rate, (f"imported from {source.name}",))
+    if not mapping.channels:
+        columns = ", ".join(table.names)
+        raise ImportDataError(f"{source}: no channel is mapped, its columns are {columns}")
+    base, remarks = _time_base(table, mapping)
+    channels = tuple(
+        _channel(name, text, table, base, allow_missing=mapping.flag_missing)
+        for name, text in mapping.channels.items()
+    )
+    block = _block(mapping.device, channels, base.grid, start_ns)
+    remarks = (f"imported from {source.name}", *remarks)
+    return _write([block], target, mapping, base.grid.rate_hz, remarks)
+
+
+@dataclass(frozen=True, slots=True)
+class _TimeBase:
+    """The uniform grid, and the recording's own times [s]."""
+
+    grid: Grid
+    times: FloatArray
+
+
+def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str, ...]]:
+    """The times, and remarks on what was done to them."""
+    if not mapping.time:
+        return _counted(table, mapping)
+    source = _source("time", mapping.time, table)
+    times = _in_si("time", source, table, allow_missing=False)
+    _check_increasing(table, source.column, times)
+    grid = fit_grid(times, mapping.rate, mapping.max_hole)
+    if not grid.jittered:
+        return _TimeBase(grid, times), ()
+    shortest, longest = grid.steps_s
+    holes = int(np.count_nonzero(grid.in_hole))
+    remark = (
+        f"time stamps in steps of {shortest * 1e3:.3g} to {longest * 1e3:.3g} ms: "
+        f"{len(times)} samples resampled to {len(grid.times)} at {grid.rate_hz:g} Hz"
+    )
+    return _TimeBase(grid, times), (
+        remark,
+        *([f"{holes} samples in holes are flagged stale"] * bool(holes)),
+    )
+
+
+def _source(channel: str, text: str, table: Table) -> Source:
+    """The source of a channel, its column and unit checked; errors name the file."""
+    try:
+        source = parse_source(channel, text, table.names)
+        conversion(source.unit, channel)
+    except ImportDataError as error:
+        raise ImportDataError(f"{table.path}: {error}") from None
+    return source
+
+
+def _counted(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str, ...]]:
+    if mapping.rate is None:
+        raise ImportDataError(f"{table.path}: found neither time nor rate, expected one of them")
+    first = _source(*next(iter(mapping.channels.items())), table)
+    count = len(table.cells[first.column])
+    times = np.arange(count) / mapping.rate
+    return _TimeBase(Grid(mapping.rate, times, False, np.zeros(count, bool), (0.0, 0.0)), times), ()
+
+
+def _check_increasing(table: Table, column: str, times: FloatArray) -> None:
+    back = np.flatnonzero(np.diff(times) <= 0)
+    if len(back):
+        row = int(back[0]) + 1
+        found = f"found {times[row]:.9g} s after {times[row - 1]:.9g} s, expected increasing time"
+        raise ImportDataError(f"{table.place(row, column)}: {found}")
+
+
+def _in_si(channel: str, source: Source, table: Table, *, allow_missing: bool) -> FloatArray:
+    to_si = conversion(source.unit, channel)
+    values = table.numbers(source.column, allow_missing)
+    factor = source.factor
+    if isinstance(factor, str):
+        if factor not in table.scalars:
+            known = ", ".join(table.scalars) or "none"
+            raise ImportDataError(
+                f"{table.path}: {channel}: found no scalar {factor!r}, expected one of {known}"
+            )
+        factor = table.scalars[factor]
+    if (factor, source.offset, to_si.factor, to_si.offset) == (1.0, 0.0, 1.0, 0.0):
+        return values
+    return (factor * values + source.offset) * to_si.factor + to_si.offset
+
+
+def _channel(name: str, text: str, table: Table, base: _TimeBase, *, allow_missing: bool) -> Column:
+    source = _source(name, text, table)
+    unit = conversion(source.unit, name).unit
+    values = _in_si(name, source, table, allow_missing=allow_missing)
+    if len(values) != len(base.times):
+        found = f"found {len(values)} values, expected {len(base.times)} as there are times"
+        raise ImportDataError(f"{table.path}: {name}: {found}")
+    flags = np.where(np.isfinite(values), quality.GOOD, quality.NON_FINITE).astype(np.uint8)
+    column = Column(name, unit, values, flags)
+    return _resampled(column, base.grid, base.times) if base.grid.jittered else column
+
+
+def _resampled(column: Column, grid: Grid, times: FloatArray) -> Column:
+    """Interpolated between finite neighbours; what lies beside a missing one is invalid too."""
+    missing = column.quality != quality.GOOD
+    if missing.all():
+        found = np.full(len(grid.times), np.nan)
+    else:
+        found = np.interp(grid.times, times[~missing], column.values[~missing])
+    near_missing = np.interp(grid.times, times, missing.astype(np.float64)) > 0
+    marks = np.full(len(found), quality.RESAMPLED, np.uint8)
+    marks[near_missing] |= quality.NON_FINITE
+    marks[grid.in_hole] |= quality.STALE
+    return Column(column.name, column.unit, found, marks)
+
+
+def _block(device: str, columns: tuple[Column, ...], grid: Grid, start_ns: int) -> SampleBlock:
+    since_start = np.round((grid.times - grid.times[0]) * 1e9).astype(np.int64)
+    first_ns = start_ns + round(float(grid.times[0]) * 1e9)
+    if first_ns < 0:
+        first_ns = start_ns
+    t_ns = first_ns + since_start
+    return SampleBlock(device, 1, 0, since_start // 1000, t_ns, columns)
+
+
+def _rate_of(whole: list[SampleBlock] | list[EstimateBlock]) -> float:
+    steps = np.concatenate([np.diff(block.t_ns) for block in whole])
+    return float(f"{1e9 / float(np.median(steps)):.9g}") if len(steps) else 0.0
+
+
+def _write(
+    whole: list[SampleBlock] | list[EstimateBlock],
+    target: Path,
+    mapping: ImportMapping,
+    rate: float,
+    remarks: tuple[str, ...],
+) -> Imported:
+    notes = "; ".join(filter(None, (*remarks, mapping.notes)))
+    began = int(whole[0].t_ns[0]) if whole else time.time_ns()
+    run = run_info(mapping.rig, rate, t_ns=began, notes=notes)
+    with SessionWriter(target, run, sync=False) as writer:
+        for block in whole:
+            for piece in blocks.pieces(block, LARGEST_BLOCK):  # type: ignore[type-var]
+                writer.write(piece)
+    units = {column.name: column.unit for column in blocks.columns_of(whole[0])}
+    return Imported(target, sum(map(len, whole)), rate, units, remarks)

@@ -1,0 +1,214 @@
+"""Foreign files as tables of named columns, whose errors name file, line and column."""
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigwatch.wire.errors import ImportDataError, MissingExtraError
+from rigwatch.wire.exchange.mapping import ImportMapping
+from rigwatch.wire.exchange.mat5 import MatError, Value, read_mat5
+from rigwatch.wire.messages import FloatArray, IntArray
+
+FORMATS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv"} | {
+    ".mat": "mat",
+    ".parquet": "parquet",
+}
+_DELIMITERS = ",;\t"
+
+
+@dataclass
+class Table:
+    """Columns of equal length.
+
+    Attributes:
+        path: the file, named in errors.
+        cells: the columns as they were read, text or numbers.
+        scalars: single numbers beside the columns.
+        first_line: line of row 0 where lines can be counted (CSV), else None.
+    """
+
+    path: Path
+    cells: dict[str, Sequence[str] | np.ndarray[Any, Any]]
+    scalars: dict[str, float] = field(default_factory=dict)
+    first_line: int | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.cells)
+
+    def place(self, row: int, column: str) -> str:
+        """Where a cell stands, for errors."""
+        if self.first_line is None:
+            return f"{self.path}, row {row + 1}, column {column}"
+        return f"{self.path}:{self.first_line + row}, column {column}"
+
+    def numbers(self, column: str, allow_missing: bool = False) -> FloatArray:
+        """A column as numbers.
+
+        Args:
+            column: its name.
+            allow_missing: empty cells and NaN are NaN, not an error.
+
+        Raises:
+            ImportDataError: a cell is no number; its place is named.
+        """
+        cells = self.cells[column]
+        try:
+            values = np.asarray(cells).astype(np.float64)
+        except (ValueError, TypeError):
+            values = self._numbers_one_by_one(column, cells, allow_missing)
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad) and not allow_missing:
+            row = int(bad[0])
+            raise ImportDataError(
+                f"{self.place(row, column)}: found {str(cells[row])!r}, expected a finite number"
+            )
+        return values
+
+    def _numbers_one_by_one(
+        self, column: str, cells: Sequence[str] | np.ndarray[Any, Any], allow_missing: bool
+    ) -> FloatArray:
+        values = np.empty(len(cells))
+        for row, cell in enumerate(cells):
+            text = str(cell).strip()
+            try:
+                values[row] = np.nan if allow_missing and text in ("", "None") else float(text)
+            except ValueError:
+                where = self.place(row, column)
+                raise ImportDataError(f"{where}: found {text!r}, expected a number") from None
+        return values
+
+    def integers(self, column: str) -> IntArray:
+        """A column as whole numbers, exact to 63 bits.
+
+        Raises:
+            ImportDataError: a cell is no whole number; its place is named.
+        """
+        cells = self.cells[column]
+        if isinstance(cells, np.ndarray) and cells.dtype.kind in "iu":
+            return cells.astype(np.int64)
+        values = np.empty(len(cells), np.int64)
+        for row, cell in enumerate(cells):
+            try:
+                values[row] = int(cell)
+            except (ValueError, OverflowError, TypeError):
+                where = self.place(row, column)
+                found = f"found {str(cell)!r}, expected a whole number"
+                raise ImportDataError(f"{where}: {found}") from None
+        return values
+
+    def without_first(self, rows: int) -> "Table":
+        """The table without its first `rows` rows."""
+        cells = {name: column[rows:] for name, column in self.cells.items()}
+        line = None if self.first_line is None else self.first_line + rows
+        return Table(self.path, cells, self.scalars, line)
+
+
+def read_table(path: Path, mapping: ImportMapping) -> Table:
+    """The table in the file at `path`, without the rows that the mapping leaves out.
+
+    Raises:
+        ImportDataError: the file cannot be read, is of no known format, or holds no rows.
+        MissingExtraError: it is Parquet and pyarrow is not installed.
+    """
+    kind = mapping.format if mapping.format != "auto" else FORMATS.get(path.suffix.lower(), "")
+    if kind not in _READERS:
+        known = ", ".join(FORMATS)
+        raise ImportDataError(f"{path}: unknown format {path.suffix!r}, expected one of {known}")
+    try:
+        table = _READERS[kind](path, mapping)
+    except OSError as error:
+        reason = error.strerror or str(error).partition("\n")[0]
+        raise ImportDataError(f"{path}: cannot be read: {reason}") from error
+    table = table.without_first(mapping.skip_rows)
+    if not table.cells or not max(len(column) for column in table.cells.values()):
+        raise ImportDataError(f"{path}: found no rows of data, expected at least one")
+    return table
+
+
+def _read_csv(path: Path, mapping: ImportMapping) -> Table:
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise ImportDataError(f"{path}: found bytes that are not UTF-8, expected text") from error
+    while lines and not lines[-1].strip():
+        lines.pop()
+    if not lines:
+        raise ImportDataError(f"{path}: the file is empty, expected rows of data")
+    rows = _rows(lines, mapping.delimiter)
+    header = [name.strip() for name in (mapping.columns or rows.pop(0))]
+    first_line = 1 if mapping.columns else 2
+    if len(set(header)) < len(header):
+        raise ImportDataError(f"{path}:1: found the columns {header}, expected different names")
+    for number, row in enumerate(rows):
+        if len(row) != len(header):
+            where = f"{path}:{number + first_line}"
+            raise ImportDataError(f"{where}: found {len(row)} cells, expected {len(header)}")
+    columns = zip(*rows, strict=True) if rows else [()] * len(header)
+    return Table(path, dict(zip(header, columns, strict=True)), first_line=first_line)
+
+
+def _rows(lines: list[str], delimiter: str) -> list[list[str]]:
+    if delimiter == "auto":
+        counts = {mark: lines[0].count(mark) for mark in _DELIMITERS}
+        best = max(counts, key=lambda mark: counts[mark])
+        delimiter = best if counts[best] else "whitespace"
+    if delimiter == "whitespace":
+        return [line.split() for line in lines]
+    if len(delimiter) != 1:
+        expected = "auto, whitespace or one character"
+        raise ImportDataError(f"delimiter: found {delimiter!r}, expected {expected}")
+    return list(csv.reader(lines, delimiter=delimiter))
+
+
+def _read_mat(path: Path, _: ImportMapping) -> Table:
+    try:
+        variables = read_mat5(path.read_bytes())
+    except MatError as error:
+        raise ImportDataError(f"{path}: found {error}") from error
+    arrays = {name: item for name, item in variables.items() if isinstance(item, np.ndarray)}
+    titles = _titles(variables.get("column_titles"), arrays)
+    table = Table(path, {titles[name]: arrays[name].ravel() for name in titles})
+    for name, value in arrays.items():
+        if name in titles:
+            continue
+        if value.size == 1:
+            table.scalars[name] = float(value.item())
+        elif value.ndim == 2 and min(value.shape) == 1:
+            table.cells[name] = value.ravel()
+    return table
+
+
+def _titles(found: Value | None, arrays: dict[str, Any]) -> dict[str, str]:
+    """Column titles by variable that our own export adds, as names in MAT files hold no units."""
+    pairs = [text.partition("=") for text in found] if isinstance(found, list) else []
+    return {name: title for name, _, title in pairs if name in arrays}
+
+
+def _read_parquet(path: Path, _: ImportMapping) -> Table:
+    try:
+        from pyarrow import parquet
+    except ImportError:
+        raise MissingExtraError("pyarrow", "parquet", "reading Parquet files") from None
+    import pyarrow
+
+    try:
+        found = parquet.read_table(path)
+    except pyarrow.ArrowException as error:
+        reason = str(error).splitlines()[0]
+        raise ImportDataError(f"{path}: not a readable Parquet file: {reason}") from error
+    return Table(
+        path, {name: found[name].to_numpy(zero_copy_only=False) for name in found.column_names}
+    )
+
+
+_READERS: dict[str, Callable[[Path, ImportMapping], Table]] = {
+    "csv": _read_csv,
+    "mat": _read_mat,
+    "parquet": _read_parquet,
+}
