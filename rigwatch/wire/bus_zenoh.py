@@ -163,14 +163,17 @@ class ZenohTransport:
 
     def ask(self, key: str, question: bytes, timeout: float) -> list[bytes]:
         """The replies of all that serve `key`, as many as came within `timeout` [s]."""
-        replies = self._session.get(
-            key,
-            payload=question,
-            timeout=timeout,
-            target=zenoh.QueryTarget.ALL,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            congestion_control=zenoh.CongestionControl.DROP,
-        )
+        try:
+            replies = self._session.get(
+                key,
+                payload=question,
+                timeout=timeout,
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                congestion_control=zenoh.CongestionControl.DROP,
+            )
+        except zenoh.ZError:
+            return []  # closed meanwhile
         return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
     def declare_token(self, key: str) -> Close:

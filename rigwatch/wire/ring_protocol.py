@@ -3,8 +3,9 @@
     question    boot, first, last                    three int64, little endian
     reply       boot, settled, blocks in order       two int64, then each block's length and bytes
 
-A reply settles the samples from `first` to `settled`: those not in its blocks will never come. Where `settled` is short of `last`, the reader asks again from there. A ring that does not know
-the boot replies with `settled` of -1 and no block.
+A reply settles the samples from `first` to `settled`: those not in its blocks will never come.
+Where `settled` is short of `last`, the reader asks again from there. A ring that does not know the
+boot replies with `settled` of -1 and no block.
 """
 
 import struct

@@ -18,7 +18,7 @@ from rigwatch.wire.errors import BusError, MessageError
 from rigwatch.wire.messages import Event, Gap, SampleBlock
 from rigwatch.wire.ring import SOURCE_KEY
 from rigwatch.wire.ring_protocol import Ask, RingReply
-from rigwatch.wire.sample_order import Counters, Loss, Outcome, SampleOrder
+from rigwatch.wire.sample_order import Counters, Loss, Outcome, Remark, SampleOrder
 from rigwatch.wire.schema import decode
 from rigwatch.wire.topics import EVENTS, GAPS, RING_KEY, SAMPLES
 
@@ -63,9 +63,10 @@ class SampleReader:
         self._capacity = capacity
         self._inbox: SimpleQueue[_Incoming] = SimpleQueue()
         self._questions: SimpleQueue[Ask | None] = SimpleQueue()
-        self._heard_at = time.monotonic()
+        self._heard_at = self._silence_told_at = time.monotonic()
         self._latest_ns = 0
         self._device = ""
+        self._closed = False
         self._ready: list[Item] = []
         self._start(resume_after)
 
@@ -117,6 +118,7 @@ class SampleReader:
 
     def close(self) -> None:
         """Read no more."""
+        self._closed = True
         for close in self._closers:
             close()
         self._questions.put(None)
@@ -156,8 +158,9 @@ class SampleReader:
         self._handle(self._order.on_block(block))
 
     def _check_silence(self) -> None:
-        if self.silent_for() > SILENCE:
-            self._heard_at += SILENCE
+        now = time.monotonic()
+        if now - max(self._heard_at, self._silence_told_at) > SILENCE:
+            self._silence_told_at = now
             self._handle(self._order.on_silence())
 
     def _handle(self, outcomes: list[Outcome]) -> None:
@@ -170,15 +173,11 @@ class SampleReader:
             elif isinstance(outcome, Loss):
                 self._report_gap(outcome)
             else:
-                self._report(
-                    Event(
-                        self._bus.process,
-                        time.time_ns(),
-                        outcome.severity,
-                        outcome.code,
-                        outcome.text,
-                    )
-                )
+                self._report_event(outcome)
+
+    def _report_event(self, remark: Remark) -> None:
+        name, now_ns = self._bus.process, time.time_ns()
+        self._report(Event(name, now_ns, remark.severity, remark.code, remark.text))
 
     def _report_gap(self, loss: Loss) -> None:
         gap = Gap(
@@ -210,6 +209,8 @@ class SampleReader:
 
     def _asked(self, ask: Ask) -> RingReply | None:
         """The reply of the ring that knows most; None where none replied."""
+        while not (self._bus.connected() or self._closed):
+            time.sleep(0.1)
         replies = []
         with contextlib.suppress(BusError):
             for data in self._bus.query(RING_KEY, ask.to_bytes(), REPLY_TIMEOUT):
