@@ -7,7 +7,7 @@ room for.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from monitor.admission import GOOD, NEW_BOOT
 from monitor.detectors.adaptive_threshold import AdaptiveThreshold, fit_threshold
 from monitor.detectors.detector import Channels
+from monitor.detectors.high_pass import high_passed, leaky
 from monitor.detectors.innovation_test import nis_limit
-from monitor.detectors.parity import OperatingPoint, ParityDetector, high_pass
+from monitor.detectors.parity import OperatingPoint, ParityDetector
 from monitor.detectors.unknown_input import NoiseModel, UnknownInputDetector
 from rigwatch.physics.transfer_function import FloatArray, TransferFunction
 from rigwatch.wire.errors import ModelError
@@ -26,17 +27,21 @@ MARGIN = 1.5
 """Limits stand this much above the largest healthy residual [1]."""
 CORNER = 0.3
 """High-pass that follows the operating point [Hz]: below the excitation, above drift."""
-SETTLED = 5.0
+SETTLED = 8.0
 """Time constants after which a start is forgotten [1]."""
 NIS_WINDOW = 64
 FALSE_ALARM = 1e-9
 """Chance of a false alarm in one window of a right model [1]."""
+DRIVE_SHARE, STATE_SHARE = 1e-8, 1e-8
+"""W as shares of the variances of input and model error: it only keeps the filters awake [1]."""
 
 
-def slowest_constant(function: TransferFunction, sample_rate: float) -> float:
-    """Slowest time constant of a stable function [s]."""
-    radius = float(np.abs(function.poles).max(initial=1e-3))
-    return float(min(-1.0 / (sample_rate * np.log(min(radius, 1.0 - 1e-6))), 10.0))
+def time_constant(function: TransferFunction, sample_rate: float) -> float:
+    """Slowest time constant that lasts [s]: slower ones are taken away by the high-pass."""
+    high_passed = 1.0 / (2.0 * np.pi * CORNER)
+    radii = np.clip(np.abs(function.poles), 1e-3, 1.0 - 1e-9)
+    constants = -1.0 / (sample_rate * np.log(radii))
+    return float(np.minimum(constants, high_passed).max(initial=0.0))
 
 
 def calibrate_parity(
@@ -51,10 +56,10 @@ def calibrate_parity(
     Raises:
         ModelError: the recording is too short to settle.
     """
-    slowest = slowest_constant(function, sample_rate)
-    settle = SETTLED * max(slowest, 1.0 / (2.0 * np.pi * CORNER)) * sample_rate
-    point = OperatingPoint(CORNER, 0.0, 0.0, int(settle))
-    _refuse_short(signals, int(settle))
+    slowest = time_constant(function, sample_rate)
+    settle = int(SETTLED / (2.0 * np.pi * CORNER) * sample_rate)
+    point = OperatingPoint(CORNER, 0.0, 0.0, settle)
+    _refuse_short(signals, settle)
     free = ParityDetector(
         function,
         AdaptiveThreshold(0.0, 0.0, 0.0, slowest),
@@ -64,9 +69,8 @@ def calibrate_parity(
         moving_average=moving_average,
     )
     residual = free.judge(np.ascontiguousarray(signals[:, :2]), _codes(len(signals))).value
-    u = high_pass(CORNER, sample_rate).simulate(signals[:, 0] - signals[0, 0])
-    lag = min(slowest, 1.0)
-    threshold = fit_threshold(residual, u, sample_rate, lag, MARGIN)
+    u = high_passed(signals[:, 0], CORNER, sample_rate)
+    threshold = fit_threshold(residual, u, sample_rate, slowest, MARGIN)
     return {**asdict(threshold), **asdict(point)}
 
 
@@ -91,28 +95,34 @@ def calibrate_unknown_input(
 ) -> dict[str, float]:
     """Noise and limit from healthy input, position and acceleration, shape (n, 2 or 3).
 
-    Sensor noise is what differences of a high order leave; q is the one at which the innovations
-    are as large as expected on average. A linear model of a nonlinear plant leaves innovations that
-    are not white, so the limit is the chi-square one or `MARGIN` above the largest healthy sum,
-    whichever is higher.
+    The limit is the chi-square one. A linear model of a nonlinear plant leaves innovations that are
+    neither white nor normal, so the measurements' variances, in proportion to what the model gets
+    wrong in each, are scaled until the largest healthy sum stands `MARGIN` below that limit.
 
     Raises:
         ModelError: the recording is too short to settle.
     """
-    settle = int(SETTLED * slowest_constant(function, sample_rate) * sample_rate)
+    settle = int(SETTLED / (2.0 * np.pi * CORNER) * sample_rate)
     _refuse_short(signals, settle + NIS_WINDOW)
-    position = _noise_variance(signals[:, 1])
-    acceleration = _noise_variance(signals[:, 2]) if signals.shape[1] > 2 else 1.0
-    noise = NoiseModel(0.0, 1e-2 * position, position, acceleration, NIS_WINDOW, np.inf, settle)
-    measurements = signals.shape[1] - 1
+    errors = _model_errors(function, signals, sample_rate, settle)
+    limit = nis_limit(NIS_WINDOW, signals.shape[1] - 1, FALSE_ALARM)
 
-    def sums(drive: float) -> FloatArray:
-        return _nis_sums(function, replace(noise, input=drive), signals, sample_rate)
+    def noise(scale: float) -> NoiseModel:
+        return NoiseModel(
+            input=DRIVE_SHARE * float(np.var(signals[:, 0])),
+            state=STATE_SHARE * errors[0],
+            position=scale * errors[0],
+            acceleration=scale * errors[1],
+            window=NIS_WINDOW,
+            limit=limit,
+            settle=settle,
+            corner=CORNER,
+        )
 
-    drive = _drive_variance(sums, NIS_WINDOW * measurements, float(np.var(signals[:, 0])))
-    largest = float(np.nanmax(sums(drive)))
-    limit = max(nis_limit(NIS_WINDOW, measurements, FALSE_ALARM), MARGIN * largest)
-    return asdict(replace(noise, input=drive, limit=limit))
+    def largest_sum(scale: float) -> float:
+        return float(np.nanmax(_nis_sums(function, noise(scale), signals, sample_rate)))
+
+    return asdict(noise(_falls_to(limit / MARGIN, largest_sum)))
 
 
 def make_unknown_input(
@@ -125,6 +135,7 @@ def make_unknown_input(
         window=int(figures["window"]),
         limit=figures["limit"],
         settle=int(figures["settle"]),
+        corner=figures["corner"],
     )
     return UnknownInputDetector(function, noise, channels, sample_rate)
 
@@ -142,11 +153,18 @@ def _refuse_short(signals: FloatArray, needed: int) -> None:
         )
 
 
-def _noise_variance(values: FloatArray) -> float:
-    """Variance of white noise under a smooth signal, from its sixth differences."""
-    gain = float(np.sum(np.array([1, 6, 15, 20, 15, 6, 1]) ** 2))
-    floor = 1e-6 * float(np.var(values)) + 1e-300
-    return max(float(np.mean(np.diff(values, 6) ** 2)) / gain, floor)
+def _model_errors(
+    function: TransferFunction, signals: FloatArray, sample_rate: float, settle: int
+) -> tuple[float, float]:
+    """Variance of the model's error in position [m²] and acceleration [m²/s⁴], 1 without one."""
+    model = leaky(function, CORNER, sample_rate)
+    u, y = (high_passed(signals[:, i], CORNER, sample_rate) for i in (0, 1))
+    position = float(np.var((y - model.simulate(u))[settle:]))
+    if signals.shape[1] < 3:
+        return position, 1.0
+    a = high_passed(signals[:, 2], CORNER, sample_rate)
+    modelled = model.second_difference(sample_rate).simulate(u)
+    return position, float(np.var((a[:-1] - modelled[1:])[settle:]))
 
 
 def _nis_sums(
@@ -157,15 +175,14 @@ def _nis_sums(
     return detector.judge(np.ascontiguousarray(signals), _codes(len(signals))).value
 
 
-def _drive_variance(
-    sums: Callable[[float], FloatArray], expected: float, input_variance: float
+def _falls_to(
+    target: float, of: Callable[[float], float], low: float = 1e-5, high: float = 1e2
 ) -> float:
-    """q at which the mean sum is as expected, by bisection: the sum falls with q."""
-    low, high = np.log(1e-8 * input_variance), np.log(1e4 * input_variance)
-    for _ in range(24):
-        middle = 0.5 * (low + high)
-        if np.nanmean(sums(float(np.exp(middle)))) > expected:
+    """Where the falling function `of` reaches `target`, by bisection of the logarithm."""
+    for _ in range(16):
+        middle = float(np.sqrt(low * high))
+        if of(middle) > target:
             low = middle
         else:
             high = middle
-    return float(np.exp(high))
+    return high

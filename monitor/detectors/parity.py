@@ -15,7 +15,9 @@ reacts and forgets at once, and amplifies noise.
 
 The operating point is either given, or followed by a first-order high-pass of both signals; linear
 filters commute, so the high-pass leaves the residual's meaning and lets constant faults fade with
-its time constant. Each residual is judged by an adaptive threshold.
+its time constant. The residual is then high-passed once more: a plant that integrates, like the
+rig, has a model that never forgets where it started, and this makes the residual forget it. Each
+residual is judged by an adaptive threshold.
 """
 
 from dataclasses import dataclass
@@ -33,6 +35,7 @@ from monitor.detectors.adaptive_threshold import (
     threshold_sample,
 )
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
+from monitor.detectors.high_pass import forgetting
 from rigwatch.physics.transfer_function import FloatArray, TransferFunction, filter_sample
 from rigwatch.wire.errors import ModelError
 
@@ -54,18 +57,13 @@ class OperatingPoint:
     settle: int = 0
 
 
-def high_pass(corner: float, sample_rate: float) -> TransferFunction:
-    """The filter that follows the operating point, for signals that start at 0; `corner` in [Hz]."""
-    forget = 1.0 / (1.0 + 2.0 * np.pi * corner / sample_rate)
-    return TransferFunction.of([forget, -forget], [1.0, -forget])
-
-
 class ParityState(NamedTuple):
     """State of one parity residual.
 
     Attributes:
         output, input: state of the filters of y and u.
-        point: held (u, y) and high-passed (u, y), shape (4,).
+        point: last (u, y), the same high-passed, last residual and the same high-passed,
+            shape (6,).
         threshold: state of the adaptive threshold.
         counts: samples since the start; samples since the last one that was held, shape (2,).
     """
@@ -79,14 +77,14 @@ class ParityState(NamedTuple):
 
 def _new_state(order: int) -> ParityState:
     filters = np.zeros(max(order, 1)), np.zeros(max(order, 1))
-    return ParityState(*filters, np.zeros(4), new_threshold_state(), np.zeros(2, np.int64))
+    return ParityState(*filters, np.zeros(6), new_threshold_state(), np.zeros(2, np.int64))
 
 
 @njit(cache=True)
 def small_signal(
     forget: float, u0: float, y0: float, state: ParityState, u: float, y: float
 ) -> None:
-    """Take the operating point off; the results stand in `state.point[2:]`."""
+    """Take the operating point off; the results stand in `state.point[2:4]`."""
     point = state.point
     if forget == 1.0:
         point[2], point[3] = u - u0, y - y0
@@ -96,6 +94,17 @@ def small_signal(
         point[2] = forget * (point[2] + u - point[0])
         point[3] = forget * (point[3] + y - point[1])
     point[0], point[1] = u, y
+
+
+@njit(cache=True)
+def _forget_start(forget: float, state: ParityState, residual: float) -> float:
+    """The residual without what the model remembers of its start."""
+    if forget == 1.0:
+        return residual
+    point = state.point
+    point[5] = forget * (point[5] + residual - point[4])
+    point[4] = residual
+    return float(point[5])
 
 
 @njit(cache=True)
@@ -142,7 +151,7 @@ def parity_block(
         if moving_average:
             r = filter_sample(a, one, state.output, y) - filter_sample(b, one, state.input, u)
         else:
-            r = y - filter_sample(b, a, state.input, u)
+            r = _forget_start(point[0], state, y - filter_sample(b, a, state.input, u))
         bound = threshold_sample(threshold, state.threshold, u)
         state.counts[0] += 1
         state.counts[1] = 0 if code[k] == HELD else state.counts[1] + 1
@@ -183,7 +192,7 @@ class ParityDetector(SampleDetector):
         super().__init__(name, (channels.input, channels.output))
         self._moving_average, self._function = moving_average, function.padded()
         self._threshold = threshold.coefficients(sample_rate)
-        forget = high_pass(point.corner, sample_rate).b[0]
+        forget = forgetting(point.corner, sample_rate)
         self._point = np.array([forget, point.u0, point.y0, float(point.settle)])
         self._state = _new_state(self._function[0].size - 1)
 

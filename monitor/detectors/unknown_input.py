@@ -10,9 +10,11 @@ generalised one takes the sensor's bias η as an unknown input of the measuremen
 so gives the fault-free states and the bias whatever it is.
 
 On the rig the model is the transfer function with W = q·B·Bᵀ + s·I: errors of a linear model of a
-nonlinear plant act like an unknown drive of variance q [input unit²]; s [output unit²] keeps W
-regular. Measured are the position and, where there is one, the acceleration one sample ago, which
-tells a moved sensor from a moved mass.
+nonlinear plant act partly like an unknown drive of variance q [input unit²]; s [output unit²] keeps
+W regular. Measured are the position and, where there is one, the acceleration one sample ago, which
+tells a moved sensor from a moved mass. All signals pass one high-pass (`high_pass.py`): neither a
+plant that integrates nor a piezo accelerometer says anything about a lasting offset. So a bias
+shows when it comes and then fades.
 """
 
 from dataclasses import dataclass
@@ -24,6 +26,7 @@ from numpy.typing import NDArray
 
 from monitor.admission import DEAD, HELD, NEW_BOOT, RESTART
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
+from monitor.detectors.high_pass import forgetting, high_pass_sample, leaky
 from monitor.detectors.innovation_test import NisWindow, new_nis_window, push_nis
 from monitor.detectors.kalman import (
     augmented_matrices,
@@ -48,6 +51,7 @@ class NoiseModel:
         window: samples whose innovations are tested together [1].
         limit: of their sum [1].
         settle: samples after a start that are not judged [1].
+        corner: of the high-pass of all signals [Hz]; 0 for none.
     """
 
     input: float
@@ -57,6 +61,7 @@ class NoiseModel:
     window: int
     limit: float
     settle: int
+    corner: float = 0.0
 
 
 class FilterModel(NamedTuple):
@@ -79,7 +84,8 @@ class FilterState(NamedTuple):
         plain, plain_p: state and covariance of the plain filter.
         general, general_p: the same of the generalised one.
         augmented: x̄ of the generalised one, its last entry is the bias.
-        last: (u, acceleration) of the sample before.
+        last: input and acceleration of the sample before, high-passed, shape (2,).
+        raw, high: signals as they came and high-passed, shape (2 or 3,).
         window: normalised innovations.
         counts: samples since the start; resets so far.
     """
@@ -90,6 +96,8 @@ class FilterState(NamedTuple):
     general_p: FloatArray
     augmented: FloatArray
     last: FloatArray
+    raw: FloatArray
+    high: FloatArray
     window: NisWindow
     counts: NDArray[np.int64]
 
@@ -126,25 +134,29 @@ def new_filter_state(model: FilterModel, window: int) -> FilterState:
         np.zeros((n, n)),
         np.zeros(model.e.shape[1]),
         np.zeros(2),
+        np.zeros(1 + model.h.shape[0]),
+        np.zeros(1 + model.h.shape[0]),
         new_nis_window(window),
         np.zeros(2, np.int64),
     )
 
 
 @njit(cache=True)
-def _start(model: FilterModel, state: FilterState, u: float, y: FloatArray) -> None:
+def _start(model: FilterModel, state: FilterState, beta: float, signals: FloatArray) -> None:
     """Begin at the position that is measured, not knowing how it moves."""
-    outputs = model.b.size
-    for x in (state.plain, state.general):
-        x[:] = y[0]
-    spread = 1e4 * model.v[0, 0] + 1e4 * model.w[0, 0]
-    state.plain_p[:, :] = spread * np.eye(outputs)
-    state.general_p[:, :] = spread * np.eye(outputs)
+    state.raw[:] = signals
+    state.high[:] = 0.0
+    if beta == 1.0:
+        state.high[:] = signals
+    state.plain[:] = state.high[1]
+    state.general[:] = state.high[1]
+    spread = 1e4 * (model.v[0, 0] + model.w[0, 0])
+    state.plain_p[:, :] = spread * np.eye(model.b.size)
+    state.general_p[:, :] = spread * np.eye(model.b.size)
     state.window.values[:] = 0.0
     state.window.total[0] = 0.0
     state.window.place[:] = 0
-    state.last[0] = u
-    state.last[1] = y[y.size - 1]
+    state.last[0], state.last[1] = state.high[0], state.high[state.high.size - 1]
     state.counts[0] = 0
 
 
@@ -166,10 +178,20 @@ def _step(model: FilterModel, state: FilterState, y: FloatArray) -> float:
 
 
 @njit(cache=True)
+def _measure(state: FilterState, beta: float, signals: FloatArray, y: FloatArray) -> None:
+    """High-pass the signals; `y` becomes the position now and the acceleration one sample ago."""
+    high_pass_sample(beta, state.raw, state.high, signals)
+    y[0] = state.high[1]
+    if y.size > 1:
+        y[1] = state.last[1]
+        state.last[1] = state.high[2]
+
+
+@njit(cache=True)
 def unknown_input_block(
     model: FilterModel,
     state: FilterState,
-    settle: int,
+    traits: tuple[int, float],
     signals: FloatArray,
     code: NDArray[np.int64],
 ) -> tuple[FloatArray, FloatArray]:
@@ -178,34 +200,31 @@ def unknown_input_block(
     Args:
         model: constant matrices.
         state: carried on.
-        settle: samples after a start that are not judged.
+        traits: samples after a start that are not judged, high-pass coefficient.
         signals: input, position and, with two measurements, acceleration; shape (n, 2 or 3).
         code: of admission, shape (n,).
     """
+    settle, beta = traits
     bias, total = np.full(code.size, np.nan), np.full(code.size, np.nan)
     y = np.empty(model.h.shape[0])
     for k in range(code.size):
         if code[k] == DEAD:
             continue
-        y[0] = signals[k, 1]
-        if y.size > 1:
-            y[1] = state.last[1]
-            state.last[1] = signals[k, 2]
         if code[k] == RESTART or code[k] == NEW_BOOT:
-            _start(model, state, signals[k, 0], signals[k, 1:])
+            _start(model, state, beta, signals[k])
             continue
         _predict(model, state.plain, state.plain_p, state.last[0])
         _predict(model, state.general, state.general_p, state.last[0])
-        state.last[0] = signals[k, 0]
+        _measure(state, beta, signals[k], y)
+        state.last[0] = state.high[0]
         state.counts[0] += 1
         if code[k] == HELD:
             continue
         nis = _step(model, state, y)
         if np.isnan(nis):
-            _start(model, state, signals[k, 0], signals[k, 1:])
+            _start(model, state, beta, signals[k])
             state.counts[1] += 1
-            continue
-        if state.counts[0] > settle:
+        elif state.counts[0] > settle:
             total[k] = push_nis(state.window, nis)
             bias[k] = state.augmented[model.b.size]
     return bias, total
@@ -237,6 +256,9 @@ class UnknownInputDetector(SampleDetector):
             "unknown_input", (*names, channels.acceleration) if with_acceleration else names
         )
         self._noise = noise
+        self._traits = (noise.settle, forgetting(noise.corner, sample_rate))
+        if noise.corner > 0.0:
+            function = leaky(function, noise.corner, sample_rate)
         self._model = filter_model(
             function, noise, sample_rate, with_acceleration=with_acceleration
         )
@@ -251,9 +273,7 @@ class UnknownInputDetector(SampleDetector):
 
     def judge(self, signals: FloatArray, code: NDArray[np.int64]) -> Judgement:
         """Sum of normalised innovations against its limit, and the bias."""
-        bias, total = unknown_input_block(
-            self._model, self._state, self._noise.settle, signals, code
-        )
+        bias, total = unknown_input_block(self._model, self._state, self._traits, signals, code)
         limit = np.where(np.isnan(total), np.nan, self._noise.limit)
         series = (
             Series("unknown_input_bias", "m", bias),

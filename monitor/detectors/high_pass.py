@@ -1,0 +1,45 @@
+"""The first-order high-pass that follows an operating point, and what it does to a model.
+
+v(t) = β·( v(t-1) + u(t) - u(t-1) ),   β = 1/(1 + 2π·fc/fs),   v = 0 at the start
+
+fc  corner [Hz]    fs  sample rate [Hz]    β  share that is remembered; 1 for fc = 0
+"""
+
+import numpy as np
+from numba import njit
+
+from rigwatch.physics.transfer_function import FloatArray, TransferFunction
+
+
+def forgetting(corner: float, sample_rate: float) -> float:
+    """β of a corner [Hz]."""
+    return float(1.0 / (1.0 + 2.0 * np.pi * corner / sample_rate))
+
+
+def high_passed(values: FloatArray, corner: float, sample_rate: float) -> FloatArray:
+    """A whole signal from rest, shape (n,)."""
+    beta = forgetting(corner, sample_rate)
+    return TransferFunction.of([beta, -beta], [1.0, -beta]).simulate(values - values[0])
+
+
+def leaky(function: TransferFunction, corner: float, sample_rate: float) -> TransferFunction:
+    """`function` with poles that remember longer than the high-pass moved to where it forgets.
+
+    Above the corner nothing changes; an integrator becomes one that forgets its start.
+    """
+    beta = forgetting(corner, sample_rate)
+    poles = function.poles
+    slow = np.abs(poles) > beta
+    poles[slow] *= beta / np.abs(poles[slow])
+    return TransferFunction.of(function.b, np.real(np.poly(poles)))
+
+
+@njit(cache=True)
+def high_pass_sample(beta: float, last: FloatArray, high: FloatArray, values: FloatArray) -> None:
+    """One sample of several signals: `high` becomes the output, `last` the input."""
+    for i in range(values.size):
+        if beta == 1.0:
+            high[i] = values[i]
+        else:
+            high[i] = beta * (high[i] + values[i] - last[i])
+        last[i] = values[i]
