@@ -121,14 +121,15 @@ def _lines(tree: Mapping[str, Any], prefix: str) -> Iterator[str]:
             yield f"{_key(key)} = {_value(value)}"
     for key, value in tables.items():
         name = f"{prefix}{_key(key)}"
-        for table in value if isinstance(value, list) else [value]:
-            yield f"\n[[{name}]]" if isinstance(value, list) else f"\n[{name}]"
+        is_one = isinstance(value, dict)
+        for table in [value] if is_one else value:
+            yield f"\n[{name}]" if is_one else f"\n[[{name}]]"
             yield from _lines(table, f"{name}.")
 
 
 def _is_table(value: object) -> bool:
-    is_list = isinstance(value, list) and bool(value) and isinstance(value[0], dict)
-    return isinstance(value, dict) or is_list
+    is_many = isinstance(value, list | tuple) and bool(value) and isinstance(value[0], dict)
+    return isinstance(value, dict) or is_many
 
 
 def _key(key: str) -> str:
