@@ -21,6 +21,8 @@ the mass sticks exactly and no level is too large.
 # Fields of a record are known to numba, not to mypy.
 # mypy: disable-error-code="no-any-return"
 
+# All that `advance_plant` calls stands in this file: numba's cache does not see changes in others.
+
 import math
 from typing import Any
 
@@ -215,9 +217,11 @@ def advance_plant(  # noqa: PLR0915, PLR0917
         truth[row, 3], truth[row, 4], truth[row, 5], truth[row, 6] = p1, p2, pu1, pu2
         truth[row, 7], truth[row, 8], truth[row, 9] = friction, drive, sensed
         for sub in range(int(p.substeps)):
+            # Means over the step, so that the valve neither leads nor lags the rest.
+            former_1, former_2 = valve_1, valve_2
             valve_1 += share_1 * (volts - valve_1)
-            valve_2 += share_2 * (valve_1 - valve_2)
-            lift = null + p.pressure_per_volt * valve_2
+            valve_2 += share_2 * (0.5 * (former_1 + valve_1) - valve_2)
+            lift = null + 0.5 * p.pressure_per_volt * (former_2 + valve_2)
             pu1, pu2 = upstream(lift, supply, p), upstream(-lift, supply, p)
 
             push = p1 * area_1 - p2 * area_2 - p.atmosphere * (area_1 - area_2)

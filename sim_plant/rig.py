@@ -2,6 +2,12 @@
 
 `Rig` carries all state between calls, so a run gives the same samples however it is cut into calls.
 Effects of `sim_plant.effects` can be set or ramped at any sample.
+
+A cylinder integrates, and with a rod on one side only it creeps, so two things hold it at mid
+stroke for days. The valve's null is set once, as by its screw, so that 0 V balances the two areas
+(`plant_kernel.balance`). And a slow centring loop adds to the commanded voltage: a pick-off of its
+own, low-passed at 0.7 Hz, times -16 V/m, which gives a corner near 0.2 Hz and about 10 mV at 8 Hz.
+What it adds reaches the valve, so it is part of the measured voltage.
 """
 
 from dataclasses import dataclass

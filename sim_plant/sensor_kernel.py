@@ -30,9 +30,11 @@ _SPIKES_PER_SECOND = 2.0
 
 
 @njit(cache=True, error_model="numpy")
-def high_passed(value: float, corner: float, rate: float, s: Record) -> float:
-    """First-order high-pass, bilinear, as a piezo element with its charge amplifier has."""
-    warped = math.tan(math.pi * corner / rate)
+def high_passed(value: float, warped: float, s: Record) -> float:
+    """First-order high-pass, bilinear, as a piezo element with its charge amplifier has.
+
+    `warped` is tan(pi corner / rate).
+    """
     out = (value - s.high_pass_in + (1.0 - warped) * s.high_pass_out) / (1.0 + warped)
     s.high_pass_in, s.high_pass_out = value, out
     return out
@@ -52,7 +54,7 @@ def delayed(value: float, line: Floats, sample: int, late: float) -> float:
 @njit(cache=True, error_model="numpy")
 def reading(  # noqa: PLR0917
     value: float,
-    normal: float,
+    noise: float,
     uniform: float,
     traits: Record,
     f: Record,
@@ -62,7 +64,7 @@ def reading(  # noqa: PLR0917
     """The sensor's reading in SI units, faults included."""
     s.drifted = s.drifted + f.drift / rate if f.drift != 0.0 else 0.0
     value = f.gain * value + f.bias + s.drifted
-    value += math.hypot(traits.noise, f.noise) * normal
+    value += noise
     if f.spikes != 0.0 and uniform < _SPIKES_PER_SECOND / rate:
         value += f.spikes if uniform < 0.5 * _SPIKES_PER_SECOND / rate else -f.spikes
     limit = traits.range if f.saturation <= 0.0 else min(traits.range, f.saturation)
@@ -98,12 +100,17 @@ def advance_sensors(  # noqa: PLR0917
         f: Record = faults[channel]
         s: Record = state[channel]
         share = 1.0 - math.exp(-1.0 / (f.lag * rate)) if f.lag > 0.0 else 1.0
+        warped = math.tan(math.pi * t.high_pass / rate)
+        noise = math.hypot(t.noise, f.noise)
+        codes_per_si = t.volts_per_si / t.volts_per_code
         for row in range(true_values.shape[0]):
             value = true_values[row, channel]
             if t.high_pass > 0.0:
-                value = high_passed(value, t.high_pass, rate, s)
+                value = high_passed(value, warped, s)
             s.lagged += share * (value - s.lagged)
             value = delayed(s.lagged, lines[channel], first + row, f.delay * rate)
-            value = reading(value, normal[row, channel], uniform[row, channel], t, f, s, rate)
-            code = round(value * t.volts_per_si / t.volts_per_code)
+            value = reading(
+                value, noise * normal[row, channel], uniform[row, channel], t, f, s, rate
+            )
+            code = round(value * codes_per_si)
             codes[row, channel] = min(max(code, -32768), 32767)

@@ -1,14 +1,17 @@
 """Scenario files load, run and do what they say."""
 
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pytest
 from msgspec import structs
 
+from rigwatch.wire.config import Section
 from rigwatch.wire.errors import ConfigError
+from sim_plant.excitation import SHAPES
 from sim_plant.parameters import RigParameters, load_parameters
-from sim_plant.scenario import Scenario, ScenarioRun, load_scenario
+from sim_plant.scenario import Event, Experiment, Scenario, ScenarioRun, load_scenario
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 FILES = sorted((CONFIGS / "scenarios").glob("*.toml"))
@@ -166,6 +169,13 @@ def test_mistakes_are_named(tmp_path: Path, text: str, key: str, says: str):
     assert "scenario.toml" in message
     assert key in message or says in message
     assert says in message
+
+
+@pytest.mark.parametrize("kind", [Scenario, Event, Experiment, RigParameters, *SHAPES])
+def test_every_key_is_described(kind: type[Section]):
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        described = any(getattr(part, "description", None) for part in hint.__metadata__)
+        assert described, name
 
 
 def test_plant_file_names_every_key_with_its_default():
