@@ -1,0 +1,151 @@
+"""The parts of the demonstration: its configuration, its words, its verdict."""
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.demo.narrator import Narrator, acts
+from rigwatch.demo.rig_file import as_toml, find_config, write_rig_file
+from rigwatch.demo.verdict import complaints, newest_session, read_recording
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import Alarm, Column, EstimateBlock, SampleBlock
+from rigwatch.wire.rig_config import SerialSection, load_rig
+from rigwatch.wire.session import SessionWriter, run_info
+from sim_plant.scenario import load_scenario
+
+RATE = 256
+CAUSE = "Dry friction has appeared in the actuator."
+
+
+def alarm(name: str = "dry_friction", seq: int = 5200, state: str = "unacknowledged") -> Alarm:
+    return Alarm(
+        name=name,
+        state=state,  # type: ignore[arg-type]
+        severity="error",
+        cause=CAUSE if name == "dry_friction" else "Something else.",
+        guidance="Stop and look.",
+        device="rig",
+        boot=7,
+        seq=seq,
+        t_ns=seq * 3906250,
+        value=1.0,
+        low=-0.1,
+        high=0.1,
+        first_out=True,
+        user="",
+        onset_seq=seq - 20,
+    )
+
+
+def samples(seq: int, n: int, boot: int = 7) -> SampleBlock:
+    t_ns = (seq + np.arange(n)) * 3906250
+    column = Column("position", "m", np.zeros(n), np.zeros(n, np.uint8))
+    return SampleBlock("rig", boot, seq, t_ns // 1000, t_ns, (column,))
+
+
+def estimates(seq: int, n: int) -> EstimateBlock:
+    t_ns = (seq + np.arange(n)) * 3906250
+    return EstimateBlock("rig", 7, seq, t_ns, (Column("theta1", "", np.zeros(n)),))
+
+
+Recorded = Callable[..., Path]
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Recorded:
+    def write(*messages: SampleBlock | EstimateBlock | Alarm) -> Path:
+        folder = tmp_path / "sessions" / "demo-1"
+        folder.mkdir(parents=True)
+        info = run_info("demo", 256.0, t_ns=0, notes="")
+        with SessionWriter(folder / "000001.mcap", info) as writer:
+            for message in messages:
+                writer.write(message)
+        return folder
+
+    return write
+
+
+def test_everything_the_demonstration_writes_is_in_its_folder(tmp_path: Path) -> None:
+    config = load_rig(write_rig_file(find_config("demo.toml"), tmp_path, "web"))
+    assert isinstance(config.daq.device, SerialSection)
+    assert config.plant is not None
+    assert config.monitor is not None
+    assert config.recorder is not None
+    written = (config.daq.device.port, config.monitor.model, config.recorder.folder)
+    assert all(Path(path).is_relative_to(tmp_path) for path in written)
+    assert config.daq.device.port == config.plant.port
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        {"a": 1, "b": 1e-7, "c": 'x"y\\z', "d": True, "e": [1.5, 2.0]},
+        {"t": {"x": 1, "u": {"y": 2}}, "many": [{"p": 1, "q": {"r": 2}}, {"p": 3, "q": {"r": 4}}]},
+        {"t": {"sensor.position": {"on": False}}},
+    ],
+)
+def test_toml_that_is_printed_reads_back_the_same(tree: dict[str, object]) -> None:
+    assert tomllib.loads(as_toml(tree)) == tree
+
+
+def test_acts_follow_the_scenario_through_its_cycles() -> None:
+    scenario = load_scenario(find_config("scenarios/demo.toml"))
+    told = acts(scenario)
+    first, second = (next(told) for _ in range(2))
+    assert first.text == "dry friction of 0.43 N begins"
+    assert second.text == "the friction ends"
+    rest = [next(told) for _ in range(len(scenario.events))]
+    assert rest[len(scenario.events) - 2].seq == first.seq + round(scenario.cycle_s * RATE)
+
+
+def test_an_alarm_is_told_with_its_cause_and_its_delay_after_what_was_done() -> None:
+    said: list[str] = []
+    narrator = Narrator(load_scenario(find_config("scenarios/demo.toml")), said.append)
+    narrator.samples(100)
+    assert said == []
+    begins = next(acts(load_scenario(find_config("scenarios/demo.toml")))).seq
+    narrator.alarm(alarm(seq=begins + 32))
+    assert "dry friction of 0.43 N begins" in said[0]
+    assert CAUSE in said[1]
+    assert "noticed 47 ms after it began, named after 125 ms" in said[1]
+    assert "Stop and look." in said[2]
+
+
+def test_a_whole_recording_with_the_alarm_has_nothing_to_complain_about(
+    recorded: Recorded,
+) -> None:
+    path = recorded(samples(0, 512), samples(512, 256), estimates(0, 768), alarm())
+    recording = read_recording(newest_session(path.parent))
+    assert (recording.samples, recording.estimates) == (768, 768)
+    assert complaints([alarm()], recording) == []
+
+
+@pytest.mark.parametrize(
+    ("blocks", "fault"),
+    [
+        ((samples(0, 512), samples(520, 256)), "samples 512 to 519 are missing"),
+        ((samples(64, 512),), "the first 64 samples are missing"),
+        ((samples(0, 512), samples(0, 64, boot=8)), "started again"),
+    ],
+)
+def test_missing_samples_are_found(
+    recorded: Recorded, blocks: tuple[SampleBlock, ...], fault: str
+) -> None:
+    recording = read_recording(recorded(*blocks, estimates(0, 768), alarm()))
+    assert fault in " ".join(complaints([alarm()], recording))
+
+
+def test_a_wrong_name_no_alarm_and_no_estimates_are_complained_about(recorded: Recorded) -> None:
+    recording = read_recording(recorded(samples(0, 512)))
+    found = complaints([alarm("other_fault")], recording)
+    assert any("no alarm named dry friction; alarms: other_fault" in line for line in found)
+    assert any("not in the recording" in line for line in found)
+    assert any("no estimates" in line for line in found)
+
+
+def test_a_run_that_left_no_recording_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(SessionError, match="no recording"):
+        newest_session(tmp_path)
