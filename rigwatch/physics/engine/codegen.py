@@ -9,7 +9,7 @@ by the classical fourth-order Runge-Kutta method with fixed steps. Derivatives a
 counts as having none. Zero entries of the Jacobians are not printed.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
@@ -29,46 +29,76 @@ from numba import njit
 
 _DRIVER = """
 @njit(cache=True, error_model="numpy")
+def advance(u, row, step, substeps, hold, dt, p, x, xs, dx, acc, s, ss, ds, sacc, us):
+    n, m, h = x.size, s.shape[1], dt / substeps
+    for stage in range(4):
+        weight = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
+        back = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
+        place = step / substeps + back / dt
+        for j in range(us.size):
+            us[j] = u[row, j] + hold * place * (u[row + 1, j] - u[row, j])
+        for i in range(n):
+            xs[i] = x[i] + back * dx[i]
+            for j in range(m):
+                ss[i, j] = s[i, j] + back * ds[i, j]
+        rates((row + place) * dt, xs, us, p, ss, dx, ds)
+        for i in range(n):
+            acc[i] = weight * dx[i] + (acc[i] if stage else 0.0)
+            for j in range(m):
+                sacc[i, j] = weight * ds[i, j] + (sacc[i, j] if stage else 0.0)
+    for i in range(n):
+        x[i] += acc[i]
+        for j in range(m):
+            s[i, j] += sacc[i, j]
+
+
+@njit(cache=True, error_model="numpy")
 def simulate(u, dt, substeps, hold, starts, x0, p, y, dy):
-    n, m, h = {n}, {m}, dt / substeps
-    x, xs, dx, acc = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    n, m = {n}, {m}
+    x, xs, dx, acc = np.empty(n), np.empty(n), np.zeros(n), np.empty(n)
     s, ss = np.empty((n, m)), np.empty((n, m))
-    ds, sacc = np.empty((n, m)), np.empty((n, m))
+    ds, sacc = np.zeros((n, m)), np.empty((n, m))
     us = np.empty(u.shape[1])
     for w in range(starts.size):
-        x[:] = x0[w]
-        s[:] = 0.0
         for i in range(n):
-            s[i, m - n + i] = 1.0
+            x[i] = x0[w, i]
+            for j in range(m):
+                s[i, j] = 1.0 if j == m - n + i else 0.0
         for k in range(y.shape[1]):
             row = starts[w] + k
             read(row * dt, x, u[row], p, s, y[w, k], dy[w, k])
-            if k + 1 == y.shape[1]:
-                break
-            for step in range(substeps):
-                acc[:] = 0.0
-                sacc[:] = 0.0
-                xs[:] = x
-                ss[:] = s
-                for stage in range(4):
-                    weight = 1.0 if stage == 0 or stage == 3 else 2.0
-                    share = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-                    place = (step + share) / substeps
-                    for j in range(us.size):
-                        us[j] = u[row, j] + hold * place * (u[row + 1, j] - u[row, j])
-                    rates((row + place) * dt, xs, us, p, ss, dx, ds)
-                    ahead = h if stage == 2 else 0.5 * h
-                    for i in range(n):
-                        acc[i] += weight * dx[i]
-                        xs[i] = x[i] + ahead * dx[i]
-                        for j in range(m):
-                            sacc[i, j] += weight * ds[i, j]
-                            ss[i, j] = s[i, j] + ahead * ds[i, j]
+            if k + 1 < y.shape[1]:
+                for step in range(substeps):
+                    advance(u, row, step, substeps, hold, dt, p, x, xs, dx, acc, s, ss, ds, sacc, us)
+
+
+@njit(cache=True, error_model="numpy")
+def linearise(u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy):
+    n, m, q = {n}, {m}, {q}
+    x, xs, dx, acc = np.empty(n), np.empty(n), np.zeros(n), np.empty(n)
+    s, ss, unit = np.zeros((n, m)), np.empty((n, m)), np.zeros((n, m + q))
+    ds, sacc = np.zeros((n, m)), np.empty((n, m))
+    us = np.empty(u.shape[1])
+    for i in range(n):
+        unit[i, m - n + i] = 1.0
+    for w in range(starts.size):
+        for i in range(n):
+            x[i] = x0[w, i]
+        for k in range(y.shape[1]):
+            row, last = starts[w] + k, k + 1 == y.shape[1]
+            read(row * dt, x, u[row], p, unit, y[w, k], dy[w, k])
+            for step in range(1 if last else substeps):
+                place = step / substeps
+                for j in range(us.size):
+                    ahead = 0.0 if last else u[row + 1, j] - u[row, j]
+                    us[j] = u[row, j] + hold * place * ahead
+                node = k * substeps + step
                 for i in range(n):
-                    x[i] += h / 6.0 * acc[i]
-                    for j in range(m):
-                        s[i, j] += h / 6.0 * sacc[i, j]
-"""
+                    nodes[w, node, i] = x[i]
+                rates((row + place) * dt, x, us, p, unit, acc, slopes[w, node])
+                if not last:
+                    advance(u, row, step, substeps, hold, dt, p, x, xs, dx, acc, s, ss, ds, sacc, us)
+"""  # noqa: E501
 
 
 class _Printer(PythonCodePrinter):  # type: ignore[misc]
@@ -108,7 +138,7 @@ def source(system: System) -> str:
             _HEAD.format(title=title),
             _function(system, "rates", "dx", "ds", list(system.derivatives.values())),
             _function(system, "read", "y", "dy", list(system.outputs.values())),
-            _DRIVER.format(n=n, m=m),
+            _DRIVER.format(n=n, m=m, q=len(system.probes)),
         ]
     )
 
@@ -136,6 +166,8 @@ def _unpacked(system: System) -> Iterator[str]:
     ):
         for index, name in enumerate(names):
             yield f"    _{name} = {array}[{index}]"
+    for name in system.probes:
+        yield f"    _{name} = 0.0"
 
 
 def _body(
@@ -145,7 +177,10 @@ def _body(
     free = [symbol(name) for name in system.free]
     by_state = [[derivative(e, s) for s in states] for e in expressions]
     by_parameter = [[derivative(e, p) for p in free] for e in expressions]
-    flat = [*expressions, *_flatten(by_state), *_flatten(by_parameter)]
+    by_probe = [[derivative(e, symbol(name)) for name in system.probes] for e in expressions]
+    flat = [
+        e for rows in ([expressions], by_state, by_parameter, by_probe) for r in rows for e in r
+    ]
     shared, reduced = sympy.cse(flat, symbols=sympy.numbered_symbols(""), order="none")
     printer = _Printer()
     for name, expression in shared:
@@ -155,12 +190,21 @@ def _body(
         yield f"{value}[{i}] = {next(rest)}"
     for i, row in enumerate(by_state):
         yield from _chained(slope, i, row, rest)
-    for i, row in enumerate(by_parameter):
-        for j, entry in enumerate(row):
-            text = next(rest)
+    yield from _added(slope, by_parameter, rest, 0)
+    first = len(free) + len(states)
+    yield f"if {slope}.shape[1] > {first}:"
+    yield "    pass"
+    yield from (f"    {line}" for line in _added(slope, by_probe, rest, first))
+
+
+def _added(
+    slope: str, rows: Sequence[Sequence[sympy.Expr]], rest: Iterator[str], first: int
+) -> Iterator[str]:
+    """The explicit part of the derivatives, from column `first` on; zero entries left out."""
+    for i, row in enumerate(rows):
+        for j, (entry, text) in enumerate(_with(row, rest), start=first):
             if entry != 0:
                 yield f"{slope}[{i}, {j}] += {text}"
-    yield "return"
 
 
 def _chained(slope: str, i: int, row: Sequence[sympy.Expr], rest: Iterator[str]) -> Iterator[str]:
@@ -172,10 +216,6 @@ def _chained(slope: str, i: int, row: Sequence[sympy.Expr], rest: Iterator[str])
 
 def _with(row: Sequence[sympy.Expr], rest: Iterator[str]) -> list[tuple[sympy.Expr, str]]:
     return [(entry, next(rest)) for entry in row]
-
-
-def _flatten(rows: Iterable[Iterable[sympy.Expr]]) -> list[sympy.Expr]:
-    return [entry for row in rows for entry in row]
 
 
 def derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:

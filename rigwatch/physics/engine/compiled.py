@@ -9,10 +9,11 @@ import importlib.util
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,11 +41,34 @@ class Simulation:
 
 
 @dataclass(frozen=True, eq=False)
+class Linearisation:
+    """A trajectory with the Jacobians along it, at the nodes of the integration.
+
+    With m free parameters, n states and q probes, the last axis of the slopes is (m, n, q).
+
+    Attributes:
+        spacing: time between nodes [s].
+        substeps: nodes from one sample to the next.
+        states: shape (windows, nodes, n).
+        rate_slopes: shape (windows, nodes, n, m + n + q): ∂rates.
+        read_slopes: at the samples, shape (windows, samples, outputs, m + n + q): ∂outputs.
+        outputs: at the samples, shape (windows, samples, outputs).
+    """
+
+    spacing: float
+    substeps: int
+    states: FloatArray
+    rate_slopes: FloatArray
+    read_slopes: FloatArray
+    outputs: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class CompiledSystem:
     """A system that can be simulated."""
 
     system: System
-    kernel: Callable[..., None]
+    kernel: ModuleType
 
     @property
     def parameters(self) -> FloatArray:
@@ -76,22 +100,61 @@ class CompiledSystem:
         Raises:
             ModelError: a window reaches beyond the inputs, or a shape does not fit.
         """
-        system = self.system
-        n, m = len(system.states), len(system.free) + len(system.states)
-        if inputs.ndim != 2 or inputs.shape[1] != len(system.model.inputs):
+        outputs = np.empty((len(starts), length, len(self.system.outputs)))
+        slopes = np.empty((*outputs.shape, self.columns))
+        arguments = self._arguments(inputs, dt, starts, length, initial, parameters, substeps)
+        self.kernel.simulate(*arguments, outputs, slopes)
+        return Simulation(outputs, slopes)
+
+    @property
+    def columns(self) -> int:
+        """Free parameters and states: what outputs are differentiated by."""
+        return len(self.system.free) + len(self.system.states)
+
+    def linearise(
+        self,
+        inputs: FloatArray,
+        dt: float,
+        starts: IntArray,
+        length: int,
+        *,
+        initial: FloatArray,
+        parameters: FloatArray,
+        substeps: int = 4,
+    ) -> Linearisation:
+        """The trajectory of `simulate` with its Jacobians; arguments and errors are the same."""
+        arguments = self._arguments(inputs, dt, starts, length, initial, parameters, substeps)
+        n, wide = len(self.system.states), self.columns + len(self.system.probes)
+        nodes = (len(starts), (length - 1) * substeps + 1)
+        samples = (len(starts), length, len(self.system.outputs))
+        states, rates = np.empty((*nodes, n)), np.zeros((*nodes, n, wide))
+        outputs, reads = np.empty(samples), np.zeros((*samples, wide))
+        self.kernel.linearise(*arguments, states, rates, outputs, reads)
+        return Linearisation(dt / substeps, substeps, states, rates, reads, outputs)
+
+    def _arguments(  # noqa: PLR0917 -- they stand in the order of the kernel's
+        self,
+        inputs: FloatArray,
+        dt: float,
+        starts: IntArray,
+        length: int,
+        initial: FloatArray,
+        parameters: FloatArray,
+        substeps: int,
+    ) -> tuple[Any, ...]:
+        model = self.system.model
+        if inputs.ndim != 2 or inputs.shape[1] != len(model.inputs):
             raise ModelError(
-                f"{system.model.name}: found inputs of shape {inputs.shape}, expected"
-                f" {len(system.model.inputs)} columns: {', '.join(system.model.inputs)}"
+                f"{model.name}: found inputs of shape {inputs.shape}, expected"
+                f" {len(model.inputs)} columns: {', '.join(model.inputs)}"
             )
         if len(starts) and (starts.min() < 0 or starts.max() + length > len(inputs)):
-            raise ModelError(f"{system.model.name}: found a window beyond the recording's end")
-        outputs = np.empty((len(starts), length, len(system.outputs)))
-        slopes = np.empty((*outputs.shape, m))
-        hold = 1.0 if system.model.hold == "linear" else 0.0
-        initial = np.ascontiguousarray(initial, dtype=np.float64).reshape(len(starts), n)
-        arrays = (np.ascontiguousarray(inputs), dt, substeps, hold, starts, initial)
-        self.kernel(*arrays, np.asarray(parameters, np.float64), outputs, slopes)
-        return Simulation(outputs, slopes)
+            raise ModelError(f"{model.name}: found a window beyond the recording's end")
+        hold = 1.0 if model.hold == "linear" else 0.0
+        first = np.ascontiguousarray(initial, np.float64).reshape(len(starts), -1)
+        values = np.ascontiguousarray(parameters, np.float64)
+        driven = np.ascontiguousarray(inputs, np.float64)
+        return (driven, dt, substeps, hold, starts, first, values)
 
     def vector(self, values: Mapping[str, float]) -> FloatArray:
         """All parameters, those in `values` replaced; shape (n_p,).
@@ -113,7 +176,7 @@ class CompiledSystem:
 
 def compile_system(system: System) -> CompiledSystem:
     """The kernel of `system`, from the cache where it has been compiled before."""
-    return CompiledSystem(system, _module(source(system)).simulate)
+    return CompiledSystem(system, _module(source(system)))
 
 
 def cache_folder() -> Path:

@@ -16,6 +16,7 @@ from rigwatch.physics.engine.scope import Scope, symbol
 from rigwatch.wire.errors import ModelError
 
 TIME = "t"
+PROBE = "probe_"
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class System:
         derivatives: rates of the states, by name.
         outputs: by name, as the sensors read them.
         ports: what each port is: the force that is added, the signal that leaves.
+        probes: one a force or actuator port, added to what it is and always 0: derivatives by them
+            say what any further effect there would do.
     """
 
     model: Model
@@ -56,6 +59,7 @@ class System:
     derivatives: Mapping[str, sympy.Expr]
     outputs: Mapping[str, sympy.Expr]
     ports: Mapping[str, sympy.Expr]
+    probes: tuple[str, ...]
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -128,6 +132,7 @@ class _Composer:
             self._rates,
             outputs,
             ports | sensors,
+            tuple(PROBE + name for name in ports),
         )
 
     def _entered(self, kind: str) -> dict[str, sympy.Expr]:
@@ -135,7 +140,8 @@ class _Composer:
         values = {}
         for name, port in self._model.ports.items():
             if port.kind == kind:
-                values[name] = self._port_value(name, port)
+                probe = symbol(PROBE + name) if kind != "sensor" else sympy.Integer(0)
+                values[name] = self._port_value(name, port) + probe
                 self._scope.define(name, values[name], self._port_unit(name, port))
         return values
 

@@ -1,0 +1,289 @@
+"""What a missing effect would do to the outputs, to first order in its strength.
+
+Along the trajectory of a fitted model an effect at strength zero adds e(t) = ∂effect/∂strength to
+its port. The outputs then move by
+
+    dR/dt = (∂f/∂x)·R + (∂f/∂port)·e,   ∂y/∂strength = (∂g/∂x)·R + (∂g/∂port)·e,   R(0) = 0
+
+which is one linear equation for all candidates together and needs nothing compiled for the model.
+At a sensor the effect moves its own output alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import sympy
+from numba import njit
+
+from rigwatch.physics.engine.codegen import derivative
+from rigwatch.physics.engine.compiled import (
+    CompiledSystem,
+    FloatArray,
+    IntArray,
+    Linearisation,
+    compile_system,
+)
+from rigwatch.physics.engine.effect import Effect
+from rigwatch.physics.engine.expression import parse
+from rigwatch.physics.engine.model import Input, Model, Output, State
+from rigwatch.physics.engine.scope import symbol
+from rigwatch.physics.engine.system import PROBE, TIME, System
+
+RATE = "rate"
+"""What an effect at a signal may call the signal's own rate of change."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that may be missing at a port, with values for its shape parameters."""
+
+    name: str
+    effect: Effect
+    port: str
+    shape: dict[str, float] = field(default_factory=dict, hash=False)
+
+
+def shaped(name: str, effect: Effect, port: str) -> list[Candidate]:
+    """The candidates of one effect at one port: one a combination of the shapes that are tried."""
+    grids = [
+        [(key, value) for value in (p.tried or (p.value,))]
+        for key, p in effect.parameters.items()
+        if p.role != "strength"
+    ]
+    combinations: list[list[tuple[str, float]]] = [[]]
+    for grid in grids:
+        combinations = [[*c, choice] for c in combinations for choice in grid]
+    return [Candidate(name, effect, port, dict(c)) for c in combinations]
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A linearised run with the signals that effects at its ports see.
+
+    Attributes:
+        compiled: the model.
+        run: its linearisation.
+        inputs: at the nodes, shape (windows, nodes, inputs).
+        time: at the nodes, shape (windows, nodes) [s].
+        parameters: all of them, shape (n_p,).
+    """
+
+    compiled: CompiledSystem
+    run: Linearisation
+    inputs: FloatArray
+    time: FloatArray
+    parameters: FloatArray
+
+
+def trajectory(
+    compiled: CompiledSystem,
+    inputs: FloatArray,
+    dt: float,
+    starts: IntArray,
+    length: int,
+    *,
+    initial: FloatArray,
+    parameters: FloatArray,
+    substeps: int = 4,
+) -> Trajectory:
+    """The run of `CompiledSystem.linearise` with inputs and time at its nodes."""
+    run = compiled.linearise(
+        inputs, dt, starts, length, initial=initial, parameters=parameters, substeps=substeps
+    )
+    nodes = np.arange(run.states.shape[1])
+    row, place = nodes // substeps, (nodes % substeps) / substeps
+    rows = starts[:, None] + row
+    following = np.minimum(rows + 1, len(inputs) - 1)
+    share = place if compiled.system.model.hold == "linear" else np.zeros_like(place)
+    at_nodes = inputs[rows] + share[:, None] * (inputs[following] - inputs[rows])
+    return Trajectory(compiled, run, at_nodes, (rows + place) * dt, parameters)
+
+
+def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
+    """∂outputs/∂strength of every candidate, shape (windows, samples, outputs, candidates)."""
+    system, run = at.compiled.system, at.run
+    kinds = {name: port.kind for name, port in system.model.ports.items()}
+    inner = [c for c in candidates if kinds[c.port] != "sensor"]
+    found = np.zeros((*run.outputs.shape, len(candidates)))
+    if inner:
+        pushes = np.stack([_push(at, c) for c in inner], axis=-1)
+        columns = np.array([_probe_column(system, c.port) for c in inner])
+        places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
+        found[..., places] = _propagated(run, len(system.free), pushes, columns)
+    for index, candidate in enumerate(candidates):
+        if kinds[candidate.port] == "sensor":
+            signal = list(system.outputs).index(system.model.ports[candidate.port].signal)
+            found[..., signal, index] = _push(at, candidate)[:, :: run.substeps]
+    return found
+
+
+def _probe_column(system: System, port: str) -> int:
+    return len(system.free) + len(system.states) + system.probes.index(PROBE + port)
+
+
+def _push(at: Trajectory, candidate: Candidate) -> FloatArray:
+    """e(t) of one candidate at the nodes, shape (windows, nodes)."""
+    signals = _signals(at, candidate.port)
+    names = {name: symbol(name) for name in (*signals, *candidate.effect.states)}
+    names |= {name: symbol(name) for name in candidate.effect.parameters}
+    if candidate.effect.states:
+        signals = signals | _memory(at, candidate, signals, names)
+    expression = _at_neutral(_direction(candidate.effect, names), candidate)
+    return _evaluated(expression, signals, at.time.shape)
+
+
+def _direction(effect: Effect, names: dict[str, sympy.Symbol]) -> sympy.Expr:
+    """∂effect/∂strength as an expression."""
+    if effect.direction:
+        return parse(effect.direction, names, "direction")
+    return derivative(parse(effect.expression, names, "effect"), names[effect.strength])
+
+
+def _at_neutral(expression: sympy.Expr, candidate: Candidate) -> sympy.Expr:
+    strength = candidate.effect.strength
+    neutral = candidate.effect.parameters[strength].neutral
+    numbers = {**candidate.shape, strength: neutral}
+    return expression.subs({symbol(name): value for name, value in numbers.items()})
+
+
+def _evaluated(
+    expression: sympy.Expr, signals: dict[str, FloatArray], shape: tuple[int, ...]
+) -> FloatArray:
+    function = sympy.lambdify([symbol(name) for name in signals], expression, "numpy", cse=True)
+    return np.broadcast_to(np.asarray(function(*signals.values()), np.float64), shape)
+
+
+def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
+    """What an effect at a port sees, at the nodes, each of shape (windows, nodes)."""
+    system = at.compiled.system
+    port = system.model.ports[port_name]
+    signals = {TIME: at.time}
+    for name, variable in port.variables.items():
+        expression = parse(variable.expression, _symbols(system), f"port {port_name}")
+        signals[name] = _along(at, expression.subs(_known(at)))
+    if port.kind != "force":
+        signals["u"] = _along(at, _clean(system, port_name).subs(_known(at)))
+        signals[RATE] = np.gradient(signals["u"], at.run.spacing, axis=1)
+    return signals
+
+
+def _symbols(system: System) -> dict[str, sympy.Expr]:
+    names = (*system.states, *system.parameters, *system.model.inputs, TIME)
+    return {name: symbol(name) for name in names} | dict(system.ports)
+
+
+def _clean(system: System, port_name: str) -> sympy.Expr:
+    return system.ports[port_name].subs({symbol(name): 0 for name in system.probes})
+
+
+def _known(at: Trajectory) -> dict[sympy.Symbol, float]:
+    system = at.compiled.system
+    numbers = dict(zip(system.parameters, at.parameters.tolist(), strict=True))
+    numbers |= dict.fromkeys(system.probes, 0.0)
+    return {symbol(name): value for name, value in numbers.items()}
+
+
+def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
+    """An expression in states, inputs and time along the trajectory."""
+    system = at.compiled.system
+    values = dict(zip(system.states, np.moveaxis(at.run.states, -1, 0), strict=True))
+    values |= dict(zip(system.model.inputs, np.moveaxis(at.inputs, -1, 0), strict=True))
+    return _evaluated(expression, values | {TIME: at.time}, at.time.shape)
+
+
+def _memory(
+    at: Trajectory,
+    candidate: Candidate,
+    signals: dict[str, FloatArray],
+    names: dict[str, sympy.Symbol],
+) -> dict[str, FloatArray]:
+    """The effect's own states at strength zero, driven by what it sees."""
+    effect, count = candidate.effect, at.time.shape[1]
+    rates = {
+        name: _at_neutral(parse(state.derivative, names, f"state {name}"), candidate)
+        for name, state in effect.states.items()
+    }
+    model = Model(
+        name=f"memory of {candidate.name}",
+        summary="the states of one effect",
+        inputs={name: Input(unit="1") for name in signals if name != TIME},
+        parameters={},
+        outputs={name: Output(unit="1", expression=name) for name in effect.states},
+    )
+    states = {n: State(unit="1", derivative=s.derivative) for n, s in effect.states.items()}
+    read = {name: symbol(name) for name in effect.states}
+    compiled = compile_system(System(model, (), states, {}, rates, read, {}, ()))
+    driving = np.stack([signals[name].ravel() for name in model.inputs], axis=-1)
+    starts = np.arange(0, len(driving), count, dtype=np.int64)
+    first = np.tile([state.start for state in effect.states.values()], (len(starts), 1))
+    run = compiled.simulate(
+        driving, at.run.spacing, starts, count, initial=first, parameters=np.zeros(0)
+    )
+    return dict(zip(effect.states, np.moveaxis(run.outputs, -1, 0), strict=True))
+
+
+def _propagated(run: Linearisation, free: int, pushes: FloatArray, columns: IntArray) -> FloatArray:
+    """Outputs moved by pushes at probes, shape (windows, samples, outputs, candidates)."""
+    n = run.states.shape[2]
+    along = np.ascontiguousarray(run.rate_slopes[..., free : free + n])
+    across = np.ascontiguousarray(run.rate_slopes[..., columns])
+    reads = np.ascontiguousarray(run.read_slopes[..., free : free + n])
+    direct = np.ascontiguousarray(run.read_slopes[..., columns])
+    moved = np.empty((*run.outputs.shape, len(columns)))
+    _propagate(along, across, reads, direct, pushes, run.spacing, run.substeps, moved)
+    return moved
+
+
+@njit(cache=True)
+def _propagate(  # noqa: C901, PLR0917 -- a kernel
+    along: FloatArray,
+    across: FloatArray,
+    reads: FloatArray,
+    direct: FloatArray,
+    pushes: FloatArray,
+    h: float,
+    substeps: int,
+    moved: FloatArray,
+) -> None:
+    """Heun's method over the nodes; the outputs are read at the samples."""
+    windows, nodes, n, candidates = across.shape
+    response, ahead = np.empty((n, candidates)), np.empty((n, candidates))
+    slope, next_slope = np.empty((n, candidates)), np.empty((n, candidates))
+    for w in range(windows):
+        response[:] = 0.0
+        for node in range(nodes):
+            if node % substeps == 0:
+                k = node // substeps
+                for o in range(moved.shape[2]):
+                    for c in range(candidates):
+                        value = direct[w, k, o, c] * pushes[w, node, c]
+                        for j in range(n):
+                            value += reads[w, k, o, j] * response[j, c]
+                        moved[w, k, o, c] = value
+            if node + 1 < nodes:
+                _slopes(along[w, node], across[w, node], pushes[w, node], response, slope)
+                for i in range(n):
+                    for c in range(candidates):
+                        ahead[i, c] = response[i, c] + h * slope[i, c]
+                following = node + 1
+                _slopes(
+                    along[w, following], across[w, following], pushes[w, following], ahead,
+                    next_slope,
+                )  # fmt: skip
+                for i in range(n):
+                    for c in range(candidates):
+                        response[i, c] += 0.5 * h * (slope[i, c] + next_slope[i, c])
+
+
+@njit(cache=True)
+def _slopes(
+    along: FloatArray, across: FloatArray, push: FloatArray, at: FloatArray, out: FloatArray
+) -> None:
+    n, candidates = at.shape
+    for i in range(n):
+        for c in range(candidates):
+            value = across[i, c] * push[c]
+            for j in range(n):
+                value += along[i, j] * at[j, c]
+            out[i, c] = value
