@@ -25,10 +25,13 @@ COMMANDS: dict[str, str] = {
     # name on the command line: module below rigwatch.commands
     "demo": "demo",
     "up": "up",
+    "router": "router",
     "plant": "plant",
     "daq": "daq",
+    "record": "record",
     "doctor": "doctor",
     "dashboard": "dashboard",
+    "view": "view",
     "info": "info",
     "trim": "trim",
     "recover": "recover",

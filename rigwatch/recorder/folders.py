@@ -1,0 +1,72 @@
+"""Where a recording goes: a new session folder, or on with the last one after a short break.
+
+    <recorder.folder>/<rig>-20260501T120000Z/000001.mcap, 000002.mcap, …
+
+A recorder that was killed and started again goes on in the same folder and asks the ring for what
+it missed.
+"""
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import RunInfo
+from rigwatch.wire.session.reader import SUFFIX, Session, open_session
+
+LONGEST_BREAK = 120.0
+"""Break after which a recorder begins a new session [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """The folder to record to, and (boot, seq) of the last sample in it, None in a new one."""
+
+    folder: Path
+    last: tuple[int, int] | None = None
+
+
+def choose(root: Path, run: RunInfo) -> Place:
+    """The folder for a recording that begins at `run.t_ns`."""
+    going_on = _interrupted(root, run)
+    if going_on is not None:
+        return going_on
+    stamp = datetime.fromtimestamp(run.t_ns // 1_000_000_000, UTC).strftime("%Y%m%dT%H%M%SZ")
+    return Place(_unused(root / f"{run.rig}-{stamp}"))
+
+
+def _unused(folder: Path) -> Path:
+    number = 2
+    found = folder
+    while found.exists():
+        found = folder.with_name(f"{folder.name}-{number}")
+        number += 1
+    return found
+
+
+def _interrupted(root: Path, run: RunInfo) -> Place | None:
+    """The newest session of this rig, where it was made with the same configuration just now."""
+    try:
+        folders = [path for path in root.glob(f"{run.rig}-*Z*") if any(path.glob(f"*{SUFFIX}"))]
+        newest = max(folders, key=lambda path: max(f.stat().st_mtime for f in path.iterdir()))
+        session = open_session(newest)
+        same = session.info.configuration_sha256 == run.configuration_sha256
+        last = _last_sample(session) if same else None
+    except (OSError, SessionError, ValueError):
+        return None
+    if last is None:
+        return None
+    boot, seq, t_ns = last
+    recent = abs(run.t_ns - t_ns) <= LONGEST_BREAK * 1e9
+    return Place(newest, (boot, seq)) if recent else None
+
+
+def _last_sample(session: Session) -> tuple[int, int, int] | None:
+    """(boot, seq, t_ns) of the last sample, in the last segment that has any."""
+    for path in reversed(session.segments):
+        last = None
+        for block in Session(path, (path,)).samples():
+            last = block
+        if last is not None:
+            return last.boot, last.seq + len(last) - 1, int(last.t_ns[-1])
+    return None

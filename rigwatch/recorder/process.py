@@ -1,0 +1,127 @@
+"""The recording process: bus ─▶ feed ─▶ store ─▶ session folder.
+
+python -m rigwatch.recorder CONFIG
+"""
+
+import hashlib
+import math
+import threading
+import time
+from pathlib import Path
+
+from rigwatch.recorder.disk import DiskWatch, free_share
+from rigwatch.recorder.feed import Feed
+from rigwatch.recorder.folders import choose
+from rigwatch.recorder.store import Store
+from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.heartbeat import Heartbeat
+from rigwatch.wire.messages import Event, Health, RunInfo
+from rigwatch.wire.rig_config import RecorderSection, RigConfig, load_rig
+from rigwatch.wire.session.writer import run_info
+from rigwatch.wire.topics import EVENTS, HEALTH, RUN
+
+PROCESS = "recorder"
+HEALTH_EVERY = 1.0
+_OF_FLUSH = 0.8
+"""Share of the flush time that a turn of the loop waits, the rest is for the disk."""
+
+
+class Recorder:
+    """A rig being recorded.
+
+    Args:
+        config: the rig's configuration.
+        run: stands at the head of every segment.
+        bus: where the messages are.
+    """
+
+    def __init__(self, config: RigConfig, run: RunInfo, bus: Bus) -> None:
+        self.settings = config.recorder or RecorderSection()
+        place = choose(Path(self.settings.folder), run)
+        self.store = Store(place.folder, run, self.settings.segment)
+        self.feed = Feed(bus, place.last)
+        self._bus = bus
+        self._disk = DiskWatch()
+        self._told_at = -HEALTH_EVERY
+        bus.publish(RUN, run)
+
+    def turn(self, now: float, t_ns: int) -> None:
+        """Keep what has come; `now` is a monotonic clock's time [s], `t_ns` Unix time [ns]."""
+        for message in self.feed.take():
+            self.store.add(message)
+        self._tell(self.store.flush(now, t_ns))
+        if now - self._told_at >= HEALTH_EVERY:
+            self._told_at = now
+            self._report(t_ns)
+
+    def _tell(self, events: list[Event]) -> None:
+        for event in events:
+            self._bus.publish(EVENTS, event)
+            self.store.add(event)
+
+    def _report(self, t_ns: int) -> None:
+        share = free_share(self.store.folder)
+        self._tell(self._disk.update(share, t_ns))
+        health = self._health(share, t_ns)
+        self._bus.publish(HEALTH, health)
+
+    def _health(self, share: float, t_ns: int) -> Health:
+        state = "recording" if not self.store.failure else "not recording"
+        counters = {
+            "samples": float(self.store.samples),
+            "lost_samples": float(self.feed.gap_samples),
+            "dropped_samples": float(self.store.dropped_samples),
+            "dropped_messages": float(self.store.dropped_messages + self.feed.dropped),
+            "rejected": float(self.feed.rejected),
+            "segments": float(self.store.segment_count),
+            "free_share": -1.0 if math.isnan(share) else share,
+            "disk_trouble": float(bool(self.store.failure) or self._disk.short),
+        }
+        return Health(PROCESS, t_ns, state, self.store.failure, counters)
+
+    def close(self, now: float, t_ns: int) -> None:
+        """Write what waits and close the session."""
+        for message in self.feed.take():
+            self.store.add(message)
+        self.feed.close()
+        self._tell(self.store.close(now, t_ns))
+
+
+def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event) -> Path:
+    """Record until `stop` is set; returns the session's folder."""
+    recorder = Recorder(config, run, bus)
+    heartbeat = Heartbeat(PROCESS)
+    heartbeat.ready(f"recording to {recorder.store.folder}")
+    while not stop.wait(recorder.settings.flush * _OF_FLUSH):
+        recorder.turn(time.monotonic(), time.time_ns())
+        heartbeat.advance(recorder.feed.samples)
+    heartbeat.stopping()
+    recorder.close(time.monotonic(), time.time_ns())
+    return recorder.store.folder
+
+
+def describe_run(path: Path | str, config: RigConfig, notes: str = "") -> RunInfo:
+    """What stands at the head of a recording made with the configuration at `path`."""
+    text = Path(path).read_text(encoding="utf-8")
+    return run_info(
+        config.rig.id,
+        config.rig.sample_rate,
+        notes=notes,
+        configuration=text,
+        configuration_sha256=hashlib.sha256(text.encode()).hexdigest(),
+    )
+
+
+def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path:
+    """Record the rig whose configuration is at `path`, until `stop` is set; the session's folder.
+
+    Raises:
+        ConfigError: the configuration is wrong.
+        BusError: the router's endpoint is wrong.
+    """
+    config = load_rig(path)
+    bus = connect(config, PROCESS)
+    try:
+        return record(config, describe_run(path, config, notes), bus, stop)
+    finally:
+        bus.close()

@@ -1,0 +1,222 @@
+"""The recorder on a real bus: what is said is kept, and a killed recorder leaves no hole."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.recorder.folders import choose
+from rigwatch.recorder.process import Recorder, describe_run
+from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus_memory import MemoryNetwork
+from rigwatch.wire.bus_zenoh import open_router
+from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Event, Gap, SampleBlock
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.ring import SampleRing
+from rigwatch.wire.session import open_session, run_info
+from rigwatch.wire.topics import ALARMS, ESTIMATES, EVENTS, GAPS, SAMPLES
+
+CONFIG = """
+[rig]
+id = "bench1"
+[bus]
+router = "tcp/127.0.0.1:{port}"
+listen = "tcp/127.0.0.1:{port}"
+[[channels]]
+name = "voltage"
+unit = "V"
+gain = 1.0
+[daq.device]
+adapter = "serial"
+port = "/dev/null"
+[recorder]
+folder = "{folder}"
+"""
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    path = tmp_path / "rig.toml"
+    path.write_text(CONFIG.format(port=free_port(), folder=tmp_path / "sessions"))
+    return path
+
+
+def block(seq: int, n: int = 1) -> SampleBlock:
+    index = np.arange(seq, seq + n)
+    column = Column("voltage", "V", index.astype(np.float64), np.zeros(n, np.uint8))
+    t_ns = time.time_ns() + index * 3_906_250
+    return SampleBlock("rig", 7, seq, index * 3906, t_ns, (column,))
+
+
+class Source:
+    """Stands where the acquisition stands: ring and publisher on the bus."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus, self.ring, self.next = bus, SampleRing(bus, 65536), 0
+
+    def send(self, count: int) -> None:
+        for _ in range(count):
+            part = block(self.next)
+            self.ring.add(part)
+            self.bus.publish(SAMPLES, part)
+            self.next += 1
+
+
+def recorded(folder: Path) -> list[int]:
+    return [n for b in open_session(folder).samples() for n in range(b.seq, b.seq + len(b))]
+
+
+def test_everything_said_is_kept_once(config: Path) -> None:
+    network = MemoryNetwork()
+    source = Source(network.bus("bench1", "daq"))
+    monitor = network.bus("bench1", "monitor")
+    rig = load_rig(config)
+    recorder = Recorder(rig, describe_run(config, rig, "a note"), network.bus("bench1", "recorder"))
+    source.send(100)
+    for seq in range(100):
+        column = (Column("theta1", "", np.array([seq * 0.1])),)
+        monitor.publish(ESTIMATES, EstimateBlock("rig", 7, seq, np.array([seq]), column))
+    monitor.publish(EVENTS, Event("monitor", 5, "info", "HELLO", "here"))
+    monitor.publish(GAPS, Gap("rig", 7, 200, 201, 5, "monitor", "not in the ring"))
+    alarm = Alarm("gap", "normal", "info", "", "", "rig", 7, 1, 5, 0.0, 0.0, 0.0, False, "", 1)
+    monitor.publish(ALARMS, alarm)
+    recorder.turn(0.0, time.time_ns())
+    recorder.close(1.0, time.time_ns())
+    session = open_session(recorder.store.folder)
+    counts: dict[str, int] = {}
+    for item in session.messages():
+        counts[item.topic.name] = counts.get(item.topic.name, 0) + 1
+    assert recorded(recorder.store.folder) == list(range(100))
+    assert counts == {
+        "run": 1,
+        "samples": 1,
+        "estimates": 1,
+        "events": 2,  # HELLO, and the reader's own JOINED
+        "gaps": 1,
+        "alarms": 1,
+        "health": 1,
+    }
+    assert session.info.notes == "a note"
+    assert session.info.configuration == config.read_text()
+    (estimates,) = session.estimates()
+    assert len(estimates) == 100
+
+
+def test_a_recorder_whose_disk_is_away_says_so_and_keeps_the_samples(config: Path) -> None:
+    rig = load_rig(config)
+    assert rig.recorder is not None
+    root = Path(rig.recorder.folder)
+    root.write_text("in the way")
+    network = MemoryNetwork()
+    source = Source(network.bus("bench1", "daq"))
+    listener = network.bus("bench1", "test").subscribe(EVENTS)
+    recorder = Recorder(rig, describe_run(config, rig), network.bus("bench1", "recorder"))
+    for turn in range(4):
+        source.send(50)
+        recorder.turn(float(turn), turn)
+    root.unlink()
+    recorder.turn(5.0, 5)
+    recorder.close(6.0, 6)
+    expected = ["JOINED", "RECORDING_STOPPED", "RECORDING_RESUMED"]
+    assert [event.code for event in listener.drain()] == expected
+    assert recorded(recorder.store.folder) == list(range(200))
+    kept = [item.message for item in open_session(recorder.store.folder).messages(["events"])]
+    assert [event.code for event in kept if isinstance(event, Event)] == expected
+
+
+def test_a_session_goes_on_after_a_short_break_only(tmp_path: Path, config: Path) -> None:
+    network = MemoryNetwork()
+    source = Source(network.bus("bench1", "daq"))
+    rig = load_rig(config)
+    run = describe_run(config, rig)
+    recorder = Recorder(rig, run, network.bus("bench1", "recorder"))
+    source.send(30)
+    recorder.turn(0.0, time.time_ns())
+    recorder.close(0.0, time.time_ns())
+    folder = recorder.store.folder
+    again = choose(tmp_path / "sessions", run)
+    assert (again.folder, again.last) == (folder, (7, 29))
+    later = run_info("bench1", 256.0, t_ns=run.t_ns + 10**12, configuration_sha256="")
+    assert choose(tmp_path / "sessions", later).folder != folder
+    other = run_info("bench1", 256.0, t_ns=run.t_ns, configuration_sha256="changed")
+    assert choose(tmp_path / "sessions", other).folder != folder
+    assert choose(tmp_path / "nowhere", run).last is None
+
+
+@pytest.fixture
+def router(config: Path) -> Iterator[None]:
+    close = open_router(load_rig(config).bus.listen)
+    yield
+    close()
+
+
+def start(config: Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "rigwatch", "record", str(config), "--json"]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+
+def wait_for_file(root: Path, timeout: float = 20.0) -> Path:
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
+        if found := sorted(root.glob("*/*.mcap")):
+            return found[-1]
+        time.sleep(0.05)
+    raise AssertionError("nothing was recorded")
+
+
+@pytest.mark.usefixtures("router")
+def test_killed_and_started_again_over_zenoh(tmp_path: Path, config: Path) -> None:
+    """`rigwatch record` under kill -9 in mid-run: no sample is missing from its first on."""
+    bus = connect(load_rig(config), "daq", timeout=10.0)
+    source = Source(bus)
+    stop = threading.Event()
+
+    def publish() -> None:
+        while not stop.wait(0.02):
+            source.send(5)
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    first = start(config)
+    try:
+        wait_for_file(tmp_path / "sessions")
+        time.sleep(1.2)
+        os.kill(first.pid, signal.SIGKILL)
+        first.wait()
+        second = start(config)
+        try:
+            while len(list((tmp_path / "sessions").glob("*/*.mcap"))) < 2:
+                time.sleep(0.05)
+                assert second.poll() is None
+            time.sleep(1.0)
+        finally:
+            second.send_signal(signal.SIGTERM)
+            output, _ = second.communicate(timeout=20)
+    finally:
+        stop.set()
+        thread.join()
+        bus.close()
+    assert second.returncode == 0
+    folder = Path(json.loads(output)["session"])
+    assert list((tmp_path / "sessions").iterdir()) == [folder]
+    seqs = recorded(folder)
+    assert seqs == list(range(seqs[0], seqs[-1] + 1))
+    assert len(seqs) > 300
+    session = open_session(folder)
+    assert [item.message for item in session.messages(["gaps"])] == []
+    assert len(session.unclosed) == 1
