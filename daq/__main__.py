@@ -1,6 +1,6 @@
 """The acquisition process: device ─▶ adapter ─▶ acquisition ─▶ bus and ring.
 
-    python -m daq CONFIG
+Started by `rigwatch daq CONFIG` or `python -m daq CONFIG`.
 """
 
 import signal

@@ -1,5 +1,7 @@
 """Raw blocks to messages: counted, stamped, calibrated and judged. No bus or device inside.
 
+What becomes of a block::
+
     RawBlock ─▶ SequenceTracker ─▶ DeviceClock ─▶ Conditioner ─▶ SampleBlock
                   └▶ Gap, Event      └▶ Event       └▶ quality ─▶ Watch ─▶ Health, Event
 """
@@ -92,9 +94,7 @@ class Acquisition:
             stamps, jump = self.clock.stamp(part)
             if jump:
                 text = f"the device's clock jumped by {jump:+.6f} s, its time is anchored anew"
-                messages.append(
-                    self._event(int(part.arrived_ns[0]), "warning", "clock_jump", text)
-                )
+                messages.append(self._event(int(part.arrived_ns[0]), "warning", "clock_jump", text))
             block = self.conditioner.condition(part, stamps)
             messages.append(self._counted(block, int(part.arrived_ns[-1])))
         return messages

@@ -1,8 +1,8 @@
-"""What an adapter is: it turns a device into raw blocks, and knows nothing of calibration, clocks or buses.
+"""What an adapter is: it turns a device into raw blocks and knows nothing of what becomes of them.
 
-An adapter's `read` waits for samples and returns them as they came: with wrapping counters, perhaps twice, perhaps
-with holes. Everything after that is the same for all devices (`acquisition.py`). An adapter raises `DeviceError` when the device
-has gone away and the supervisor opens it again.
+An adapter's `read` waits for samples and returns them as they came: with wrapping counters, perhaps
+twice, perhaps with holes. Everything after that is the same for all devices (`acquisition.py`). An
+adapter raises `DeviceError` when the device has gone away and the supervisor opens it again.
 """
 
 from collections.abc import Mapping, Sequence

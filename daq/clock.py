@@ -2,10 +2,11 @@
 
     t = origin + (us - us0)·1000·(1 + drift) + offset
 
-A sample arrives late by what the line and the host take, never early. So of every quarter second the least late sample
-counts, and through those of the last minute a line is laid by the median of slopes (after Theil and Sen), which does not
-care about the seconds in which the host slept. A jump of the device's clock shows within one sample: its microseconds
-move otherwise than its sample numbers, and the host's clock disagrees as well.
+A sample arrives late by what the line and the host take, never early. So of every quarter second
+the least late sample counts, and through those of the last minute a line is laid by the median of
+slopes (after Theil and Sen), which does not care about the seconds in which the host slept. A jump
+of the device's clock shows within one sample: its microseconds move otherwise than its sample
+numbers, and the host's clock disagrees as well.
 """
 
 import time
@@ -57,7 +58,7 @@ class DeviceClock:
         self._last = None
 
     def stamp(self, run: RawBlock) -> tuple[IntArray, float]:
-        """Unix time of each sample of `run` [ns], and the last jump of the device's clock in it [s].
+        """Unix time of each sample of `run` [ns], and the last jump of its clock in it [s].
 
         `run` holds consecutive samples, unwrapped, of one boot.
         """

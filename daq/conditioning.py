@@ -5,9 +5,10 @@
     spike        further from the last good sample than the sensor can have moved
     non-finite   NaN or infinite; the last good value is held in its place
 
-What is decided about a sample depends on it and on those before it, never on how they were cut into blocks. A channel
-"moves" when its code has gone at least a thousandth of the converter's range within the same time: all others must, so
-that a mass that friction holds still is not taken for a dead sensor.
+What is decided about a sample depends on it and on those before it, never on how they were cut into
+blocks. A channel "moves" when its code has gone at least a thousandth of the converter's range
+within the same time: all others must, so that a mass that friction holds still is not taken for a
+dead sensor.
 """
 
 from collections.abc import Sequence
@@ -55,6 +56,7 @@ class Conditioner:
         self._spike_above = np.array(steps, np.float64)
         self._boot: int | None = None
         self._state = np.zeros(len(self._channels), _STATE)
+        self._compile()
 
     def condition(self, raw: RawBlock, t_ns: IntArray) -> SampleBlock:
         """The calibrated block of `raw`, which holds consecutive samples, unwrapped, of one boot.
@@ -73,6 +75,13 @@ class Conditioner:
             for i, channel in enumerate(self._channels)
         )
         return SampleBlock(self._device, raw.boot, int(raw.seq[0]), raw.device_us, t_ns, columns)
+
+    def _compile(self) -> None:
+        """Have the kernels ready before the first sample comes."""
+        none = np.zeros((0, len(self._channels)))
+        for calibrated in (False, True):
+            no_numbers = np.zeros(0, np.int64)
+            self._judged(RawBlock(0, no_numbers, no_numbers, none, no_numbers, calibrated))
 
     def _judged(self, raw: RawBlock) -> tuple[FloatArray, ByteArray]:
         codes = np.ascontiguousarray(raw.codes, np.float64)
@@ -111,7 +120,7 @@ def _follow(code, moves, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _judge(codes, values, flags, limits, stuck_after, state):  # type: ignore[no-untyped-def]
+def _judge(codes, values, flags, limits, stuck_after, state):  # type: ignore[no-untyped-def]  # noqa: PLR0917
     n, channels = codes.shape
     for i in range(n):
         for k in range(channels):
@@ -119,16 +128,16 @@ def _judge(codes, values, flags, limits, stuck_after, state):  # type: ignore[no
                 _follow(codes[i, k], _MOVES * (limits[1, k] - limits[0, k]), state[k])
         for k in range(channels):
             flags[i, k] |= _flags_of(codes[i, k], values[i, k], limits[:, k], state[k])
-            if stuck_after[k] > 0 and state[k].equal >= stuck_after[k]:
-                if _others_move(state, k, stuck_after[k]):
-                    flags[i, k] |= quality.STUCK
+            same = stuck_after[k] > 0 and state[k].equal >= stuck_after[k]
+            if same and _others_move(state, k, stuck_after[k]):
+                flags[i, k] |= quality.STUCK
             if flags[i, k] & quality.NON_FINITE:
                 values[i, k] = state[k].good
 
 
 @njit(cache=True)
 def _others_move(state, k, within):  # type: ignore[no-untyped-def]
-    for j in range(len(state)):
+    for j in range(len(state)):  # noqa: SIM110 (no generators in a compiled kernel)
         if j != k and state[j].since_move >= within:
             return False
     return True

@@ -1,4 +1,4 @@
-"""Messages onto the bus, and samples into the ring that readers ask for what they missed. Never waits."""
+"""Messages onto the bus and samples into the ring; never waits for a reader."""
 
 from collections.abc import Iterable
 
@@ -28,7 +28,7 @@ class Publisher:
         self._ring = ring
 
     def publish(self, messages: Iterable[Message]) -> None:
-        """Publish messages in order; samples go into the ring first, so that they can be asked for."""
+        """Publish messages in order; samples go into the ring first, to be there when asked for."""
         for message in messages:
             if isinstance(message, SampleBlock):
                 self._ring.add(message)

@@ -1,7 +1,8 @@
 """Sample numbers of a device: every sample is delivered once, or counted.
 
-Counters of 32 bits are unwrapped, repeated samples dropped and counted, holes told exactly, and a device that starts
-anew is recognised by its boot, or where it keeps that, by a count that went back while its clock did not say so.
+Counters of 32 bits are unwrapped, repeated samples dropped and counted, holes told exactly, and a
+device that starts anew is recognised by its boot, or where it keeps that, by a count that went back
+while its clock did not say so.
 """
 
 import zlib
@@ -71,9 +72,7 @@ class SequenceTracker:
         """The steps that `raw` means, in order: runs, and between them holes and restarts."""
         steps: list[Step] = []
         run = _Run(self._boot)
-        rows = zip(
-            raw.seq.tolist(), raw.device_us.tolist(), raw.arrived_ns.tolist(), strict=True
-        )
+        rows = zip(raw.seq.tolist(), raw.device_us.tolist(), raw.arrived_ns.tolist(), strict=True)
         for index, (seq, us, arrived) in enumerate(rows):
             found = self._place(raw.boot, seq, us, arrived)
             if found is _REPEATED:

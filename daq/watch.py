@@ -2,7 +2,7 @@
 
 `state` is the first of these that holds:
 
-    reconnecting   the device is not open
+    reconnecting   the device is not open, or open again and nothing has come yet
     starting       open, nothing has come yet
     garbage        more than 1 % of the bytes of the last second belonged to no frame
     stale          no sample for `stale_after`
@@ -57,6 +57,7 @@ class Watch:
         self, source: str, rate: float, stale_after: float, clock_rate: float = 1.0
     ) -> None:
         self.state = "starting"
+        self._text = ""
         self._source = source
         self._rate = rate
         self._clock_rate = clock_rate
@@ -102,26 +103,26 @@ class Watch:
         if second_over:
             messages += self._second(now_ns, unix_ns, counters)
         state, text = self._judge(now_ns, link)
-        if state != self.state:
+        if state != self.state or (state == "reconnecting" and text != self._text):
             messages += self._changed(state, text, unix_ns)
         if second_over or messages:
             messages.append(self._health(now_ns, unix_ns, text, link, counters))
         return messages
 
     def _judge(self, now_ns: int, link: Link) -> tuple[str, str]:
-        if not link.connected:
+        if not link.connected or link.text:
             return "reconnecting", link.text
         if self._garbage_text:
             return "garbage", self._garbage_text
         if self._last_ns is None:
-            return "starting", link.text or "nothing has come from the device yet"
+            return "starting", "nothing has come from the device yet"
         silence = now_ns - self._last_ns
         if silence >= self._stale_ns:
             return "stale", f"no sample for {silence / _SECOND:.1f} s"
         rate = self._recent_rate()
         if rate < _SLOW * self._rate:
             return "slow", f"{rate:.0f} samples a second, expected {self._rate:.0f}"
-        return "running", link.text
+        return "running", ""
 
     def _recent_rate(self) -> float:
         """Rate at which the device takes samples, lost ones counted [Hz]."""
@@ -133,7 +134,7 @@ class Watch:
         return (last - first) * 1e9 / max(end - start, 1) / self._clock_rate
 
     def _changed(self, state: str, text: str, unix_ns: int) -> list[Message]:
-        was, self.state = self.state, state
+        was, self.state, self._text = self.state, state, text
         if state == "running" and was == "starting":
             return []
         severity, code = _STATE_EVENTS.get(state, ("info", state))

@@ -1,6 +1,6 @@
 """The simulated device as a process: scenario ─▶ samples in real time ─▶ serial line or Modbus.
 
-python -m sim_plant CONFIG
+Started by `rigwatch plant CONFIG` or `python -m sim_plant CONFIG`.
 """
 
 import signal

@@ -1,7 +1,7 @@
 """The adapters that come with rigwatch, and how others are found.
 
-Adapters are entry points in the group `rigwatch.adapters`; the ones here are registered there like those of anybody else. An
-entry point names a callable `factory(section, channels) -> Adapter`.
+Adapters are entry points in the group `rigwatch.adapters`; the ones here are registered there like
+those of anybody else. An entry point names a callable `factory(section, channels) -> Adapter`.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """Input registers through pymodbus, over TCP or a serial line.
 
-pymodbus takes a reply that is too short for good and hides a silent device behind retries: here lengths are checked,
-nothing is retried and every wait has an end.
+pymodbus takes a reply that is too short for good and hides a silent device behind retries: here
+lengths are checked, nothing is retried and every wait has an end.
 """
 
 import contextlib
@@ -101,7 +101,7 @@ class PymodbusRegisters:
             raise ModbusError(f"{self._where}: {found}, expected {count}")
 
 
-class _RtuClient(ModbusSerialClient):  # type: ignore[misc]
+class _RtuClient(ModbusSerialClient):
     """A serial client that waits for bytes instead of looking for them every millisecond."""
 
     def open_port(self) -> None:
@@ -122,7 +122,8 @@ class _RtuClient(ModbusSerialClient):  # type: ignore[misc]
         except (OSError, serial.SerialException):
             data = b""
         if data == b"":
-            self.close()
+            self.socket.close()
+            self.socket = None
             raise ConnectionException(str(self))
         return data or b""
 
@@ -131,8 +132,8 @@ def tcp(section: ModbusSection, channels: tuple[ChannelSection, ...]) -> ModbusA
     """Entry point `modbus-tcp` of the group `rigwatch.adapters`."""
     where = f"{section.host}:{section.port}"
 
-    def make() -> ModbusTcpClient:
-        client = ModbusTcpClient(
+    def make() -> Any:
+        client: Any = ModbusTcpClient(
             section.host, port=section.port, timeout=section.timeout, retries=0
         )
         if not client.connect():

@@ -1,9 +1,10 @@
 """Polling a Modbus device: header, then the slots that have not been read yet.
 
-    32 times a second:   Registers.read(header) ─▶ how many samples are new ─▶ Registers.read(slots) … ─▶ RawBlock
+    32 times a second:  header ─▶ how many samples are new ─▶ their slots ─▶ RawBlock
 
-The same for TCP and RTU, which differ in the `Registers` that is handed in. A poll that fails is counted and the samples
-stay in the device's ring for the next one; after several failures in a row the connection is made anew.
+The same for TCP and RTU, which differ in the `Registers` that is handed in. A poll that fails is
+counted and the samples stay in the device's ring for the next one; after several failures in a row
+the connection is made anew.
 """
 
 import time
@@ -66,6 +67,7 @@ class ModbusAdapter:
         channels: int,
         polls: float = 32.0,
         order: WordOrder = "big",
+        *,
         clock: Callable[[], int] = time.monotonic_ns,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
@@ -95,7 +97,7 @@ class ModbusAdapter:
         self._header()
 
     def read(self, timeout: float) -> Sequence[RawBlock]:
-        """The samples that are new at the next poll; none where that is not due within `timeout` [s].
+        """The samples that are new at the next poll, if that is due within `timeout` [s].
 
         Raises:
             DeviceError: the link is gone, or several polls in a row failed.
@@ -165,8 +167,7 @@ class ModbusAdapter:
             new = header.samples
         self._backwards = 0
         readable = max(header.slots - _MARGIN, 1)
-        if new > readable:
-            new = readable
+        new = min(new, readable)
         self._next_seq = (header.samples - new) % _U32
         return new
 

@@ -1,7 +1,7 @@
 """A recorded session in place of a device, at any speed.
 
-Samples come when they are due by the recording's own clock, calibrated and judged as they were recorded. Their numbers are
-those of the recording; each turn of a loop has a boot of its own.
+Samples come when they are due by the recording's own clock, calibrated and judged as they were
+recorded. Their numbers are those of the recording; each turn of a loop has a boot of its own.
 """
 
 import time
@@ -35,6 +35,7 @@ class ReplayAdapter:
         session: Path | str,
         channels: Sequence[ChannelSection],
         speed: float = 1.0,
+        *,
         loop: bool = False,
         clock: Callable[[], int] = time.monotonic_ns,
         sleep: Callable[[float], None] = time.sleep,
@@ -156,4 +157,4 @@ def _arrived(raw: RawBlock, now_ns: int) -> RawBlock:
 
 def from_section(section: ReplaySection, channels: tuple[ChannelSection, ...]) -> ReplayAdapter:
     """Entry point `replay` of the group `rigwatch.adapters`."""
-    return ReplayAdapter(section.session, channels, section.speed, section.loop)
+    return ReplayAdapter(section.session, channels, section.speed, loop=section.loop)

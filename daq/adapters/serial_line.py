@@ -2,8 +2,8 @@
 
     port (device file or glob) ── SerialPort ──bytes──▶ FrameDecoder ──frames──▶ RawBlock
 
-The port is waited for with `select`, so that a frame is handed on as soon as its last byte is here. A test hands the
-adapter a transport of its own.
+The port is waited for with `select`, so that a frame is handed on as soon as its last byte is here.
+A test hands the adapter a transport of its own.
 """
 
 import errno
@@ -101,7 +101,7 @@ def first_that_opens(pattern: str, opened: Callable[[str], P]) -> P:
         DeviceBusyError: what matches is in use by another process.
         DeviceError: nothing matches, or what matches refuses.
     """
-    paths = sorted(glob.glob(pattern)) if glob.has_magic(pattern) else [pattern]
+    paths = sorted(glob.glob(pattern)) if glob.has_magic(pattern) else [pattern]  # noqa: PTH207
     refusals: list[str] = []
     kind = DeviceError
     for path in paths:
@@ -130,12 +130,16 @@ class SerialAdapter:
     Args:
         source: the line.
         channels: how many channels a frame must have.
+        clock: monotonic time [ns].
     """
 
     clock_rate = 1.0
 
-    def __init__(self, source: ByteSource, channels: int) -> None:
+    def __init__(
+        self, source: ByteSource, channels: int, clock: Callable[[], int] = time.monotonic_ns
+    ) -> None:
         self._source = source
+        self._clock = clock
         self._channels = channels
         self._decoder = FrameDecoder()
         self._bytes = 0
@@ -152,7 +156,7 @@ class SerialAdapter:
             DeviceError: the line is gone, or frames have another number of channels.
         """
         data = self._source.read(timeout)
-        arrived = time.monotonic_ns()
+        arrived = self._clock()
         self._bytes += len(data)
         frames = self._decoder.feed(data)
         for frame in frames:

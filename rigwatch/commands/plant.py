@@ -1,21 +1,21 @@
-"""`rigwatch plant`: serves the simulated rig, talks to a running one, or writes a session of a scenario."""
+"""`rigwatch plant`: serves the simulated rig, talks to a running one, or records a scenario."""
 
 import argparse
 import json
 from pathlib import Path
 
-from rigwatch.wire.errors import ConfigError
-
 HELP = "serve the simulated rig, change it while it runs, or record it faster than real time"
 EXAMPLE = """  rigwatch plant configs/demo.toml
   rigwatch plant configs/demo.toml --set friction=0.4 --over 5
   rigwatch plant configs/demo.toml --line-fault flip=20
-  rigwatch plant configs/demo.toml --session out.mcap --scenario configs/scenarios/experiment_1.toml"""
+  rigwatch plant --session out.mcap configs/scenarios/experiment_1.toml"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="configuration of the rig; a scenario to record"
+    )
     talk = parser.add_argument_group("talk to the simulated rig that runs")
     talk.add_argument(
         "--set", action="append", default=[], metavar="EFFECT=VALUE", help="set an effect"
@@ -29,9 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     talk.add_argument("--tell", metavar="LINE", help="any other line, such as 'restart'")
     record = parser.add_argument_group("record faster than real time")
     record.add_argument("--session", type=Path, metavar="OUT.mcap", help="write a session here")
-    record.add_argument("--scenario", type=Path, metavar="FILE", help="in place of plant.scenario")
-    record.add_argument("--seconds", type=float, metavar="S", help="length, for endless scenarios")
-    record.add_argument("--seed", type=int, metavar="N", help="of the noise, else plant.seed")
+    record.add_argument("--seconds", type=float, metavar="S", help="length, else the scenario's")
+    record.add_argument("--seed", type=int, default=1, metavar="N", help="of the sensors' noise")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -43,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _talk(arguments, lines)
     from sim_plant.__main__ import main
 
-    return main(arguments.config)
+    return main(arguments.file)
 
 
 def _lines(arguments: argparse.Namespace) -> list[str]:
@@ -61,7 +60,7 @@ def _talk(arguments: argparse.Namespace, lines: list[str]) -> int:
     from rigwatch.wire.rig_config import load_rig
     from sim_plant.serve.control import ask, control_path
 
-    path = control_path(load_rig(arguments.config).rig.id)
+    path = control_path(load_rig(arguments.file).rig.id)
     answers = {line: ask(path, line) for line in lines}
     if arguments.json:
         print(json.dumps(answers))
@@ -73,16 +72,10 @@ def _talk(arguments: argparse.Namespace, lines: list[str]) -> int:
 
 def _record(arguments: argparse.Namespace) -> int:
     from rigwatch.simulated import write_session
-    from rigwatch.wire.rig_config import load_rig
 
-    config = load_rig(arguments.config)
-    if config.plant is None and arguments.scenario is None:
-        raise ConfigError(arguments.config, "plant", "no such section", "it, or --scenario FILE")
-    scenario = arguments.scenario or config.plant.scenario
-    seed = arguments.seed if arguments.seed is not None else config.plant.seed
     samples = write_session(
-        arguments.session, scenario, config, seed=seed, seconds=arguments.seconds
+        arguments.session, arguments.file, seed=arguments.seed, seconds=arguments.seconds
     )
-    text = {"session": str(arguments.session), "samples": samples, "scenario": str(scenario)}
-    print(json.dumps(text) if arguments.json else f"{samples} samples in {arguments.session}")
+    figures = {"session": str(arguments.session), "samples": samples, "seed": arguments.seed}
+    print(json.dumps(figures) if arguments.json else f"{samples} samples in {arguments.session}")
     return 0

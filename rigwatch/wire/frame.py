@@ -1,4 +1,4 @@
-"""The frame that the device sends on the serial line, one a sample: COBS around a payload with a CRC-32.
+"""The frame that the device sends for each sample: COBS around a payload with a CRC-32.
 
 Payload, little endian, for n channels::
 
@@ -10,9 +10,9 @@ COBS replaces the zeros of the payload, so that a zero byte ends a frame and occ
 
     | count to next zero | ... payload without zeros ... | 0x00 |
 
-Three channels take 25 bytes, 56 % of a line of 115 200 baud at 256 Hz. `seq` and the microseconds wrap at 2³². A reader
-that joins in the middle of a frame is in step at the next zero byte. CRC-32 and not CRC-16: over ten million
-corrupted frames the shorter one let 150 wrong ones through.
+Three channels take 25 bytes, 56 % of a line of 115 200 baud at 256 Hz. `seq` and the microseconds
+wrap at 2³². A reader that joins in the middle of a frame is in step at the next zero byte. CRC-32
+and not CRC-16: over ten million corrupted frames the shorter one let 150 wrong ones through.
 """
 
 import struct

@@ -1,6 +1,7 @@
 """The registers in which a Modbus device buffers its samples: a header, and a ring of slots.
 
-Input registers (function 4), 16 bits each; values of 32 bits take two, in an order that differs between devices::
+Input registers (function 4), 16 bits each; values of 32 bits take two, in an order that differs
+between devices::
 
     0   identification    u32   0x52494757, "RIGW": tells a wrong word order or another device
     2   version of map    u16   1
@@ -13,9 +14,9 @@ Input registers (function 4), 16 bits each; values of 32 bits take two, in an or
     12… reserved up to 15
     16 + (s mod R)·(4 + n)    the slot of sample s:  s u32 | device µs u32 | n codes i16
 
-A poll reads the header and then the slots that it has not had, at most 125 registers at a time. Every slot carries its
-own number, so that a late reply, or one that was overwritten meanwhile, cannot be taken for something else. A reply is
-consistent in itself: the device copies it in one go.
+A poll reads the header and then the slots that it has not had, at most 125 registers at a time.
+Every slot carries its own number, so that a late reply, or one that was overwritten meanwhile,
+cannot be taken for something else. A reply is consistent in itself: the device copies it in one go.
 """
 
 from dataclasses import dataclass
@@ -120,7 +121,7 @@ def encode_slot(seq: int, device_us: int, codes: list[int], order: WordOrder = "
 def decode_slots(
     registers: list[int], first: int, count: int, header: Header, order: WordOrder = "big"
 ) -> tuple[NDArray[np.int64], NDArray[np.int16]]:
-    """Device microseconds, shape (count,), and codes, shape (count, channels), of samples from `first`.
+    """The samples from `first` on: device microseconds (count,), and codes (count, channels).
 
     Raises:
         ModbusError: too short or too long, or a slot holds another sample.

@@ -1,1 +1,1 @@
-"""The simulated device at its connectors: serial frames on a pty, Modbus over TCP and over a pty."""
+"""The simulated device at its connectors: serial frames on a pty, Modbus over TCP or a pty."""

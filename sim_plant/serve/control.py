@@ -28,7 +28,9 @@ Answer = Callable[[str], str]
 
 def control_path(rig: str) -> Path:
     """Where the plant of the rig called `rig` listens."""
-    return Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"rigwatch-{rig}.plant"
+    return (
+        Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"rigwatch-{rig}.plant"
+    )
 
 
 def ask(path: Path, line: str) -> str:
@@ -46,7 +48,9 @@ def ask(path: Path, line: str) -> str:
                 stream.flush()
                 answer = stream.readline().strip()
     except OSError as error:
-        raise DeviceError(f"no simulated rig answers at {path}: {error.strerror or error}") from error
+        raise DeviceError(
+            f"no simulated rig answers at {path}: {error.strerror or error}"
+        ) from error
     status, _, text = answer.partition(" ")
     if status != "ok":
         raise DeviceError(text or "the simulated rig did not answer")

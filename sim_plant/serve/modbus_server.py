@@ -1,12 +1,13 @@
-"""The device on Modbus, over TCP or over a pty: samples go into the ring in real time, masters read it."""
+"""The device on Modbus, over TCP or a pty: its ring fills in real time, masters read it."""
 
 import asyncio
 import contextlib
 import logging
 import threading
 from collections.abc import Callable
+from typing import Any
 
-from pymodbus import FramerType, ModbusDeviceIdentification
+from pymodbus import FramerType
 from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
@@ -43,6 +44,7 @@ class ModbusServer:
         device: Device,
         bank: RegisterBank,
         rate: float = 256.0,
+        *,
         unit: int = 1,
         trace: TracePacket | None = None,
         heartbeat: Heartbeat | None = None,
@@ -68,12 +70,10 @@ class ModbusServer:
         with bridge:
             asyncio.run(self._serve(lambda: self._rtu(bridge.device_end, baud), stop, "pty"))
 
-    async def _serve(
-        self, make: Callable[[], _Server], stop: threading.Event, where: str
-    ) -> None:
+    async def _serve(self, make: Callable[[], _Server], stop: threading.Event, where: str) -> None:
         pace = Pace(self._rate)
         self._bank.add(self.device.advance(max(pace.due(), 1)))
-        server = make()
+        server: Any = make()
         try:
             await server.serve_forever(background=True)
         except (RuntimeError, OSError) as error:
@@ -109,9 +109,7 @@ class ModbusServer:
         return None
 
     def _tcp(self, host: str, port: int) -> ModbusTcpServer:
-        return ModbusTcpServer(
-            self._sim_device(), address=(host, port), trace_packet=self._trace, identity=_IDENTITY
-        )
+        return ModbusTcpServer(self._sim_device(), address=(host, port), trace_packet=self._trace)
 
     def _rtu(self, port: str, baud: int) -> ModbusSerialServer:
         return ModbusSerialServer(
@@ -120,10 +118,4 @@ class ModbusServer:
             port=port,
             baudrate=baud,
             trace_packet=self._trace,
-            identity=_IDENTITY,
         )
-
-
-_IDENTITY = ModbusDeviceIdentification(
-    info_name={"VendorName": "rigwatch", "ProductCode": "simulated rig"}
-)

@@ -1,4 +1,4 @@
-"""Two pseudo terminals joined back to back: a serial cable between two programs that both want a port."""
+"""Two pseudo terminals back to back: a cable between two programs that both want a port."""
 
 import contextlib
 import os

@@ -1,7 +1,7 @@
 """A serial line made of a pseudo terminal: raw, never waiting for its reader, and pluggable.
 
-The device holds the master's end. A symbolic link gives the other end a name that stays. While nobody has the line open
-its bytes are lost, as on a wire.
+The device holds the master's end. A symbolic link gives the other end a name that stays. While
+nobody has the line open its bytes are lost, as on a wire.
 """
 
 import contextlib

@@ -1,7 +1,8 @@
 """Where a server's samples come from, and the pace at which they are due.
 
-`Device` numbers the samples as a real one does: a boot drawn at its start, counters of 32 bits that wrap. Faults of the
-device itself (a restart, a clock that drifts or jumps) are switched here; faults of the line in `line_faults.py`.
+`Device` numbers the samples as a real one does: a boot drawn at its start, counters of 32 bits that
+wrap. Faults of the device itself (a restart, a clock that drifts or jumps) are switched here;
+faults of the line in `line_faults.py`.
 """
 
 import secrets
@@ -67,6 +68,11 @@ class Device:
         self._previous_us: int | None = None
         self._clock = float(first_us)
         self.drift_ppm = 0.0
+
+    @property
+    def next_seq(self) -> int:
+        """Number of the sample that comes next, not wrapped."""
+        return self._seq
 
     def advance(self, n: int) -> Sent:
         """The next n samples."""

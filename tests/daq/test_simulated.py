@@ -23,6 +23,14 @@ def test_calibration_of_the_demo_is_that_of_the_simulated_sensors() -> None:
     np.testing.assert_allclose(gains, RigParameters().si_per_code, rtol=1e-12)
 
 
+def test_a_scenario_alone_is_calibrated_by_its_sensors() -> None:
+    own, demo = (
+        next(iter(simulate(SCENARIO, channels, seconds=0.5))) for channels in (None, DEMO.channels)
+    )
+    for name in ("voltage", "position", "acceleration"):
+        np.testing.assert_allclose(own.channel(name).values, demo.channel(name).values, rtol=1e-12)
+
+
 def test_samples_are_in_si_and_like_the_thesis() -> None:
     blocks = list(simulate(SCENARIO, DEMO.channels, seconds=2.0))
     voltage = np.concatenate([block.channel("voltage").values for block in blocks])
@@ -47,7 +55,9 @@ def test_session_file_holds_the_same_samples(tmp_path: Path) -> None:
     recorded = list(session.samples())
     assert count == sum(map(len, recorded)) == 5120
     simulated = list(simulate(SCENARIO, DEMO.channels, seconds=20.0, device=DEMO.daq.name))
-    position = [np.concatenate([b.channel("position").values for b in s]) for s in (recorded, simulated)]
+    position = [
+        np.concatenate([b.channel("position").values for b in s]) for s in (recorded, simulated)
+    ]
     np.testing.assert_array_equal(position[0], position[1])
     assert "healthy" in session.info.notes
 

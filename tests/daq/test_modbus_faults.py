@@ -1,0 +1,221 @@
+"""Faults of a Modbus device, by their numbers in the fault catalogue, on real servers.
+
+Each line of the table disturbs some replies of the server. The ring in the device then gives the
+samples a moment later: none may be lost, doubled or wrong.
+"""
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.adapters import adapter_for
+from daq.adapters.modbus_poll import ModbusAdapter, RefusedError
+from rigwatch.wire.errors import DeviceError, ModbusError
+from rigwatch.wire.modbus_map import Header, encode_header
+from rigwatch.wire.ports import free_port
+from sim_plant.serve.modbus_server import ModbusServer
+from sim_plant.serve.pty_bridge import PtyBridge
+from sim_plant.serve.register_bank import RegisterBank
+from sim_plant.serve.source import Device
+from tests.daq.rig import Heard, Running, ToySource, codes_of, config_of, in_thread
+
+Edit = Callable[["Replies", bytes], bytes]
+
+
+class Replies:
+    """Disturbs the next `left` replies of a server with `edit`."""
+
+    def __init__(self, edit: Edit) -> None:
+        self.left = 0
+        self.held = b""
+        self._edit = edit
+
+    def trace(self, sending: bool, data: bytes) -> bytes:
+        if not sending or (self.left == 0 and not self.held):
+            return data
+        self.left = max(self.left - 1, 0)
+        return self._edit(self, data)
+
+
+def short(_replies: Replies, data: bytes) -> bytes:
+    """One register less, with lengths that agree: pymodbus takes it for good."""
+    length, count = int.from_bytes(data[4:6], "big") - 2, data[8] - 2
+    return data[:4] + length.to_bytes(2, "big") + data[6:8] + bytes([count]) + data[9:-2]
+
+
+def late(replies: Replies, data: bytes) -> bytes:
+    """Hold a reply back and send it before the next one."""
+    held, replies.held = replies.held, b"" if replies.held else data
+    return held + data if held else b""
+
+
+def flipped(_replies: Replies, data: bytes) -> bytes:
+    """A bit of the first slot's sample number, or of the identification."""
+    return data[:10] + bytes([data[10] ^ 4]) + data[11:]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Replies that are disturbed, and how often polls must have failed at least."""
+
+    number: int
+    name: str
+    edit: Edit
+    failed: int
+    replies: int = 1
+    link: str = "tcp"
+
+
+FAULTS = [
+    Fault(19, "no reply", lambda r, data: b"", 1),
+    Fault(19, "no reply", lambda r, data: b"", 1, link="rtu"),
+    Fault(19, "silent for four polls", lambda r, data: b"", 3, replies=4),
+    Fault(22, "short reply", short, 1, replies=2),
+    Fault(23, "bit flip", flipped, 1),
+    Fault(23, "bit flip under a checksum", flipped, 1, link="rtu"),
+    Fault(25, "late reply", late, 1),
+    Fault(25, "late reply", late, 1, link="rtu"),
+    Fault(25, "duplicate reply", lambda r, data: data + data, 0, replies=3),
+    Fault(25, "duplicate reply", lambda r, data: data + data, 0, replies=3, link="rtu"),
+]
+
+
+@dataclass
+class ModbusBench:
+    """A server of a device, and the acquisition that polls it."""
+
+    device: Device
+    server: ModbusServer
+    serve: Callable[[threading.Event], None]
+    running: Running
+
+
+@pytest.fixture
+def opened(tmp_path: Path) -> Iterator[Callable[..., ModbusBench]]:
+    made = []
+
+    def open_bench(edit: Edit | None = None, link: str = "tcp", extra: str = "") -> ModbusBench:
+        device = Device(ToySource())
+        replies = Replies(edit or (lambda r, data: data))
+        server = ModbusServer(device, RegisterBank(3), trace=replies.trace)
+        server.replies = replies  # type: ignore[attr-defined]
+        port = free_port()
+        if link == "tcp":
+            section = f'adapter = "modbus-tcp"\nhost = "127.0.0.1"\nport = {port}'
+            serve = lambda stop: server.run_tcp("127.0.0.1", port, stop)  # noqa: E731
+        else:
+            section = f'adapter = "modbus-rtu"\nport = "{tmp_path / "rtu"}"'
+            serve = lambda stop: server.run_rtu(PtyBridge(tmp_path / "rtu"), stop)  # noqa: E731
+        config = config_of(f"{section}\ntimeout = 0.1\n{extra}")
+        adapter = adapter_for(config.daq.device, config.channels)
+        made.append(Running(config, adapter))
+        return ModbusBench(device, server, serve, made[-1])
+
+    yield open_bench
+    for running in made:
+        running.device.close()
+
+
+def every_sample_is_there_and_right(heard: Heard) -> None:
+    numbers = [seq for _, seq in heard.numbers()]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    values = np.concatenate([block.channel("position").values for block in heard.blocks])
+    np.testing.assert_array_equal(values, codes_of(np.array(numbers))[:, 1])
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda f: f"{f.number}-{f.name}-{f.link}")
+def test_fault(fault: Fault, opened: Callable[..., ModbusBench]) -> None:
+    bench = opened(fault.edit, fault.link)
+    with in_thread(bench.serve):
+        bench.running.more(20)
+        bench.server.replies.left = fault.replies  # type: ignore[attr-defined]
+        heard = bench.running.more(60)
+    assert bench.running.adapter.counters()["failed_polls"] >= fault.failed
+    every_sample_is_there_and_right(heard)
+
+
+@pytest.mark.parametrize(("code", "word"), [(2, "illegal address"), (6, "busy")])
+def test_20_exception_codes_are_named(
+    code: int, word: str, opened: Callable[..., ModbusBench]
+) -> None:
+    bench = opened()
+    with in_thread(bench.serve):
+        bench.running.more(20)
+        bench.server.exception = code
+        wanted = f"exception code {code}, {word}"
+        bench.running.until(lambda heard: any(wanted in text for text in texts(heard)))
+        bench.server.exception = 0
+        heard = bench.running.more(20)
+    every_sample_is_there_and_right(heard)
+
+
+def test_21_word_order_is_checked_before_the_first_sample(
+    opened: Callable[..., ModbusBench],
+) -> None:
+    bench = opened(extra='word_order = "little"')
+    with in_thread(bench.serve):
+        heard = bench.running.until(lambda h: any("word order" in e for e in texts(h)))
+    assert "set word_order = 'big'" in " ".join(texts(heard))
+    assert heard.count() == 0
+
+
+def texts(heard: Heard) -> list[str]:
+    return [event.text for event in heard.messages if hasattr(event, "text")]
+
+
+def test_24_a_server_that_was_away_is_found_again(opened: Callable[..., ModbusBench]) -> None:
+    bench = opened()
+    with in_thread(bench.serve):
+        bench.running.more(20)
+    bench.running.until(lambda heard: "link_lost" in heard.events())
+    with in_thread(bench.serve):
+        heard = bench.running.more(20)
+    assert heard.health.counters["reconnects"] >= 1 or bench.running.device.reconnects >= 1
+    every_sample_is_there_and_right(heard)
+
+
+def test_24_a_restarted_device_has_a_new_boot(opened: Callable[..., ModbusBench]) -> None:
+    bench = opened()
+    with in_thread(bench.serve):
+        bench.running.more(20)
+        bench.device.restart()
+        heard = bench.running.until(lambda h: "boot_changed" in h.events())
+        heard = bench.running.more(20)
+    assert len({boot for boot, _ in heard.numbers()}) == 2
+    assert heard.numbers()[-1][0] == bench.device.boot
+
+
+class Still:
+    """Registers that always hold the same."""
+
+    def __init__(self, header: Header) -> None:
+        self.header = header
+
+    def open(self) -> None: ...
+
+    def close(self) -> None: ...
+
+    def read(self, address: int, count: int) -> list[int]:
+        return encode_header(self.header)[address : address + count]
+
+
+def test_another_number_of_channels_is_refused() -> None:
+    adapter = ModbusAdapter(Still(Header(2, 1, 5, 0, 64)), channels=3)
+    with pytest.raises(RefusedError, match="the device has 2 channels, the configuration has 3"):
+        adapter.open()
+
+
+def test_a_device_that_always_fails_is_given_up_and_opened_anew() -> None:
+    registers = Still(Header(3, 1, 0, 0, 64))
+    adapter = ModbusAdapter(registers, channels=3, sleep=lambda seconds: None, polls=1e6)
+    adapter.open()
+    registers.read = lambda address, count: [0] * (count - 1)  # type: ignore[method-assign]
+    assert [adapter.read(1.0), adapter.read(1.0)] == [(), ()]
+    with pytest.raises(DeviceError, match="3 polls in a row failed, the last: a reply of 15 reg"):
+        adapter.read(1.0)
+    with pytest.raises(ModbusError):
+        adapter.open()
