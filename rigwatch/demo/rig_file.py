@@ -18,6 +18,7 @@ from rigwatch.wire.rig_config import (
     MonitorSection,
     PlantSection,
     RecorderSection,
+    RigSection,
     SerialSection,
     load_rig,
 )
@@ -52,9 +53,11 @@ def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
     config = load_rig(source)
     if config.plant is None:
         raise ConfigError(source, "plant", "no such section", "a simulated rig")
+    bus = _free_bus(config.bus)
     own = structs.replace(
         config,
-        bus=_free_bus(config.bus),
+        rig=config.rig if bus is config.bus else _another(config.rig, bus),
+        bus=bus,
         daq=_serial(config.daq, folder),
         plant=_plant(config.plant, folder),
         monitor=_monitor(config.monitor, folder),
@@ -76,6 +79,11 @@ def _free_bus(bus: BusSection) -> BusSection:
         return bus
     endpoint = f"tcp/{_HOST}:{free_port(_HOST)}"
     return structs.replace(bus, router=endpoint, listen=endpoint)
+
+
+def _another(rig: RigSection, bus: BusSection) -> RigSection:
+    """The rig under a name of its own, beside one that is up already."""
+    return structs.replace(rig, id=f"{rig.id}-{bus.listen.rpartition(':')[2]}")
 
 
 def _line(folder: Path) -> str:
