@@ -6,6 +6,12 @@ import os
 import signal
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.wire.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rigwatch.dashboard.facts import Facts
 
 HELP = "show a rig live: signals, residual, friction estimates, alarms and what to do"
 EXAMPLE = """  rigwatch dashboard configs/demo.toml
@@ -38,6 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
     bus = connect(config, "dashboard")
     choice = arguments.viewer or settings.viewer
     live = LiveDashboard(bus, settings, choice, _say_json if arguments.json else _say)
+    if config.monitor is not None:
+        _know_model(live.facts, config.monitor.model)
     for ending in (signal.SIGTERM, signal.SIGINT):
         signal.signal(ending, lambda *_: live.stop.set())
     try:
@@ -45,6 +53,17 @@ def run(arguments: argparse.Namespace) -> int:
     finally:
         bus.close()
     return 0
+
+
+def _know_model(facts: "Facts", path: str) -> None:
+    """Take signature and limits from the model; a screen without them is better than none."""
+    from rigwatch.commands._marks import marks_of
+
+    facts.model = Path(path).name
+    try:
+        facts.marks = marks_of(path)
+    except ConfigError as error:
+        _say(f"signature and limits are not shown: {error}")
 
 
 def _say(text: str) -> None:

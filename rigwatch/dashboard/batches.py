@@ -4,7 +4,7 @@ Drawing sample by sample costs ten times as much of a core, and many small chunk
 lag by seconds.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,17 +22,22 @@ class Batches:
     """What has not been sent yet, by path of the plot.
 
     Attributes:
+        marks: figures that stay the same, such as "theta1_signature", by name.
+        waiting: times and values, by path.
         styled: paths whose colours and names the viewer already knows.
     """
 
+    marks: Mapping[str, float]
     waiting: dict[str, list[tuple[IntArray, FloatArray]]] = field(default_factory=dict)
     styled: set[str] = field(default_factory=set)
 
     def add(self, plot: Plot, t_ns: IntArray, columns: Iterable[Column]) -> FloatArray:
         """Gather the plot's columns; returns what will be drawn, shape (n, series)."""
         by_name = {column.name: column.values for column in columns}
-        missing = np.full(len(t_ns), np.nan)
-        drawn = plot.scale * np.stack([by_name.get(s.column, missing) for s in plot.series], axis=1)
+        drawn = np.empty((len(t_ns), len(plot.series)))
+        for place, series in enumerate(plot.series):
+            mark = self.marks.get(series.column, np.nan)
+            drawn[:, place] = plot.scale * by_name.get(series.column, mark)
         self.waiting.setdefault(plot.path, []).append((t_ns, drawn))
         return drawn
 

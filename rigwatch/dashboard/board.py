@@ -44,7 +44,7 @@ class Dashboard:
         stream: where to; already connected to a viewer or a file.
         facts: what is known already; carried on.
         windows: how much time the plots show.
-        live: whether the screen follows the newest data.
+        bare: leave out what serves to operate the viewer, for pictures.
     """
 
     def __init__(
@@ -53,13 +53,13 @@ class Dashboard:
         facts: Facts,
         windows: Windows | None = None,
         *,
-        live: bool = True,
+        bare: bool = False,
     ) -> None:
         self.facts = facts
-        self.now_ns = 0
-        self._stream, self._live = stream, live
+        self.began_ns = self.now_ns = 0
+        self._stream, self._bare = stream, bare
         self._windows = windows or Windows()
-        self._survey, self._batches = Survey(), Batches()
+        self._survey, self._batches = Survey(), Batches(facts.marks)
         self._plan: tuple[PlotPlan, ...] | None = None
         self._lanes = Lanes(stream, facts.book)
         self._said_ns = 0
@@ -95,15 +95,12 @@ class Dashboard:
                 self._say()
 
     def _samples(self, block: SampleBlock) -> None:
-        known = {plot.key for plot in quantities.SAMPLE_PLOTS}
-        others = (column for column in block.channels if column.name not in known)
-        plots = quantities.plots_of(block.channels, quantities.SAMPLE_PLOTS)
-        plots += [quantities.other_plot(column, place) for place, column in enumerate(others)]
+        plots = quantities.plots_of(block.channels, quantities.SAMPLE_PLOTS, "signals")
         self._plot(plots, block.t_ns, block.channels)
         self.facts.see_samples(block)
 
     def _estimates(self, block: EstimateBlock) -> None:
-        plots = quantities.plots_of(block.columns, quantities.ESTIMATE_PLOTS)
+        plots = quantities.plots_of(block.columns, quantities.ESTIMATE_PLOTS, quantities.DETAILS)
         self._plot(plots, block.t_ns, block.columns)
         self.facts.see_estimates(block)
 
@@ -113,11 +110,11 @@ class Dashboard:
         if len(t_ns):
             for plot in plots:
                 self._survey.see(plot, columns, self._batches.add(plot, t_ns, columns))
-            self._reach(int(t_ns[-1]))
+            self._reach(int(t_ns[0]), int(t_ns[-1]))
 
     def _alarm(self, alarm: Alarm) -> None:
         self.facts.book.record(alarm)
-        self._reach(alarm.t_ns)
+        self._reach(alarm.t_ns, alarm.t_ns)
         self._lanes.alarm(alarm)
         self._lanes.verdict(self.facts.verdict(), alarm.t_ns)
         self._line(at.LOG, alarm.t_ns, words.alarm_line(alarm), words.alarm_level(alarm))
@@ -143,9 +140,11 @@ class Dashboard:
         self._at(t_ns)
         self._stream.log(path, rr.TextLog(text, level=level))
 
-    def _reach(self, t_ns: int) -> None:
-        self.now_ns = max(self.now_ns, t_ns)
-        self._lanes.begin(t_ns)
+    def _reach(self, first_ns: int, last_ns: int) -> None:
+        self.now_ns = max(self.now_ns, last_ns)
+        if not self.began_ns:
+            self.began_ns = first_ns
+            self._lanes.begin(first_ns)
 
     def _at(self, t_ns: int) -> None:
         self._stream.set_time(at.TIMELINE, timestamp=np.datetime64(t_ns, "ns"))
@@ -154,7 +153,7 @@ class Dashboard:
         plan = self._survey.plan()
         if plan != self._plan:
             self._plan = plan
-            layout = blueprint(plan, self._windows, live=self._live)
+            layout = blueprint(plan, self._windows, bare=self._bare)
             rr.send_blueprint(layout, recording=self._stream)
 
     def _say(self) -> None:

@@ -63,3 +63,4 @@ class Drawer:
             self.facts.skipped = self._feed.skipped
             dashboard.flush(time.time_ns())
         stream.flush(timeout_sec=_FLUSH_TIMEOUT)
+        stream.disconnect()

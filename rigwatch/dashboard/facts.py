@@ -1,5 +1,6 @@
 """What is known of the rig now, as far as people are told: no drawing, no bus, no clock."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,6 +39,8 @@ class Facts:
         health: last health message of each process, by source.
         figures: last value of each estimated figure, by column name.
         age: of the newest sample drawn; known only live.
+        marks: figures of the model that stay the same, such as "theta1_signature".
+        model: the model's name.
         silent_s: time without samples [s], 0 while they come.
         skipped: messages that the dashboard left out because it was slow.
         samples: samples drawn.
@@ -48,6 +51,8 @@ class Facts:
     health: dict[str, Health] = field(default_factory=dict)
     figures: dict[str, float] = field(default_factory=dict)
     age: Age = field(default_factory=Age)
+    marks: Mapping[str, float] = field(default_factory=dict)
+    model: str = ""
     silent_s: float = 0.0
     skipped: int = 0
     samples: int = 0
@@ -88,4 +93,11 @@ class Facts:
             return "over"
         if self.book.remarks():
             return "no_verdict"
-        return "healthy" if self.figures else "waiting"
+        return self._calm()
+
+    def _calm(self) -> str:
+        if not self.figures:
+            return "waiting"
+        if not self.figures.get("armed", 1.0):
+            return "learning"
+        return "healthy" if self.figures.get("observable", 1.0) else "no_verdict"

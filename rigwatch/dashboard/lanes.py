@@ -23,18 +23,15 @@ class Lanes:
     def __init__(self, stream: rr.RecordingStream, book: AlarmBook) -> None:
         self._stream, self._book = stream, book
         self._verdict = ""
-        self._begun = False
         self._names: set[str] = set()
         self._configure(at.VERDICT, palette.VERDICTS)
         for name in (*LANES, *(alarm.name for alarm in book.faults())):
             self._add(name)
 
     def begin(self, t_ns: int) -> None:
-        """Let all lanes start, the first time that a time is known."""
-        if not self._begun:
-            self._begun = True
-            for name in self._names:
-                self._start(name, t_ns)
+        """Let the lanes start; to be called once, when a first time is known."""
+        for name in self._names:
+            self._start(name, t_ns)
 
     def alarm(self, alarm: Alarm) -> None:
         """One transition, on its own lane."""

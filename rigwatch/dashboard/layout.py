@@ -14,18 +14,8 @@ import rerun.blueprint as rrb
 
 from rigwatch.dashboard import entities as at
 from rigwatch.dashboard import quantities
+from rigwatch.dashboard.quantities import DETAILS
 from rigwatch.dashboard.survey import PlotPlan
-
-_TITLES = {
-    quantities.VOLTAGE.path: "Servo voltage",
-    quantities.FORCE.path: "Force",
-    quantities.POSITION.path: "Position",
-    quantities.RESIDUAL.path: "Residual acceleration with limits",
-    quantities.THETA1.path: "Coulomb friction θ1 with thresholds and signature",
-    quantities.THETA2.path: "Viscous friction θ2 with thresholds and signature",
-}
-FRICTION = (quantities.THETA1.path, quantities.THETA2.path)
-ACCELERATION_TITLE = "Acceleration, measured and modelled"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,18 +31,19 @@ class Windows:
     history: float | None = 60.0
 
 
-def blueprint(plan: Sequence[PlotPlan], windows: Windows, *, live: bool) -> rrb.Blueprint:
+def blueprint(plan: Sequence[PlotPlan], windows: Windows, *, bare: bool) -> rrb.Blueprint:
     """The whole layout for the plots that exist.
 
     Args:
         plan: the plots, with units and ranges.
         windows: how much time they show.
-        live: whether the cursor follows the newest data.
+        bare: leave out what serves to operate the viewer.
     """
     return rrb.Blueprint(
-        rrb.Tabs(_watch(plan, windows), _health(windows), active_tab=0),
+        rrb.Tabs(*_tabs(plan, windows), active_tab=0),
+        rrb.TopPanel(state="hidden" if bare else "expanded"),
         rrb.TimePanel(
-            state="collapsed", timeline=at.TIMELINE, play_state="following" if live else "paused"
+            state="hidden" if bare else "collapsed", timeline=at.TIMELINE, play_state="following"
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
@@ -61,19 +52,17 @@ def blueprint(plan: Sequence[PlotPlan], windows: Windows, *, live: bool) -> rrb.
     )
 
 
-def title_of(plan: PlotPlan) -> str:
-    """Title of a plot's view, with the unit."""
-    return f"{_TITLES.get(plan.plot.path, plan.plot.series[-1].label.capitalize())}{_in(plan.unit)}"
-
-
-def _in(unit: str) -> str:
-    shown = unit.replace("^2", "²").replace("^3", "³")
-    return f" [{shown}]" if unit not in ("", "1") else ""
+def _tabs(plan: Sequence[PlotPlan], windows: Windows) -> list[rrb.Container]:
+    details = [
+        _series_view(line, windows.history) for line in plan if line.plot.path.startswith(DETAILS)
+    ]
+    middle = [rrb.Grid(*details, grid_columns=2, name="Details")] if details else []
+    return [_watch(plan, windows), *middle, _health(windows)]
 
 
 def _watch(plan: Sequence[PlotPlan], windows: Windows) -> rrb.Container:
     by_path = {line.plot.path: line for line in plan}
-    friction = [by_path[path] for path in FRICTION if path in by_path]
+    friction = [by_path[path] for path in quantities.FRICTION if path in by_path]
     right: list[rrb.Container | rrb.View] = [
         rrb.Horizontal(
             rrb.TextDocumentView(origin=at.ADVICE if plan else at.WAITING, name=at.ADVICE_VIEW),
@@ -83,7 +72,7 @@ def _watch(plan: Sequence[PlotPlan], windows: Windows) -> rrb.Container:
         *(_series_view(line, windows.history) for line in friction),
         _log_view(at.LOG, at.LOG_VIEW),
     ]
-    shares = [2.8, 2.2, *[1.9] * len(friction), 1.4]
+    shares = [2.7, 2.4, *[1.9] * len(friction), 1.4]
     columns: list[rrb.Container] = [rrb.Vertical(*right, row_shares=shares)]
     if left := _signal_views(plan, windows):
         columns.insert(0, rrb.Vertical(*left))
@@ -106,43 +95,26 @@ def _log_view(origin: str, name: str) -> rrb.View:
 
 
 def _signal_views(plan: Sequence[PlotPlan], windows: Windows) -> list[rrb.View]:
-    """One view a signal, in the order of the table; both accelerations in one."""
-    views: list[rrb.View] = []
+    """One view a signal, in the order of the table, strangers last; both accelerations in one."""
     order = [plot.path for plot in (*quantities.SAMPLE_PLOTS, *quantities.ESTIMATE_PLOTS)]
-    lines = sorted(plan, key=lambda p: order.index(p.plot.path) if p.plot.path in order else 3.5)
-    pair = (quantities.MEASURED.path, quantities.MODELLED.path)
-    done: set[str] = set()
-    for line in lines:
-        path = line.plot.path
-        if path in FRICTION or path in done:
-            continue
-        if path in pair:
-            done.update(pair)
-            views.append(_acceleration_view(line, windows.signals))
-        else:
-            views.append(_series_view(line, windows.signals))
-    return views
+    shown = [
+        line for line in plan if not line.plot.path.startswith((*quantities.FRICTION, DETAILS))
+    ]
+    shown.sort(key=lambda line: order.index(line.plot.path) if line.plot.path in order else 99)
+    views: dict[str, rrb.View] = {}
+    for line in shown:
+        views.setdefault(line.title, _series_view(line, windows.signals))
+    return list(views.values())
 
 
 def _series_view(line: PlotPlan, window: float | None) -> rrb.View:
-    many = len(line.plot.series) > 1
-    return _time_series(line.plot.path, title_of(line), line, window, legend=many)
-
-
-def _acceleration_view(line: PlotPlan, window: float | None) -> rrb.View:
-    title = f"{ACCELERATION_TITLE}{_in(line.unit)}"
-    return _time_series("signals/acceleration", title, line, window, legend=True)
-
-
-def _time_series(
-    origin: str, name: str, line: PlotPlan, window: float | None, *, legend: bool
-) -> rrb.View:
+    pair = line.plot in (quantities.MEASURED, quantities.MODELLED)
     return rrb.TimeSeriesView(
-        origin=origin,
-        name=name,
+        origin=quantities.ACCELERATION if pair else line.plot.path,
+        name=line.title,
         axis_x=_time_axis(window),
         axis_y=rrb.ScalarAxis(range=line.range) if line.range else None,
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=pair or len(line.plot.series) > 1),
         time_ranges=_visible(window),
     )
 

@@ -4,7 +4,16 @@ import threading
 from collections.abc import Callable
 from typing import Literal
 
-from rigwatch.dashboard.viewer import ForeignViewer, Kind, Viewer, ViewerError, answers, has_display
+from rigwatch.dashboard.viewer import (
+    LIVE_MEMORY,
+    ForeignViewer,
+    Kind,
+    Memory,
+    Viewer,
+    ViewerError,
+    answers,
+    has_display,
+)
 from rigwatch.wire.rig_config import DashboardSection
 
 Choice = Literal["auto", "native", "web", "connect", "headless"]
@@ -17,6 +26,8 @@ def open_viewer(
     stop: threading.Event,
     say: Callable[[str], None],
     tick: Callable[[], None],
+    *,
+    memory: Memory = LIVE_MEMORY,
 ) -> Viewer | ForeignViewer | None:
     """A viewer that takes data; None when stopped while waiting for one.
 
@@ -26,6 +37,7 @@ def open_viewer(
         stop: ends waiting.
         say: takes remarks for people.
         tick: called a few times a second while waiting.
+        memory: how much it may keep.
 
     Raises:
         ViewerError: none can be started.
@@ -33,23 +45,27 @@ def open_viewer(
     if choice == "connect":
         return _wait_for(settings.grpc_port, stop, say, tick)
     if choice != "auto":
-        return _start(choice, settings, say, tick)
+        return _start(choice, settings, say, tick, memory)
     if has_display():
         try:
-            return _start("native", settings, say, tick)
+            return _start("native", settings, say, tick, memory)
         except ViewerError as error:
             say(f"{error}; a web page takes the window's place")
-    return _start("web", settings, say, tick)
+    return _start("web", settings, say, tick, memory)
 
 
 def _start(
-    kind: Kind, settings: DashboardSection, say: Callable[[str], None], tick: Callable[[], None]
+    kind: Kind,
+    settings: DashboardSection,
+    say: Callable[[str], None],
+    tick: Callable[[], None],
+    memory: Memory,
 ) -> Viewer:
     # A browser's address should stay the same; a window does not care where it takes its data.
     port = settings.grpc_port if kind == "web" or not answers(settings.grpc_port) else 0
-    viewer = Viewer(kind, port, settings.web_port).await_answer(tick)
+    viewer = Viewer(kind, port, settings.web_port, memory).await_answer(tick)
     if kind == "web":
-        say(f"dashboard: open {viewer.web_url} in a browser on this machine")
+        say(f"open {viewer.web_url} in a browser on this machine")
     return viewer
 
 

@@ -12,11 +12,14 @@ VOLTAGE: Colour = (88, 160, 255)
 POSITION: Colour = (76, 205, 140)
 ACCELERATION: Colour = (255, 165, 60)
 MODEL: Colour = (196, 150, 255)
-RESIDUAL: Colour = (235, 225, 120)
+RESIDUAL: Colour = (120, 116, 84)
+CHANGE: Colour = (240, 226, 90)
 THETA1: Colour = (255, 110, 190)
 THETA2: Colour = (70, 205, 220)
 LIMIT: Colour = (235, 75, 75)
 SIGNATURE: Colour = (245, 245, 245)
+DEVIATION: Colour = (255, 140, 105)
+VELOCITY: Colour = (120, 215, 175)
 OTHERS: tuple[Colour, ...] = ((160, 190, 220), (220, 180, 150), (170, 210, 150), (210, 160, 210))
 """For channels and counters that have no colour of their own."""
 
@@ -32,6 +35,7 @@ STATES: dict[AlarmState, tuple[str, Colour]] = {
 _ALARM: Colour = STATES["unacknowledged"][1]
 VERDICTS: dict[str, tuple[str, Colour]] = {
     "waiting": ("no estimates yet", (70, 70, 78)),
+    "learning": ("learning what is healthy", (60, 90, 130)),
     "healthy": ("healthy", (36, 140, 84)),
     "no_verdict": ("no verdict", (84, 92, 110)),
     "over": ("over, not yet seen", (150, 110, 30)),

@@ -1,11 +1,12 @@
 """Which column of a message is drawn where: one row a plot, one line a series.
 
-A plot is one entity with several scalars, so that one batch a plot travels to the viewer. Its last
-series, which is drawn on top, decides whether the plot exists; a message without the others leaves
-them out (NaN). Channels without a row of their own get a plot each under `signals/other`.
+A plot is one entity with several scalars, so that one batch a plot travels to the viewer. Its `key`
+decides whether the plot exists; other columns that a message lacks come from the marks, figures
+that stay the same such as the signature of a fault, or are left out. Columns without a row get a
+plot of their own.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from rigwatch.dashboard import palette
@@ -15,10 +16,10 @@ from rigwatch.wire.messages import Column
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One line of a plot.
+    """One line of a plot; later ones are drawn on top.
 
     Attributes:
-        column: name of the column in the message.
+        column: name of the column in the message, or of a mark.
         label: what the legend says.
         colour: (red, green, blue).
         width: stroke width in points.
@@ -36,61 +37,128 @@ class Plot:
 
     Attributes:
         path: the entity.
+        key: the column that must be there.
         series: its scalars, in order.
+        title: of its view, without the unit.
         scale: the drawn value is the SI value times this.
         unit: unit of the drawn value; "" takes the column's own.
     """
 
     path: str
+    key: str
     series: tuple[Series, ...]
+    title: str
     scale: float = 1.0
     unit: str = ""
 
-    @property
-    def key(self) -> str:
-        """Name of the column that decides whether the plot exists."""
-        return self.series[-1].column
+
+def _single(path: str, column: str, title: str, colour: Colour) -> Plot:
+    return Plot(path, column, (Series(column, title.lower(), colour),), title)
 
 
-def _limited(path: str, column: str, label: str, colour: Colour) -> Plot:
-    limits = (
+def _limits(column: str) -> tuple[Series, Series]:
+    """Both limits under one name, so that the legend shows them once."""
+    return (
         Series(f"{column}_low", "limit", palette.LIMIT, 1.2),
         Series(f"{column}_high", "limit", palette.LIMIT, 1.2),
     )
-    return Plot(path, (*limits, Series(column, label, colour)))
 
 
-def _friction(path: str, column: str, label: str, colour: Colour) -> Plot:
-    low, high, estimate = _limited(path, column, label, colour).series
+def _friction(path: str, column: str, label: str, title: str, colour: Colour) -> Plot:
     signature = Series(f"{column}_signature", "signature", palette.SIGNATURE, 1.2)
-    return Plot(path, (low, high, signature, estimate))
+    series = (*_limits(column), signature, Series(column, label, colour, 2.0))
+    return Plot(path, column, series, title)
 
 
-VOLTAGE = Plot("signals/voltage", (Series("voltage", "servo voltage", palette.VOLTAGE),))
-FORCE = Plot("signals/force", (Series("force", "force", palette.VOLTAGE),))
-POSITION = Plot("signals/position", (Series("position", "position", palette.POSITION),), 1e3, "mm")
+VOLTAGE = _single("signals/voltage", "voltage", "Servo voltage", palette.VOLTAGE)
+FORCE = _single("signals/force", "force", "Force", palette.VOLTAGE)
+POSITION = Plot(
+    "signals/position",
+    "position",
+    (Series("position", "position", palette.POSITION),),
+    "Position",
+    scale=1e3,
+    unit="mm",
+)
+ACCELERATION_TITLE = "Acceleration, measured and modelled"
+ACCELERATION = "signals/acceleration"
 MEASURED = Plot(
-    "signals/acceleration/measured", (Series("acceleration", "measured", palette.ACCELERATION),)
+    f"{ACCELERATION}/measured",
+    "acceleration",
+    (Series("acceleration", "measured", palette.ACCELERATION),),
+    ACCELERATION_TITLE,
 )
 MODELLED = Plot(
-    "signals/acceleration/modelled", (Series("acceleration_model", "modelled", palette.MODEL),)
+    f"{ACCELERATION}/modelled",
+    "modelled_acceleration",
+    (Series("modelled_acceleration", "modelled", palette.MODEL),),
+    ACCELERATION_TITLE,
 )
-RESIDUAL = _limited("monitor/residual", "residual", "residual", palette.RESIDUAL)
-THETA1 = _friction("monitor/theta1", "theta1", "θ1", palette.THETA1)
-THETA2 = _friction("monitor/theta2", "theta2", "θ2", palette.THETA2)
+RESIDUAL = Plot(
+    "monitor/residual",
+    "residual",
+    (
+        *_limits("change"),
+        Series("residual", "residual", palette.RESIDUAL),
+        Series("change", "change since healthy", palette.CHANGE),
+    ),
+    "Residual acceleration and its change, with limits",
+)
+THETA1 = _friction(
+    "monitor/theta1",
+    "theta1",
+    "θ1",
+    "Coulomb friction θ1 with thresholds and signature",
+    palette.THETA1,
+)
+THETA2 = _friction(
+    "monitor/theta2",
+    "theta2",
+    "θ2",
+    "Viscous friction θ2 with thresholds and signature",
+    palette.THETA2,
+)
+DEVIATION = Plot(
+    "details/deviation",
+    "deviation",
+    (
+        Series("deviation_high", "limit", palette.LIMIT, 1.2),
+        Series("deviation", "deviation", palette.DEVIATION),
+    ),
+    "Deviation from the healthy rig, in standard deviations",
+)
+SHARES = Plot(
+    "details/shares",
+    "friction_fit",
+    (
+        Series("friction_fit", "explained by friction", palette.THETA1),
+        Series("friction_share", "jump at reversals", palette.THETA2),
+        Series("rest", "time at rest", palette.POSITION),
+    ),
+    "What the change looks like, as shares",
+)
+VELOCITY = _single(
+    "details/velocity", "velocity", "Velocity, from the accelerometer", palette.VELOCITY
+)
 
 SAMPLE_PLOTS = (VOLTAGE, FORCE, POSITION, MEASURED)
-ESTIMATE_PLOTS = (MODELLED, RESIDUAL, THETA1, THETA2)
-OTHER = "signals/other"
+ESTIMATE_PLOTS = (MODELLED, RESIDUAL, THETA1, THETA2, DEVIATION, SHARES, VELOCITY)
+FRICTION = (THETA1.path, THETA2.path)
+DETAILS = "details"
+_IN_WORDS = {"armed", "observable", "verdict"}
+_PLACED = _IN_WORDS | {s.column for p in (*SAMPLE_PLOTS, *ESTIMATE_PLOTS) for s in p.series}
 
 
-def other_plot(column: Column, index: int) -> Plot:
-    """The plot of a channel that has no row above."""
-    colour = palette.OTHERS[index % len(palette.OTHERS)]
-    return Plot(f"{OTHER}/{column.name}", (Series(column.name, column.name, colour),))
-
-
-def plots_of(columns: Iterable[Column], table: tuple[Plot, ...]) -> list[Plot]:
-    """The rows of `table` whose key is among `columns`."""
+def plots_of(columns: Collection[Column], table: tuple[Plot, ...], others: str) -> list[Plot]:
+    """The rows of `table` for these columns, and a plot below `others` for each that has no row."""
     names = {column.name for column in columns}
-    return [plot for plot in table if plot.key in names]
+    strangers = [column.name for column in columns if column.name not in _PLACED]
+    own = [
+        _single(f"{others}/{name}", name, name.replace("_", " ").capitalize(), _colour(place))
+        for place, name in enumerate(strangers)
+    ]
+    return [plot for plot in table if plot.key in names] + own
+
+
+def _colour(place: int) -> Colour:
+    return palette.OTHERS[place % len(palette.OTHERS)]

@@ -29,14 +29,18 @@ def symmetric(peak: float) -> Range | None:
 
 
 def around_signature(signature: float, low: float, high: float) -> Range | None:
-    """A range that holds zero, thresholds and signature of a fault, whatever the estimate does.
+    """A round range that holds zero, thresholds and signature, whatever the estimate does.
 
-    Estimates have no physical meaning before a fault and may be huge when the rig hardly moves;
-    the plot is about how they stand to thresholds and signature.
+    Estimates have no physical meaning before a fault and may be huge when the rig hardly moves; the
+    plot is about how they stand to thresholds and signature. None where these are unknown.
     """
-    marks = [value for value in (0.0, signature, low, high) if math.isfinite(value)]
-    span = max(marks) - min(marks)
-    return (min(marks) - 0.4 * span, max(marks) + 0.4 * span) if span > 0 else None
+    if not math.isfinite(signature):
+        return None
+    reach = max(abs(mark) for mark in (signature, low, high) if math.isfinite(mark))
+    if reach <= 0:
+        return None
+    edge = nice_above(1.2 * reach)
+    return -0.5 * edge, edge
 
 
 def peak(values: FloatArray) -> float:

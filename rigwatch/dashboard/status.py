@@ -12,6 +12,15 @@ from rigwatch.wire.messages import Alarm
 _UNITS = {"hz": "Hz", "ms": "ms", "us": "µs", "ppm": "ppm", "s": "s"}
 _SIGNATURES = (("theta1", "Coulomb θ1"), ("theta2", "viscous θ2"))
 
+_CALM = {
+    "waiting": ("# No estimates yet", "Samples arrive; the monitor is silent so far."),
+    "learning": ("# Learning", "The monitor is learning how this run looks while it is healthy."),
+    "no_verdict": ("# No verdict now", "Too little motion to see friction. Move the rig."),
+    "healthy": ("# Healthy", "The rig moves as its model says. Nothing to do."),
+}
+_ALWAYS = ("rate_hz", "lost_samples", "crc_errors")
+_WHEN_NOT_ZERO = ("recovered", "skipped", "dropped", "reconnects", "restarts", "rejected")
+
 
 def advice(facts: Facts) -> str:
     """Is there a fault, what is it probably, and what to do."""
@@ -34,10 +43,8 @@ def advice(facts: Facts) -> str:
 def _calm(facts: Facts, remarks: Sequence[Alarm]) -> str:
     if remarks:
         return _paragraphs("# No verdict now", _sentence(remarks[0].cause), remarks[0].guidance)
-    if not facts.figures:
-        return _paragraphs("# No estimates yet", "Samples arrive; the monitor is silent so far.")
-    text = "The rig moves as its model says: no sign of friction. Nothing to do."
-    return _paragraphs("# Healthy", text, _friction(facts))
+    title, text = _CALM[facts.verdict()]
+    return _paragraphs(title, text, _friction(facts))
 
 
 def status(facts: Facts) -> str:
@@ -50,7 +57,21 @@ def status(facts: Facts) -> str:
     complaints = [f"* {h.source}: {h.state}, {h.text}" for h in facts.health.values() if h.text]
     if facts.skipped:
         complaints.append(f"* this screen left out {facts.skipped} messages to keep up")
-    return _paragraphs("\n".join(complaints), "\n".join([*head, *rows]) if rows else "")
+    return _paragraphs(
+        _model(facts), "\n".join(complaints), "\n".join([*head, *rows]) if rows else ""
+    )
+
+
+def _model(facts: Facts) -> str:
+    """With which model, and whether it is in a state to judge."""
+    parts = [f"model **{facts.model}**" if facts.model else "", f"{facts.samples} samples"]
+    for name, yes, no in (
+        ("armed", "armed", "not armed yet"),
+        ("observable", "friction observable", "friction not observable"),
+    ):
+        if name in facts.figures:
+            parts.append(yes if facts.figures[name] else no)
+    return ", ".join(filter(None, parts))
 
 
 def _paragraphs(*parts: str) -> str:
@@ -73,7 +94,7 @@ def _friction(facts: Facts) -> str:
     """The estimates beside the signature of the fault, where both are known."""
     parts = []
     for name, label in _SIGNATURES:
-        value, signature = facts.figures.get(name), facts.figures.get(f"{name}_signature")
+        value, signature = facts.figures.get(name), facts.marks.get(f"{name}_signature")
         if value is not None:
             known = f" (friction: {signature:.3g})" if signature is not None else ""
             parts.append(f"{label} = {value:.2f}{known}")
@@ -84,9 +105,19 @@ def _counter_rows(facts: Facts) -> Iterator[str]:
     """One row a counter; `rate_mean_hz` and `rate_worst_hz` join `rate_hz`."""
     for source, health in sorted(facts.health.items()):
         for name, value in health.counters.items():
-            if not _belongs_to_another(name, health.counters):
+            if _worth_a_row(name, value) and not _belongs_to_another(name, health.counters):
                 mean, worst = (health.counters.get(_with(name, w)) for w in ("mean", "worst"))
                 yield _row(f"{source}: {_words(name)}", value, mean, worst)
+
+
+def _worth_a_row(name: str, value: float) -> bool:
+    """The screen has room for what people ask for; everything is on the tab of the health."""
+    unit = name.rpartition("_")[2]
+    return (
+        name in _ALWAYS
+        or ("latency" in name and unit in _UNITS)
+        or (value != 0.0 and any(word in name for word in _WHEN_NOT_ZERO))
+    )
 
 
 def _belongs_to_another(name: str, counters: Mapping[str, float]) -> bool:

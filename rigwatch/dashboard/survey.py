@@ -27,6 +27,12 @@ class PlotPlan:
     unit: str
     range: Range | None
 
+    @property
+    def title(self) -> str:
+        """Title of the plot's view, with the unit."""
+        shown = self.unit.replace("^2", "²").replace("^3", "³")
+        return f"{self.plot.title} [{shown}]" if shown not in ("", "1") else self.plot.title
+
 
 @dataclass(slots=True)
 class Survey:
@@ -51,7 +57,7 @@ class Survey:
             own = next(c.unit for c in columns if c.name == plot.key)
             self.units[plot.path] = plot.unit or own
         self.peaks[plot.path] = max(self.peaks.get(plot.path, 0.0), peak(drawn))
-        if len(plot.series) == 4 and len(drawn):
+        if plot.path in quantities.FRICTION and len(drawn):
             low, high, signature = drawn[-1, :3]
             self.marks[plot.path] = (float(signature), float(low), float(high))
 
@@ -62,13 +68,14 @@ class Survey:
         )
 
     def _range(self, path: str) -> Range | None:
+        if path.startswith(quantities.DETAILS):
+            return None
         if path in self.marks and (span := around_signature(*self.marks[path])):
             return span
-        shared = [p for p in self.peaks if _same_axis(p, path)]
-        return symmetric(max(self.peaks[p] for p in shared))
+        return symmetric(max(self.peaks[other] for other in self.peaks if _one_axis(other, path)))
 
 
-def _same_axis(path: str, other: str) -> bool:
+def _one_axis(path: str, other: str) -> bool:
     """Measured and modelled acceleration share one plot."""
-    both = (quantities.MEASURED.path, quantities.MODELLED.path)
-    return path == other or (path in both and other in both)
+    pair = (quantities.MEASURED.path, quantities.MODELLED.path)
+    return path == other or (path in pair and other in pair)

@@ -12,17 +12,33 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Literal, Self
 
 from rigwatch.wire.errors import RigwatchError
 
 HOST = "127.0.0.1"
-MEMORY_LIMIT = "1GiB"
-SERVER_MEMORY_LIMIT = "256MiB"
+_PICTURE = "1440x900"
 _START_TIMEOUT = 30.0
 _STOP_TIMEOUT = 3.0
 
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """How much may be kept before the oldest data go, in words of the viewer.
+
+    Attributes:
+        viewer: by the viewer.
+        server: for browsers that come later.
+    """
+
+    viewer: str
+    server: str
+
+
+LIVE_MEMORY = Memory("1GiB", "256MiB")
+RECORDING_MEMORY = Memory("75%", "1GiB")
 Kind = Literal["native", "web", "headless"]
 
 
@@ -37,13 +53,16 @@ class Viewer:
         kind: a window, a web page, or drawn into memory for pictures and tests.
         port: where it takes data; 0 for any that is free.
         web_port: where a browser finds it; 0 for any that is free.
+        memory: how much it may keep.
 
     Raises:
         ViewerError: a port is taken.
     """
 
-    def __init__(self, kind: Kind, port: int = 0, web_port: int = 0) -> None:
-        self.kind = kind
+    def __init__(
+        self, kind: Kind, port: int = 0, web_port: int = 0, memory: Memory = LIVE_MEMORY
+    ) -> None:
+        self.kind, self._memory = kind, memory
         self.port = port or free_port()
         self.web_port = (web_port or free_port()) if kind == "web" else 0
         for taken in filter(answers, filter(None, (self.port, self.web_port))):
@@ -104,10 +123,11 @@ class Viewer:
 
     def _options(self) -> list[str]:
         options = ["--bind", HOST, "--port", str(self.port), "--hide-welcome-screen"]
-        options += ["--memory-limit", MEMORY_LIMIT, "--server-memory-limit", SERVER_MEMORY_LIMIT]
+        options += ["--memory-limit", self._memory.viewer]
+        options += ["--server-memory-limit", self._memory.server]
         kind = {
             "native": ["--expect-data-soon"],
-            "headless": ["--headless"],
+            "headless": ["--headless", "--window-size", _PICTURE],
             "web": ["--serve-web", "--web-viewer-port", str(self.web_port)],
         }
         return options + kind[self.kind]

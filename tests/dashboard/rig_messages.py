@@ -10,6 +10,7 @@ from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Health, Message
 RATE = 256.0
 START_NS = 1_790_000_000_000_000_000
 SIGNATURE = (1.0, 4.0)
+MARKS = {"theta1_signature": 1.0, "theta2_signature": 4.0, "deviation_high": 7.0}
 _WINDOW = 1.2  # s, in which the estimates go over to the signature
 
 
@@ -61,15 +62,19 @@ class Rig:
         _, model, residual = self.motion(seq)
         share = np.clip((t - self.friction_at) / _WINDOW, 0, 1)
         columns = [
-            Column("acceleration_model", "m/s^2", model),
+            Column("modelled_acceleration", "m/s^2", model),
             Column("residual", "m/s^2", residual + rng.normal(0, 0.15, len(t))),
-            *_constant("residual", "m/s^2", len(t), low=-0.8, high=0.8),
+            Column("change", "m/s^2", residual + rng.normal(0, 0.1, len(t))),
+            *_constant("change", "m/s^2", len(t), low=-0.8, high=0.8),
+            Column("deviation", "", 0.4 + 30.0 * share),
+            Column("armed", "", np.ones(len(t))),
+            Column("observable", "", np.ones(len(t))),
         ]
         for name, value in zip(("theta1", "theta2"), SIGNATURE, strict=True):
             theta = value * share + rng.normal(0, 0.02 * value, len(t))
             columns += [
                 Column(name, "1", theta),
-                *_constant(name, "1", len(t), low=-0.1 * value, high=0.1 * value, signature=value),
+                *_constant(name, "1", len(t), low=-0.1 * value, high=0.1 * value),
             ]
         return EstimateBlock("rig", 7, int(seq[0]), self.t_ns(seq), tuple(columns))
 

@@ -144,7 +144,7 @@ def check_views(screen: Screen) -> None:
         "Servo voltage [V]",
         "Position [mm]",
         "Acceleration, measured and modelled [m/s²]",
-        "Residual acceleration with limits [m/s²]",
+        "Residual acceleration and its change, with limits [m/s²]",
         "Coulomb friction θ1 with thresholds and signature",
         "Viscous friction θ2 with thresholds and signature",
         "Rates [Hz]",
@@ -159,8 +159,8 @@ def check_colours(screen: Screen) -> None:
         ("Position [mm]", palette.POSITION),
         ("Acceleration, measured and modelled [m/s²]", palette.ACCELERATION),
         ("Acceleration, measured and modelled [m/s²]", palette.MODEL),
-        ("Residual acceleration with limits [m/s²]", palette.RESIDUAL),
-        ("Residual acceleration with limits [m/s²]", palette.LIMIT),
+        ("Residual acceleration and its change, with limits [m/s²]", palette.CHANGE),
+        ("Residual acceleration and its change, with limits [m/s²]", palette.LIMIT),
     ):
         patch = screen.patch(title, colour)
         assert patch.pixels > 300, (title, patch)

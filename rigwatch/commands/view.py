@@ -1,0 +1,122 @@
+"""`rigwatch view`: a recording on the screen of a live rig."""
+
+import argparse
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.commands._sessions import add_span
+
+if TYPE_CHECKING:
+    from rigwatch.dashboard.recording import Drawn
+
+HELP = "show a recording: signals, residual, friction estimates, alarms and what to do"
+EXAMPLE = """  rigwatch view sessions/bench1-20260501T120000Z
+  rigwatch view sessions/bench1-20260501T120000Z --start 60 --end 120 --save minute.rrd"""
+_LOOK_AGAIN = 0.3
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("session", type=Path, help="session file or folder of segments")
+    parser.add_argument(
+        "--model",
+        type=Path,
+        help="compute estimates and alarms with this model; default: what was recorded",
+    )
+    add_span(parser)
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write a file for Rerun (.rrd)")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="write a picture (.png)")
+    parser.add_argument(
+        "--viewer", choices=("auto", "native", "web"), default="auto", help="how it is shown"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when it was drawn, and when a window was shown, once that is closed."""
+    from rigwatch.commands._sessions import print_json, say
+    from rigwatch.dashboard import require_rerun
+
+    require_rerun()
+    os.environ.setdefault("RUST_LOG", "off")
+    drawn = _shown(arguments, _silent if arguments.json else say)
+    if arguments.json:
+        print_json(drawn)
+    return 0
+
+
+def _silent(text: str) -> None:
+    """Nothing but JSON is wanted."""
+
+
+def _shown(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn":
+    from rigwatch.dashboard import recording
+
+    if arguments.picture:
+        viewer = recording.headless_viewer()
+        try:
+            drawn = _draw(arguments, say, viewer.url)
+            recording.point_cursor(viewer.url, drawn.cursor_ns())
+            recording.take_picture(viewer, arguments.picture)
+        finally:
+            viewer.stop()
+        return drawn
+    if arguments.save:
+        return _draw(arguments, say, "")
+    return _in_a_viewer(arguments, say)
+
+
+def _in_a_viewer(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn":
+    """Show it until the window is closed or the command is interrupted."""
+    from rigwatch.dashboard import recording
+    from rigwatch.dashboard.opening import open_viewer
+    from rigwatch.dashboard.viewer import RECORDING_MEMORY, Viewer
+    from rigwatch.wire.rig_config import DashboardSection
+
+    stop = threading.Event()
+    viewer = open_viewer(
+        arguments.viewer, DashboardSection(), stop, say, lambda: None, memory=RECORDING_MEMORY
+    )
+    assert viewer is not None  # only a wait for a foreign viewer can be given up
+    try:
+        drawn = _draw(arguments, say, viewer.url)
+        if isinstance(viewer, Viewer) and viewer.kind == "native":
+            recording.point_cursor(viewer.url, drawn.cursor_ns())
+        say(f"{drawn.samples} samples shown; Ctrl-C ends")
+        while viewer.exit_code() is None:
+            stop.wait(_LOOK_AGAIN)
+    except KeyboardInterrupt:
+        say("")
+    finally:
+        viewer.stop()
+    return drawn
+
+
+def _draw(arguments: argparse.Namespace, say: Callable[[str], None], url: str) -> "Drawn":
+    """Draw the session into the viewer at `url`, or into the file asked for."""
+    from rigwatch.commands import _watched
+    from rigwatch.commands._marks import marks_of
+    from rigwatch.commands._sessions import span_of
+    from rigwatch.dashboard import recording
+    from rigwatch.dashboard.facts import Facts
+    from rigwatch.wire.session import open_session
+
+    session = open_session(arguments.session)
+    span = span_of(arguments, session)
+    model, compute = _watched.model_for(session, span, arguments.model)
+    facts = Facts(_watched.rig_of(session))
+    if model is not None:
+        facts.model, facts.marks = model.name, marks_of(model)
+    windows = recording.windows_for(_watched.length_of(session, span))
+    messages = _watched.messages_of(session, span, model if compute else None)
+    stream = recording.new_stream(session.path.stem)
+    if url:
+        stream.connect_grpc(url)
+    else:
+        stream.save(arguments.save)
+    bare = arguments.picture is not None
+    return recording.draw(
+        messages, stream, facts, windows, lambda n: say(f"{n} samples drawn"), bare=bare
+    )

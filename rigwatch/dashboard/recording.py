@@ -1,0 +1,137 @@
+"""A recording on the same screen as a live rig: drawn whole, with the cursor at what matters.
+
+What matters is the first alarm that means a fault, and where there is none, the end.
+"""
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import rerun as rr
+from rerun.experimental import ViewerClient
+
+from rigwatch.dashboard import entities as at
+from rigwatch.dashboard.alarm_book import is_active
+from rigwatch.dashboard.board import APPLICATION, Dashboard
+from rigwatch.dashboard.facts import Facts
+from rigwatch.dashboard.layout import Windows
+from rigwatch.dashboard.viewer import RECORDING_MEMORY, Viewer, ViewerError
+from rigwatch.wire.messages import Alarm, Message
+
+_FLUSH_AFTER = 16384
+_LONGEST_WHOLE = 300.0
+_SIGNALS = 5.0
+_HISTORY = 60.0
+_FLUSH_TIMEOUT = 60.0
+_DRAWING_TIMEOUT = 60.0
+_SETTLING = 6.0
+"""Until the viewer's own notices have gone from the screen [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """What was drawn of a recording.
+
+    Attributes:
+        samples: how many.
+        start_ns, end_ns: first and last time [ns]; 0 where nothing was drawn.
+        fault_ns: time of the first alarm that means a fault [ns]; 0 where there was none.
+    """
+
+    samples: int
+    start_ns: int
+    end_ns: int
+    fault_ns: int
+
+    def cursor_ns(self) -> int:
+        """Where the cursor is to stand: the fault in the middle of the signals' window."""
+        if not self.fault_ns:
+            return self.end_ns
+        return min(self.end_ns, self.fault_ns + round(0.5e9 * _SIGNALS))
+
+
+def windows_for(seconds: float) -> Windows:
+    """How much time the plots show of a recording of that length [s]."""
+    return Windows(_SIGNALS, None if seconds <= _LONGEST_WHOLE else _HISTORY)
+
+
+def new_stream(name: str) -> rr.RecordingStream:
+    """A recording of the viewer's, not connected to anything yet."""
+    return rr.RecordingStream(APPLICATION, recording_id=name)
+
+
+def draw(
+    messages: Iterable[Message],
+    stream: rr.RecordingStream,
+    facts: Facts,
+    windows: Windows,
+    progress: Callable[[int], None],
+    *,
+    bare: bool = False,
+) -> Drawn:
+    """Draw the messages of a recording, in the order in which they were recorded.
+
+    Args:
+        messages: of any topic.
+        stream: connected to a viewer or a file.
+        facts: the rig, its model and marks.
+        windows: how much time the plots show.
+        progress: told the number of samples drawn, now and then.
+        bare: leave out what serves to operate the viewer, for pictures.
+    """
+    dashboard = Dashboard(stream, facts, windows, bare=bare)
+    fault_ns = flushed = 0
+    for message in messages:
+        dashboard.show(message)
+        if isinstance(message, Alarm) and is_active(message) and message.severity != "info":
+            fault_ns = fault_ns or message.t_ns
+        if facts.samples - flushed >= _FLUSH_AFTER:
+            flushed = facts.samples
+            dashboard.flush()
+            progress(flushed)
+    dashboard.flush()
+    stream.flush(timeout_sec=_FLUSH_TIMEOUT)
+    stream.disconnect()
+    return Drawn(facts.samples, dashboard.began_ns, dashboard.now_ns, fault_ns)
+
+
+def point_cursor(url: str, t_ns: int) -> None:
+    """Let the viewer at `url` stand still at a time [ns], once it has got so far.
+
+    Raises:
+        ViewerError: it does not get so far.
+    """
+    client = ViewerClient.connect(url)
+    deadline = time.monotonic() + _DRAWING_TIMEOUT
+    while _end_of(client) < t_ns:
+        if time.monotonic() > deadline:
+            raise ViewerError("the viewer did not take all data in time")
+        time.sleep(0.1)
+    client.set_time(at.TIMELINE, timestamp=t_ns / 1e9, play_state="paused")
+
+
+def take_picture(viewer: Viewer, path: Path) -> None:
+    """Write what a headless viewer shows as a PNG file."""
+    time.sleep(_SETTLING)
+    client = ViewerClient.connect(viewer.url)
+    path.write_bytes(client.take_screenshot())
+
+
+def headless_viewer() -> Viewer:
+    """A viewer that draws into memory; needs a graphics driver, if only Mesa's in software.
+
+    Raises:
+        ViewerError: it does not start.
+    """
+    return Viewer("headless", memory=RECORDING_MEMORY).await_answer()
+
+
+def _end_of(client: ViewerClient) -> int:
+    ends = [
+        timeline.end or 0
+        for recording in client.get_state().recordings
+        for timeline in recording.timelines
+        if timeline.name == at.TIMELINE
+    ]
+    return max(ends, default=0)

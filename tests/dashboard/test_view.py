@@ -1,0 +1,56 @@
+"""`rigwatch view` shows a recording as a live screen would, or draws it into a file."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from rigwatch.commands import main
+from rigwatch.dashboard import palette
+from rigwatch.wire.session import SessionWriter, run_info
+from tests.dashboard.rig_messages import Rig
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eight seconds in which friction appears, with the monitor's results."""
+    path = tmp_path_factory.mktemp("session") / "rubbing.mcap"
+    with SessionWriter(path, run_info("bench", 256.0)) as writer:
+        for message in Rig(friction_at=4.0).messages(8.0):
+            writer.write(message)
+    return path
+
+
+def test_the_picture_shows_signals_and_verdict(session: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "rubbing.png"
+    assert main(["view", str(session), "--picture", str(picture)]) == 0
+    pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
+    for colour in (palette.VOLTAGE, palette.POSITION, palette.ACCELERATION, palette.THETA1):
+        assert (np.abs(pixels - np.array(colour)).max(axis=2) < 40).sum() > 300, colour
+    red = np.array(palette.VERDICTS["dry_friction"][1]) * 0.78
+    assert (np.abs(pixels - red).max(axis=2) < 15).sum() > 500
+    assert picture.stat().st_size < 400_000
+
+
+def test_a_file_for_the_viewer_holds_the_whole_recording(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "rubbing.rrd"
+    assert main(["view", str(session), "--save", str(target), "--json"]) == 0
+    drawn = json.loads(capsys.readouterr().out)
+    assert drawn["samples"] == 8 * 256
+    assert drawn["fault_ns"] - drawn["start_ns"] == pytest.approx(4.1e9, abs=0.1e9)
+    assert target.stat().st_size > 100_000
+
+
+def test_a_part_of_it(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "part.rrd"
+    main(["view", str(session), "--start", "1", "--end", "2", "--save", str(target), "--json"])
+    assert json.loads(capsys.readouterr().out)["samples"] == 256
+
+
+def test_no_session(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["view", str(tmp_path / "none.mcap"), "--save", str(tmp_path / "x.rrd")]) == 2
+    assert "none.mcap: no such file" in capsys.readouterr().err
