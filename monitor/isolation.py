@@ -3,11 +3,12 @@
 The change of the residual since its onset is put before two explanations over the same samples:
 
     friction   y = θ1·Ge[sgn v] + θ2·Ge[v]                                                 (5.33)
-    rivals     any change that is linear in the healthy motion: gain, lag, delay, lost pressure, spring, mass,
-               damping, bias; as  A, dA, X, dX, 1  and the first two growing in time,
-               with A and X one healthy period of acceleration and position, d a difference of neighbours
+    rivals     any change that is smooth in the healthy motion: gain, lag, delay, lost pressure, spring, mass,
+               damping, bias, and what bends them; as  A, dA, X, dX, 1, the first two growing in time, and the
+               products X², X·dX, X³, X²·dX, with A and X one healthy period of acceleration and position and
+               d a difference of neighbours
 
-Smooth faults are linear in the healthy motion or nearly so. Dry friction is not: it jumps where the velocity turns. So the
+Other faults are smooth in the healthy motion or nearly so. Dry friction is not: it jumps where the velocity turns. So the
 question is what the jump explains that no rival can,
 
     share = (part of y that Ge[sgn v] explains beyond the rivals)² / y²,   ρ = the same over what the rivals leave,
@@ -22,14 +23,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.reference import PERIOD, Reference, place_in_period
+from monitor.reference import PERIOD, POSITION_SWING, Reference, place_in_period
 from rigwatch.physics.transfer_function import FloatArray, filter_sample
 
 HISTORY = 512
 """Samples that are kept for judging."""
-Y, SIGN_PART, SPEED_PART, SPEED, AT_REST = range(5)
-"""Columns of the history: change of the residual, g1, g2, velocity, 1 at rest."""
-_RIVALS = 7
+Y, SIGN_PART, SPEED_PART, SPEED, AT_REST, VOLTS = range(6)
+"""Columns of the history: change of the residual, g1, g2, velocity, 1 at rest, change of the voltage."""
+_RIVALS = 11
 
 
 class History(NamedTuple):
@@ -51,6 +52,8 @@ class Evidence(NamedTuple):
         rest: share of the samples at rest.
         rivals: share of y² that the rivals explain.
         jump: energy explained by the jump beyond the rivals [(m/s^2)^2].
+        together: share of y² that rivals and jump explain together.
+        dry: share of y² in the Coulomb part of the friction fit, zero where θ1 is negative.
     """
 
     explained: float
@@ -59,20 +62,23 @@ class Evidence(NamedTuple):
     rest: float
     rivals: float
     jump: float
+    together: float
+    dry: float
 
 
 def new_history(b: FloatArray, a: FloatArray) -> History:
     """An empty history for the friction filter b/a, padded to one length."""
-    return History(np.zeros((HISTORY, 5)), np.zeros(1, np.int64), b, a)
+    return History(np.zeros((HISTORY, 6)), np.zeros(1, np.int64), b, a)
 
 
 @njit(cache=True)
 def remember(
-    history: History, y: float, g1: float, g2: float, speed: float, rest: float
+    history: History, y: float, g1: float, g2: float, speed: float, rest: float, volts: float
 ) -> None:
     """Keep one sample."""
     row = history.rows[history.head[0]]
-    row[Y], row[SIGN_PART], row[SPEED_PART], row[SPEED], row[AT_REST] = y, g1, g2, speed, rest
+    row[Y], row[SIGN_PART], row[SPEED_PART], row[SPEED] = y, g1, g2, speed
+    row[AT_REST], row[VOLTS] = rest, volts
     history.head[0] = (history.head[0] + 1) % HISTORY
 
 
@@ -100,19 +106,35 @@ def weigh(history: History, ref: Reference, seq: int, since: int, count: int) ->
 
 
 @njit(cache=True)
+def swing_of_voltage_change(history: History, count: int) -> float:
+    """Standard deviation of the voltage's change over the newest `count` samples [V]; a shifted mean is none."""
+    mean = square = 0.0
+    for k in range(count):
+        volts = history.rows[(history.head[0] - 1 - k) % HISTORY, VOLTS]
+        mean += volts / count
+        square += volts * volts / count
+    return np.sqrt(max(square - mean * mean, 0.0))
+
+
+@njit(cache=True)
 def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
     period = ref.number[PERIOD]
+    mean = 0.0
+    for place in range(period):
+        mean += ref.template[1, place] / period
+    swing = max(ref.value[POSITION_SWING], 1e-12)
     for k in range(n):
         place = place_in_period(ref, seq - n + 1 + k)
         later, earlier = (place + 1) % period, (place - 1) % period
         data[k, 0] = ref.template[2, place]
         data[k, 1] = ref.template[2, later] - ref.template[2, earlier]
-        data[k, 2] = ref.template[1, place]
-        data[k, 3] = ref.template[1, later] - ref.template[1, earlier]
+        data[k, 2] = x = (ref.template[1, place] - mean) / swing
+        data[k, 3] = dx = (ref.template[1, later] - ref.template[1, earlier]) / swing
         data[k, 4] = 1.0
         time = (k + 0.5) / n - 0.5
         data[k, 5] = time * data[k, 0]
         data[k, 6] = time * data[k, 1]
+        data[k, 7], data[k, 8], data[k, 9], data[k, 10] = x * x, x * dx, x * x * x, x * x * dx
 
 
 @njit(cache=True)
@@ -142,11 +164,12 @@ def _compare(gram: FloatArray, rest: float) -> Evidence:
     y, g1, g2 = size - 1, _RIVALS, _RIVALS + 1
     yy = max(gram[y, y], 1e-30)
     determinant = gram[g1, g1] * gram[g2, g2] - gram[g1, g2] ** 2
-    explained = 0.0
+    explained = dry = 0.0
     if determinant > 1e-12 * gram[g1, g1] * gram[g2, g2]:
         theta1 = (gram[g2, g2] * gram[g1, y] - gram[g1, g2] * gram[g2, y]) / determinant
         theta2 = (gram[g1, g1] * gram[g2, y] - gram[g1, g2] * gram[g1, y]) / determinant
         explained = (theta1 * gram[g1, y] + theta2 * gram[g2, y]) / yy
+        dry = max(theta1, 0.0) ** 2 * gram[g1, g1] / yy
     left = gram.copy()
     for i in range(_RIVALS):
         _eliminate(left, i, 1e-9 * gram[i, i])
@@ -156,7 +179,8 @@ def _compare(gram: FloatArray, rest: float) -> Evidence:
         jump = left[g1, y] ** 2 / left[g1, g1]
     sign = 1.0 if left[g1, y] > 0.0 else -1.0
     rho = sign * np.sqrt(min(jump / remains, 1.0)) if remains > 0.0 else 0.0
-    return Evidence(explained, sign * jump / yy, rho, rest, 1.0 - remains / yy, jump)
+    together = 1.0 - (remains - jump) / yy
+    return Evidence(explained, sign * jump / yy, rho, rest, 1.0 - remains / yy, jump, together, dry)
 
 
 @njit(cache=True)

@@ -43,6 +43,8 @@ PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("friction_share", "", w.SHARE),
     ("rest", "", w.REST),
     ("verdict", "", w.VERDICT),
+    ("rho", "", w.RHO),
+    ("together", "", w.TOGETHER),
 )
 """Columns of an estimate block: name, unit, place in the kernel's output."""
 

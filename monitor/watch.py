@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from monitor.admission import DEAD, GOOD, HELD, NEW_BOOT, RESTART, Codes
 from monitor.energies import Energies, add, energy, recent_energy, restart_energies
-from monitor.isolation import HISTORY, History, remember, weigh
+from monitor.isolation import HISTORY, History, remember, swing_of_voltage_change, weigh
 from monitor.reference import (
     ACCELERATION_SWING,
     APERIODIC,
@@ -49,10 +49,11 @@ NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
 (
     MODELLED, RESIDUAL, CHANGE, SPEED, THETA1, THETA2, LOW1, HIGH1, LOW2, HIGH2,
     OBSERVABLE, ARMED_FLAG, DEVIATION, EXPLAINED, SHARE, RHO, REST, VERDICT, CONDITION, MOVED_VOLTAGE, SPEED_RMS,
-) = range(21)  # fmt: skip
-OUTPUTS = 21
+    TOGETHER,
+) = range(22)  # fmt: skip
+OUTPUTS = 22
 
-_SINCE, _QUIET, _LAST_VERDICT, _HOP, _EXCITED = range(5)
+_SINCE, _QUIET, _AGREED, _HOP, _EXCITED = range(5)
 _Y, _X, _V, _A, _S = range(5)
 
 
@@ -137,7 +138,7 @@ def _skip(state: WatchState) -> None:
     """A sample that counts in nothing, so that the windows stay stretches of time."""
     push(state.window, np.zeros(3))
     add(state.energies, np.zeros(5))
-    remember(state.history, 0.0, 0.0, 0.0, 0.0, 0.0)
+    remember(state.history, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if state.number[_SINCE] > 0:
         state.number[_SINCE] += 1
 
@@ -164,7 +165,8 @@ def _judge(
     regressors = np.empty(3)
     regressors[0], regressors[1], regressors[2] = data[5], data[6], y
     push(state.window, regressors)
-    remember(state.history, y, data[5], data[6], data[4], _at_rest(row, ref, state))
+    rest = _at_rest(row, ref, state)
+    remember(state.history, y, data[5], data[6], data[4], rest, signals[_V])
     state.held[CHANGE] = y
     state.number[_HOP] += 1
     if state.number[_HOP] >= rules.hop:
@@ -185,7 +187,8 @@ def _at_rest(row: FloatArray, ref: Reference, state: WatchState) -> float:
     spread -= min(min(recent[0], recent[1]), min(recent[2], recent[3]))
     shaken = max(max(recent[4], recent[5]), max(recent[6], recent[7]))
     shaken -= min(min(recent[4], recent[5]), min(recent[6], recent[7]))
-    still = spread < 6.0 * ref.value[POSITION_NOISE] and shaken < 10.0 * ref.value[NOISE]
+    weak = abs(recent[7]) < 0.15 * ref.value[ACCELERATION_SWING] + 5.0 * ref.value[NOISE]
+    still = spread < 6.0 * ref.value[POSITION_NOISE] and shaken < 10.0 * ref.value[NOISE] and weak
     return 1.0 if still else 0.0
 
 
@@ -292,6 +295,7 @@ def _decide(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     evidence = weigh(state.history, ref, seq, min(since, HISTORY), min(since, 2 * span))
     held[EXPLAINED], held[SHARE] = evidence.explained, evidence.share
     held[RHO], held[REST] = evidence.rho, evidence.rest
+    held[TOGETHER] = evidence.together
     held[VERDICT] = _verdict(
         held[VERDICT], since, span, moved_v, moved_x, moved_a, rules, ref, state, evidence, spread
     )
@@ -305,16 +309,17 @@ def _verdict(
     limit_v = _voltage_limit(rules, ref)
     if moved_v > limit_v and not moved_a:
         return OTHER
-    if moved_v > 0.1 * ref.value[SWING] and moved_a:
+    swing_v = swing_of_voltage_change(state.history, min(since, 64))
+    if swing_v > 0.1 * ref.value[SWING] and moved_a:
         return NEW_EXCITATION
-    jumps = (
-        evidence.share > 0.004
-        and evidence.rho > 0.35
-        and evidence.jump > 30.0 * spread**2
-    )
-    slips = 0.06 < evidence.rest
-    friction = moved_a and moved_x and (jumps or slips)
-    if before == FRICTION or before == STICKING or (friction and since >= span):
+    jump_seen = evidence.share > 0.003 and evidence.jump > 30.0 * spread**2 and evidence.dry > 0.2
+    certain = jump_seen and evidence.rho > 0.9 and evidence.explained > 0.95
+    jumps = jump_seen and evidence.rho > 0.35 and evidence.explained > 0.6 and since >= span
+    slips = evidence.rest > 0.03 and evidence.together > 0.7 and since >= span
+    sure = moved_x or evidence.share > 0.1
+    friction = moved_a and sure and (certain or jumps or slips)
+    state.number[_AGREED] = state.number[_AGREED] + 1 if friction else 0
+    if before == FRICTION or before == STICKING or state.number[_AGREED] >= 3:
         return STICKING if evidence.rest >= 0.5 and moved_a else FRICTION
     if since >= 2 * span + 64:
         return OTHER

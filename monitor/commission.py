@@ -1,0 +1,259 @@
+"""Commissioning: recordings in, one model file out.
+
+    chirp or multisine, no friction  ──▶ frequency response ──▶ Ĝ (5.16), (5.19); corner of the accelerometer
+    healthy reference(s)             ──▶ shift, amplitude scale, one healthy period, noise, time to settle
+    known friction                   ──▶ friction filter Ge and γf (5.29)
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.friction_filter import FrictionFilter, fit_friction_filter
+from monitor.model_file import (
+    DecisionSection,
+    FrictionSection,
+    NoiseSection,
+    RecordingSection,
+    ReferenceSection,
+    RigModel,
+    TransferPlant,
+    VelocitySection,
+    WindowSection,
+)
+from monitor.periodic import averaged, period_of
+from monitor.recordings import Recording, Role
+from monitor.residual import modelled_acceleration
+from rigwatch.physics.frequency_fit import fit_transfer_function
+from rigwatch.physics.frequency_response import FrequencyResponse, frequency_response
+from rigwatch.physics.transfer_function import FloatArray
+from rigwatch.physics.velocity import velocity_filter
+from rigwatch.wire.errors import ModelError
+
+CHANNELS = ("voltage", "position", "acceleration")
+
+
+@dataclass(frozen=True)
+class CommissionSettings:
+    """What can be chosen.
+
+    Args:
+        band: frequencies that the transfer function is fitted to [Hz].
+        velocity_corner: of the high-pass before the integrator [Hz].
+        window, hop: of the windowed least squares [samples].
+        before, after: samples before and after the onset that the friction filter is fitted to.
+    """
+
+    band: tuple[float, float] = (1.0, 14.0)
+    velocity_corner: float = 0.5
+    window: int = 32
+    hop: int = 1
+    before: int = 64
+    after: int = 512
+
+
+def commission(
+    recordings: Sequence[Recording], settings: CommissionSettings | None = None
+) -> RigModel:
+    """The model of a rig from its commissioning recordings; at least one of each role.
+
+    Raises:
+        ModelError: a recording is missing, too short, of another rate, or cannot be fitted.
+    """
+    settings = settings or CommissionSettings()
+    rate = _one_rate(recordings)
+    chirp = _of_role(recordings, "chirp")[0]
+    plant = _fit_plant(chirp, settings)
+    healthy = _of_role(recordings, "healthy")
+    plant = _with_shift(plant, healthy[0], rate)
+    references = [_reference(recording, plant, rate) for recording in healthy]
+    velocity = VelocitySection(
+        corner=settings.velocity_corner, sensor_corner=_sensor_corner(chirp)
+    )
+    friction = _friction(_of_role(recordings, "friction"), plant, velocity, rate, settings)
+    return RigModel(
+        sample_rate=rate,
+        channels=CHANNELS,
+        plant=plant,
+        friction=FrictionSection(
+            b=tuple(friction.function.b.tolist()),
+            a=tuple(friction.function.a.tolist()),
+            gamma=friction.gamma,
+            explained=friction.explained,
+        ),
+        noise=_noise(healthy, plant, rate),
+        velocity=velocity,
+        window=WindowSection(length=settings.window, hop=settings.hop),
+        decision=DecisionSection(settle=_settling(healthy[0], plant, rate)),
+        reference=tuple(references),
+        recording=tuple(
+            RecordingSection(role=r.role, name=r.name, sha256=r.sha256) for r in recordings
+        ),
+    )
+
+
+def _of_role(recordings: Sequence[Recording], role: Role) -> list[Recording]:
+    found = [recording for recording in recordings if recording.role == role]
+    if not found:
+        raise ModelError(f"commissioning: found no {role} recording, expected at least one")
+    return found
+
+
+def _one_rate(recordings: Sequence[Recording]) -> float:
+    rates = {recording.sample_rate for recording in recordings}
+    if len(rates) != 1:
+        raise ModelError(f"commissioning: found sample rates {sorted(rates)} Hz, expected one")
+    return rates.pop()
+
+
+def _fit_plant(chirp: Recording, settings: CommissionSettings) -> TransferPlant:
+    response = frequency_response(
+        chirp.channel("voltage"), chirp.channel("position"), chirp.sample_rate
+    )
+    function = fit_transfer_function(response.band(*settings.band, least_coherence=0.5))
+    return TransferPlant(b=tuple(function.b.tolist()), a=tuple(function.a.tolist()), shift=1)
+
+
+def _sensor_corner(chirp: Recording) -> float:
+    """Corner p of the accelerometer's own high-pass [Hz]: a/ẍ = jω/(jω + p) against the double-differentiated LVDT."""
+    response: FrequencyResponse = frequency_response(
+        chirp.channel("position"), chirp.channel("acceleration"), chirp.sample_rate
+    )
+    try:
+        lines = response.band(0.8, 5.0, least_coherence=0.9)
+    except ModelError:
+        return 0.0
+    omega = 2.0 * np.pi * lines.frequency
+    # The second difference of a sampled position is (2 sin(ωT/2)/T)², a little less than ω².
+    curvature = (2.0 * np.sin(omega / lines.sample_rate / 2.0) * lines.sample_rate) ** 2
+    corner = np.real(1j * omega * (-curvature / lines.response - 1.0))
+    return float(max(np.median(corner) / (2.0 * np.pi), 0.0))
+
+
+def _with_shift(plant: TransferPlant, healthy: Recording, rate: float) -> TransferPlant:
+    """The shift that leaves the smallest residual: a thing to measure (theory 1.2)."""
+    measured = healthy.channel("acceleration")
+    candidates = [
+        TransferPlant(b=plant.b, a=plant.a, shift=shift) for shift in range(len(plant.b) + 2)
+    ]
+
+    def left(candidate: TransferPlant) -> float:
+        function, delay = modelled_acceleration(candidate, rate)
+        modelled = function.simulate(healthy.channel("voltage"))[measured.size // 4 :]
+        late = np.roll(measured, delay)[measured.size // 4 :]
+        return -abs(float(np.corrcoef(modelled, late)[0, 1]))
+
+    return min(candidates, key=left)
+
+
+def _signals(recording: Recording, plant: TransferPlant, rate: float) -> FloatArray:
+    """V, x, a, am, aligned, shape (4, n)."""
+    function, delay = modelled_acceleration(plant, rate)
+    voltage = recording.channel("voltage")
+    late = [np.roll(recording.channel(name), delay) for name in CHANNELS[1:]]
+    return np.array([voltage, *late, function.simulate(voltage)])
+
+
+def _steady(recording: Recording, plant: TransferPlant, rate: float) -> tuple[FloatArray, int]:
+    """Signals of the part in which everything has settled, and the period."""
+    signals = _signals(recording, plant, rate)[:, round(4.0 * rate) :]
+    period = period_of(signals[0], longest=1024) if signals.shape[1] else 0
+    if period == 0 or signals.shape[1] < 4 * period:
+        raise ModelError(
+            f"{recording.name}: found no period in the voltage, expected at least 4 s and four "
+            "periods of an excitation that repeats after a whole number of samples"
+        )
+    return signals, period
+
+
+def _scale(mean: FloatArray) -> float:
+    return float(mean[2] @ mean[3] / (mean[3] @ mean[3]))
+
+
+def _reference(recording: Recording, plant: TransferPlant, rate: float) -> ReferenceSection:
+    signals, period = _steady(recording, plant, rate)
+    found = averaged(signals, period)
+    voltage, position, acceleration, modelled = (tuple(row.tolist()) for row in found.mean)
+    return ReferenceSection(
+        periods=found.periods,
+        scale=_scale(found.mean),
+        voltage=voltage,
+        position=position,
+        acceleration=acceleration,
+        modelled=modelled,
+    )
+
+
+def _noise(healthy: Sequence[Recording], plant: TransferPlant, rate: float) -> NoiseSection:
+    """The largest scatter of any healthy recording."""
+    scatters = []
+    for recording in healthy:
+        signals, period = _steady(recording, plant, rate)
+        scale = _scale(averaged(signals, period).mean)
+        residual = signals[2] - scale * signals[3]
+        scatters.append(averaged(np.array([residual, signals[1], signals[0]]), period).scatter)
+    residual_noise, position, voltage = np.max(scatters, axis=0)
+    return NoiseSection(
+        residual=float(residual_noise), position=float(position), voltage=float(voltage)
+    )
+
+
+def _settling(healthy: Recording, plant: TransferPlant, rate: float) -> int:
+    """Samples until the modelled acceleration, started from rest at any phase, has joined its steady course."""
+    signals, period = _steady(healthy, plant, rate)
+    found = averaged(signals, period)
+    function, _ = modelled_acceleration(plant, rate)
+    limit = 0.3 * averaged(signals[2:3], period).scatter[0]
+    length = min(signals.shape[1] - period, round(8.0 * rate))
+    latest = 0
+    for start in range(0, period, max(period // 8, 1)):
+        modelled = function.simulate(signals[0, start : start + length])
+        steady = np.resize(np.roll(found.mean[3], -start), length)
+        late = np.flatnonzero(np.abs(modelled - steady) > limit)
+        latest = max(latest, int(late[-1]) + 1 if late.size else 0)
+    return int(max(latest, round(0.5 * rate)))
+
+
+def _friction(
+    recordings: Sequence[Recording],
+    plant: TransferPlant,
+    velocity: VelocitySection,
+    rate: float,
+    settings: CommissionSettings,
+) -> FrictionFilter:
+    """The filter of the first friction recording that gives one; others are checked against it in the tests."""
+    fits = []
+    for recording in recordings:
+        signals, period = _steady(recording, plant, rate)
+        speed = velocity_filter(velocity.corner, rate, velocity.sensor_corner)
+        speeds = speed.simulate(recording.channel("acceleration"))[round(4.0 * rate) :]
+        change, onset = _change(recording, signals, period, rate)
+        first = max(onset - settings.before, 0)
+        last = min(onset + settings.after, change.size)
+        begun = np.where(np.arange(speeds.size) >= onset, speeds, 0.0)
+        fits.append(fit_friction_filter(begun[first:last], change[first:last], skip=0))
+    return max(fits, key=lambda fit: fit.explained)
+
+
+def _change(
+    recording: Recording, signals: FloatArray, period: int, rate: float
+) -> tuple[FloatArray, int]:
+    """Change of the residual against the recording's own healthy beginning, and the sample at which it sets in."""
+    beginning = max(4, round(rate / period)) * period
+    found = averaged(signals[:, :beginning], period)
+    scale = _scale(found.mean)
+    residual = signals[2] - scale * signals[3]
+    healthy = np.resize(found.mean[2] - scale * found.mean[3], residual.size)
+    change = residual - healthy
+    noise = averaged(residual[None, :beginning], period).scatter[0]
+    departed = np.flatnonzero(np.abs(change) > 8.0 * noise)
+    late = departed[departed >= beginning]
+    if late.size == 0:
+        raise ModelError(f"{recording.name}: found no change in the residual, expected a friction fault")
+    if departed[0] < beginning:
+        raise ModelError(
+            f"{recording.name}: found a residual that is not steady in the first "
+            f"{beginning / rate + 4.0:.1f} s, expected the fault to begin later"
+        )
+    return change, int(late[0])
