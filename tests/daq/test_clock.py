@@ -1,0 +1,88 @@
+"""Device time on host time: drift, jumps, late arrivals and the host's own clock."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.adapter import RawBlock
+from daq.clock import DeviceClock
+
+PERIOD_NS = 1e9 / 256
+UNIX_NS = 1_700_000_000_000_000_000
+
+
+def run_of(count: int, first: int = 0, drift: float = 0.0, late_ns: object = 0) -> RawBlock:
+    seq = np.arange(first, first + count)
+    host = np.rint(seq * PERIOD_NS).astype(np.int64)
+    us = np.rint(seq * PERIOD_NS * (1 + drift) / 1000).astype(np.int64)
+    arrived = host + np.asarray(late_ns, np.int64)
+    return RawBlock(1, seq, us, np.zeros((count, 1)), np.maximum.accumulate(arrived))
+
+
+@pytest.mark.parametrize("drift", [-1e-3, 0.0, 4e-5, 1e-3])
+def test_drift_is_found_and_followed(drift: float) -> None:
+    late = np.random.default_rng(1).exponential(4e5, 256 * 60).astype(np.int64)
+    late[5000:5100] += 80_000_000  # the host slept
+    run = run_of(256 * 60, drift=drift, late_ns=late)
+    clock = DeviceClock(256.0, unix_minus_monotonic_ns=UNIX_NS)
+    stamps, jump = clock.stamp(run)
+    assert jump == 0.0
+    assert clock.drift_ppm == pytest.approx(1e6 * drift, abs=2.0)
+    error = stamps - UNIX_NS - run.seq * PERIOD_NS
+    assert np.abs(error[2560:]).max() < 200_000
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.5, -0.5, 100.0])
+def test_a_jump_is_seen_at_its_first_sample(seconds: float) -> None:
+    clock = DeviceClock(256.0, unix_minus_monotonic_ns=UNIX_NS)
+    before, _ = clock.stamp(run_of(500))
+    after = run_of(500, first=500)
+    jumped = RawBlock(
+        1, after.seq, after.device_us + round(1e6 * seconds), after.codes, after.arrived_ns
+    )
+    stamps, jump = clock.stamp(jumped)
+    assert jump == pytest.approx(seconds, abs=1e-4)
+    assert clock.jumps == 1
+    assert abs(stamps[0] - before[-1] - PERIOD_NS) < 100_000
+
+
+def test_a_device_that_pauses_has_not_jumped() -> None:
+    clock = DeviceClock(256.0)
+    clock.stamp(run_of(500))
+    later = run_of(100, first=500)
+    paused = RawBlock(
+        1, later.seq, later.device_us + 300_000, later.codes, later.arrived_ns + 300_000_000
+    )
+    assert clock.stamp(paused)[1] == 0.0
+
+
+def test_a_late_block_has_not_jumped() -> None:
+    clock = DeviceClock(256.0)
+    clock.stamp(run_of(500))
+    assert clock.stamp(run_of(100, first=500, late_ns=900_000_000))[1] == 0.0
+
+
+@given(st.lists(st.integers(0, 50_000_000), min_size=300, max_size=300))
+def test_time_only_goes_forward(late: list[int]) -> None:
+    stamps, _ = DeviceClock(256.0).stamp(run_of(300, late_ns=late))
+    assert (np.diff(stamps) > 0).all()
+
+
+def test_a_replay_at_ten_times_the_speed_has_no_drift() -> None:
+    clock = DeviceClock(256.0, clock_rate=10.0)
+    run = run_of(256 * 40)
+    fast = RawBlock(1, run.seq, run.device_us, run.codes, run.arrived_ns // 10)
+    stamps, _ = clock.stamp(fast)
+    assert abs(clock.drift_ppm) < 1.0
+    assert stamps[-1] - stamps[0] == pytest.approx(4e9, rel=1e-2)
+
+
+def test_the_wall_clock_is_followed_forward_only() -> None:
+    clock = DeviceClock(256.0, unix_minus_monotonic_ns=UNIX_NS)
+    assert clock.follow(UNIX_NS + 1000) == 0.0
+    assert clock.follow(UNIX_NS - 30_000_000_000) == pytest.approx(-30.0)
+    assert clock.unix_ns(5) == UNIX_NS + 5
+    assert clock.follow(UNIX_NS - 30_000_000_000) == 0.0
+    assert clock.follow(UNIX_NS + 10_000_000_000) == pytest.approx(40.0)
+    assert clock.unix_ns(5) == UNIX_NS + 10_000_000_005

@@ -1,0 +1,80 @@
+"""Every sample is delivered once or told as lost, whatever happens to the numbers on the way."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from daq.adapter import RawBlock
+from daq.sequence import Hole, Restart, SequenceTracker
+
+PERIOD_US = 1e6 / 256
+
+
+def raw_of(seqs: list[int], boot: int = 1, us_offset: int = 0) -> RawBlock:
+    seq = np.array(seqs, np.int64)
+    us = np.rint(seq * PERIOD_US).astype(np.int64) + us_offset
+    codes = np.stack([seq % 1000, -(seq % 1000)], axis=1)
+    return RawBlock(boot, seq % 2**32, us % 2**32, codes, us * 1000)
+
+
+def delivered(tracker: SequenceTracker, *blocks: RawBlock) -> tuple[list[int], list[int]]:
+    """Numbers delivered, and numbers told as lost."""
+    numbers, lost = [], []
+    for block in blocks:
+        for step in tracker.accept(block):
+            if isinstance(step, RawBlock):
+                assert (np.diff(step.seq) == 1).all()
+                np.testing.assert_array_equal(step.codes[:, 0], step.seq % 2**32 % 1000)
+                numbers += step.seq.tolist()
+            elif isinstance(step, Hole):
+                lost += range(step.first, step.last + 1)
+    return numbers, lost
+
+
+@given(
+    st.integers(0, 2**33),
+    st.lists(st.sampled_from(["keep", "lose", "twice", "again"]), min_size=1, max_size=80),
+    st.lists(st.integers(1, 9), min_size=1),
+)
+def test_any_losses_and_repetitions(first: int, fates: list[str], cuts: list[int]) -> None:
+    seqs, at = [first], first
+    for fate in fates:
+        at += 1
+        seqs += {"keep": [at], "lose": [], "twice": [at, at], "again": [at, max(at - 3, first)]}[fate]
+    tracker, numbers, lost, start, turn = SequenceTracker(256.0), [], [], 0, 0
+    while start < len(seqs):
+        stop = start + cuts[turn % len(cuts)]
+        good, holes = delivered(tracker, raw_of(seqs[start:stop]))
+        numbers, lost, start, turn = numbers + good, lost + holes, stop, turn + 1
+    assert sorted(numbers + lost) == list(range(numbers[0], numbers[-1] + 1))
+    assert tracker.duplicates == len(seqs) - len(numbers)
+    assert tracker.lost == len(lost)
+
+
+def test_microseconds_are_unwrapped_over_a_long_silence() -> None:
+    tracker = SequenceTracker(256.0)
+    hours = 256 * 3600 * 5
+    (first,) = [s for s in tracker.accept(raw_of([0])) if isinstance(s, RawBlock)]
+    (later,) = [s for s in tracker.accept(raw_of([hours])) if isinstance(s, RawBlock)]
+    assert later.device_us[0] - first.device_us[0] == 5 * 3600 * 1_000_000
+    assert tracker.lost == hours - 1
+
+
+def test_a_new_boot_is_a_hole_of_unknown_length() -> None:
+    tracker = SequenceTracker(256.0)
+    tracker.accept(raw_of([7, 8]))
+    hole, restart, run = tracker.accept(raw_of([3, 4], boot=2))
+    assert hole == Hole(1, 9, 8)
+    assert restart == Restart(2, 1, "the device has started anew")
+    assert isinstance(run, RawBlock)
+    assert (run.boot, run.seq.tolist()) == (2, [3, 4])
+
+
+def test_a_count_that_begins_again_with_the_same_boot_gets_another() -> None:
+    tracker = SequenceTracker(256.0)
+    tracker.accept(raw_of([5000, 5001]))
+    steps = tracker.accept(raw_of([0, 1], us_offset=round(5002 * PERIOD_US)))
+    assert [type(step) for step in steps] == [Hole, Restart, RawBlock]
+    assert steps[-1].boot not in (1, 0)  # type: ignore[union-attr]
+    again = tracker.accept(raw_of([2], us_offset=round(5002 * PERIOD_US)))
+    assert [step.boot for step in again] == [steps[-1].boot]  # type: ignore[union-attr]
