@@ -84,17 +84,14 @@ def _recorded(session: "Session", span: Span) -> "list[Iterator[Message]]":
 
 
 def _monitored(session: "Session", span: Span, path: Path) -> "Iterator[Message]":
-    from monitor.alarms import AlarmManager, quality_conditions
     from monitor.model_file import load_model
-    from monitor.pipeline import Monitor
+    from monitor.rig_monitor import RigMonitor
     from rigwatch.wire.blocks import pieces
 
-    monitor, alarms = Monitor(load_model(path)), AlarmManager()
+    monitor = RigMonitor(load_model(path))
     for whole in session.samples(None, *span):
         for block in pieces(whole, _BLOCK):
             yield block
-            if result := monitor.update(block):
-                yield result.estimates
-                conditions = [*result.conditions, *quality_conditions(block)]
-                at = result.estimates
-                yield from alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
+            if watched := monitor.update(block):
+                yield watched.estimates
+                yield from watched.announcements

@@ -79,6 +79,7 @@ class Dashboard:
         """Take one message of any topic; kinds that are not drawn are left out."""
         if draw := self._draw.get(type(message)):
             draw(message)
+            self._keep_up()
 
     def flush(self, now_ns: int | None = None) -> None:
         """Send what waits, lay out anew where something new has come, renew the words.
@@ -89,10 +90,13 @@ class Dashboard:
         self.facts.tell_time(now_ns)
         self._batches.send(self._stream, self._survey.plots)
         self._lay_out()
-        if self.now_ns:
+        self._keep_up(changed=self.facts.silent_s > 0)
+
+    def _keep_up(self, *, changed: bool = False) -> None:
+        """Let verdict and words follow, not with every message."""
+        if self.now_ns and (changed or self.now_ns - self._said_ns >= _WORDS_EVERY_NS):
             self._lanes.verdict(self.facts.verdict(), self.now_ns)
-            if self.now_ns - self._said_ns >= _WORDS_EVERY_NS or self.facts.silent_s:
-                self._say()
+            self._say()
 
     def _samples(self, block: SampleBlock) -> None:
         plots = quantities.plots_of(block.channels, quantities.SAMPLE_PLOTS, "signals")
@@ -116,9 +120,8 @@ class Dashboard:
         self.facts.book.record(alarm)
         self._reach(alarm.t_ns, alarm.t_ns)
         self._lanes.alarm(alarm)
-        self._lanes.verdict(self.facts.verdict(), alarm.t_ns)
         self._line(at.LOG, alarm.t_ns, words.alarm_line(alarm), words.alarm_level(alarm))
-        self._say()
+        self._keep_up(changed=True)
 
     def _health(self, health: Health) -> None:
         self.facts.health[health.source] = health

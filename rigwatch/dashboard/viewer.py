@@ -19,7 +19,7 @@ from typing import IO, Literal, Self
 from rigwatch.wire.errors import RigwatchError
 
 HOST = "127.0.0.1"
-_PICTURE = "1440x900"
+_PICTURE = "1600x1000"
 _START_TIMEOUT = 30.0
 _STOP_TIMEOUT = 3.0
 
