@@ -104,8 +104,8 @@ class SampleOrder:
     Args:
         resume_after: (boot, seq) of the last sample that an earlier run has dealt with: everything
             after it is delivered, recovered or reported.
-        history: samples before the first one heard that are asked for on joining, as many of them
-            as the ring still has.
+        history: samples before those that are asked for too, as many of them as the ring still has;
+            on joining without `resume_after`, samples before the first one heard.
         capacity: samples that may wait behind a hole before it is given up.
     """
 
@@ -128,7 +128,8 @@ class SampleOrder:
         if resume_after is not None:
             # Taken for alive until the tokens that are there have been listed.
             self.sources.appeared(resume_after[0], 0)
-            self._control(Stream(resume_after[0], resume_after[1] + 1))
+            boot, seq = resume_after[0], resume_after[1] + 1
+            self._control(Stream(boot, max(0, seq - history), promised_from=seq))
 
     def on_block(self, block: SampleBlock) -> list[Outcome]:
         """A block was received from the bus."""

@@ -41,10 +41,12 @@ class SampleReader:
         bus: where the samples are; `bus.process` is named in gaps and events.
         resume_after: (boot, seq) of the last sample that an earlier run of this process has dealt
             with, so that none after it goes missing.
-        history: samples before the first one heard that are wanted from the ring on joining.
+        history: samples before those (or before the first one heard) that are wanted too, as far as
+            the ring has them; that some are missing there is no gap.
         capacity: messages that wait for a slow reader before further ones are left to the ring.
 
     Attributes:
+        heard: whether a sample block was ever received.
         rejected: payloads that were no sample blocks.
         dropped: payloads left to the ring because the inbox was full.
     """
@@ -56,6 +58,7 @@ class SampleReader:
         history: int = 0,
         capacity: int = QUEUE_CAPACITY,
     ) -> None:
+        self.heard = False
         self.rejected = 0
         self.dropped = 0
         self._bus = bus
@@ -63,6 +66,7 @@ class SampleReader:
         self._capacity = capacity
         self._inbox: SimpleQueue[_Incoming] = SimpleQueue()
         self._questions: SimpleQueue[Ask | None] = SimpleQueue()
+        self.heard = True
         self._heard_at = self._silence_told_at = time.monotonic()
         self._latest_ns = 0
         self._device = ""
@@ -93,6 +97,11 @@ class SampleReader:
     def position(self) -> tuple[int, int] | None:
         """(boot, seq) of the last sample returned or reported; None before the first."""
         return self._order.position
+
+    @property
+    def contested(self) -> bool:
+        """Whether a second source sends samples beside the one that is read."""
+        return self._order.sources.contested
 
     def silent_for(self) -> float:
         """Time since a sample was received, or since the start [s]."""
@@ -154,7 +163,7 @@ class SampleReader:
         except MessageError:
             self.rejected += 1
             return
-        self._heard_at = time.monotonic()
+        self._heard_at = self._silence_told_at = time.monotonic()
         self._handle(self._order.on_block(block))
 
     def _check_silence(self) -> None:

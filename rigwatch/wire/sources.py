@@ -55,6 +55,14 @@ class Sources:
         """Whether the boot's token is there now."""
         return boot in self._alive
 
+    @property
+    def contested(self) -> bool:
+        """Whether a second source sends samples beside the one in control."""
+        return any(
+            rival.told and (boot in self._alive or boot not in self._had_token)
+            for boot, rival in self._rivals.items()
+        )
+
     def appeared(self, boot: int, since_ns: int) -> None:
         """The boot's token is there, put up at `since_ns`."""
         self._alive[boot] = since_ns

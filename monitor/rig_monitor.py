@@ -1,0 +1,91 @@
+"""All that the monitor makes of samples, live and in replay alike: estimates and alarms.
+
+    SampleBlock ─▶ pipeline ──▶ conditions ─▶ alarms ─▶ announcements
+                ├▶ detectors ─▶ conditions ─┘
+                └▶ quality ───▶ conditions ─┘
+
+Pure as its parts are: no clock, bus or file, and the same samples give the same results however
+they are cut into blocks.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from monitor.alarms import AlarmManager, Announcement, quality_conditions
+from monitor.detectors.detector import Detector
+from monitor.model_file import RigModel
+from monitor.pipeline import Monitor
+from rigwatch.wire.blocks import cut
+from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.rig_config import AlarmSection
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What came of one block: its estimates, and what to announce, in order."""
+
+    estimates: EstimateBlock
+    announcements: list[Announcement]
+
+
+class RigMonitor:
+    """Pipeline, detectors and alarms of one rig.
+
+    Args:
+        model: what commissioning found.
+        settings: sections of [monitor.alarms].
+        detectors: what runs beside the friction scheme.
+        file: the configuration's name, for errors.
+
+    Raises:
+        ConfigError: a section names no alarm.
+    """
+
+    def __init__(
+        self,
+        model: RigModel,
+        settings: Mapping[str, AlarmSection] | None = None,
+        detectors: Sequence[Detector] = (),
+        file: str = "configuration",
+    ) -> None:
+        self.alarms = AlarmManager(settings, file)
+        self._pipeline = Monitor(model)
+        self._detectors = tuple(detectors)
+
+    def update(self, block: SampleBlock) -> Watched | None:
+        """Take the next block; None where it holds nothing new.
+
+        Raises:
+            KeyError: the block lacks a channel of the model.
+        """
+        result = self._pipeline.update(block)
+        if result is None:
+            return None
+        at = result.estimates
+        fresh = cut(block, at.seq - block.seq, len(block))
+        found = [detector.update(fresh) for detector in self._detectors]
+        columns = at.columns + tuple(column for columns, _ in found for column in columns)
+        conditions = [
+            *result.conditions,
+            *(condition for _, conditions in found for condition in conditions),
+            *quality_conditions(fresh),
+        ]
+        announced = self.alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
+        return Watched(replace(at, columns=columns), announced)
+
+    def learn(self, block: SampleBlock) -> None:
+        """Take a block that an earlier run has judged already: state moves on, nothing is said."""
+        self._pipeline.update(block)
+        for detector in self._detectors:
+            detector.update(block)
+
+
+def compile_kernels(model: RigModel) -> None:
+    """Run every kernel once on a monitor of its own, so that the first sample does not wait."""
+    n = 4
+    zeros = np.zeros(n)
+    channels = tuple(Column(name, "", zeros, np.zeros(n, np.uint8)) for name in model.channels)
+    times = np.arange(n, dtype=np.int64)
+    RigMonitor(model).update(SampleBlock("", 0, 0, times, times, channels))
