@@ -44,7 +44,7 @@ fi
 # that are already in the environment, so that nothing unlocked is fetched.
 for lock in "$@"; do
     echo "setup: $lock"
-    PIP_DISABLE_PIP_VERSION_CHECK=1 "$venv/bin/python" -m pip install --quiet \
+    PIP_DISABLE_PIP_VERSION_CHECK=1 "$venv/bin/python" -m pip install --quiet --quiet \
         --require-hashes --no-deps --no-build-isolation -r "$lock"
 done
-"$venv/bin/python" -m pip install --quiet --no-deps --no-build-isolation --editable .
+"$venv/bin/python" -m pip install --quiet --quiet --no-deps --no-build-isolation --editable .

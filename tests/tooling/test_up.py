@@ -142,7 +142,9 @@ def _runs(pid: int) -> bool:
     return status.rpartition(")")[2].split()[0] != "Z"
 
 
-def test_beside_a_rig_that_is_up_another_gets_ports_and_a_name_of_its_own(config: Path, tmp_path: Path) -> None:
+def test_beside_a_rig_that_is_up_another_gets_ports_and_a_name_of_its_own(
+    config: Path, tmp_path: Path
+) -> None:
     first = load_rig(config)
     address = endpoint_address(first.bus.listen)
     assert address is not None
