@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from monitor.alarms import AlarmManager, Announcement, quality_conditions
+from monitor.conditions import Condition
 from monitor.detectors.detector import Detector
 from monitor.model_file import RigModel
 from monitor.pipeline import Monitor
@@ -24,9 +25,10 @@ from rigwatch.wire.rig_config import AlarmSection
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What came of one block: its estimates, and what to announce, in order."""
+    """What came of one block: its estimates, its conditions, and what to announce, in order."""
 
     estimates: EstimateBlock
+    conditions: tuple[Condition, ...]
     announcements: list[Announcement]
 
 
@@ -73,7 +75,7 @@ class RigMonitor:
             *quality_conditions(fresh),
         ]
         announced = self.alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
-        return Watched(replace(at, columns=columns), announced)
+        return Watched(replace(at, columns=columns), tuple(conditions), announced)
 
     def learn(self, block: SampleBlock) -> None:
         """Take a block that an earlier run has judged already: state moves on, nothing is said."""
