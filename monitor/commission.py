@@ -66,7 +66,7 @@ def commission(
     chirp = _of_role(recordings, "chirp")[0]
     plant = _fit_plant(chirp, settings)
     healthy = _of_role(recordings, "healthy")
-    plant = _with_shift(plant, healthy[0], rate)
+    plant = _with_shift(plant, healthy, rate)
     references = [_reference(recording, plant, rate) for recording in healthy]
     velocity = VelocitySection(
         corner=settings.velocity_corner, sensor_corner=_sensor_corner(chirp)
@@ -131,20 +131,21 @@ def _sensor_corner(chirp: Recording) -> float:
     return float(max(np.median(corner) / (2.0 * np.pi), 0.0))
 
 
-def _with_shift(plant: TransferPlant, healthy: Recording, rate: float) -> TransferPlant:
-    """The shift that leaves the smallest residual: a thing to measure (theory 1.2)."""
-    measured = healthy.channel("acceleration")
-    candidates = [
-        TransferPlant(b=plant.b, a=plant.a, shift=shift) for shift in range(len(plant.b) + 2)
-    ]
+def _with_shift(plant: TransferPlant, healthy: Sequence[Recording], rate: float) -> TransferPlant:
+    """The shift that makes modelled and measured acceleration most alike: a thing to measure (theory 1.2).
 
-    def left(candidate: TransferPlant) -> float:
-        function, delay = modelled_acceleration(candidate, rate)
-        modelled = function.simulate(healthy.channel("voltage"))[measured.size // 4 :]
-        late = np.roll(measured, delay)[measured.size // 4 :]
-        return -abs(float(np.corrcoef(modelled, late)[0, 1]))
+    Only advances that Ĝ's own delay pays for are tried: a longer one would delay every alarm, and the healthy average takes
+    up what it would have gained.
+    """
+    leading = int(np.argmax(np.array(plant.b) != 0.0))
+    candidates = [TransferPlant(b=plant.b, a=plant.a, shift=shift) for shift in range(leading + 1)]
+    return max(candidates, key=lambda plant: sum(_likeness(plant, r, rate) for r in healthy))
 
-    return min(candidates, key=left)
+
+def _likeness(plant: TransferPlant, healthy: Recording, rate: float) -> float:
+    """Correlation of modelled and measured acceleration in the later three quarters of a recording."""
+    signals = _signals(healthy, plant, rate)[:, healthy.channel("voltage").size // 4 :]
+    return float(np.corrcoef(signals[2], signals[3])[0, 1])
 
 
 def _signals(recording: Recording, plant: TransferPlant, rate: float) -> FloatArray:
@@ -215,6 +216,14 @@ def _settling(healthy: Recording, plant: TransferPlant, rate: float) -> int:
     return int(max(latest, round(0.5 * rate)))
 
 
+@dataclass(frozen=True, eq=False)
+class _Onset:
+    """Velocity, zero before the onset, and change of the residual, around the onset of a known fault."""
+
+    velocity: FloatArray
+    change: FloatArray
+
+
 def _friction(
     recordings: Sequence[Recording],
     plant: TransferPlant,
@@ -222,18 +231,34 @@ def _friction(
     rate: float,
     settings: CommissionSettings,
 ) -> FrictionFilter:
-    """The filter of the first friction recording that gives one; others are checked against it in the tests."""
-    fits = []
-    for recording in recordings:
-        signals, period = _steady(recording, plant, rate)
-        speed = velocity_filter(velocity.corner, rate, velocity.sensor_corner)
-        speeds = speed.simulate(recording.channel("acceleration"))[round(4.0 * rate) :]
-        change, onset = _change(recording, signals, period, rate)
-        first = max(onset - settings.before, 0)
-        last = min(onset + settings.after, change.size)
-        begun = np.where(np.arange(speeds.size) >= onset, speeds, 0.0)
-        fits.append(fit_friction_filter(begun[first:last], change[first:last], skip=0))
-    return max(fits, key=lambda fit: fit.explained)
+    """One filter from each recording; the one that serves all of them best."""
+    onsets = [_onset(recording, plant, velocity, rate, settings) for recording in recordings]
+    fits = [fit_friction_filter(onset.velocity, onset.change, skip=0) for onset in onsets]
+    return min(fits, key=lambda fit: sum(_unexplained(fit, onset) for onset in onsets))
+
+
+def _unexplained(fit: FrictionFilter, onset: _Onset) -> float:
+    """Share of the change's energy that the filter leaves, its strength being free."""
+    model = fit.function.simulate(np.sign(onset.velocity) + fit.gamma * onset.velocity)
+    strength = (model @ onset.change) / (model @ model)
+    left = onset.change - strength * model
+    return float((left @ left) / (onset.change @ onset.change))
+
+
+def _onset(
+    recording: Recording,
+    plant: TransferPlant,
+    velocity: VelocitySection,
+    rate: float,
+    settings: CommissionSettings,
+) -> _Onset:
+    signals, period = _steady(recording, plant, rate)
+    function = velocity_filter(velocity.corner, rate, velocity.sensor_corner)
+    speed = function.simulate(recording.channel("acceleration"))[round(4.0 * rate) :]
+    change, begin = _change(recording, signals, period, rate)
+    speed = np.where(np.arange(speed.size) >= begin, speed, 0.0)
+    part = slice(max(begin - settings.before, 0), begin + settings.after)
+    return _Onset(speed[part], change[part])
 
 
 def _change(
