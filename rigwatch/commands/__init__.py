@@ -30,6 +30,7 @@ COMMANDS: dict[str, str] = {
     "daq": "daq",
     "monitor": "monitor",
     "record": "record",
+    "commission": "commission",
     "alarms": "alarms",
     "ack": "ack",
     "doctor": "doctor",
@@ -38,6 +39,7 @@ COMMANDS: dict[str, str] = {
     "info": "info",
     "trim": "trim",
     "recover": "recover",
+    "replay": "replay",
     "import": "import_",
     "export": "export",
 }

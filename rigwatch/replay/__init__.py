@@ -1,0 +1,1 @@
+"""The monitor over recordings: replayed for people, and compared with references in CI."""

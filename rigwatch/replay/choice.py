@@ -1,0 +1,48 @@
+"""Which model and which alarm settings a session is replayed with."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from monitor.model_file import RigModel, load_model
+from monitor.rig_monitor import RigMonitor
+from rigwatch.replay.run import check_suits
+from rigwatch.wire.config import parse
+from rigwatch.wire.errors import ConfigError, SessionError
+from rigwatch.wire.rig_config import AlarmSection, MonitorSection, RigConfig, load_rig
+from rigwatch.wire.session.reader import Session
+
+
+def monitor_for(session: Session, model: Path | None, config: Path | None) -> RigMonitor:
+    """A new monitor for the session.
+
+    Args:
+        session: the recording.
+        model: the model file; None takes that of the configuration.
+        config: the rig's configuration; None takes the one that was recorded with the session.
+
+    Raises:
+        ConfigError: model or configuration are wrong.
+        SessionError: no model is named anywhere, or it was made for another rate.
+    """
+    section, file = _section(session, config)
+    path = model or (Path(section.model) if section else None)
+    if path is None:
+        raise SessionError(f"{session.path}: found no model in its configuration, expected --model")
+    loaded: RigModel = load_model(path)
+    check_suits(session, loaded)
+    settings: Mapping[str, AlarmSection] = section.alarms if section else {}
+    return RigMonitor(loaded, settings, file=file)
+
+
+def _section(session: Session, config: Path | None) -> tuple[MonitorSection | None, str]:
+    """[monitor] of the given or the recorded configuration, and that configuration's name."""
+    if config is not None:
+        return load_rig(config).monitor, str(config)
+    name = f"configuration in {session.path}"
+    if not session.info.configuration:
+        return None, name
+    try:
+        return parse(session.info.configuration, RigConfig, name).monitor, name
+    except ConfigError:
+        # Recorded by another version: its alarm settings are not ours, the samples are.
+        return None, name

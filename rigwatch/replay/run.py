@@ -1,0 +1,188 @@
+"""Runs the monitor over a session: the same pure object as live, fed from a file.
+
+session ─▶ samples, commands ─▶ RigMonitor ─▶ estimates, alarms ─▶ caller, new session
+"""
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Self
+
+from monitor.alarms import Announcement
+from monitor.model_file import RigModel
+from monitor.rig_monitor import RigMonitor, Watched
+from rigwatch.replay.source import Item, items
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import Alarm, AlarmCommand, Event, SampleBlock
+from rigwatch.wire.session.reader import MERGED_SAMPLES, LostSpan, Session
+from rigwatch.wire.session.writer import SessionWriter
+
+PACED_BLOCK = 0.05
+"""Length of a block where the replay keeps time [s of the wall clock]."""
+
+
+@dataclass(slots=True)
+class Replay:
+    """What came of a replay.
+
+    Attributes:
+        samples: how many were judged.
+        first_ns, last_ns: times of the first and the last of them [ns].
+        elapsed_s: time that it took [s].
+        alarms: transitions, in order.
+        events: what else was said.
+        lost: damage of the session.
+    """
+
+    samples: int = 0
+    first_ns: int = 0
+    last_ns: int = 0
+    elapsed_s: float = 0.0
+    alarms: list[Alarm] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+    lost: tuple[LostSpan, ...] = ()
+
+    def count(self, judged: "Judged") -> None:
+        """Add what came of one item."""
+        if isinstance(judged.item, SampleBlock):
+            self.first_ns = self.first_ns if self.samples else int(judged.item.t_ns[0])
+            self.last_ns = int(judged.item.t_ns[-1])
+            self.samples += len(judged.item)
+        for announcement in judged.announced:
+            if isinstance(announcement, Alarm):
+                self.alarms.append(announcement)
+            else:
+                self.events.append(announcement)
+
+    @property
+    def duration_s(self) -> float:
+        """Recorded time [s]."""
+        return (self.last_ns - self.first_ns) / 1e9
+
+    @property
+    def times_real_time(self) -> float:
+        """Recorded time over the time that it took."""
+        return self.duration_s / self.elapsed_s if self.elapsed_s > 0 else 0.0
+
+
+def check_suits(session: Session, model: RigModel) -> None:
+    """Refuse a model that was made for another rate.
+
+    Raises:
+        SessionError: the session's rate is another one.
+    """
+    rate = session.info.sample_rate_hz
+    if abs(rate - model.sample_rate) > 1e-6 * model.sample_rate:
+        found = f"found a session of {rate:g} Hz, expected {model.sample_rate:g} Hz as in the model"
+        raise SessionError(f"{session.path}: {found}")
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One item of a recording, and what the monitor made of it."""
+
+    item: Item
+    watched: Watched | None
+    announced: list[Announcement]
+
+
+def judge(session: Session, monitor: RigMonitor, found: Iterable[Item]) -> Iterator[Judged]:
+    """Hand each item to the monitor.
+
+    Raises:
+        SessionError: samples lack a channel that the model needs.
+    """
+    for item in found:
+        if isinstance(item, AlarmCommand):
+            yield Judged(item, None, monitor.alarms.command(item))
+            continue
+        try:
+            watched = monitor.update(item)
+        except KeyError as error:
+            names = ", ".join(column.name for column in item.channels)
+            text = f"found the channels {names}, expected {error} that the model needs"
+            raise SessionError(f"{session.path}: {text}") from None
+        yield Judged(item, watched, watched.announcements if watched else [])
+
+
+def replay(
+    session: Session,
+    monitor: RigMonitor,
+    span: tuple[int | None, int | None] = (None, None),
+    *,
+    speed: float = 0.0,
+    out: Path | None = None,
+    say: Callable[[Alarm], None] = lambda _: None,
+) -> Replay:
+    """Run `monitor` over the session.
+
+    Args:
+        session: the recording.
+        monitor: new, or as an earlier part left it.
+        span: start and end of the part that is replayed [ns].
+        speed: times real time; 0 for as fast as it goes.
+        out: session file for samples, estimates and alarms.
+        say: told each alarm as it comes.
+
+    Raises:
+        SessionError: the samples lack a channel, or `out` cannot be written.
+    """
+    done, began = Replay(), time.perf_counter()
+    rate = session.info.sample_rate_hz
+    size = max(1, int(PACED_BLOCK * speed * rate)) if speed > 0 else MERGED_SAMPLES
+    found = _paced(items(session, *span, size), speed)
+    with _Sink(session, out) as sink:
+        for judged in judge(session, monitor, found):
+            done.count(judged)
+            sink.write(judged)
+            for announcement in judged.announced:
+                if isinstance(announcement, Alarm):
+                    say(announcement)
+    done.elapsed_s = time.perf_counter() - began
+    done.lost = session.lost
+    return done
+
+
+def _paced(found: Iterator[Item], speed: float) -> Iterator[Item]:
+    """The items, each held back until its last sample would have been there."""
+    began, first = time.monotonic(), None
+    for item in found:
+        if speed > 0 and isinstance(item, SampleBlock):
+            first = int(item.t_ns[0]) if first is None else first
+            due = began + (int(item.t_ns[-1]) - first) / 1e9 / speed
+            time.sleep(max(0.0, due - time.monotonic()))
+        yield item
+
+
+class _Sink:
+    """The session file that a replay leaves, or nothing."""
+
+    def __init__(self, session: Session, out: Path | None) -> None:
+        self._writer: SessionWriter | None = None
+        if out is not None:
+            notes = f"replayed from {session.path.name}"
+            run = session.info
+            run = replace(run, notes=f"{run.notes}; {notes}" if run.notes else notes)
+            self._writer = SessionWriter(out, run, sync=False)
+
+    def write(self, judged: Judged) -> None:
+        if self._writer is None:
+            return
+        self._writer.write(judged.item)
+        if judged.watched is not None:
+            self._writer.write(judged.watched.estimates)
+        for announcement in judged.announced:
+            self._writer.write(announcement)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if self._writer is None:
+            return
+        if kind is None:
+            self._writer.close()
+        else:
+            self._writer.abandon()
+            self._writer.path.unlink(missing_ok=True)
