@@ -1,0 +1,234 @@
+"""Readers on a real router, while publishers, router and links are killed, frozen and restarted."""
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rigwatch.wire.bus import Bus
+from rigwatch.wire.bus_memory import MemoryNetwork
+from rigwatch.wire.messages import Event, SampleBlock
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.ring import SampleRing
+from rigwatch.wire.sample_reader import Item, SampleReader
+from rigwatch.wire.topics import EVENTS, GAPS, SAMPLES
+from tests.bus.rig import TestRig, eventually, kill, stopped
+from tests.bus.samples import Ledger, block
+
+
+class Listener:
+    """Reads samples in a thread and keeps the ledger."""
+
+    def __init__(self, bus: Bus, **options: object) -> None:
+        self.reader = SampleReader(bus, **options)  # type: ignore[arg-type]
+        self.ledger = Ledger()
+        self.events: list[Event] = []
+        self.error: BaseException | None = None
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            while not self._stop.is_set():
+                for item in self.reader.read(0.05):
+                    self._take(item)
+        except BaseException as error:
+            self.error = error
+
+    def _take(self, item: Item) -> None:
+        if isinstance(item, Event):
+            self.events.append(item)
+        else:
+            self.ledger.add(item)
+
+    def reaches(self, boot: int, seq: int) -> None:
+        eventually(lambda: self.error is not None or self.ledger.last(boot) >= seq, f"seq {seq}")
+        assert self.error is None
+
+    def goes_on(self, boot: int, samples: int = 50) -> None:
+        """A number of further samples come."""
+        self.reaches(boot, self.ledger.last(boot) + samples)
+
+    def codes(self) -> list[str]:
+        return [event.code for event in self.events]
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+        self.reader.close()
+        assert self.error is None
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[TestRig]:
+    with TestRig(tmp_path) as made:
+        yield made
+
+
+def test_a_router_that_is_killed_and_comes_back_costs_no_sample(rig: TestRig) -> None:
+    router = rig.router()
+    listener = Listener(rig.bus("reader"))
+    rig.publisher(5)
+    listener.reaches(5, 100)
+    for _ in range(2):
+        kill(router)
+        time.sleep(0.5)
+        router = rig.router()
+        listener.goes_on(5)
+    listener.close()
+    listener.ledger.assert_complete(5)
+    assert listener.ledger.lost(5) == 0
+    assert listener.reader.counters.recovered > 0
+
+
+@pytest.mark.parametrize("ring", [65536, 256])
+def test_after_a_partition_all_that_the_ring_has_comes_and_the_rest_is_reported(
+    rig: TestRig, ring: int
+) -> None:
+    rig.router()
+    proxy, port = rig.proxy()
+    far = load_rig(rig.configure("far.toml", port))
+    listener = Listener(rig.bus("reader", far))
+    gaps = rig.bus("observer").subscribe(GAPS)
+    rig.publisher(5, "--ring", str(ring), "--rate", "1000")
+    listener.reaches(5, 100)
+    before = listener.ledger.last(5)
+    with stopped(proxy):
+        time.sleep(1.0)
+        # The link still takes some megabytes; what comes late then is as good as what never left.
+        kill(proxy)
+    rig.start("-m", "tests.bus.rig", str(port), str(rig.listen))
+    listener.reaches(5, before + 1000)
+    listener.goes_on(5)
+    listener.close()
+    listener.ledger.assert_complete(5)
+    lost = sum(gap.last - gap.first + 1 for gap in gaps.drain())
+    assert lost == listener.ledger.lost(5) == listener.reader.counters.lost
+    assert (lost == 0) == (ring == 65536)
+
+
+def test_a_frozen_link_delays_samples_and_loses_none(rig: TestRig) -> None:
+    rig.router()
+    proxy, port = rig.proxy()
+    listener = Listener(rig.bus("reader", load_rig(rig.configure("far.toml", port))))
+    rig.publisher(5)
+    listener.reaches(5, 100)
+    with stopped(proxy):
+        eventually(lambda: listener.reader.silent_for() > 0.5, "silence is noticed")
+    listener.goes_on(5, 200)
+    listener.close()
+    listener.ledger.assert_complete(5)
+    assert listener.ledger.lost(5) == 0
+
+
+def test_a_killed_publisher_is_followed_by_the_head_of_its_successor(rig: TestRig) -> None:
+    rig.router()
+    listener = Listener(rig.bus("reader"))
+    first = rig.publisher(5)
+    listener.reaches(5, 100)
+    kill(first)
+    rig.publisher(6)
+    listener.reaches(6, 100)
+    listener.close()
+    listener.ledger.assert_complete(5)
+    listener.ledger.assert_complete(6, 0)
+    assert listener.ledger.lost(6) == 0
+    assert listener.ledger.unknown_ends == [5]
+    assert "SOURCE RESTARTED" in listener.codes()
+    assert "DUPLICATE SOURCE" not in listener.codes()
+
+
+def test_late_joiners_get_the_head_from_the_ring_or_say_where_they_joined(rig: TestRig) -> None:
+    rig.router()
+    early = Listener(rig.bus("early"))
+    rig.publisher(5)
+    early.reaches(5, 300)
+    with_history = Listener(rig.bus("late"), history=100_000)
+    without = Listener(rig.bus("later"))
+    with_history.reaches(5, 400)
+    without.reaches(5, 400)
+    for listener in (early, with_history, without):
+        listener.close()
+    with_history.ledger.assert_complete(5, 0)
+    first = without.ledger.spans[5][0][0]
+    without.ledger.assert_complete(5, first)
+    assert first > 0
+    assert without.events[0].text == f"joined boot 5 at seq {first}"
+
+
+def test_a_reader_that_resumes_has_everything_since(rig: TestRig) -> None:
+    rig.router()
+    rig.publisher(5)
+    first = Listener(rig.bus("first"))
+    first.goes_on(5, 50)
+    first.close()
+    position = first.reader.position
+    assert position is not None
+    time.sleep(0.5)
+    second = Listener(rig.bus("second"), resume_after=position)
+    second.reaches(5, position[1] + 150)
+    second.close()
+    second.ledger.assert_complete(5, position[1] + 1)
+    assert second.ledger.lost(5) == 0
+
+
+def test_of_two_publishers_the_first_is_believed_by_everyone_until_it_dies(rig: TestRig) -> None:
+    rig.router()
+    listener = Listener(rig.bus("reader"))
+    first = rig.publisher(5)
+    listener.reaches(5, 20)
+    rig.publisher(6)
+    eventually(lambda: "DUPLICATE SOURCE" in listener.codes(), "the conflict is remarked on")
+    assert listener.reader.contested
+    late = Listener(rig.bus("late"))
+    late.goes_on(5)
+    listener.goes_on(5)
+    assert 6 not in late.ledger.spans
+    kill(first)
+    for one in (listener, late):
+        eventually(lambda one=one: one.ledger.delivered(6) > 50, "the second has taken over")  # type: ignore[misc]
+        one.close()
+        one.ledger.assert_complete(5)
+        one.ledger.assert_complete(6)
+        assert one.codes().count("DUPLICATE SOURCE") == 1
+        assert not one.reader.contested
+
+
+def test_a_reader_slower_than_its_inbox_leaves_the_rest_to_the_ring() -> None:
+    network = MemoryNetwork()
+    source, bus = network.bus("bench", "daq"), network.bus("bench", "reader")
+    ring, reader = SampleRing(source, 4096), SampleReader(bus, capacity=16)
+    ledger = Ledger()
+    for seq in range(200):
+        ring.add(block(seq))
+        source.publish(SAMPLES, block(seq))
+    assert reader.dropped > 100
+
+    def complete() -> bool:
+        source.publish(SAMPLES, block(199))
+        for item in reader.read(0.05):
+            ledger.add(item)
+        return ledger.last(7) == 199
+
+    eventually(complete, "all samples are there")
+    ledger.assert_complete(7, 0, 199)
+    assert ledger.lost(7) == 0
+
+
+def test_garbage_on_the_samples_key_is_counted_and_hurts_nobody() -> None:
+    network = MemoryNetwork()
+    source, bus = network.bus("bench", "daq"), network.bus("bench", "reader")
+    events = network.bus("bench", "observer").subscribe(EVENTS)
+    reader = SampleReader(bus)
+    for payload in (b"", b"\xff" * 50, b"\x00", bytes(range(256))):
+        source.transport.put(source.key(SAMPLES.key), payload)
+    source.declare_token("source/not-a-number/x")
+    SampleRing(source, 256).add(block(0))
+    source.publish(SAMPLES, block(0, 3))
+    items = reader.read(1.0)
+    assert [item.seq for item in items if isinstance(item, SampleBlock)] == [0]
+    assert reader.rejected >= 2
+    assert [event.code for event in events.drain()] == ["JOINED"]
