@@ -45,6 +45,12 @@ class AlarmBook:
         self.last[alarm.name] = alarm
         return before is None or before.state != alarm.state
 
+    def standing(self) -> list[Alarm]:
+        """Alarms that are not normal, the oldest first."""
+        return sorted(
+            (a for a in self.last.values() if a.state != "normal"), key=lambda alarm: alarm.t_ns
+        )
+
     def faults(self) -> list[Alarm]:
         """Alarms that stand and mean a fault: worst first, then first-out, then oldest."""
         standing = [a for a in self.last.values() if is_active(a) and a.severity != "info"]

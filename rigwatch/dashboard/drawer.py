@@ -14,7 +14,7 @@ from rigwatch.dashboard.board import APPLICATION, Dashboard
 from rigwatch.dashboard.facts import Facts
 from rigwatch.dashboard.feed import Feed
 
-_FLUSH_TIMEOUT = 1.0
+_FLUSH_TIMEOUT = 5.0
 
 
 class Drawer:
@@ -56,11 +56,14 @@ class Drawer:
         stream = rr.RecordingStream(APPLICATION, recording_id=f"{self.facts.rig}-{time.time_ns()}")
         stream.connect_grpc(self._url)
         dashboard = Dashboard(stream, self.facts)
+        for alarm in self._feed.standing() or self.facts.book.standing():
+            dashboard.show(alarm)
         while not self._stop.wait(max(0.0, self._period - self.held_for)):
             self._turned_at = time.monotonic()
             for message in self._feed.drain():
                 dashboard.show(message)
             self.facts.skipped = self._feed.skipped
             dashboard.flush(time.time_ns())
-        stream.flush(timeout_sec=_FLUSH_TIMEOUT)
+            # Waiting for each turn's data bounds what piles up before a viewer that takes none.
+            stream.flush(timeout_sec=_FLUSH_TIMEOUT)
         stream.disconnect()

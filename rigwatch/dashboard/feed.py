@@ -4,11 +4,14 @@ A screen may leave something out, so that nothing is asked of anybody twice: wha
 drops is counted and shown.
 """
 
+from rigwatch.wire.alarm_list import ask_alarm_list
 from rigwatch.wire.bus import Bus
-from rigwatch.wire.messages import Message
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.messages import Alarm, Message
 from rigwatch.wire.topics import ALARMS, ESTIMATES, EVENTS, GAPS, HEALTH, RUN, SAMPLES
 
 _DRAWN = (RUN, SAMPLES, ESTIMATES, ALARMS, GAPS, HEALTH, EVENTS)
+_ASK_TIMEOUT = 0.5
 _CAPACITY = 2048
 """Messages a topic: eight seconds of one message a sample."""
 
@@ -21,11 +24,19 @@ class Feed:
     """
 
     def __init__(self, bus: Bus) -> None:
+        self._bus = bus
         self._subscriptions = [bus.subscribe(topic, _CAPACITY) for topic in _DRAWN]
 
     def drain(self) -> list[Message]:
         """All that waits, topic by topic; within a topic the oldest first."""
         return [message for waiting in self._subscriptions for message in waiting.drain()]
+
+    def standing(self) -> list[Alarm]:
+        """Alarms that were raised before anybody looked; none where no monitor answers."""
+        try:
+            return ask_alarm_list(self._bus, _ASK_TIMEOUT)
+        except BusError:
+            return []
 
     @property
     def skipped(self) -> int:

@@ -35,6 +35,8 @@ class Lanes:
 
     def alarm(self, alarm: Alarm) -> None:
         """One transition, on its own lane."""
+        if alarm.severity == "info":
+            return  # a remark: it stands in the words and the log, and would only fill the screen
         if alarm.name not in self._names:
             self._add(alarm.name)
         self._change(_path(alarm.name), alarm.state, alarm.t_ns)

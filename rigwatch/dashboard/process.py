@@ -24,7 +24,7 @@ from rigwatch.wire.topics import HEALTH
 
 _TURN = 0.2
 _HEALTH_PERIOD = 1.0
-_HELD_TOO_LONG = 6.0
+_HELD_TOO_LONG = 10.0
 _RESTARTS, _WITHIN = 5, 60.0
 
 

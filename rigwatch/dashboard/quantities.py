@@ -85,13 +85,13 @@ ACCELERATION = "signals/acceleration"
 MEASURED = Plot(
     f"{ACCELERATION}/measured",
     "acceleration",
-    (Series("acceleration", "measured", palette.ACCELERATION),),
+    (Series("acceleration", "measured", palette.ACCELERATION, 2.5),),
     ACCELERATION_TITLE,
 )
 MODELLED = Plot(
     f"{ACCELERATION}/modelled",
     "modelled_acceleration",
-    (Series("modelled_acceleration", "modelled", palette.MODEL),),
+    (Series("modelled_acceleration", "modelled", palette.MODEL, 1.2),),
     ACCELERATION_TITLE,
 )
 RESIDUAL = Plot(

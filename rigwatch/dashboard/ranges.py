@@ -11,7 +11,7 @@ import numpy as np
 from rigwatch.wire.messages import FloatArray
 
 Range = tuple[float, float]
-_STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0)
+_STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 
 def nice_above(value: float) -> float:
@@ -39,7 +39,7 @@ def around_signature(signature: float, low: float, high: float) -> Range | None:
     reach = max(abs(mark) for mark in (signature, low, high) if math.isfinite(mark))
     if reach <= 0:
         return None
-    edge = nice_above(1.2 * reach)
+    edge = nice_above(1.5 * reach)
     return -0.5 * edge, edge
 
 

@@ -27,6 +27,8 @@ _SIGNALS = 5.0
 _HISTORY = 60.0
 _FLUSH_TIMEOUT = 60.0
 _DRAWING_TIMEOUT = 60.0
+_EMPTY_TOP = 36
+"""Where the viewer's own bar would be [pixels]."""
 _SETTLING = 6.0
 """Until the viewer's own notices have gone from the screen [s]."""
 
@@ -118,6 +120,7 @@ def take_picture(viewer: Viewer, path: Path) -> None:
     time.sleep(_SETTLING)
     client = ViewerClient.connect(viewer.url)
     picture = Image.open(io.BytesIO(client.take_screenshot())).convert("RGB")
+    picture = picture.crop((0, _EMPTY_TOP, *picture.size))
     # The viewer packs its pictures for speed; packed well they are a third smaller.
     picture.save(path, format="PNG", optimize=True)
 

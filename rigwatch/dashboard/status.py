@@ -10,7 +10,8 @@ from rigwatch.dashboard.facts import Facts
 from rigwatch.wire.messages import Alarm
 
 _UNITS = {"hz": "Hz", "ms": "ms", "us": "µs", "ppm": "ppm", "s": "s"}
-_SIGNATURES = (("theta1", "Coulomb θ1"), ("theta2", "viscous θ2"))
+_ESTIMATES = (("theta1", "Coulomb θ1"), ("theta2", "viscous θ2"))
+_ENDS = ("low", "high", "signature")
 
 _CALM = {
     "waiting": ("# No estimates yet", "Samples arrive; the monitor is silent so far."),
@@ -26,7 +27,7 @@ def advice(facts: Facts) -> str:
     """Is there a fault, what is it probably, and what to do."""
     faults, remarks, unseen = facts.book.faults(), facts.book.remarks(), facts.book.unseen()
     if faults:
-        return _paragraphs(*_fault(faults[0], faults[1:]), _friction(facts))
+        return _paragraphs(*_fault(faults[0], faults[1:]))
     if facts.samples == 0:
         return _paragraphs(f"# Waiting for {facts.rig}", "No sample has arrived yet.")
     if facts.silent_s:
@@ -36,7 +37,7 @@ def advice(facts: Facts) -> str:
         return _paragraphs("# NO SAMPLES", text)
     if unseen:
         text = f"{_sentence(unseen[0].cause)} It has gone, and nobody has acknowledged it."
-        return _paragraphs(f"# Over: {title(unseen[0].name)}", text, _friction(facts))
+        return _paragraphs(f"# Over: {title(unseen[0].name)}", text)
     return _calm(facts, remarks)
 
 
@@ -44,22 +45,29 @@ def _calm(facts: Facts, remarks: Sequence[Alarm]) -> str:
     if remarks:
         return _paragraphs("# No verdict now", _sentence(remarks[0].cause), remarks[0].guidance)
     title, text = _CALM[facts.verdict()]
-    return _paragraphs(title, text, _friction(facts))
+    return _paragraphs(title, text)
 
 
 def status(facts: Facts) -> str:
-    """How far to trust the verdict: figures of the processes, and what they complain of."""
+    """How far to trust the verdict: estimates, figures of the processes, their complaints."""
     rows = [*_counter_rows(facts)]
     if facts.age.known:
-        age = facts.age
-        rows.append(_row("newest sample here, age [ms]", age.now, age.mean, age.worst))
-    head = ["| | now | mean | worst |", "|---|---:|---:|---:|"]
+        rows.append(
+            _row("age of what is drawn [ms]", facts.age.now, facts.age.mean, facts.age.worst)
+        )
     complaints = [f"* {h.source}: {h.state}, {h.text}" for h in facts.health.values() if h.text]
     if facts.skipped:
         complaints.append(f"* this screen left out {facts.skipped} messages to keep up")
     return _paragraphs(
-        _model(facts), "\n".join(complaints), "\n".join([*head, *rows]) if rows else ""
+        _model(facts),
+        "\n".join(complaints),
+        _table("| | now | thresholds | friction |", [*_friction_rows(facts)]),
+        _table("| | now | mean | worst |", rows),
     )
+
+
+def _table(head: str, rows: Sequence[str]) -> str:
+    return "\n".join([head, "|---|---:|---:|---:|", *rows]) if rows else ""
 
 
 def _model(facts: Facts) -> str:
@@ -90,15 +98,16 @@ def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
-def _friction(facts: Facts) -> str:
-    """The estimates beside the signature of the fault, where both are known."""
-    parts = []
-    for name, label in _SIGNATURES:
-        value, signature = facts.figures.get(name), facts.marks.get(f"{name}_signature")
-        if value is not None:
-            known = f" (friction: {signature:.3g})" if signature is not None else ""
-            parts.append(f"{label} = {value:.2f}{known}")
-    return ", ".join(parts)
+def _friction_rows(facts: Facts) -> Iterator[str]:
+    """The estimates beside their thresholds and the signature of the fault."""
+    for name, label in _ESTIMATES:
+        if name in facts.figures:
+            known = (
+                facts.figures.get(f"{name}_{end}", facts.marks.get(f"{name}_{end}"))
+                for end in _ENDS
+            )
+            low, high, signature = (_figure(value, 2) for value in known)
+            yield f"| {label} | {facts.figures[name]:.2f} | {low} … {high} | {signature} |"
 
 
 def _counter_rows(facts: Facts) -> Iterator[str]:
@@ -140,7 +149,7 @@ def _row(label: str, now: float, mean: float | None = None, worst: float | None 
     return f"| {label} | {_figure(now)} | {_figure(mean)} | {_figure(worst)} |"
 
 
-def _figure(value: float | None) -> str:
+def _figure(value: float | None, digits: int = 4) -> str:
     if value is None:
         return ""
-    return f"{value:.0f}" if float(value).is_integer() else f"{value:.4g}"
+    return f"{value:.0f}" if float(value).is_integer() else f"{value:.{digits}g}"

@@ -9,10 +9,13 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 
 from rigwatch.dashboard import palette
+from rigwatch.dashboard.feed import Feed
 from rigwatch.dashboard.viewer import answers, free_port
+from rigwatch.wire.alarm_list import serve_alarm_list
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.bus_zenoh import open_router
 from rigwatch.wire.messages import Alarm, EstimateBlock, Health, Message, SampleBlock
@@ -91,7 +94,7 @@ class Player(threading.Thread):
 
 @contextlib.contextmanager
 def playing(bus: Bus) -> Iterator[Player]:
-    player = Player(bus, Rig(friction_at=3.0, start_ns=time.time_ns()))
+    player = Player(bus, Rig(friction_at=2.0, start_ns=time.time_ns()))
     player.start()
     yield player
     player.stopped.set()
@@ -126,6 +129,41 @@ def test_the_screen_shows_the_rig_and_its_friction(
         process.send_signal(signal.SIGTERM)
         assert process.wait(15) == 0
         until(lambda: not answers(port), "the viewer ends with the dashboard", 10.0)
+
+
+def test_it_may_die_and_so_may_its_viewer(bus: Bus, config_file: Path, config: RigConfig) -> None:
+    assert config.dashboard is not None
+    port = config.dashboard.grpc_port
+    listener = bus.subscribe(SAMPLES)
+    with dashboard(config_file, "headless") as process, playing(bus) as player:
+        until(lambda: answers(port) or process.poll() is not None, "the viewer answers")
+        viewer = psutil.Process(process.pid).children()[0]
+        viewer.kill()
+        assert process.stderr is not None
+        assert "has died and is opened again" in process.stderr.readline()
+        until(lambda: new_viewer(process.pid, viewer.pid) and answers(port), "a new viewer")
+        screen = Screen(f"rerun+http://127.0.0.1:{port}/proxy")
+        until(lambda: red_verdict(screen), "the new viewer shows the verdict")
+        process.kill()
+        until(lambda: not answers(port), "the viewer ends with a killed dashboard", 10.0)
+        sent = player.sent
+        until(lambda: player.sent > sent + 128, "the rig goes on")
+    blocks = listener.drain()
+    assert [block.seq for block in blocks] == list(range(0, player.sent, 8))[: len(blocks)]
+    assert len(blocks) * 8 >= player.sent - 8
+
+
+def test_a_late_screen_knows_the_alarms_that_stand(bus: Bus) -> None:
+    rig = Rig()
+    standing = rig.alarm("dry_friction", "unacknowledged", 5000, "dry friction")
+    close = serve_alarm_list(bus, lambda: [standing])
+    assert [alarm.name for alarm in Feed(bus).standing()] == ["dry_friction"]
+    close()
+    assert Feed(bus).standing() == []
+
+
+def new_viewer(dashboard: int, old: int) -> bool:
+    return any(child.pid != old for child in psutil.Process(dashboard).children())
 
 
 def red_verdict(screen: Screen) -> bool:

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from rigwatch.commands import main
-from rigwatch.dashboard import palette
+from rigwatch.dashboard import palette, recording
 from rigwatch.wire.session import SessionWriter, run_info
 from tests.dashboard.rig_messages import Rig
 
@@ -23,7 +23,10 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_picture_shows_signals_and_verdict(session: Path, tmp_path: Path) -> None:
+def test_the_picture_shows_signals_and_verdict(
+    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recording, "_SETTLING", 1.0)  # the viewer's notices may be in the picture
     picture = tmp_path / "rubbing.png"
     assert main(["view", str(session), "--picture", str(picture)]) == 0
     pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
