@@ -315,9 +315,17 @@ def _verdict(
     jump_seen = evidence.share > 0.003 and evidence.jump > 30.0 * spread**2 and evidence.dry > 0.2
     certain = jump_seen and evidence.rho > 0.9 and evidence.explained > 0.95
     jumps = jump_seen and evidence.rho > 0.35 and evidence.explained > 0.6 and since >= span
-    slips = evidence.rest > 0.03 and evidence.together > 0.7 and since >= span
+    follows = (
+        evidence.explained > 0.93
+        and evidence.dry > 0.3
+        and evidence.share > 0.001
+        and evidence.rho > 0.2
+        and since >= span
+    )
+    thin = evidence.share > 0.3 and evidence.rho > 0.6 and since >= span
+    slips = evidence.rest > 0.03 and evidence.together > 0.7 and since >= span and before != OTHER
     sure = moved_x or evidence.share > 0.1
-    friction = moved_a and sure and (certain or jumps or slips)
+    friction = moved_a and sure and (certain or jumps or follows or thin or slips)
     state.number[_AGREED] = state.number[_AGREED] + 1 if friction else 0
     if before == FRICTION or before == STICKING or state.number[_AGREED] >= 3:
         return STICKING if evidence.rest >= 0.5 and moved_a else FRICTION
