@@ -165,6 +165,13 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "Look for a loose contact or electrical disturbance near the sensor's cable.",
         _SENSOR,
     ),
+    AlarmKind(
+        "sensor_invalid",
+        "error",
+        "a channel that the estimates need has been invalid for too long",
+        "See which sensor alarm stands beside this one. Estimates go on once the channel is back.",
+        _AT_ONCE,
+    ),
     # The rig itself.
     AlarmKind(
         "departure",

@@ -25,6 +25,10 @@ from rigwatch.physics.transfer_function import FloatArray
 from rigwatch.wire.errors import ModelError
 
 
+NOISE_FACTOR = 4.0
+"""The floor stands at least this many deviations of the residual's noise away [1]."""
+
+
 @dataclass(frozen=True, slots=True)
 class AdaptiveThreshold:
     """The four figures.
@@ -109,25 +113,34 @@ def fit_threshold(
     if not judged.any():
         raise ModelError("adaptive threshold: found no judged sample in the healthy recording")
     size = margin * np.abs(residual[judged])
+    noise = margin * NOISE_FACTOR * noise_deviation(residual[judged])
     best, best_cost = AdaptiveThreshold(float(size.max()), 0.0, 0.0, slowest), float(size.max())
-    for lag in slowest * np.array([0.25, 0.5, 1.0]):
+    for lag in slowest * np.array([0.5, 1.0, 2.0]):
         for ratio in (0.5, 1.0, 2.0, 4.0):
             unit = AdaptiveThreshold(0.0, 1.0, float(ratio * lag), float(lag))
             envelope = threshold_block(unit.coefficients(sample_rate), new_threshold_state(), u)
-            candidate, cost = _best_gain(size, envelope[judged], unit)
+            candidate, cost = _best_gain(size, envelope[judged], unit, noise)
             if cost < 0.98 * best_cost or (cost < 1.02 * best_cost and candidate.gain > best.gain):
                 best, best_cost = candidate, min(cost, best_cost)
     return best
 
 
+def noise_deviation(values: FloatArray) -> float:
+    """Standard deviation of white noise under a smooth signal, from its sixth differences."""
+    if values.size < 16:
+        return 0.0
+    gain = float(np.sum(np.array([1, 6, 15, 20, 15, 6, 1]) ** 2))
+    return float(np.sqrt(np.mean(np.diff(values, 6) ** 2) / gain))
+
+
 def _best_gain(
-    size: FloatArray, envelope: FloatArray, unit: AdaptiveThreshold
+    size: FloatArray, envelope: FloatArray, unit: AdaptiveThreshold, noise: float
 ) -> tuple[AdaptiveThreshold, float]:
-    """Gain and floor of the lowest mean limit above `size`, for one lead and lag."""
+    """Gain and floor, at least `noise`, of the lowest mean limit above `size`."""
     steepest = float(size.max() / max(envelope.max(), 1e-300))
     options = []
     for gain in steepest * np.linspace(0.0, 1.5, 31):
-        floor = max(float(np.max(size - gain * envelope)), float(np.median(size)))
+        floor = max(float(np.max(size - gain * envelope)), noise)
         mean_limit = floor + float(gain) * float(envelope.mean())
         options.append((mean_limit, float(gain), floor))
     lowest = min(options)[0]
