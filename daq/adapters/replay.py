@@ -4,6 +4,7 @@ Samples come when they are due by the recording's own clock, calibrated and judg
 recorded. Their numbers are those of the recording; each turn of a loop has a boot of its own.
 """
 
+import math
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -96,7 +97,7 @@ class ReplayAdapter:
         return {"played": self._played, "turns": self._turn + 1}
 
     def _due_ns(self, us: int) -> int:
-        return self._start_ns + round((us - self._start_us) * 1e3 / self.clock_rate)
+        return self._start_ns + math.ceil((us - self._start_us) * 1e3 / self.clock_rate) + 1
 
     def _opened(self) -> Iterator[SampleBlock]:
         try:

@@ -84,6 +84,9 @@ class ControlServer:
 
     def __exit__(self, *_: object) -> None:
         if self._socket is not None:
+            # Closing alone does not wake a thread that waits in accept().
+            with contextlib.suppress(OSError):
+                self._socket.shutdown(socket.SHUT_RDWR)
             self._socket.close()
         with contextlib.suppress(OSError):
             self._path.unlink()

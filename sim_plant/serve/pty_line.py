@@ -28,6 +28,7 @@ class PtyLine:
         self.link = Path(link)
         self.dropped = 0
         self._master: int | None = None
+        self._target = ""
 
     @property
     def plugged(self) -> bool:
@@ -57,8 +58,7 @@ class PtyLine:
         if self._master is not None:
             os.close(self._master)
             self._master = None
-            with contextlib.suppress(OSError):
-                self.link.unlink()
+            self._remove_link()
 
     def heard(self) -> bool:
         """Whether somebody has the line open at its other end."""
@@ -83,7 +83,14 @@ class PtyLine:
         except OSError:
             return b""
 
+    def _remove_link(self) -> None:
+        """Only the link that was made here: another plant may have put its own in its place."""
+        with contextlib.suppress(OSError):
+            if str(self.link.readlink()) == self._target:
+                self.link.unlink()
+
     def _make_link(self, target: str) -> None:
+        self._target = target
         try:
             if self.link.is_symlink():
                 self.link.unlink()

@@ -40,7 +40,9 @@ def test_any_losses_and_repetitions(first: int, fates: list[str], cuts: list[int
     seqs, at = [first], first
     for fate in fates:
         at += 1
-        seqs += {"keep": [at], "lose": [], "twice": [at, at], "again": [at, max(at - 3, first)]}[fate]
+        seqs += {"keep": [at], "lose": [], "twice": [at, at], "again": [at, max(at - 3, first)]}[
+            fate
+        ]
     tracker, numbers, lost, start, turn = SequenceTracker(256.0), [], [], 0, 0
     while start < len(seqs):
         stop = start + cuts[turn % len(cuts)]
