@@ -31,16 +31,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when the demonstration did what it is for."""
     from rigwatch.demo.commissioning import ensure_model
-    from rigwatch.demo.rig_file import find_config, write_rig_file
+    from rigwatch.demo.rig_file import find_config, forget_alarms, write_rig_file
     from rigwatch.demo.show import Show
 
     folder: Path = arguments.folder
     folder.mkdir(parents=True, exist_ok=True)
-    viewer = "web" if arguments.headless else "auto"
-    rig = write_rig_file(find_config("demo.toml"), folder, viewer)
-    ensure_model(rig, folder, _remark)
+    config = find_config("demo.toml")
+    ensure_model(config, folder, _remark)
     if arguments.commission_only:
         return 0
+    forget_alarms(folder)
+    rig = write_rig_file(config, folder, "web" if arguments.headless else "auto")
     seconds = arguments.seconds or (HEADLESS_SECONDS if arguments.headless else None)
     outcome = Show(rig, folder, _remark).play(seconds)
     if arguments.json:

@@ -26,14 +26,14 @@ RECORDINGS = {
 """The recordings that commissioning asks for, by role, and the scenario that each is of."""
 
 
-def ensure_model(rig: Path, folder: Path, say: Callable[[str], None]) -> Path:
-    """The model for the simulated rig of the file `rig`, made anew where anything has changed.
+def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path:
+    """The model for the simulated rig of `config`, made anew where anything has changed.
 
     Raises:
         ModelError: a step failed.
     """
     model, stamp = folder / MODEL, folder / "model.made-from"
-    made_from = _made_from(rig)
+    made_from = _made_from(config)
     if model.is_file() and stamp.is_file() and stamp.read_text(encoding="utf-8") == made_from:
         say(f"model of the rig: {relative(model)}, made in an earlier run")
         return model
@@ -43,7 +43,7 @@ def ensure_model(rig: Path, folder: Path, say: Callable[[str], None]) -> Path:
         session.parent.mkdir(parents=True, exist_ok=True)
         session.unlink(missing_ok=True)
         scenario = find_config(RECORDINGS[role])
-        _run(["plant", rig, "--session", session, "--scenario", scenario], say)
+        _run(["plant", "--session", session, scenario], say)
     roles = [part for role, session in sessions.items() for part in (f"--{role}", session)]
     _run(["commission", *roles, "--output", model], say)
     stamp.write_text(made_from, encoding="utf-8")
@@ -60,19 +60,13 @@ def _run(arguments: list[str | Path], say: Callable[[str], None]) -> None:
         raise ModelError(f"rigwatch {words[0]} failed: {reason[-1]}")
 
 
-def _made_from(rig: Path) -> str:
+def _made_from(config: Path) -> str:
     """A hash of the configuration, the scenarios and the code that the model comes from."""
-    parts = [find_config(name) for name in RECORDINGS.values()]
-    found = hashlib.sha256(_calibration(rig))
-    for path in [*parts, *_sources()]:
+    scenarios = [find_config(name) for name in RECORDINGS.values()]
+    found = hashlib.sha256()
+    for path in [config, *scenarios, *_sources()]:
         found.update(path.read_bytes())
     return found.hexdigest()
-
-
-def _calibration(rig: Path) -> bytes:
-    """The configuration without what differs from run to run: ports and viewer."""
-    text = rig.read_text(encoding="utf-8")
-    return text.partition("[[channels]]")[2].partition("[daq]")[0].encode()
 
 
 def _sources() -> Iterator[Path]:

@@ -25,6 +25,7 @@ from rigwatch.wire.rig_config import (
 
 NAME = "rig.toml"
 MODEL = "model.toml"
+JOURNAL = "alarms.jsonl"
 _HOST = "127.0.0.1"
 
 
@@ -73,6 +74,12 @@ def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
     return target
 
 
+def forget_alarms(folder: Path) -> None:
+    """Begin without the alarms of an earlier run, which a real rig's monitor would restore."""
+    for journal in folder.glob(f"{JOURNAL}*"):
+        journal.unlink()
+
+
 def _free_bus(bus: BusSection) -> BusSection:
     address = endpoint_address(bus.listen)
     if address is None or is_free(*address):
@@ -102,7 +109,7 @@ def _plant(plant: PlantSection, folder: Path) -> PlantSection:
 
 
 def _monitor(monitor: MonitorSection | None, folder: Path) -> MonitorSection:
-    model, journal = str(folder / MODEL), str(folder / "alarms.jsonl")
+    model, journal = str(folder / MODEL), str(folder / JOURNAL)
     if monitor is None:
         return MonitorSection(model=model, journal=journal)
     return structs.replace(monitor, model=model, journal=journal)

@@ -58,7 +58,7 @@ class Show:
         self._config = load_rig(rig)
         assert self._config.plant is not None
         self._narrator = Narrator(load_scenario(self._config.plant.scenario), say)
-        self._seen = 0
+        self._first = self._seen = 0
         self._up: subprocess.Popen[str] | None = None
 
     def play(self, seconds: float | None) -> Outcome:
@@ -92,16 +92,17 @@ class Show:
                     self._narrator.alarm(alarm)
                 blocks: list[SampleBlock] = samples.drain()
                 if blocks:
-                    self._first_samples()
-                    self._seen = blocks[-1].seq + len(blocks[-1])
-                    self._narrator.samples(self._seen)
+                    self._take(blocks)
                     give_up = time.monotonic() + START_TIMEOUT
         finally:
             bus.close()
 
-    def _first_samples(self) -> None:
+    def _take(self, blocks: list[SampleBlock]) -> None:
         if not self._seen:
             self._say("samples arrive: the rig moves, healthy so far")
+            self._first = blocks[0].seq
+        self._seen = blocks[-1].seq + len(blocks[-1])
+        self._narrator.samples(self._seen)
 
     def _check_running(self, give_up: float) -> None:
         assert self._up is not None
@@ -139,7 +140,7 @@ class Show:
 
     def _judge(self) -> Outcome:
         recording = read_recording(newest_session(self._folder / "sessions"))
-        found = complaints(self._narrator.alarms, recording)
+        found = complaints(self._narrator.alarms, recording, range(self._first, self._seen))
         seconds = recording.samples / self._config.rig.sample_rate
         whole = "; ".join(recording.faults) or "none missing"
         session = relative(recording.path)

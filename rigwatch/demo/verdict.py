@@ -19,6 +19,7 @@ class Recording:
 
     Attributes:
         path: the session.
+        first, end: number of the first sample, and of the one after the last.
         samples: how many of the rig's samples are in it.
         estimates: how many samples the monitor's estimates cover.
         alarms: names of the alarms raised in it.
@@ -26,6 +27,8 @@ class Recording:
     """
 
     path: Path
+    first: int
+    end: int
     samples: int
     estimates: int
     alarms: tuple[str, ...]
@@ -58,15 +61,15 @@ def read_recording(path: Path) -> Recording:
     faults = [f"damaged: {span.reason}" for span in session.lost]
     faults += ["not closed"] if session.unclosed else []
     faults += list(_missing(blocks))
-    return Recording(path, sum(n for _, _, n in blocks), estimates, alarms, tuple(faults))
+    first, end = (blocks[0][1], blocks[-1][1] + blocks[-1][2]) if blocks else (0, 0)
+    count = sum(n for _, _, n in blocks)
+    return Recording(path, first, end, count, estimates, alarms, tuple(faults))
 
 
 def _missing(blocks: Sequence[tuple[int, int, int]]) -> Iterator[str]:
     if not blocks:
         yield "holds no samples"
         return
-    if blocks[0][1] != 0:
-        yield f"the first {blocks[0][1]} samples are missing"
     for (boot, seq, n), (next_boot, next_seq, _) in pairwise(blocks):
         if next_boot != boot:
             yield f"the device started again after sample {seq + n - 1}"
@@ -74,9 +77,18 @@ def _missing(blocks: Sequence[tuple[int, int, int]]) -> Iterator[str]:
             yield f"samples {seq + n} to {next_seq - 1} are missing"
 
 
-def complaints(alarms: Sequence[Alarm], recording: Recording) -> list[str]:
-    """Why the demonstration failed; empty where it did what it is for."""
+def complaints(alarms: Sequence[Alarm], recording: Recording, seen: range) -> list[str]:
+    """Why the demonstration failed; empty where it did what it is for.
+
+    Args:
+        alarms: raised while it ran.
+        recording: what was left.
+        seen: numbers of the samples that another reader of the bus saw meanwhile.
+    """
     found = list(recording.faults)
+    if seen and not (recording.first <= seen.start and seen.stop <= recording.end):
+        has, saw = f"{recording.first} to {recording.end - 1}", f"{seen.start} to {seen.stop - 1}"
+        found.append(f"samples {has} are in it, but {saw} were on the bus")
     named = [alarm for alarm in alarms if alarm.name == ALARM]
     if not named:
         others = ", ".join(alarm.name for alarm in alarms) or "none at all"

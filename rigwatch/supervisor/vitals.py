@@ -39,6 +39,7 @@ class Vitals:
         started_at: when it was started.
         heard_at: when it said something last.
         ready: it has said that it is.
+        ready_at: when it said so first; until then it may have compiled kernels.
         stopping: it has said that it stops.
         count: samples that went through it since its start.
         advanced_at: when the count last grew.
@@ -49,6 +50,7 @@ class Vitals:
     started_at: float
     heard_at: float = field(init=False)
     ready: bool = False
+    ready_at: float = field(init=False)
     stopping: bool = False
     count: int = 0
     advanced_at: float = field(init=False)
@@ -56,7 +58,8 @@ class Vitals:
     status: str = ""
 
     def __post_init__(self) -> None:
-        self.heard_at = self.advanced_at = self.flowing_since = self.started_at
+        self.heard_at = self.ready_at = self.started_at
+        self.advanced_at = self.flowing_since = self.started_at
 
     def take(self, word: str, now: float) -> None:
         """Take in one datagram of systemd's notify protocol; unknown variables are passed over."""
@@ -64,7 +67,7 @@ class Vitals:
         for line in word.splitlines():
             name, _, value = line.partition("=")
             if name == "READY":
-                self.ready = True
+                self._is_ready(now)
             elif name == "STOPPING":
                 self.stopping = True
             elif name == "STATUS":
@@ -72,10 +75,14 @@ class Vitals:
             elif name == "X_RIGWATCH_COUNT" and value.isdigit():
                 self._count(int(value), now)
 
+    def _is_ready(self, now: float) -> None:
+        if not self.ready:
+            self.ready, self.ready_at = True, now
+
     def _count(self, count: int, now: float) -> None:
         if count <= self.count:
             return
-        self.ready = True
+        self._is_ready(now)
         if now - self.advanced_at > 1.0:
             self.flowing_since = now
         self.count, self.advanced_at = count, now
@@ -92,7 +99,7 @@ class Vitals:
         if now - self.heard_at > limits.silence:
             return f"hangs: silent for {limits.silence:g} s"
         if source is not None and source.flows(now):
-            dry_since = max(self.advanced_at, source.flowing_since)
+            dry_since = max(self.advanced_at, self.ready_at, source.flowing_since)
             if now - dry_since > limits.stall:
                 return f"takes no samples for {limits.stall:g} s while its source has them"
         return ""

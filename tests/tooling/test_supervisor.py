@@ -149,6 +149,18 @@ def test_a_process_cannot_be_judged_by_words_that_waited_for_a_late_supervisor()
     assert vitals.complaint(None, 30.0, LIMITS) == ""
 
 
+def test_time_to_get_ready_is_not_time_without_samples() -> None:
+    source, reader = Vitals(0.0), Vitals(0.0)
+    for second in range(31):
+        source.take(f"X_RIGWATCH_COUNT={second + 1}", now=float(second))
+    reader.take("READY=1", now=29.9)
+    assert reader.complaint(source, 30.0, LIMITS) == ""
+    for second in (30.5, 31.0, 31.5):
+        source.take(f"X_RIGWATCH_COUNT={second * 10:.0f}", now=second)
+    reader.take("X_RIGWATCH_COUNT=0", now=31.5)
+    assert "takes no samples" in reader.complaint(source, 31.5, LIMITS)
+
+
 @pytest.mark.parametrize(("silent_for", "ill"), [(0.5, False), (1.5, True)])
 def test_silence_is_measured_from_the_last_word(silent_for: float, ill: bool) -> None:
     vitals = Vitals(0.0)
