@@ -40,6 +40,7 @@ COMMANDS: dict[str, str] = {
     "trim": "trim",
     "recover": "recover",
     "replay": "replay",
+    "verify": "verify",
     "import": "import_",
     "export": "export",
 }

@@ -1,0 +1,114 @@
+"""Verification cases: recordings, models and what may differ, declared in a TOML file.
+
+[[case]]
+name = "friction"
+recording = "friction.mcap"         paths are relative to the file
+model = "model.toml"
+reference = "friction.reference.mcap"
+block = 8                           samples handed over at a time
+ignore = ["condition.gap.*"]        fields that are not compared
+tolerance = { theta2 = 1e-4 }       relative to the field's largest value
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta, field
+
+from rigwatch.replay.choice import monitor_for
+from rigwatch.replay.compare import Difference, Rules, compare
+from rigwatch.replay.reference import Output, output_of, read_reference, write_reference
+from rigwatch.wire.config import Section, load
+from rigwatch.wire.session.reader import Session, open_session
+
+Text = Annotated[str, Meta(min_length=1)]
+
+
+class Case(Section, frozen=True):
+    """One case."""
+
+    name: Annotated[Text, Meta(description="what it is called in reports")]
+    recording: Annotated[Text, Meta(description="session file or folder")]
+    model: Annotated[Text, Meta(description="model file")]
+    reference: Annotated[Text, Meta(description="session file with the reference")]
+    config: Annotated[
+        str, Meta(description="configuration of the rig; empty: the one recorded with it")
+    ] = ""
+    block: Annotated[int, Meta(ge=1, description="samples handed over at a time")] = 8
+    ignore: Annotated[tuple[Text, ...], Meta(description="patterns of fields not compared")] = ()
+    tolerance: Annotated[
+        dict[Text, Annotated[float, Meta(ge=0)]],
+        Meta(description="tolerance by pattern of field, relative to the field's largest value"),
+    ] = field(default_factory=dict)
+
+
+class CaseFile(Section, frozen=True):
+    """The whole file."""
+
+    case: Annotated[tuple[Case, ...], Meta(min_length=1, description="the cases")]
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What came of one case.
+
+    Attributes:
+        name: the case.
+        samples: samples judged.
+        fields: fields published.
+        differences: what differs from the reference.
+        has_reference: whether there was one.
+        updated: whether the reference was renewed.
+    """
+
+    name: str
+    samples: int
+    fields: int
+    differences: tuple[Difference, ...]
+    has_reference: bool
+    updated: bool
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything is as the reference says, or was renewed."""
+        return self.updated or (self.has_reference and not self.differences)
+
+
+def load_cases(path: Path) -> tuple[Case, ...]:
+    """The cases in the file at `path`.
+
+    Raises:
+        ConfigError: the file is wrong.
+    """
+    return load(path, CaseFile).case
+
+
+def verify(case: Case, folder: Path, *, update: bool = False) -> Verdict:
+    """Replay one case and compare; with `update`, renew the reference where it differs.
+
+    Args:
+        case: what is replayed.
+        folder: that the case's paths are relative to.
+        update: renew the reference.
+
+    Raises:
+        RigwatchError: recording, model, configuration or reference cannot be read.
+    """
+    session = open_session(folder / case.recording)
+    new = replayed(case, folder, session, case.block)
+    path = folder / case.reference
+    known = path.exists()
+    rules = Rules(case.ignore, case.tolerance)
+    differences = compare(read_reference(path), new, rules) if known else []
+    renew = update and (not known or bool(differences))
+    if renew:
+        write_reference(path, session.info, new)
+    fields = len(new.blocks[0].columns) if new.blocks else 0
+    return Verdict(case.name, new.samples, fields, tuple(differences), known, renew)
+
+
+def replayed(case: Case, folder: Path, session: Session, block: int) -> Output:
+    """What the monitor publishes over the case's recording, handed over in blocks of `block`."""
+    config = folder / case.config if case.config else None
+    return output_of(session, monitor_for(session, folder / case.model, config), block)
