@@ -5,7 +5,7 @@ A detector needs the model file's transfer function from input to output and a t
 run. Heavy imports wait until a detector is asked for.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -24,25 +24,25 @@ class DetectorKind:
         name: in the configuration.
         condition: that it reports, with an alarm of the same name.
         summary: what it is, for people.
-        calibrate: (function, healthy signals of shape (n, 3): input, output, acceleration (or
-            (n, 2) without), sample rate [Hz]) → figures.
+        calibrate: (function, healthy recordings, sample rate [Hz]) → figures; a recording has shape
+            (n, 3): input, output, acceleration, or (n, 2) without the last.
         make: (function, figures, channels, sample rate [Hz]) → detector.
     """
 
     name: str
     condition: str
     summary: str
-    calibrate: "Callable[[TransferFunction, FloatArray, float], dict[str, float]]"
+    calibrate: "Callable[[TransferFunction, Sequence[FloatArray], float], dict[str, float]]"
     make: "Callable[[TransferFunction, Mapping[str, float], Channels, float], Detector]"
 
 
 def _calibrate_parity(*, moving_average: bool) -> "Callable[..., dict[str, float]]":
     def calibrate(
-        function: "TransferFunction", signals: "FloatArray", sample_rate: float
+        function: "TransferFunction", healthy: "Sequence[FloatArray]", sample_rate: float
     ) -> dict[str, float]:
         from monitor.detectors.calibration import calibrate_parity
 
-        return calibrate_parity(function, signals, sample_rate, moving_average=moving_average)
+        return calibrate_parity(function, healthy, sample_rate, moving_average=moving_average)
 
     return calibrate
 
@@ -62,11 +62,11 @@ def _make_parity(*, moving_average: bool) -> "Callable[..., Detector]":
 
 
 def _calibrate_unknown_input(
-    function: "TransferFunction", signals: "FloatArray", sample_rate: float
+    function: "TransferFunction", healthy: "Sequence[FloatArray]", sample_rate: float
 ) -> dict[str, float]:
     from monitor.detectors.calibration import calibrate_unknown_input
 
-    return calibrate_unknown_input(function, signals, sample_rate)
+    return calibrate_unknown_input(function, healthy, sample_rate)
 
 
 def _make_unknown_input(

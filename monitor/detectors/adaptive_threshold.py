@@ -24,7 +24,6 @@ from numba import njit
 from rigwatch.physics.transfer_function import FloatArray
 from rigwatch.wire.errors import ModelError
 
-
 NOISE_FACTOR = 4.0
 """The floor stands at least this many deviations of the residual's noise away [1]."""
 

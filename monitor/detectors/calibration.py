@@ -6,7 +6,7 @@ excitation that will be watched: what the model gets wrong there is what the thr
 room for.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 
 import numpy as np
@@ -46,31 +46,32 @@ def time_constant(function: TransferFunction, sample_rate: float) -> float:
 
 def calibrate_parity(
     function: TransferFunction,
-    signals: FloatArray,
+    healthy: Sequence[FloatArray],
     sample_rate: float,
     *,
     moving_average: bool,
 ) -> dict[str, float]:
-    """Operating point and adaptive threshold from healthy input and output, shape (n, 2 or more).
+    """Operating point and adaptive threshold from healthy recordings, each of shape (n, 2 or more).
 
     Raises:
-        ModelError: the recording is too short to settle.
+        ModelError: a recording is too short to settle.
     """
+    settle = _settling(sample_rate)
+    _refuse_short(healthy, settle)
     slowest = time_constant(function, sample_rate)
-    settle = int(SETTLED / (2.0 * np.pi * CORNER) * sample_rate)
     point = OperatingPoint(CORNER, 0.0, 0.0, settle)
-    _refuse_short(signals, settle)
-    free = ParityDetector(
-        function,
-        AdaptiveThreshold(0.0, 0.0, 0.0, slowest),
-        point,
-        Channels(),
-        sample_rate,
-        moving_average=moving_average,
+    free = AdaptiveThreshold(0.0, 0.0, 0.0, slowest)
+    residuals = []
+    for signals in healthy:
+        detector = ParityDetector(
+            function, free, point, Channels(), sample_rate, moving_average=moving_average
+        )
+        plain = np.ascontiguousarray(signals[:, :2])
+        residuals.append(detector.judge(plain, _codes(len(signals))).value)
+    inputs = [high_passed(signals[:, 0], CORNER, sample_rate) for signals in healthy]
+    threshold = fit_threshold(
+        np.concatenate(residuals), np.concatenate(inputs), sample_rate, slowest, MARGIN
     )
-    residual = free.judge(np.ascontiguousarray(signals[:, :2]), _codes(len(signals))).value
-    u = high_passed(signals[:, 0], CORNER, sample_rate)
-    threshold = fit_threshold(residual, u, sample_rate, slowest, MARGIN)
     return {**asdict(threshold), **asdict(point)}
 
 
@@ -91,28 +92,29 @@ def make_parity(
 
 
 def calibrate_unknown_input(
-    function: TransferFunction, signals: FloatArray, sample_rate: float
+    function: TransferFunction, healthy: Sequence[FloatArray], sample_rate: float
 ) -> dict[str, float]:
-    """Noise and limit from healthy input, position and acceleration, shape (n, 2 or 3).
+    """Noise and limit from healthy recordings, each of shape (n, 3), or (n, 2) without
+    acceleration.
 
     The limit is the chi-square one. A linear model of a nonlinear plant leaves innovations that are
     neither white nor normal, so the measurements' variances, in proportion to what the model gets
     wrong in each, are scaled until the largest healthy sum stands `MARGIN` below that limit.
 
     Raises:
-        ModelError: the recording is too short to settle.
+        ModelError: a recording is too short to settle.
     """
-    settle = int(SETTLED / (2.0 * np.pi * CORNER) * sample_rate)
-    _refuse_short(signals, settle + NIS_WINDOW)
-    errors = _model_errors(function, signals, sample_rate, settle)
-    limit = nis_limit(NIS_WINDOW, signals.shape[1] - 1, FALSE_ALARM)
+    settle = _settling(sample_rate)
+    _refuse_short(healthy, settle + NIS_WINDOW)
+    errors = np.max([_model_errors(function, one, sample_rate, settle) for one in healthy], axis=0)
+    limit = nis_limit(NIS_WINDOW, healthy[0].shape[1] - 1, FALSE_ALARM)
 
     def noise(scale: float) -> NoiseModel:
         return NoiseModel(
-            input=DRIVE_SHARE * float(np.var(signals[:, 0])),
-            state=STATE_SHARE * errors[0],
-            position=scale * errors[0],
-            acceleration=scale * errors[1],
+            input=DRIVE_SHARE * max(float(np.var(one[:, 0])) for one in healthy),
+            state=STATE_SHARE * float(errors[0]),
+            position=scale * float(errors[0]),
+            acceleration=scale * float(errors[1]),
             window=NIS_WINDOW,
             limit=limit,
             settle=settle,
@@ -120,7 +122,8 @@ def calibrate_unknown_input(
         )
 
     def largest_sum(scale: float) -> float:
-        return float(np.nanmax(_nis_sums(function, noise(scale), signals, sample_rate)))
+        sums = [_nis_sums(function, noise(scale), one, sample_rate) for one in healthy]
+        return max(float(np.nanmax(one)) for one in sums)
 
     return asdict(noise(_falls_to(limit / MARGIN, largest_sum)))
 
@@ -146,10 +149,16 @@ def _codes(n: int) -> NDArray[np.int64]:
     return code
 
 
-def _refuse_short(signals: FloatArray, needed: int) -> None:
-    if len(signals) < 2 * needed:
+def _settling(sample_rate: float) -> int:
+    """Samples after a start that are not judged."""
+    return int(SETTLED / (2.0 * np.pi * CORNER) * sample_rate)
+
+
+def _refuse_short(healthy: Sequence[FloatArray], needed: int) -> None:
+    shortest = min((len(signals) for signals in healthy), default=0)
+    if shortest < 2 * needed:
         raise ModelError(
-            f"detectors: found {len(signals)} healthy samples, expected at least {2 * needed}"
+            f"detectors: found {shortest} healthy samples, expected at least {2 * needed}"
         )
 
 

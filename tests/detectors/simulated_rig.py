@@ -65,5 +65,5 @@ class SimulatedRig:
 
     def detector(self, kind: DetectorKind) -> Detector:
         """Calibrated with the healthy minute."""
-        figures = kind.calibrate(self.function, self.reference, RATE)
+        figures = kind.calibrate(self.function, [self.reference], RATE)
         return kind.make(self.function, figures, CHANNELS, RATE)

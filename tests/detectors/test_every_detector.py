@@ -28,7 +28,7 @@ def kind(request):
 
 @pytest.fixture(scope="session")
 def figures(rig):
-    return {kind.name: kind.calibrate(rig.function, rig.reference, RATE) for kind in DETECTORS}
+    return {kind.name: kind.calibrate(rig.function, [rig.reference], RATE) for kind in DETECTORS}
 
 
 @pytest.fixture
@@ -149,4 +149,4 @@ def test_figures_are_plain_numbers_for_the_model_file(kind, figures):
 
 def test_a_short_recording_is_refused_in_one_line(rig, kind):
     with pytest.raises(ModelError, match="healthy samples, expected at least"):
-        kind.calibrate(rig.function, rig.reference[:500], RATE)
+        kind.calibrate(rig.function, [rig.reference[:500]], RATE)
