@@ -90,7 +90,8 @@ class Acquisition:
     def _samples(self, run: RawBlock) -> list[Message]:
         messages: list[Message] = []
         for start in range(0, len(run), LONGEST_BLOCK):
-            part = picked(run, slice(start, start + LONGEST_BLOCK))
+            whole = len(run) <= LONGEST_BLOCK
+            part = run if whole else picked(run, slice(start, start + LONGEST_BLOCK))
             stamps, jump = self.clock.stamp(part)
             if jump:
                 text = f"the device's clock jumped by {jump:+.6f} s, its time is anchored anew"

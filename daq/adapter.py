@@ -78,7 +78,9 @@ class Adapter(Protocol):
 
 
 def picked(raw: RawBlock, index: Sequence[int] | slice) -> RawBlock:
-    """Some of a block's samples."""
+    """Some of a block's samples, in order."""
+    if not isinstance(index, slice) and len(index) == len(raw):
+        return raw
     span = index if isinstance(index, slice) else list(index)
     return replace(
         raw,

@@ -50,10 +50,10 @@ class Conditioner:
     def __init__(self, channels: Sequence[ChannelSection], device: str = "rig") -> None:
         self._channels = tuple(channels)
         self._device = device
-        self._calibration = Calibration.of(channels)
+        self._calibration = c = Calibration.of(channels)
         self._stuck_after = np.array([channel.stuck_after for channel in channels], np.int64)
         steps = [np.inf if c.spike_above is None else c.spike_above for c in channels]
-        self._spike_above = np.array(steps, np.float64)
+        self._limits = np.stack([c.code_low, c.code_high, c.low, c.high, steps])
         self._boot: int | None = None
         self._state = np.zeros(len(self._channels), _STATE)
         self._compile()
@@ -90,10 +90,8 @@ class Conditioner:
             flags = raw.quality.copy() if len(raw.quality) else np.zeros(codes.shape, np.uint8)
             _hold_last(values, flags, self._state)
         else:
-            c = self._calibration
-            values, flags = c.values(codes), np.zeros(codes.shape, np.uint8)
-            limits = np.stack([c.code_low, c.code_high, c.low, c.high, self._spike_above])
-            _judge(codes, values, flags, limits, self._stuck_after, self._state)
+            values, flags = self._calibration.values(codes), np.zeros(codes.shape, np.uint8)
+            _judge(codes, values, flags, self._limits, self._stuck_after, self._state)
         return values, flags
 
 

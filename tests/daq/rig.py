@@ -132,7 +132,7 @@ class Running:
         link, counters = self.device.link, self.adapter.counters()
         self.heard.messages += self.acquisition.tick(self.clock(), link, counters)
 
-    def until(self, holds: Callable[["Heard"], bool], timeout: float = 5.0) -> Heard:
+    def until(self, holds: Callable[["Heard"], bool], timeout: float = 30.0) -> Heard:
         """Run until `holds(heard)`; fails when that takes longer than `timeout` [s]."""
         deadline = time.monotonic() + timeout
         while not holds(self.heard):
@@ -141,7 +141,7 @@ class Running:
             self.turn()
         return self.heard
 
-    def more(self, samples: int, timeout: float = 5.0) -> Heard:
+    def more(self, samples: int, timeout: float = 30.0) -> Heard:
         """Run until so many more samples have come."""
         wanted = self.heard.count() + samples
         return self.until(lambda heard: heard.count() >= wanted, timeout)

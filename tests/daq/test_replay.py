@@ -41,9 +41,7 @@ def replayed(
     session: Path, speed: float = 1.0, *, loop: bool = False
 ) -> tuple[ReplayAdapter, HostTime]:
     time = HostTime()
-    adapter = ReplayAdapter(
-        session, CHANNELS, speed, loop=loop, clock=time, sleep=lambda s: time.pass_by(s)
-    )
+    adapter = ReplayAdapter(session, CHANNELS, speed, loop=loop, clock=time, sleep=time.pass_by)
     return adapter, time
 
 

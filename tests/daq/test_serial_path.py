@@ -18,7 +18,7 @@ def test_every_sample_arrives_once_with_its_codes(tmp_path: Path) -> None:
     config = config_of(f'adapter = "serial"\nport = "{port}"')
     with in_thread(server.run):
         running = Running(config, SerialAdapter(SerialPort(port, 115200), 3))
-        heard = running.more(256)
+        heard = running.more(100)
         running.device.close()
     numbers = [seq for _, seq in heard.numbers()]
     assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
@@ -35,7 +35,7 @@ def test_time_stamps_keep_the_pace_of_the_device(tmp_path: Path) -> None:
     config = config_of(f'adapter = "serial"\nport = "{port}"')
     with in_thread(server.run):
         running = Running(config, SerialAdapter(SerialPort(port, 115200), 3))
-        heard = running.more(300)
+        heard = running.more(100)
         running.device.close()
     stamps = np.concatenate([block.t_ns for block in heard.blocks])
     steps = np.diff(stamps)
