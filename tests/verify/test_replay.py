@@ -1,0 +1,103 @@
+"""`rigwatch replay`: alarms as they come, a summary, a new session, and clear refusals."""
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.replay.source import items
+from rigwatch.wire.messages import AlarmCommand, SampleBlock
+from rigwatch.wire.session import SessionWriter, open_session, run_info
+
+HERE = Path(__file__).parent
+MODEL = ["--model", str(HERE / "model.toml")]
+FRICTION = str(HERE / "friction.mcap")
+
+
+def test_alarms_and_summary(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", FRICTION, *MODEL]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any("dry_friction: unacknowledged" in line for line in lines)
+    assert "2048 samples, 8.0 s in" in lines[-1]
+    assert "dry_friction" in lines[-1]
+
+
+def test_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", FRICTION, *MODEL, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["samples"] == 2048
+    assert "dry_friction" in [alarm["name"] for alarm in found["alarms"]]
+    assert found["lost"] == []
+    assert found["times_real_time"] > 0
+
+
+def test_a_part_at_a_given_speed(capsys: pytest.CaptureFixture[str]) -> None:
+    began = time.monotonic()
+    options = ["--start", "1", "--end", "2", "--speed", "4"]
+    assert main(["replay", FRICTION, *MODEL, *options, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["samples"] == 256
+    assert time.monotonic() - began > 0.9 / 4
+
+
+def test_a_new_session_has_samples_estimates_and_alarms(tmp_path: Path) -> None:
+    out = tmp_path / "out.mcap"
+    assert main(["replay", FRICTION, *MODEL, "--out", str(out)]) == 0
+    session = open_session(out)
+    assert sum(map(len, session.samples())) == 2048
+    assert sum(map(len, session.estimates())) == 2048
+    assert [item.topic.name for item in session.messages(["alarms"])]
+    assert "replayed from friction.mcap" in session.info.notes
+
+
+def test_operators_commands_fall_between_the_same_samples_however_it_is_cut() -> None:
+    session = open_session(HERE / "troubled.mcap")
+    for size in (1, 7, 16384):
+        before = 0
+        for item in items(session, size=size):
+            if isinstance(item, AlarmCommand):
+                break
+            before += len(item)
+        assert before == 1000 - 4
+
+
+def changed(tmp_path: Path, rate: float = 256.0, channels: slice = slice(None)) -> str:
+    path = tmp_path / "changed.mcap"
+    with SessionWriter(path, run_info("simulated", rate)) as writer:
+        for block in open_session(FRICTION).samples():
+            writer.write(replace(block, channels=block.channels[channels]))
+    return str(path)
+
+
+@pytest.mark.parametrize("speed", ["0", "-1", "nan", "fast"])
+def test_a_wrong_speed_is_refused(speed: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["replay", FRICTION, *MODEL, "--speed", speed])
+    assert "--speed" in capsys.readouterr().err
+
+
+def test_refusals(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def refusal(*arguments: str) -> str:
+        assert main(["replay", *arguments]) == 2
+        text = capsys.readouterr().err
+        assert text.count("\n") == 1
+        return text
+
+    assert "found no model in its configuration, expected --model" in refusal(FRICTION)
+    assert "no such file" in refusal(str(tmp_path / "none"), *MODEL)
+    session = changed(tmp_path, rate=100.0)
+    assert "found a session of 100 Hz, expected 256 Hz as in the model" in refusal(session, *MODEL)
+    Path(session).unlink()
+    session = changed(tmp_path, channels=slice(1, 3))
+    assert "found the channels position, acceleration, expected 'voltage'" in refusal(
+        session, *MODEL, "--out", str(tmp_path / "out.mcap")
+    )
+    assert not (tmp_path / "out.mcap").exists()
+
+
+def test_a_block_keeps_its_samples_where_nothing_falls_in() -> None:
+    (block,) = items(open_session(FRICTION))
+    assert isinstance(block, SampleBlock)
+    assert len(block) == 2048
