@@ -17,6 +17,7 @@ from daq.supervisor import Supervisor
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.heartbeat import Heartbeat
+from rigwatch.wire.realtime import prepare_for_real_time, raise_priority
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.ring import SampleRing
 
@@ -32,6 +33,7 @@ def acquire(config: RigConfig, adapter: Adapter, bus: Bus, stop: threading.Event
     publisher = Publisher(bus, SampleRing(bus, config.daq.ring))
     heartbeat = Heartbeat("daq")
     device.start()
+    prepare_for_real_time()
     heartbeat.ready()
     while not stop.is_set():
         for raw in device.read(acquisition.patience(time.monotonic_ns())):
@@ -51,6 +53,7 @@ def run(path: Path | str, stop: threading.Event) -> None:
     """
     config = load_rig(path)
     adapter = adapter_for(config.daq.device, config.channels)
+    raise_priority()
     bus = connect(config, "daq")
     try:
         acquire(config, adapter, bus, stop)

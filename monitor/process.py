@@ -12,6 +12,7 @@ from pathlib import Path
 
 from monitor.alarms import AlarmJournal, Announcement, last_records, read_journal
 from monitor.cursor import Cursor
+from monitor.detectors.selection import detectors_of
 from monitor.health import HealthBook
 from monitor.links import LinkWatch, Seen
 from monitor.model_file import RigModel, load_model
@@ -22,7 +23,7 @@ from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.heartbeat import Heartbeat
 from rigwatch.wire.messages import Alarm, Event, Gap, SampleBlock
-from rigwatch.wire.realtime import prepare_for_real_time
+from rigwatch.wire.realtime import prepare_for_real_time, raise_priority
 from rigwatch.wire.rig_config import MonitorSection, RigConfig, load_rig, section_or_error
 from rigwatch.wire.sample_reader import SampleReader
 from rigwatch.wire.topics import ALARMS, ALIVE_KEY, COMMANDS, ESTIMATES, EVENTS, HEALTH
@@ -54,7 +55,8 @@ class MonitorProcess:
         model = load_model(section.model)
         check_model(model, config, path, section.model)
         compile_kernels(model)
-        self.rig = RigMonitor(model, section.alarms, file=str(path))
+        detectors = detectors_of(section.detectors, model, path)
+        self.rig = RigMonitor(model, section.alarms, detectors, str(path))
         self.bus = bus
         self._journal = AlarmJournal(section.journal) if section.journal else None
         self._cursor = Cursor(f"{section.journal}.position") if section.journal else None
@@ -115,16 +117,17 @@ class MonitorProcess:
         try:
             if known:
                 self.rig.learn(cut(block, 0, known))
-            watched = self.rig.update(cut(block, known, len(block))) if known < len(block) else None
+            fresh = cut(block, known, len(block)) if known else block
+            judged = self.rig.judge(fresh) if len(fresh) else None
         except KeyError as error:
             self._unsuitable = f"samples without the channel {error} that the model needs"
             return
-        if watched is None:
+        if judged is None:
             return
         self._unsuitable = ""
-        self.bus.publish(ESTIMATES, watched.estimates)
+        self.bus.publish(ESTIMATES, judged[0])
         self._health.judged(int(block.t_ns[-1]), time.time_ns())
-        self.say(watched.announcements)
+        self.say(self.rig.announce(*judged))
 
     def _known_of(self, block: SampleBlock) -> int:
         """How many of the block's samples an earlier run has judged already."""
@@ -210,6 +213,7 @@ def run(path: Path | str) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     config = load_rig(path)
+    raise_priority()
     bus = connect(config, "monitor")
     try:
         process = MonitorProcess(config, path, bus)

@@ -62,6 +62,15 @@ class RigMonitor:
         Raises:
             KeyError: the block lacks a channel of the model.
         """
+        judged = self.judge(block)
+        return None if judged is None else Watched(*judged, self.announce(*judged))
+
+    def judge(self, block: SampleBlock) -> tuple[EstimateBlock, tuple[Condition, ...]] | None:
+        """Estimates and conditions of the next block, to be published before its alarms.
+
+        Raises:
+            KeyError: the block lacks a channel of the model.
+        """
         result = self._pipeline.update(block)
         if result is None:
             return None
@@ -69,13 +78,13 @@ class RigMonitor:
         fresh = cut(block, at.seq - block.seq, len(block))
         found = [detector.update(fresh) for detector in self._detectors]
         columns = at.columns + tuple(column for columns, _ in found for column in columns)
-        conditions = [
-            *result.conditions,
-            *(condition for _, conditions in found for condition in conditions),
-            *quality_conditions(fresh),
-        ]
-        announced = self.alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
-        return Watched(replace(at, columns=columns), tuple(conditions), announced)
+        more = tuple(condition for _, conditions in found for condition in conditions)
+        quality = tuple(quality_conditions(fresh))
+        return replace(at, columns=columns), (*result.conditions, *more, *quality)
+
+    def announce(self, at: EstimateBlock, conditions: tuple[Condition, ...]) -> list[Announcement]:
+        """What the alarms say to conditions, in the order in which they were judged."""
+        return self.alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
 
     def learn(self, block: SampleBlock) -> None:
         """Take a block that an earlier run has judged already: state moves on, nothing is said."""
