@@ -176,7 +176,7 @@ class CompiledSystem:
 
 def compile_system(system: System) -> CompiledSystem:
     """The kernel of `system`, from the cache where it has been compiled before."""
-    return CompiledSystem(system, _module(source(system)))
+    return CompiledSystem(system, load_source(source(system)))
 
 
 def cache_folder() -> Path:
@@ -185,7 +185,8 @@ def cache_folder() -> Path:
     return Path(base).expanduser() / "rigwatch" / "kernels"
 
 
-def _module(text: str) -> ModuleType:
+def load_source(text: str) -> ModuleType:
+    """The text of a kernel module, imported from the cache folder where it is kept."""
     name = f"kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
     if name in sys.modules:
         return sys.modules[name]
