@@ -1,0 +1,224 @@
+"""Looking into, cutting and rescuing sessions, through the commands that people type."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from rigwatch.commands import main
+from rigwatch.wire import schema
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.messages import (
+    Alarm,
+    AlarmState,
+    Column,
+    EstimateBlock,
+    Gap,
+    Message,
+    SampleBlock,
+)
+from rigwatch.wire.session import SessionWriter, open_session, run_info
+from rigwatch.wire.session.edit import recover, trim
+from rigwatch.wire.session.summary import summarise
+
+T0 = 1_767_225_600_000_000_000
+STEP = 3_906_250
+
+
+def samples(seq: int, n: int, boot: int = 7) -> SampleBlock:
+    index = np.arange(seq, seq + n)
+    flags = np.where(index % 100 == 50, 2, 0).astype(np.uint8)
+    values = index.astype(np.float64)
+    columns = (Column("voltage", "V", values, flags), Column("position", "m", -values))
+    return SampleBlock("rig", boot, seq, index * 3906, T0 + index * STEP, columns)
+
+
+def estimates(seq: int, n: int) -> EstimateBlock:
+    index = np.arange(seq, seq + n)
+    column = Column("theta1", "", index.astype(np.float64))
+    return EstimateBlock("rig", 7, seq, T0 + index * STEP, (column,))
+
+
+def alarm(name: str, state: AlarmState, seq: int) -> Alarm:
+    low, high = -np.inf, 2.0
+    return Alarm(
+        name, state, "error", "friction", "stop", "rig", 7, seq, T0 + seq * STEP, 3.0, low, high,
+        True, "", seq,
+    )  # fmt: skip
+
+
+def write(path: Path, messages: list[Message], notes: str = "") -> Path:
+    with SessionWriter(path, run_info("bench1", 256.0, t_ns=T0, notes=notes)) as writer:
+        for message in messages:
+            writer.write(message)
+            writer.flush()
+    return path
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    messages: list[Message] = []
+    for seq in range(0, 1000, 100):
+        messages += [samples(seq, 100), estimates(seq, 100)]
+        if seq == 200:
+            messages.append(alarm("link", "unacknowledged", 250))
+            messages.append(alarm("gap", "unacknowledged", 260))
+        if seq == 300:
+            messages.append(alarm("gap", "normal", 310))
+        if seq == 700:
+            messages.append(alarm("dry_friction", "unacknowledged", 750))
+    messages += [samples(1100, 50), Gap("rig", 7, 1000, 1099, T0, "recorder", "not in the ring")]
+    return write(tmp_path / "a.mcap", [*messages, samples(0, 20, boot=8)])
+
+
+def output(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    assert main([*arguments, "--json"]) == 0
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_info(session: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = output(capsys, "info", str(session))
+    (device,) = found["devices"]
+    assert (device["samples"], device["boots"]) == (1070, 2)
+    assert (device["gaps"], device["missing"]) == (1, 100)
+    assert device["rate_hz"] == pytest.approx(256.0)
+    assert device["longest_step_s"] == pytest.approx(STEP / 1e9)
+    voltage, position = device["channels"]
+    assert voltage["flags"] == {"saturated": 10, "good": 1060}
+    assert (voltage["low"], voltage["high"]) == (0.0, 1149.0)
+    assert position["flags"] == {"good": 1070}
+    assert found["reported_lost"] == 100
+    assert found["topics"]["alarms"] == 4
+    assert [item["name"] for item in found["alarms"]] == ["link", "gap", "gap", "dry_friction"]
+    assert found["alarms"][0]["low"] is None
+    assert found["duration_s"] == pytest.approx(1149 * STEP / 1e9)
+    assert found["lost"] == []
+    assert found["unclosed"] == []
+    assert main(["info", str(session)]) == 0
+    text = capsys.readouterr().out
+    assert "1070 samples at 256.000 Hz" in text
+    assert "1 gap(s) with 100 samples missing" in text
+    assert "dry_friction unacknowledged" in text
+
+
+def test_trim_by_seconds(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "b.mcap"
+    start, end = 400 * STEP / 1e9, 800 * STEP / 1e9
+    options = ["--start", repr(start), "--end", repr(end)]
+    found = output(capsys, "trim", str(session), str(target), *options)
+    part = open_session(target)
+    (block,) = part.samples()
+    assert schema.encode(block) == schema.encode(samples(400, 400))
+    assert found["samples"] == 400
+    alarms = [item.message for item in part.messages(["alarms"])]
+    assert [item.name for item in alarms if isinstance(item, Alarm)] == ["link", "dry_friction"]
+    assert part.info.rig == "bench1"
+    assert "trimmed to 2026-01-01T00:00:01.562Z" in part.info.notes
+    assert part.info.configuration == open_session(session).info.configuration
+
+
+def test_trim_by_time_of_day(session: Path, tmp_path: Path) -> None:
+    target = tmp_path / "b.mcap"
+    assert main(["trim", str(session), str(target), "--start", "2026-01-01T01:00:02+01:00"]) == 0
+    first = next(open_session(target).samples())
+    assert first.t_ns[0] >= T0 + 2 * 10**9
+    assert first.seq == 512
+
+
+def test_trim_refuses_an_empty_span_and_keeps_no_file(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "b.mcap"
+    assert main(["trim", str(session), str(target), "--start", "900"]) == 2
+    assert "nothing was recorded in the span" in capsys.readouterr().err
+    assert main(["trim", str(session), str(target), "--start", "soon"]) == 2
+    assert "--start: found 'soon', expected seconds" in capsys.readouterr().err
+    assert not target.exists()
+
+
+def test_recover_a_killed_and_damaged_session(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = bytearray(session.read_bytes())
+    content[len(content) // 2] ^= 0x10
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(content[: len(content) * 3 // 4])
+    target = tmp_path / "saved.mcap"
+    found = output(capsys, "recover", str(broken), str(target))
+    assert len(found["lost"]) >= 1
+    again = open_session(target)
+    assert again.lost == ()
+    assert again.unclosed == ()
+    assert encoded(target) == encoded(broken)
+    with target.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.channel_message_counts[3] == found["messages"]["alarms"] == 4
+
+
+def encoded(path: Path) -> list[bytes]:
+    """All samples and estimates, however they are cut."""
+    session = open_session(path)
+    return [
+        *(schema.encode(block) for block in session.samples()),
+        *(schema.encode(block) for block in session.estimates()),
+    ]
+
+
+def test_recover_without_the_head_says_so(session: Path, tmp_path: Path) -> None:
+    content = bytearray(session.read_bytes())
+    content[150] ^= 0xFF
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(content)
+    written = recover(open_session(broken), tmp_path / "saved.mcap")
+    assert "the description of the run was lost" in written.notes
+    info = open_session(tmp_path / "saved.mcap").info
+    assert (info.rig, info.sample_rate_hz) == ("unknown", 256.0)
+    assert written.samples == 1070
+
+
+def test_recover_joins_segments(tmp_path: Path) -> None:
+    folder = tmp_path / "s"
+    folder.mkdir()
+    for number in range(3):
+        write(folder / f"{number:06d}.mcap", [samples(number * 100, 110)])
+    written = recover(open_session(folder), tmp_path / "one.mcap")
+    assert written.messages["run"] == 1
+    assert written.samples == 310
+    assert sum(map(len, open_session(tmp_path / "one.mcap").samples())) == 310
+
+
+def test_a_summary_of_nothing_but_a_head(tmp_path: Path) -> None:
+    summary = summarise(open_session(write(tmp_path / "a.mcap", [])))
+    assert summary.duration_s == 0.0
+    assert summary.devices == []
+    assert main(["info", str(tmp_path / "a.mcap")]) == 0
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_no_damage_makes_a_command_fall_over(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    """Bit flips and truncation under info, recover and trim: a result or one plain line."""
+    folder = tmp_path_factory.mktemp("damage")
+    content = bytearray(write(folder / "a.mcap", [samples(0, 50), estimates(0, 50)]).read_bytes())
+    for _ in range(data.draw(st.integers(0, 5))):
+        content[data.draw(st.integers(0, len(content) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    broken = folder / "b.mcap"
+    broken.write_bytes(content[: data.draw(st.integers(0, len(content)))])
+    try:
+        opened = open_session(broken)
+        summarise(opened)
+        recover(opened, folder / "c.mcap")
+        trim(opened, folder / "d.mcap", T0 + STEP, None)
+    except RigwatchError as error:
+        one_line = str(error)
+        assert "\n" not in one_line, one_line
