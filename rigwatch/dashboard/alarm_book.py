@@ -14,6 +14,7 @@ LANES: dict[str, str] = {
     "other_fault": "other fault",
 }
 """Alarms that have a lane from the start, with the words for people; others get one later."""
+NAMED_FAULTS = ("dry_friction", "stiction", "other_fault")
 _SEVERITIES = ("info", "warning", "error", "critical")
 
 
@@ -61,9 +62,9 @@ class AlarmBook:
         return [a for a in self.last.values() if is_active(a) and a.severity == "info"]
 
     def unseen(self) -> list[Alarm]:
-        """Alarms that are over and that nobody has acknowledged."""
+        """Alarms that are over and that nobody has acknowledged; faults of the rig first."""
         gone = [a for a in self.last.values() if a.state == "cleared_unacknowledged"]
-        return sorted(gone, key=_rank)
+        return sorted(gone, key=lambda alarm: (alarm.name not in LANES, *_rank(alarm)))
 
 
 def _rank(alarm: Alarm) -> tuple[int, bool, int]:

@@ -35,6 +35,7 @@ from rigwatch.wire.messages import (
 
 APPLICATION = "rigwatch"
 _WORDS_EVERY_NS = 500_000_000
+_LAYOUT_EVERY_NS = 2_000_000_000
 
 
 class Dashboard:
@@ -62,7 +63,8 @@ class Dashboard:
         self._survey, self._batches = Survey(), Batches(facts.marks)
         self._plan: tuple[PlotPlan, ...] | None = None
         self._lanes = Lanes(stream, facts.book)
-        self._said_ns = 0
+        self._said_ns = self._laid_out_ns = 0
+        self._finished = False
         self._draw: dict[type[Message], Callable[[Any], None]] = {
             SampleBlock: self._samples,
             EstimateBlock: self._estimates,
@@ -91,6 +93,11 @@ class Dashboard:
         self._batches.send(self._stream, self._survey.plots)
         self._lay_out()
         self._keep_up(changed=self.facts.silent_s > 0)
+
+    def finish(self) -> None:
+        """Draw the last of a recording."""
+        self._finished = True
+        self.flush()
 
     def _keep_up(self, *, changed: bool = False) -> None:
         """Let verdict and words follow, not with every message."""
@@ -153,9 +160,11 @@ class Dashboard:
         self._stream.set_time(at.TIMELINE, timestamp=np.datetime64(t_ns, "ns"))
 
     def _lay_out(self) -> None:
+        """Lay out anew where something new has come; rarely, since it undoes a person's choices."""
         plan = self._survey.plan()
-        if plan != self._plan:
-            self._plan = plan
+        due = not self._plan or self.now_ns - self._laid_out_ns >= _LAYOUT_EVERY_NS
+        if plan != self._plan and (due or self._finished):
+            self._plan, self._laid_out_ns = plan, self.now_ns
             layout = blueprint(plan, self._windows, bare=self._bare)
             rr.send_blueprint(layout, recording=self._stream)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigwatch.dashboard.alarm_book import AlarmBook
+from rigwatch.dashboard.alarm_book import LANES, AlarmBook
 from rigwatch.dashboard.palette import VERDICTS
 from rigwatch.wire.messages import EstimateBlock, Health, SampleBlock
 
@@ -89,7 +89,7 @@ class Facts:
             return name if name in VERDICTS else "fault"
         if self.silent_s:
             return "stale"
-        if self.book.unseen():
+        if any(alarm.name in LANES for alarm in self.book.unseen()):
             return "over"
         if self.book.remarks():
             return "no_verdict"

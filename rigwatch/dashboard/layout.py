@@ -67,13 +67,13 @@ def _watch(plan: Sequence[PlotPlan], windows: Windows) -> rrb.Container:
         rrb.Horizontal(
             rrb.TextDocumentView(origin=at.ADVICE if plan else at.WAITING, name=at.ADVICE_VIEW),
             rrb.TextDocumentView(origin=at.STATUS, name=at.STATUS_VIEW),
-            column_shares=[5, 6],
+            column_shares=[1, 1],
         ),
         _states_view(at.LANES, at.ALARMS_VIEW, windows),
         *(_series_view(line, windows.history) for line in friction),
         _log_view(at.LOG, at.LOG_VIEW),
     ]
-    shares = [3.0, 2.5, *[1.75] * len(friction), 1.4]
+    shares = [3.7, 2.3, *[1.65] * len(friction), 1.4]
     columns: list[rrb.Container] = [rrb.Vertical(*right, row_shares=shares)]
     if left := _signal_views(plan, windows):
         columns.insert(0, rrb.Vertical(*left))

@@ -14,7 +14,7 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from rigwatch.dashboard import entities as at
-from rigwatch.dashboard.alarm_book import is_active
+from rigwatch.dashboard.alarm_book import NAMED_FAULTS, is_active
 from rigwatch.dashboard.board import APPLICATION, Dashboard
 from rigwatch.dashboard.facts import Facts
 from rigwatch.dashboard.layout import Windows
@@ -40,7 +40,8 @@ class Drawn:
     Attributes:
         samples: how many.
         start_ns, end_ns: first and last time [ns]; 0 where nothing was drawn.
-        fault_ns: time of the first alarm that means a fault [ns]; 0 where there was none.
+        fault_ns: time of the first alarm that names a fault, else of the first fault [ns]; 0 where
+            there was none.
     """
 
     samples: int
@@ -85,19 +86,26 @@ def draw(
         bare: leave out what serves to operate the viewer, for pictures.
     """
     dashboard = Dashboard(stream, facts, windows, bare=bare)
-    fault_ns = flushed = 0
+    flushed = 0
+    faults: dict[str, int] = {}
     for message in messages:
         dashboard.show(message)
         if isinstance(message, Alarm) and is_active(message) and message.severity != "info":
-            fault_ns = fault_ns or message.t_ns
+            faults.setdefault(message.name, message.t_ns)
         if facts.samples - flushed >= _FLUSH_AFTER:
             flushed = facts.samples
             dashboard.flush()
             progress(flushed)
-    dashboard.flush()
+    dashboard.finish()
     stream.flush(timeout_sec=_FLUSH_TIMEOUT)
     stream.disconnect()
-    return Drawn(facts.samples, dashboard.began_ns, dashboard.now_ns, fault_ns)
+    return Drawn(facts.samples, dashboard.began_ns, dashboard.now_ns, _most_telling(faults))
+
+
+def _most_telling(faults: dict[str, int]) -> int:
+    """The time of the fault that says most: one with a name, else any; 0 where there is none."""
+    named = [t_ns for name, t_ns in faults.items() if name in NAMED_FAULTS]
+    return min(named or faults.values(), default=0)
 
 
 def point_cursor(url: str, t_ns: int) -> None:

@@ -11,6 +11,8 @@ from rigwatch.wire.messages import Alarm
 
 _UNITS = {"hz": "Hz", "ms": "ms", "us": "µs", "ppm": "ppm", "s": "s"}
 _ESTIMATES = (("theta1", "Coulomb θ1"), ("theta2", "viscous θ2"))
+_ESTIMATE_HEAD = "| | now | thresholds | friction |"
+_COUNTER_HEAD = "| | now | mean | worst |"
 _ENDS = ("low", "high", "signature")
 
 _CALM = {
@@ -25,45 +27,38 @@ _WHEN_NOT_ZERO = ("recovered", "skipped", "dropped", "reconnects", "restarts", "
 
 def advice(facts: Facts) -> str:
     """Is there a fault, what is it probably, and what to do."""
-    faults, remarks, unseen = facts.book.faults(), facts.book.remarks(), facts.book.unseen()
-    if faults:
-        return _paragraphs(*_fault(faults[0], faults[1:]))
-    if facts.samples == 0:
-        return _paragraphs(f"# Waiting for {facts.rig}", "No sample has arrived yet.")
-    if facts.silent_s:
-        text = (
-            f"Nothing for {facts.silent_s:.0f} s. What is drawn is old: look at daq and its line."
-        )
-        return _paragraphs("# NO SAMPLES", text)
-    if unseen:
-        text = f"{_sentence(unseen[0].cause)} It has gone, and nobody has acknowledged it."
-        return _paragraphs(f"# Over: {title(unseen[0].name)}", text)
-    return _calm(facts, remarks)
-
-
-def _calm(facts: Facts, remarks: Sequence[Alarm]) -> str:
-    if remarks:
-        return _paragraphs("# No verdict now", _sentence(remarks[0].cause), remarks[0].guidance)
-    title, text = _CALM[facts.verdict()]
-    return _paragraphs(title, text)
+    return _paragraphs(*_verdict(facts), _table(_ESTIMATE_HEAD, [*_friction_rows(facts)]))
 
 
 def status(facts: Facts) -> str:
-    """How far to trust the verdict: estimates, figures of the processes, their complaints."""
+    """How far to trust the verdict: figures of the processes, and what they complain of."""
     rows = [*_counter_rows(facts)]
     if facts.age.known:
-        rows.append(
-            _row("age of what is drawn [ms]", facts.age.now, facts.age.mean, facts.age.worst)
-        )
+        rows.append(_row("age of the picture [ms]", facts.age.now, facts.age.mean, facts.age.worst))
     complaints = [f"* {h.source}: {h.state}, {h.text}" for h in facts.health.values() if h.text]
+    complaints += [f"* over, not yet seen: {title(a.name)}" for a in facts.book.unseen()]
     if facts.skipped:
         complaints.append(f"* this screen left out {facts.skipped} messages to keep up")
-    return _paragraphs(
-        _model(facts),
-        "\n".join(complaints),
-        _table("| | now | thresholds | friction |", [*_friction_rows(facts)]),
-        _table("| | now | mean | worst |", rows),
-    )
+    return _paragraphs(_model(facts), _table(_COUNTER_HEAD, rows), "\n".join(complaints))
+
+
+def _verdict(facts: Facts) -> Iterator[str]:
+    faults, remarks, unseen = facts.book.faults(), facts.book.remarks(), facts.book.unseen()
+    verdict = facts.verdict()
+    if faults:
+        yield from _fault(faults[0], faults[1:])
+    elif facts.samples == 0:
+        yield from (f"# Waiting for {facts.rig}", "No sample has arrived yet.")
+    elif verdict == "stale":
+        yield "# NO SAMPLES"
+        yield f"Nothing for {facts.silent_s:.0f} s. What is drawn is old: look at daq and its line."
+    elif verdict == "over":
+        yield f"# Over: {title(unseen[0].name)}"
+        yield f"{_sentence(unseen[0].cause)} It has gone, and nobody has acknowledged it."
+    elif remarks:
+        yield from ("# No verdict now", _sentence(remarks[0].cause), remarks[0].guidance)
+    else:
+        yield from _CALM[verdict]
 
 
 def _table(head: str, rows: Sequence[str]) -> str:
@@ -111,22 +106,27 @@ def _friction_rows(facts: Facts) -> Iterator[str]:
 
 
 def _counter_rows(facts: Facts) -> Iterator[str]:
-    """One row a counter; `rate_mean_hz` and `rate_worst_hz` join `rate_hz`."""
-    for source, health in sorted(facts.health.items()):
+    """One row a counter, from the process with the largest figure; the most wanted first."""
+    found: dict[str, Mapping[str, float]] = {}
+    for health in facts.health.values():
         for name, value in health.counters.items():
             if _worth_a_row(name, value) and not _belongs_to_another(name, health.counters):
-                mean, worst = (health.counters.get(_with(name, w)) for w in ("mean", "worst"))
-                yield _row(f"{source}: {_words(name)}", value, mean, worst)
+                known = found.get(name)
+                if known is None or value > known[name]:
+                    found[name] = health.counters
+    for name in sorted(found, key=_wanted):
+        mean, worst = (found[name].get(_with(name, word)) for word in ("mean", "worst"))
+        yield _row(_words(name), found[name][name], mean, worst)
+
+
+def _wanted(name: str) -> tuple[int, str]:
+    return (_ALWAYS.index(name) if name in _ALWAYS else len(_ALWAYS)), name
 
 
 def _worth_a_row(name: str, value: float) -> bool:
     """The screen has room for what people ask for; everything is on the tab of the health."""
-    unit = name.rpartition("_")[2]
-    return (
-        name in _ALWAYS
-        or ("latency" in name and unit in _UNITS)
-        or (value != 0.0 and any(word in name for word in _WHEN_NOT_ZERO))
-    )
+    shown = name in _ALWAYS or name.startswith("latency")
+    return shown or (value != 0.0 and any(word in name for word in _WHEN_NOT_ZERO))
 
 
 def _belongs_to_another(name: str, counters: Mapping[str, float]) -> bool:

@@ -82,6 +82,11 @@ class Viewer:
         return f"rerun+http://{HOST}:{self.port}/proxy"
 
     @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
     def web_url(self) -> str:
         """What a browser opens."""
         data = f"rerun%2Bhttp%3A%2F%2F{HOST}%3A{self.port}%2Fproxy"

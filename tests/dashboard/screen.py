@@ -1,5 +1,6 @@
 """Looking at a headless viewer: what it shows, by name and by colour."""
 
+import contextlib
 import io
 import time
 from collections.abc import Callable
@@ -61,8 +62,16 @@ class Screen:
 
     def picture(self, title: str) -> np.ndarray:
         """One view as it is drawn, shape (height, width, 3)."""
-        png = self.client.take_screenshot(self.views()[title])
+        png = self._shot(title)
         return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+
+    def _shot(self, title: str) -> bytes:
+        # A new layout gives every view a new id, which may come between the two calls.
+        for _ in range(20):
+            with contextlib.suppress(ConnectionError, KeyError):
+                return bytes(self.client.take_screenshot(self.views()[title]))
+            time.sleep(0.2)
+        raise AssertionError(f"no view {title!r} among {sorted(self.views())}")
 
     def lane(self, title: str, colour: Colour) -> Patch:
         """A state's pixels: the viewer draws lanes at 78 % of the colour's brightness."""
