@@ -64,7 +64,7 @@ def kalman_update(
 
 
 @njit(cache=True)
-def generalised_update(
+def generalised_update(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     x: FloatArray,
     p: FloatArray,
     e: FloatArray,

@@ -81,7 +81,7 @@ def _new_state(order: int) -> ParityState:
 
 
 @njit(cache=True)
-def small_signal(
+def small_signal(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     forget: float, u0: float, y0: float, state: ParityState, u: float, y: float
 ) -> None:
     """Take the operating point off; the results stand in `state.point[2:4]`."""
@@ -117,7 +117,7 @@ def _restart(state: ParityState) -> None:
 
 
 @njit(cache=True)
-def parity_block(
+def parity_block(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     moving_average: bool,
     function: tuple[FloatArray, FloatArray],
     threshold: FloatArray,
