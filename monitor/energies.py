@@ -38,7 +38,7 @@ def restart_energies(energies: Energies) -> None:
     energies.back[:] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def add(energies: Energies, signals: FloatArray) -> None:
     """Take the squares of one sample's signals in, the oldest out."""
     rows, front, back, place = energies
@@ -58,20 +58,21 @@ def add(energies: Energies, signals: FloatArray) -> None:
     for i in range(width):
         rows[head, i] = signals[i] * signals[i]
         back[i] += rows[head, i]
-    place[HEAD] = (head + 1) % length
+    place[HEAD] = head + 1 if head + 1 < length else 0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def energy(energies: Energies, signal: int) -> float:
     """Sum of squares of one signal over the window."""
     return energies.front[energies.place[FRONT_LEFT], signal] + energies.back[signal]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def recent_energy(energies: Energies, signal: int, count: int) -> float:
     """Sum of squares of the newest `count` samples."""
-    length = energies.rows.shape[0]
+    length, at = energies.rows.shape[0], energies.place[HEAD]
     total = 0.0
-    for n in range(1, min(count, energies.place[FILL]) + 1):
-        total += energies.rows[(energies.place[HEAD] - n) % length, signal]
+    for _ in range(min(count, energies.place[FILL])):
+        at = at - 1 if at > 0 else length - 1
+        total += energies.rows[at, signal]
     return total

@@ -71,7 +71,7 @@ def new_history(b: FloatArray, a: FloatArray) -> History:
     return History(np.zeros((HISTORY, 6)), np.zeros(1, np.int64), b, a)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def remember(
     history: History, y: float, g1: float, g2: float, speed: float, rest: float, volts: float
 ) -> None:
@@ -79,7 +79,8 @@ def remember(
     row = history.rows[history.head[0]]
     row[Y], row[SIGN_PART], row[SPEED_PART], row[SPEED] = y, g1, g2, speed
     row[AT_REST], row[VOLTS] = rest, volts
-    history.head[0] = (history.head[0] + 1) % HISTORY
+    head = history.head[0] + 1
+    history.head[0] = head if head < HISTORY else 0
 
 
 @njit(cache=True)

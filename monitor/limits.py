@@ -28,6 +28,7 @@ def rules_for(model: RigModel) -> Rules:
     """What the kernel decides by."""
     decision = model.decision
     chance = chance_a_look(decision.false_alarm, model.sample_rate)
+    low, high = (model.band.low, model.band.high) if model.band else ((0.0, 0.0), (0.0, 0.0))
     return Rules(
         window=model.window.length,
         hop=model.window.hop,
@@ -38,4 +39,8 @@ def rules_for(model: RigModel) -> Rules:
         worst_condition=decision.worst_condition,
         position_floor=0.02,
         voltage_floor=0.03,
+        low1=low[0],
+        high1=high[0],
+        low2=low[1],
+        high2=high[1],
     )

@@ -157,6 +157,11 @@ def load_model(path: Path | str) -> RigModel:
         if len(lengths) != 1 or 0 in lengths:
             key = f"reference[{index}]"
             raise ConfigError(path, key, f"columns of {sorted(lengths)} samples", "one length")
+    wanted = 3 if isinstance(model.plant, TransferPlant) else 2
+    if len(model.channels) != wanted:
+        raise ConfigError(path, "channels", f"{len(model.channels)} names", f"{wanted} names")
+    if (model.band is None) != isinstance(model.plant, TransferPlant):
+        raise ConfigError(path, "band", "it missing or in excess", "a band with an inertia only")
     if isinstance(model.plant, TransferPlant) and not model.plant.function().is_stable:
         raise ConfigError(path, "plant.a", "poles outside the unit circle", "a stable model")
     if not model.friction.function().is_stable:

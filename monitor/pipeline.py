@@ -18,7 +18,8 @@ from monitor.conditions import Condition
 from monitor.energies import new_energies
 from monitor.isolation import new_history
 from monitor.limits import rules_for
-from monitor.model_file import RigModel, TransferPlant
+from monitor.inertia import InertiaResidual
+from monitor.model_file import InertiaPlant, RigModel
 from monitor.reference import ReferenceRules, new_reference
 from monitor.residual import TransferResidual
 from monitor.window import new_window
@@ -75,9 +76,10 @@ class Monitor:
     def __init__(self, model: RigModel) -> None:
         self.model = model
         self.rules = rules_for(model)
-        needed = tuple(name for place, name in enumerate(model.channels) if place != 1)
+        inertia = isinstance(model.plant, InertiaPlant)
+        needed = model.channels if inertia else (model.channels[0], model.channels[2])
         self._admission = Admission(model.channels, needed, model.decision.longest_hold)
-        self._residual = TransferResidual(model)
+        self._residual = InertiaResidual(model) if inertia else TransferResidual(model)
         self._arming = _arming_rules(model)
         self._reference = new_reference(self._arming, _known(model))
         self._state = _new_state(model)
@@ -103,14 +105,14 @@ class Monitor:
         return self._result(block, admitted, out)
 
     def _result(self, block: SampleBlock, admitted: Admitted, out: FloatArray) -> Result:
-        kept = out[admitted.padding :]
+        kept = np.ascontiguousarray(out[admitted.padding :].T)
         run = admitted.invalid_run[admitted.padding :]
         estimates = EstimateBlock(
             device=block.device,
             boot=block.boot,
             seq=int(admitted.seq[admitted.padding]),
-            t_ns=block.t_ns[len(block) - len(kept) :],
-            columns=tuple(Column(name, unit, kept[:, k].copy()) for name, unit, k in PUBLISHED),
+            t_ns=block.t_ns[len(block) - kept.shape[1] :],
+            columns=tuple(Column(name, unit, kept[k]) for name, unit, k in PUBLISHED),
         )
         return Result(estimates, self._conditions(kept, run, admitted.missing))
 
@@ -118,24 +120,24 @@ class Monitor:
         self, out: FloatArray, run: NDArray[np.int64], missing: int
     ) -> tuple[Condition, ...]:
         rules, decision = self.rules, self.model.decision
-        armed = out[:, w.ARMED_FLAG] > 0.0
-        verdict = out[:, w.VERDICT]
-        lost = np.zeros(len(out))
+        armed = out[w.ARMED_FLAG] > 0.0
+        verdict = out[w.VERDICT]
+        lost = np.zeros(out.shape[1])
         lost[0] = missing
         invalid = run.astype(np.float64)
         sticks = verdict == w.STICKING
-        moving = ~armed | (out[:, w.SPEED_RMS] >= decision.least_velocity)
+        moving = ~armed | (out[w.SPEED_RMS] >= decision.least_velocity)
         return (
-            _above(kinds.DEPARTURE, armed & (out[:, w.DEVIATION] > rules.factor), out[:, w.DEVIATION], rules.factor),
-            _above(kinds.DRY_FRICTION, armed & ((verdict == w.FRICTION) | sticks), out[:, w.THETA1], 0.0),
-            _above(kinds.STICTION, armed & sticks, out[:, w.REST], 0.5),
-            _above(kinds.OTHER_FAULT, armed & (verdict == w.OTHER), out[:, w.EXPLAINED], np.inf),
-            _above(kinds.EXCITATION_CHANGED, armed & (verdict == w.NEW_EXCITATION), out[:, w.MOVED_VOLTAGE], 0.1),
-            _below(kinds.NOT_OBSERVABLE, ~moving, out[:, w.SPEED_RMS], decision.least_velocity),
+            _above(kinds.DEPARTURE, armed & (out[w.DEVIATION] > rules.factor), out[w.DEVIATION], rules.factor),
+            _above(kinds.DRY_FRICTION, armed & ((verdict == w.FRICTION) | sticks), out[w.THETA1], 0.0),
+            _above(kinds.STICTION, armed & sticks, out[w.REST], 0.5),
+            _above(kinds.OTHER_FAULT, armed & (verdict == w.OTHER), out[w.EXPLAINED], np.inf),
+            _above(kinds.EXCITATION_CHANGED, armed & (verdict == w.NEW_EXCITATION), out[w.MOVED_VOLTAGE], 0.1),
+            _below(kinds.NOT_OBSERVABLE, ~moving, out[w.SPEED_RMS], decision.least_velocity),
             _above(
                 kinds.ILL_CONDITIONED,
-                armed & (out[:, w.CONDITION] > decision.worst_condition),
-                out[:, w.CONDITION],
+                armed & (out[w.CONDITION] > decision.worst_condition),
+                out[w.CONDITION],
                 decision.worst_condition,
             ),
             _above(kinds.GAP, lost != 0.0, lost, 0.0),
@@ -161,6 +163,7 @@ def _arming_rules(model: RigModel) -> ReferenceRules:
         residual_noise=model.noise.residual,
         position_noise=model.noise.position,
         voltage_noise=model.noise.voltage,
+        fixed=model.band is not None,
     )
 
 
@@ -181,4 +184,5 @@ def _new_state(model: RigModel) -> w.WatchState:
         np.zeros(8, np.int64),
         np.zeros(w.OUTPUTS),
         np.zeros(8),
+        np.zeros((3, 8)),
     )

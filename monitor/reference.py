@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rigwatch.physics.transfer_function import FloatArray
 
 SETTLING, LEARNING, ARMED, RESUMING = 0, 1, 2, 3
-NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC = 0, 1, 2, 3
+NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC, FIXED = 0, 1, 2, 3, 4
 
 MODE, SOURCE, SINCE, PERIOD, ANCHOR, LEARNT, RING_FILL, RING_HEAD, DEPTH = range(9)
 """Integers of the state: mode, where the reference is from, samples since the last restart, period [samples], sample number of
@@ -59,6 +59,7 @@ class ReferenceRules(NamedTuple):
     residual_noise: float
     position_noise: float
     voltage_noise: float
+    fixed: bool
 
 
 def new_reference(
@@ -98,7 +99,7 @@ def restart(ref: Reference, new_boot: bool) -> None:
         ref.number[SOURCE] = NO_REFERENCE
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def place_in_period(ref: Reference, seq: int) -> int:
     """φ of sample number `seq`."""
     return (seq - ref.number[ANCHOR]) % ref.number[PERIOD]
@@ -113,11 +114,23 @@ def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) ->
     if number[MODE] == RESUMING:
         if number[SINCE] >= rules.settle:
             number[MODE] = ARMED
+    elif number[MODE] == SETTLING and rules.fixed:
+        if number[SINCE] >= rules.settle:
+            _arm_fixed(ref, rules)
     elif number[MODE] == SETTLING:
         if number[SINCE] >= rules.settle and number[SINCE] % 16 == 0:
             _look_for_period(ref, rules, seq)
     elif number[MODE] == LEARNING:
         _learn(ref, rules, seq, row)
+
+
+@njit(cache=True)
+def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
+    """No healthy average: the residual is friction itself, and its limits stand in the model file."""
+    ref.template[:, :] = 0.0
+    ref.number[PERIOD], ref.number[ANCHOR], ref.number[DEPTH] = 1, 0, LONGEST_AVERAGE
+    ref.number[SOURCE], ref.number[MODE] = FIXED, ARMED
+    ref.value[SCALE], ref.value[NOISE] = 1.0, rules.residual_noise
 
 
 @njit(cache=True)
@@ -309,13 +322,12 @@ def _measure_swings(ref: Reference) -> None:
         ref.value[place] = np.sqrt(square)
 
 
-@njit(cache=True)
-def refine(ref: Reference, seq: int, row: FloatArray) -> None:
+@njit(cache=True, inline="always")
+def refine(ref: Reference, place: int, row: FloatArray) -> None:
     """Let one plainly healthy sample into the average, while that is still growing."""
     period = ref.number[PERIOD]
     if period == 1 or ref.number[SOURCE] != FROM_RUN or ref.number[DEPTH] >= LONGEST_AVERAGE:
         return
-    place = place_in_period(ref, seq)
     gain = 1.0 / (ref.number[DEPTH] + 1)
     for i in range(4):
         ref.template[i, place] += gain * (row[i] - ref.template[i, place])

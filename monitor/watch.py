@@ -22,15 +22,13 @@ from monitor.reference import (
     APERIODIC,
     ARMED,
     DEPTH,
-    FROM_RUN,
+    FIXED,
     MODE,
-    NO_REFERENCE,
     NOISE,
     PERIOD,
     POSITION_NOISE,
     POSITION_SWING,
     SCALE,
-    SETTLING,
     SOURCE,
     SWING,
     VOLTAGE_NOISE,
@@ -41,7 +39,7 @@ from monitor.reference import (
     refine,
     restart,
 )
-from monitor.window import FILL, Window, push, restart_window, solve_two, sums
+from monitor.window import FILL, LENGTH, Window, push, restart_window, solve_two, sums
 from rigwatch.physics.transfer_function import FloatArray
 
 NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
@@ -55,6 +53,8 @@ OUTPUTS = 22
 
 _SINCE, _QUIET, _AGREED, _HOP, _EXCITED = range(5)
 _Y, _X, _V, _A, _S = range(5)
+_LOOKS_AT_NEW_EXCITATION = 32
+"""Looks, four samples apart, after which another excitation is taken for granted and learnt."""
 
 
 class Rules(NamedTuple):
@@ -69,6 +69,10 @@ class Rules(NamedTuple):
     worst_condition: float
     position_floor: float
     voltage_floor: float
+    low1: float
+    high1: float
+    low2: float
+    high2: float
 
 
 class WatchState(NamedTuple):
@@ -80,6 +84,7 @@ class WatchState(NamedTuple):
     number: NDArray[np.int64]
     held: FloatArray
     recent: FloatArray
+    scratch: FloatArray
 
 
 @njit(cache=True)
@@ -143,7 +148,7 @@ def _skip(state: WatchState) -> None:
         state.number[_SINCE] += 1
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _judge(
     data: FloatArray,
     row: FloatArray,
@@ -157,12 +162,11 @@ def _judge(
     place = place_in_period(ref, seq)
     acceleration = row[2] - ref.template[2, place]
     y = acceleration - ref.value[SCALE] * (row[3] - ref.template[3, place])
-    signals = np.empty(5)
+    signals, regressors = state.scratch[0], state.scratch[1]
     signals[_Y], signals[_A], signals[_S] = y, acceleration, data[4]
     signals[_X] = row[1] - ref.template[1, place] if position_valid else 0.0
     signals[_V] = row[0] - ref.template[0, place]
     add(state.energies, signals)
-    regressors = np.empty(3)
     regressors[0], regressors[1], regressors[2] = data[5], data[6], y
     push(state.window, regressors)
     rest = _at_rest(row, ref, state)
@@ -173,10 +177,10 @@ def _judge(
         state.number[_HOP] = 0
         _estimate(rules, ref, state)
     departed = _departure(rules, ref, state)
-    _follow(departed, seq, row, rules, ref, state)
+    _follow(departed, seq, place, row, rules, ref, state)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _at_rest(row: FloatArray, ref: Reference, state: WatchState) -> float:
     """1.0 where position and acceleration have stood still over four samples."""
     recent = state.recent
@@ -192,17 +196,17 @@ def _at_rest(row: FloatArray, ref: Reference, state: WatchState) -> float:
     return 1.0 if still else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _spread(ref: Reference) -> float:
     """Standard deviation of the change of the residual, error of the healthy average included."""
     extra = 9.0 if ref.number[SOURCE] == APERIODIC else 4.0 / max(ref.number[DEPTH], 1)
     return ref.value[NOISE] * np.sqrt(1.0 + extra)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
     """θ, its limits, D and whether friction can be seen at all."""
-    held, s = state.held, np.empty(6)
+    held, s = state.held, state.scratch[2]
     sums(state.window, s)
     theta1, theta2, condition = solve_two(s)
     speed = np.sqrt(energy(state.energies, _S) / max(state.energies.place[FILL], 1))
@@ -219,9 +223,24 @@ def _estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
     held[THETA1], held[THETA2] = theta1, theta2
     held[LOW1], held[HIGH1], held[LOW2], held[HIGH2] = -reach1, reach1, -reach2, reach2
     held[DEVIATION] = np.sqrt(max(theta1 * s[2] + theta2 * s[4], 0.0)) / spread
+    if ref.number[SOURCE] == FIXED:
+        _judge_by_band(rules, state)
 
 
 @njit(cache=True)
+def _judge_by_band(rules: Rules, state: WatchState) -> None:
+    """Fixed limits; the deviation is k at a limit. A window that is not full yet has no say."""
+    held, place = state.held, state.window.place
+    held[LOW1], held[HIGH1], held[LOW2], held[HIGH2] = (
+        rules.low1, rules.high1, rules.low2, rules.high2,
+    )  # fmt: skip
+    out1 = abs(2.0 * held[THETA1] - rules.low1 - rules.high1) / (rules.high1 - rules.low1)
+    out2 = abs(2.0 * held[THETA2] - rules.low2 - rules.high2) / (rules.high2 - rules.low2)
+    full = place[FILL] == place[LENGTH]
+    held[DEVIATION] = rules.factor * max(out1, out2) if full else 0.0
+
+
+@njit(cache=True, inline="always")
 def _moved(energies: Energies, signal: int, count: int) -> float:
     """Root mean square of the newest `count` samples."""
     if count >= energies.rows.shape[0]:
@@ -229,20 +248,22 @@ def _moved(energies: Energies, signal: int, count: int) -> float:
     return np.sqrt(recent_energy(energies, signal, count) / max(count, 1))
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _position_limit(rules: Rules, ref: Reference) -> float:
     return max(6.0 * ref.value[POSITION_NOISE], rules.position_floor * ref.value[POSITION_SWING])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _voltage_limit(rules: Rules, ref: Reference) -> float:
     return max(6.0 * ref.value[VOLTAGE_NOISE], rules.voltage_floor * ref.value[SWING])
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _departure(rules: Rules, ref: Reference, state: WatchState) -> bool:
     """Whether anything has left its limits; the largest of all goes into the deviation, in units of k."""
     held, energies = state.held, state.energies
+    if ref.number[SOURCE] == FIXED:
+        return held[DEVIATION] > rules.factor
     variance = _spread(ref) ** 2
     largest = held[DEVIATION] / rules.factor
     largest = max(largest, np.sqrt(recent_energy(energies, _Y, 8) / variance / rules.limit_8))
@@ -257,9 +278,15 @@ def _departure(rules: Rules, ref: Reference, state: WatchState) -> bool:
     return largest > 1.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _follow(
-    departed: bool, seq: int, row: FloatArray, rules: Rules, ref: Reference, state: WatchState
+    departed: bool,
+    seq: int,
+    place: int,
+    row: FloatArray,
+    rules: Rules,
+    ref: Reference,
+    state: WatchState,
 ) -> None:
     """Onset and end of an episode, its verdict, and the healthy average between episodes."""
     number, held = state.number, state.held
@@ -275,15 +302,22 @@ def _follow(
             held[EXPLAINED] = held[SHARE] = held[RHO] = held[REST] = 0.0
     if number[_SINCE] == 0:
         if held[DEVIATION] < 0.6 * rules.factor:
-            refine(ref, seq, row)
+            refine(ref, place, row)
     elif number[_SINCE] >= 12 and seq % 4 == 0:
         _decide(seq, rules, ref, state)
+        number[_EXCITED] = number[_EXCITED] + 1 if held[VERDICT] == NEW_EXCITATION else 0
+        if number[_EXCITED] >= _LOOKS_AT_NEW_EXCITATION:
+            restart(ref, True)
+            _forget(state, rules.window)
 
 
 @njit(cache=True)
 def _decide(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     """Which channels have moved, what the residual follows, and what that makes it."""
     held, energies, since = state.held, state.energies, state.number[_SINCE]
+    if ref.number[SOURCE] == FIXED:
+        held[VERDICT] = FRICTION if held[THETA1] > rules.high1 else OTHER
+        return
     count = min(since, 64)
     spread = _spread(ref)
     moved_v = _moved(energies, _V, count)
@@ -334,7 +368,7 @@ def _verdict(
     return before
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _write(
     data: FloatArray, code: int, ref: Reference, state: WatchState, out: FloatArray
 ) -> None:

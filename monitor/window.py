@@ -62,7 +62,7 @@ def restart_window(window: Window, length: int) -> None:
     window.back[:] = 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def push(window: Window, row: FloatArray) -> None:
     """Take one row in, and the oldest out when the window is full."""
     rows, _, back, place = window
@@ -103,7 +103,7 @@ def _refill(window: Window) -> None:
     place[FRONT_LEFT] = length
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def sums(window: Window, out: FloatArray) -> None:
     """Sums of products over the window into `out`, shape (m,)."""
     _, front, back, place = window
