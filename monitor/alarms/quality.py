@@ -1,7 +1,10 @@
 """Sensor alarms: the quality flags of a block's channels as conditions, one a channel and flag."""
 
+from functools import cache
+
 import numpy as np
 
+from monitor.alarms.debounce import is_zero
 from monitor.conditions import Condition
 from rigwatch.wire import quality
 from rigwatch.wire.messages import SampleBlock
@@ -15,19 +18,23 @@ SENSOR_CONDITIONS = {
 }
 
 
+@cache
+def _names(channel: str) -> tuple[tuple[int, str], ...]:
+    return tuple((bit, f"{kind}.{channel}") for bit, kind in SENSOR_CONDITIONS.items())
+
+
 def quality_conditions(block: SampleBlock) -> list[Condition]:
     """Conditions `<kind>.<channel>` of every channel that has quality flags.
 
-    `value` is the channel's own value [SI]; there are no limits, since the flag was decided in
-    `daq`.
+    `value` is the channel's own value [SI]; there are no limits, `daq` has decided.
     """
-    no_limit = np.full(len(block), np.nan)
+    none, no_limit = np.zeros(len(block), np.uint8), np.full(len(block), np.nan)
     conditions = []
     for channel in block.channels:
         if len(channel.quality) != len(block):
             continue
-        for bit, kind in SENSOR_CONDITIONS.items():
-            active = ((channel.quality & bit) != 0).astype(np.uint8)
-            name = f"{kind}.{channel.name}"
+        clean = is_zero(channel.quality)
+        for bit, name in _names(channel.name):
+            active = none if clean else ((channel.quality & bit) != 0).astype(np.uint8)
             conditions.append(Condition(name, active, channel.values, no_limit, no_limit))
     return conditions
