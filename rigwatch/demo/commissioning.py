@@ -46,6 +46,9 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
         _run(["plant", "--session", session, scenario], say)
     roles = [part for role, session in sessions.items() for part in (f"--{role}", session)]
     _run(["commission", *roles, "--output", model], say)
+    # Trying it also compiles the monitor's kernels, so that it is quick to start on the live rig.
+    say("the model is tried on the recording with known friction")
+    _run(["replay", sessions["friction"], "--model", model], say)
     stamp.write_text(made_from, encoding="utf-8")
     return model
 

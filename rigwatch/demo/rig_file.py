@@ -1,6 +1,7 @@
 """The demonstration's configuration: a rig's file with all that it writes in one folder."""
 
 import os
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -68,7 +69,9 @@ def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
         dashboard=_free_dashboard(config.dashboard or DashboardSection(), viewer),
     )
     target = folder / NAME
-    head = f"# Made by `rigwatch demo` from {source}.\n"
+    # The time makes each run's file another one: the recorder goes on with the last session where
+    # the configuration is the same.
+    head = f"# Made by `rigwatch demo` from {source}, {time.strftime('%Y-%m-%d %H:%M:%S')}.\n"
     target.write_text(head + as_toml(msgspec.to_builtins(own)), encoding="utf-8")
     load_rig(target)
     return target

@@ -14,7 +14,7 @@ from typing import Any
 
 from rigwatch.demo.narrator import Narrator
 from rigwatch.demo.rig_file import relative
-from rigwatch.demo.verdict import Recording, complaints, newest_session, read_recording
+from rigwatch.demo.verdict import ALARM, Recording, complaints, newest_session, read_recording
 from rigwatch.wire.bus import connect, unique_process
 from rigwatch.wire.errors import DeviceError
 from rigwatch.wire.messages import Alarm, SampleBlock
@@ -61,8 +61,13 @@ class Show:
         self._first = self._seen = 0
         self._up: subprocess.Popen[str] | None = None
 
-    def play(self, seconds: float | None) -> Outcome:
-        """Run for `seconds` of the rig's time, or until Ctrl-C; then judge what was recorded."""
+    def play(self, seconds: float, after_named: float) -> Outcome:
+        """Run, then judge what was recorded.
+
+        Args:
+            seconds: longest time of the rig's own; Ctrl-C ends it too [s].
+            after_named: ends so long after dry friction was named [s].
+        """
         self._say(f"starting the rig: $ rigwatch up {relative(self._rig)}")
         self._up = subprocess.Popen(
             [sys.executable, "-m", "rigwatch", "up", str(self._rig), "--json"],
@@ -74,18 +79,18 @@ class Show:
         threading.Thread(target=self._relay, name="relay", daemon=True).start()
         try:
             with suppress(KeyboardInterrupt):
-                self._watch(seconds)
+                self._watch(seconds, after_named)
         finally:
             self._stop()
         return self._judge()
 
-    def _watch(self, seconds: float | None) -> None:
+    def _watch(self, seconds: float, after_named: float) -> None:
         bus = connect(self._config, unique_process("demo"))
         samples, alarms = bus.subscribe(SAMPLES), bus.subscribe(ALARMS)
         rate = self._config.rig.sample_rate
         give_up = time.monotonic() + START_TIMEOUT
         try:
-            while seconds is None or self._seen < seconds * rate:
+            while self._seen < min(seconds, self._named_at() + after_named) * rate:
                 self._check_running(give_up)
                 alarm: Alarm | None = alarms.get(timeout=0.1)
                 if alarm is not None:
@@ -96,6 +101,11 @@ class Show:
                     give_up = time.monotonic() + START_TIMEOUT
         finally:
             bus.close()
+
+    def _named_at(self) -> float:
+        """Time of the rig's own at which dry friction was named, infinite before [s]."""
+        named = [alarm.seq for alarm in self._narrator.alarms if alarm.name == ALARM]
+        return named[0] / self._config.rig.sample_rate if named else float("inf")
 
     def _take(self, blocks: list[SampleBlock]) -> None:
         if not self._seen:

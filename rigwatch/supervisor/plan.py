@@ -17,16 +17,20 @@ class ProcessPlan:
         arguments: the command and its arguments.
         source: the process whose samples it works on, empty where there is none here.
         may_finish: an end with code 0 is somebody's wish, such as a viewer that was closed.
+        after: processes that are given time to get ready before it is started first.
     """
 
     name: str
     arguments: tuple[str, ...]
     source: str = ""
     may_finish: bool = False
+    after: tuple[str, ...] = ()
 
 
 PROCESSES = ("router", "plant", "daq", "monitor", "recorder", "dashboard")
 _COMMANDS = {"recorder": "record"}
+_READERS = ("daq", "monitor", "recorder")
+"""A simulated device waits for those who want to see it from its first sample on."""
 
 
 def plan(config: RigConfig, path: Path | str, without: Collection[str] = ()) -> list[ProcessPlan]:
@@ -37,6 +41,7 @@ def plan(config: RigConfig, path: Path | str, without: Collection[str] = ()) -> 
             arguments=(sys.executable, "-m", "rigwatch", _COMMANDS.get(name, name), str(path)),
             source=_source(name, config, without),
             may_finish=name == "dashboard",
+            after=_READERS if name == "plant" else (),
         )
         for name in PROCESSES
         if name not in without and _is_wanted(name, config)

@@ -50,6 +50,7 @@ class Watched:
     failures: int = 0
     start_at: float | None = None
     was_ready: bool = False
+    held: bool = False
     finished: bool = False
 
     @property
@@ -63,7 +64,7 @@ class Watched:
         if self.finished:
             return "finished"
         if self.start_at is not None:
-            return "down"
+            return "waiting" if self.held else "down"
         return "running" if self.vitals.ready else "starting"
 
 
@@ -103,7 +104,7 @@ class Supervisor:
         """Start everything and watch it until `stop`; then stop in reverse order and clean up."""
         try:
             for watched in self._watched.values():
-                self._start(watched)
+                self._start_or_hold(watched)
             while not self._stopped:
                 self._turn()
                 each_turn()
@@ -144,8 +145,11 @@ class Supervisor:
         if watched.finished:
             return
         if watched.start_at is not None:
+            if watched.held and self._all_ready(watched.child.plan.after):
+                watched.start_at = now
             if now >= watched.start_at:
-                self._start_again(watched)
+                watched.restarts += not watched.held
+                self._start(watched)
             return
         code = watched.child.exit_code()
         if code is not None:
@@ -181,12 +185,18 @@ class Supervisor:
         watched.start_at = now + pause
         self._say(watched, "restarting", f"starts again in {pause:.1f} s")
 
-    def _start_again(self, watched: Watched) -> None:
-        watched.restarts += 1
-        self._start(watched)
+    def _start_or_hold(self, watched: Watched) -> None:
+        if self._all_ready(watched.child.plan.after):
+            self._start(watched)
+        else:
+            watched.held = True
+            watched.start_at = self._clock() + self._limits.patience
+
+    def _all_ready(self, names: Sequence[str]) -> bool:
+        return all(self._watched[name].was_ready for name in names if name in self._watched)
 
     def _start(self, watched: Watched) -> None:
-        watched.start_at, watched.was_ready = None, False
+        watched.start_at, watched.was_ready, watched.held = None, False, False
         watched.child.start(self._clock())
         self._say(watched, "started", f"process {watched.child.pid}")
 

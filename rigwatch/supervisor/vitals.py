@@ -16,6 +16,7 @@ class Limits:
         start: until a process is ready; compiling the kernels of a first run is within it.
         silence: between two words of a process.
         stall: without samples while its source has them.
+        patience: that a process is kept back for those that it comes after.
         stop: from the request to stop until it is killed.
         first_pause: before the first restart; doubled for each one that follows.
         longest_pause: before any restart.
@@ -25,6 +26,7 @@ class Limits:
     start: float = 120.0
     silence: float = 3.0
     stall: float = 10.0
+    patience: float = 60.0
     stop: float = 8.0
     first_pause: float = 0.2
     longest_pause: float = 30.0

@@ -117,6 +117,17 @@ def test_pauses_grow_and_the_reason_is_the_last_line_that_was_printed() -> None:
     assert ended.text == "ended with code 2: model.toml: no such file"
 
 
+def test_a_simulated_device_is_started_once_those_who_watch_it_are_ready() -> None:
+    slow = "import time; time.sleep(1)\n" + WORKER.format(step=1)
+    plant = ProcessPlan("plant", worker("plant").arguments, after=("monitor", "not here"))
+    events = supervise(
+        [plant, worker("monitor", slow)], lambda _, events: bool(of_kind(events, "plant", "ready"))
+    )
+    order = [(event.process, event.kind) for event in events]
+    assert order.index(("monitor", "ready")) < order.index(("plant", "started"))
+    assert of_kind(events, "plant", "started")[0].restarts == 0
+
+
 def test_a_viewer_that_was_closed_stays_closed() -> None:
     events = supervise(
         [worker("dashboard", "pass", may_finish=True)],
