@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from benchmarks.live_rig import LiveRig, live_rig
 from benchmarks.table import Row
+from rigwatch.wire.realtime import prepare_for_real_time, raise_priority
 
 PERIOD_MS = 1000.0 / 256.0
 WARM_UP = 2.0
@@ -139,7 +140,6 @@ def _serve(server: "SerialServer", stop: threading.Event) -> None:  # type: igno
 def subscriber(config: Path, out: Path, stop: threading.Event) -> None:
     """Notes when each sample's estimate is there."""
     from rigwatch.wire.bus import connect
-    from rigwatch.wire.realtime import prepare_for_real_time
     from rigwatch.wire.rig_config import load_rig
     from rigwatch.wire.topics import ESTIMATES
 
@@ -174,6 +174,7 @@ def main(role: str, config: str, out: str) -> None:
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
+    raise_priority()
     ROLES[role](Path(config), Path(out), stop)
 
 

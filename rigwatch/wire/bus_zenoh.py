@@ -107,7 +107,7 @@ def _reach(endpoint: str, timeout: float | None) -> Any:
         if timeout is not None and waited >= timeout:
             remedy = "start `rigwatch router` or correct bus.router"
             raise BusError(f"no router answers at {endpoint}: {remedy}")
-        if waited > 2.0 and not told:
+        if timeout is None and waited > 2.0 and not told:
             _log.warning("waiting for the router at %s", endpoint)
             told = True
 

@@ -1,0 +1,286 @@
+"""The monitor's process on a bus in memory: what it says to samples, gaps, commands and silence."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from monitor.alarms import Occasion
+from monitor.links import LinkWatch, Seen
+from monitor.process import MonitorProcess
+from monitor.rig_monitor import RigMonitor
+from rigwatch.wire.alarm_list import ask_alarm_list
+from rigwatch.wire.blocks import concatenate
+from rigwatch.wire.bus import Subscription, wait_until
+from rigwatch.wire.bus_memory import MemoryNetwork
+from rigwatch.wire.errors import BusError, ConfigError
+from rigwatch.wire.messages import AlarmCommand, EstimateBlock, Health, SampleBlock
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.ring import SampleRing
+from rigwatch.wire.schema import encode
+from rigwatch.wire.topics import ALARMS, COMMANDS, ESTIMATES, EVENTS, HEALTH, SAMPLES, Topic
+from tests.bus.publisher import wave
+from tests.bus.rig import TestRig
+from tests.monitor_process.model import MODEL, monitor_section
+
+
+class Bench:
+    """A monitor whose loop is turned by hand, and a source of samples."""
+
+    def __init__(self, folder: Path) -> None:
+        rig = TestRig(folder, monitor_section(folder))
+        self.path, self.config = rig.path, rig.config
+        self.network = MemoryNetwork()
+        self.daq = self.network.bus("bench", "daq")
+        self.observer = self.network.bus("bench", "observer")
+        self.ring = SampleRing(self.daq, 65536)
+        self.heard = {t: self.observer.subscribe(t) for t in (ESTIMATES, ALARMS, EVENTS, HEALTH)}
+        self.start()
+
+    def start(self) -> None:
+        bus = self.network.bus("bench", "monitor")
+        self.monitor = MonitorProcess(self.config, self.path, bus)
+        self.bus = bus
+
+    def kill(self) -> None:
+        """What a kill -9 leaves: nothing is closed or said."""
+        self.bus.close()
+
+    def send(self, block: SampleBlock, *, kept_back: bool = False) -> None:
+        self.ring.add(block)
+        if not kept_back:
+            self.daq.publish(SAMPLES, block)
+
+    def turn(self) -> None:
+        for item in self.monitor.reader.read(0.0):
+            self.monitor.take(item)
+        self.monitor.look_around()
+
+    def turn_until(self, seq: int) -> None:
+        """Turn the loop until the monitor has dealt with the sample `seq`."""
+
+        def done() -> bool:
+            self.turn()
+            position = self.monitor.reader.position
+            return position is not None and position[1] >= seq
+
+        assert wait_until(done, 20.0, 0.001)
+
+    def got(self, topic: Topic) -> list[object]:
+        return list(self.heard[topic].drain())
+
+    def alarm_states(self) -> list[tuple[str, str]]:
+        drained = self.heard[ALARMS].drain()
+        return [(alarm.name, alarm.state) for alarm in drained]
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    made = Bench(tmp_path)
+    yield made
+    made.monitor.close()
+
+
+def estimates_of(subscription: Subscription) -> EstimateBlock:
+    return concatenate(subscription.drain())
+
+
+def same(first: EstimateBlock, second: EstimateBlock) -> bool:
+    return encode(first) == encode(second)
+
+
+def test_what_is_published_is_what_the_pipeline_says_to_the_last_bit(bench: Bench) -> None:
+    blocks = [wave(seq, 1 + seq % 3, 7, 0) for seq in _starts(600)]
+    for block in blocks:
+        bench.send(block)
+        bench.turn()
+    replayed = [RigMonitor(MODEL).update(concatenate(blocks))]
+    assert replayed[0] is not None
+    assert same(estimates_of(bench.heard[ESTIMATES]), replayed[0].estimates)
+
+
+def _starts(count: int) -> list[int]:
+    starts = [0]
+    while starts[-1] < count:
+        starts.append(starts[-1] + 1 + starts[-1] % 3)
+    return starts
+
+
+def test_samples_that_the_bus_lost_are_judged_in_order_all_the_same(bench: Bench) -> None:
+    for seq in range(300):
+        bench.send(wave(seq, 1, 7, 0), kept_back=100 <= seq < 150)
+        bench.turn()
+    bench.turn_until(299)
+    blocks = bench.heard[ESTIMATES].drain()
+    assert [b.seq for b in blocks] == list(np.cumsum([0] + [len(b) for b in blocks[:-1]]))
+    assert blocks[-1].seq + len(blocks[-1]) == 300
+
+
+def test_an_estimate_leaves_in_the_same_turn_as_its_sample_came(bench: Bench) -> None:
+    for seq in range(20):
+        bench.send(wave(seq, 1, 7, 0))
+        bench.turn()
+        assert [b.seq for b in bench.heard[ESTIMATES].drain()] == [seq]
+
+
+def test_one_that_is_behind_judges_merged_blocks(bench: Bench) -> None:
+    for seq in range(1500):
+        bench.send(wave(seq, 1, 7, 0))
+    bench.turn()
+    blocks = bench.heard[ESTIMATES].drain()
+    assert sum(len(block) for block in blocks) == 1500
+    assert len(blocks) == 3
+
+
+def test_silence_is_an_alarm_that_samples_clear(bench: Bench) -> None:
+    bench.send(wave(0, 1, 7, 0))
+    bench.turn()
+
+    def stale() -> bool:
+        bench.turn()
+        return ("stale", "unacknowledged") in bench.alarm_states()
+
+    assert wait_until(stale, 20.0)
+    bench.send(wave(1, 1, 7, 0))
+    bench.turn()
+    assert ("stale", "cleared_unacknowledged") in bench.alarm_states()
+
+
+def test_a_daq_that_is_gone_is_named(bench: Bench) -> None:
+    bench.send(wave(0, 1, 7, 0))
+    bench.turn()
+    bench.daq.close()
+
+    def named() -> bool:
+        bench.turn()
+        return ("link", "unacknowledged") in bench.alarm_states()
+
+    assert wait_until(named, 20.0)
+    standing = {alarm.name: alarm for alarm in ask_alarm_list(bench.observer)}
+    assert "the daq process is not there" in standing["link"].cause
+
+
+def test_commands_are_obeyed_and_refusals_explained(bench: Bench) -> None:
+    bench.send(wave(0, 1, 7, 0))
+    bench.turn()
+    at = Occasion("rig", 7, 0, time.time_ns())
+    bench.monitor.say(bench.monitor.rig.alarms.report("disk", at, active=True))
+    assert [a.name for a in ask_alarm_list(bench.observer)] == ["disk"]
+    command = AlarmCommand("disk", "acknowledge", "ann", time.time_ns())
+    bench.observer.publish(COMMANDS, command)
+    bench.turn()
+    assert ("disk", "acknowledged") in bench.alarm_states()
+    bench.observer.publish(COMMANDS, AlarmCommand("dsk", "reset", "ann", time.time_ns()))
+    bench.turn()
+    codes = [event.code for event in bench.heard[EVENTS].drain()]
+    assert "alarm_command_refused" in codes
+
+
+def test_a_killed_monitor_has_its_alarms_and_misses_no_sample(bench: Bench) -> None:
+    for seq in range(400):
+        bench.send(wave(seq, 1, 7, 0))
+    bench.turn_until(399)
+    at = Occasion("rig", 7, 399, time.time_ns())
+    bench.monitor.say(bench.monitor.rig.alarms.report("disk", at, active=True))
+    before = estimates_of(bench.heard[ESTIMATES])
+    bench.kill()
+    for seq in range(400, 700):
+        bench.send(wave(seq, 1, 7, 0))
+    bench.alarm_states()
+    bench.start()
+    assert ("disk", "unacknowledged") in bench.alarm_states()
+    bench.send(wave(700, 1, 7, 0))
+    bench.turn_until(700)
+    after = estimates_of(bench.heard[ESTIMATES])
+    assert (after.seq, len(after)) == (400, 301)
+    whole = RigMonitor(MODEL).update(wave_of(701))
+    assert whole is not None
+    assert same(concatenate([before, after]), whole.estimates), "it knows what went before"
+
+
+def wave_of(count: int) -> SampleBlock:
+    return concatenate([wave(seq, 1, 7, 0) for seq in range(count)])
+
+
+def test_lost_samples_are_an_alarm(bench: Bench) -> None:
+    for seq in (0, 1, 2, 10):
+        bench.send(wave(seq, 1, 7, 0))
+    bench.turn_until(10)
+    bench.turn()
+    assert ("loss", "unacknowledged") in bench.alarm_states()
+
+
+def test_samples_without_a_channel_are_said_to_be_unsuitable(bench: Bench) -> None:
+    whole = wave(0, 4, 7, 0)
+    part = SampleBlock("rig", 7, 0, whole.device_us, whole.t_ns, whole.channels[:2])
+    bench.send(part)
+
+    def told() -> bool:
+        bench.turn()
+        said = [h for h in bench.heard[HEALTH].drain() if isinstance(h, Health)]
+        return any(h.state == "unsuitable" and "acceleration" in h.text for h in said)
+
+    assert wait_until(told, 20.0)
+
+
+def test_health_counts_samples_losses_and_latency(bench: Bench) -> None:
+    now = time.time_ns()
+    found: list[Health] = []
+
+    def told() -> bool:
+        bench.send(wave(len(found), 1, 7, now))
+        bench.turn()
+        found.extend(h for h in bench.heard[HEALTH].drain() if h.counters["samples"] > 0)
+        return bool(found)
+
+    assert wait_until(told, 20.0)
+    assert found[0].source == "monitor"
+    assert {"lost_samples", "queue_length", "latency_ms", "latency_p99_ms"} <= set(
+        found[0].counters
+    )
+
+
+def test_without_a_monitor_the_list_says_so() -> None:
+    with pytest.raises(BusError, match="no monitor of rig bench answers"):
+        ask_alarm_list(MemoryNetwork().bus("bench", "asker"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('name = "acceleration"', 'name = "accel"', "found acceleration, expected channels of"),
+        ("[rig]", "[rig]\nsample_rate = 512.0", "found 256 Hz, expected 512 Hz"),
+    ],
+)
+def test_a_model_of_another_rig_is_refused(tmp_path: Path, old: str, new: str, told: str) -> None:
+    path = TestRig(tmp_path, monitor_section(tmp_path)).path
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(ConfigError, match=told):
+        MonitorProcess(load_rig(path), path, MemoryNetwork().bus("bench", "monitor"))
+
+
+def seen(t_s: float, monotonic_s: float, silent: float = 0.0, trouble: str = "") -> Seen:
+    return Seen(int(t_s * 1e9), int(monotonic_s * 1e9), silent, trouble, False, "rig", (7, 9))
+
+
+def holding(watch: LinkWatch, at: Seen) -> set[str]:
+    return {name for name, _, holds in watch.reports(at) if holds}
+
+
+def test_each_alarm_of_the_link_holds_as_long_as_its_reason() -> None:
+    watch = LinkWatch(stale_after=0.1)
+    assert holding(watch, seen(0, 0)) == set()
+    assert holding(watch, seen(1, 1, silent=0.2)) == {"stale"}
+    assert holding(watch, seen(1, 1, silent=0.2, trouble="cable")) == {"stale", "link"}
+    watch.lost(3, int(2e9))
+    assert holding(watch, seen(2.5, 2.5)) == {"loss"}
+    assert holding(watch, seen(4, 4)) == set()
+
+
+def test_a_clock_that_was_set_is_noticed_and_one_that_runs_is_not() -> None:
+    watch = LinkWatch(0.1)
+    assert [watch.clock_step(seen(t, t)) for t in (0, 1, 2)] == [0, 0, 0]
+    assert watch.clock_step(seen(3 - 30, 3)) == pytest.approx(-30e9)
+    assert watch.clock_step(seen(4 - 30, 4)) == 0
