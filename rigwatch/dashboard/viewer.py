@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Literal, Self
 
+from rigwatch.dashboard.page import HOST, Page
 from rigwatch.wire.errors import RigwatchError
 
-HOST = "127.0.0.1"
 _PICTURE = "1600x1000"
 _START_TIMEOUT = 30.0
 _STOP_TIMEOUT = 3.0
@@ -67,6 +67,8 @@ class Viewer:
         self.web_port = (web_port or free_port()) if kind == "web" else 0
         for taken in filter(answers, filter(None, (self.port, self.web_port))):
             raise ViewerError(f"port {taken} is taken: end what listens there or configure another")
+        self._page_source = free_port() if kind == "web" else 0
+        self._page: Page | None = None
         self._words: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
         self._process = subprocess.Popen(
             [*_dying_with_parent(), str(_binary()), *self._options()],
@@ -105,6 +107,8 @@ class Viewer:
                 raise ViewerError(f"the viewer did not start: {self.last_words()}")
             tick()
             time.sleep(0.05)
+        if self.kind == "web":
+            self._page = Page(self.web_port, self._page_source, self.port)
         return self
 
     def exit_code(self) -> int | None:
@@ -113,6 +117,8 @@ class Viewer:
 
     def stop(self) -> None:
         """End the process, with force where it does not listen."""
+        if self._page is not None:
+            self._page.close()
         self._process.terminate()
         try:
             self._process.wait(_STOP_TIMEOUT)
@@ -133,7 +139,7 @@ class Viewer:
         kind = {
             "native": ["--expect-data-soon"],
             "headless": ["--headless", "--window-size", _PICTURE],
-            "web": ["--serve-web", "--web-viewer-port", str(self.web_port)],
+            "web": ["--serve-web", "--web-viewer-port", str(self._page_source)],
         }
         return options + kind[self.kind]
 

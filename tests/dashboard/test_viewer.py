@@ -4,6 +4,7 @@ import importlib.util
 import json
 import threading
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
@@ -49,11 +50,20 @@ def test_web_viewer_is_served_on_this_machine_only(web: Viewer) -> None:
     until(lambda: answers(web.web_port), "the page is served")
     with urllib.request.urlopen(web.web_url, timeout=10) as page:
         assert b"<html" in page.read()
+        rule = page.headers["Content-Security-Policy"]
+    assert f"connect-src 'self' data: blob: http://127.0.0.1:{web.port}" in rule
+    assert "https:" not in rule
+    assert "*" not in rule
     process = psutil.Process(web.pid)
-    everyone = [process, *process.children(recursive=True)]
+    everyone = [process, psutil.Process()]
     places = [c.laddr for one in everyone for c in one.net_connections() if c.status == "LISTEN"]
     assert {place.port for place in places} >= {web.port, web.web_port}
     assert {place.ip for place in places} == {"127.0.0.1"}
+
+
+def test_what_the_viewer_does_not_have_is_not_there(web: Viewer) -> None:
+    with pytest.raises(urllib.error.HTTPError, match="404"):
+        urllib.request.urlopen(f"http://127.0.0.1:{web.web_port}/nothing", timeout=10)
 
 
 def test_no_usage_report_is_kept_or_sent(web: Viewer, homes: Path) -> None:

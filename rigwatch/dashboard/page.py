@@ -1,0 +1,88 @@
+"""The viewer's web page, handed on with a rule for the browser: talk to this machine only.
+
+Opened as it comes, the page reports its use to its makers, asks for updates and loads fonts and
+examples from the internet, and it has no switch for that. The rule is a Content-Security-Policy, which
+browsers obey.
+"""
+
+import threading
+import urllib.error
+import urllib.request
+from email.message import Message
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+from rigwatch.wire.errors import RigwatchError
+
+HOST = "127.0.0.1"
+_TIMEOUT = 10.0
+_HANDED_ON = ("Content-Type", "Content-Encoding", "Cache-Control")
+
+
+class PageError(RigwatchError):
+    """The page cannot be served."""
+
+
+class Page:
+    """A page server on this machine only.
+
+    Args:
+        port: where browsers find it.
+        source_port: where the viewer serves the page.
+        data_port: where the page gets its data.
+
+    Raises:
+        PageError: the port is taken.
+    """
+
+    def __init__(self, port: int, source_port: int, data_port: int) -> None:
+        source = f"http://{HOST}:{source_port}"
+        handler = type("Handler", (_Handler,), {"source": source, "rule": policy(data_port)})
+        try:
+            self._server = ThreadingHTTPServer((HOST, port), handler)
+        except OSError as error:
+            raise PageError(f"port {port}: {error.strerror}: configure another") from error
+        self._server.daemon_threads = True
+        threading.Thread(target=self._server.serve_forever, name="page", daemon=True).start()
+
+    def close(self) -> None:
+        """Serve no more."""
+        self._server.shutdown()
+        self._server.server_close()
+
+
+def policy(data_port: int) -> str:
+    """What the page may load and whom it may talk to."""
+    data = " ".join(f"http://{name}:{data_port}" for name in (HOST, "localhost"))
+    return (
+        "default-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' data: blob:; "
+        f"connect-src 'self' data: blob: {data}"
+    )
+
+
+class _Handler(BaseHTTPRequestHandler):
+    source = ""
+    rule = ""
+
+    def do_GET(self) -> None:
+        """Hand on what the viewer has at this path."""
+        request = urllib.request.Request(self.source + self.path)
+        request.add_header("Accept-Encoding", self.headers.get("Accept-Encoding", ""))
+        try:
+            with urllib.request.urlopen(request, timeout=_TIMEOUT) as answer:
+                self._reply(answer.status, answer.headers, answer.read())
+        except urllib.error.HTTPError as error:
+            self._reply(error.code, error.headers, error.read())
+        except OSError:
+            self.send_error(502, "the viewer does not answer")
+
+    def _reply(self, status: int, found: Message, body: bytes) -> None:
+        self.send_response(status)
+        for name in filter(found.get, _HANDED_ON):
+            self.send_header(name, found[name])
+        self.send_header("Content-Security-Policy", self.rule)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002
+        """Say nothing: this is not a process's business to tell."""
