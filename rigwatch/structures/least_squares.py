@@ -1,0 +1,73 @@
+"""Linear least squares as all methods here need it: weights, gaps, noise by signal, what is blind.
+
+Rows are samples of signals, columns unknowns. Columns are scaled to one length before anything is
+decomposed, so that stiffnesses of 1000 N/m and masses of 1 g are judged alike.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.wire.errors import ModelError
+
+FloatArray = NDArray[np.float64]
+
+BLIND = 1e-9
+"""Share of the largest singular value below which a combination of unknowns is not determined."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Solution of one linear problem.
+
+    Attributes:
+        change: of the unknowns, shape (m,).
+        covariance: for the residuals that are left, shape (m, m).
+        blind: which unknowns stand in a combination that the rows do not determine, shape (m,).
+    """
+
+    change: FloatArray
+    covariance: FloatArray
+    blind: NDArray[np.bool_]
+
+
+def solve(errors: FloatArray, slopes: FloatArray, weight: FloatArray, scale: FloatArray) -> Step:
+    """The change of the unknowns that makes errors smallest: errors ≈ slopes·change.
+
+    Args:
+        errors: measured less predicted, shape (samples, outputs), NaN where nothing was measured.
+        slopes: shape (samples, outputs, m).
+        weight: of each sample's square, shape (samples,).
+        scale: standard deviation to expect of each output, shape (outputs,).
+    """
+    factor = np.sqrt(weight)[:, None] / scale
+    use = np.isfinite(errors) & (factor > 0)
+    rows = slopes[use] * factor[use][:, None]
+    right = errors[use] * factor[use]
+    length = np.linalg.norm(rows, axis=0)
+    length = np.where(length > 0, length, 1.0)
+    left, sizes, across = np.linalg.svd(rows / length, full_matrices=False)
+    seen = sizes > BLIND * sizes[0]
+    along = np.where(seen, left.T @ right / np.where(seen, sizes, 1.0), 0.0)
+    change = across.T @ along / length
+    rest = right - rows @ change
+    half = across.T * (np.where(seen, 1.0 / np.where(seen, sizes, 1.0), 0.0))
+    variance = float(rest @ rest) / max(len(right) - len(length), 1)
+    covariance = variance * (half @ half.T) / np.outer(length, length)
+    blind = np.abs(across[~seen]).max(axis=0, initial=0.0) > 0.05
+    return Step(change, covariance, blind)
+
+
+def require_determined(names: tuple[str, ...], blind: NDArray[np.bool_], where: str) -> None:
+    """Refuse more unknowns than the record determines.
+
+    Raises:
+        ModelError: some unknowns are blind; they are named.
+    """
+    if blind.any():
+        found = ", ".join(name for name, flag in zip(names, blind, strict=True) if flag)
+        raise ModelError(
+            f"{where}: found {len(names)} unknowns of which this record does not determine"
+            f" {found}, expected fewer unknowns, more signals or another excitation"
+        )
