@@ -1,12 +1,13 @@
 """Reads blocks of samples and estimates straight from their protobuf bytes, as numpy arrays.
 
 The general decoder makes a Python object of every number; here the packed doubles and integers are
-taken over as they lie. Whatever this module does not recognise is left to `schema.decode`, which
-says what is wrong.
+taken over as they lie. Blocks of one recording differ in nothing but `seq` and the numbers, so
+where they lie is worked out once, and checked against every byte between them for each further
+block. Whatever this module does not recognise is left to `schema.decode`, which says what is wrong.
 """
 
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Set
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,12 +17,51 @@ from rigwatch.wire.messages import ByteArray, Column, EstimateBlock, SampleBlock
 
 _NO_QUALITY: ByteArray = np.zeros(0, np.uint8)
 _F8, _I8, _U1 = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
-_LENGTH_DELIMITED, _VARINT = 2, 0
+_MOST_LAYOUTS = 256
+_DEVICE, _BOOT, _SEQ = 0x0A, 0x10, 0x18
+"""Tags on the wire: number of the field and how it is written."""
+_TIMES = {SampleBlock: (0x22, 0x2A), EstimateBlock: (0x22,)}
+_COLUMNS = {SampleBlock: 0x32, EstimateBlock: 0x2A}
+_NAME, _UNIT, _VALUES, _QUALITY = 0x0A, 0x12, 0x1A, 0x22
+Span = tuple[int, int]
 K = TypeVar("K", SampleBlock, EstimateBlock)
 
 
 class _UnfamiliarError(Exception):
     """An encoding that this module leaves to the general decoder."""
+
+
+@dataclass(frozen=True, slots=True)
+class _ColumnPlace:
+    """Where a column's values and quality begin; -1 for none."""
+
+    name: str
+    unit: str
+    values: int
+    quality: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """Where everything lies in the blocks of one device, length and kind.
+
+    Attributes:
+        samples: samples in such a block.
+        seq: where its number stands, None for 0.
+        times: where its integer arrays begin.
+        fixed: all bytes that are neither seq nor numbers, with their places.
+    """
+
+    samples: int
+    device: str
+    boot: int
+    seq: Span | None
+    times: tuple[int, ...]
+    columns: tuple[_ColumnPlace, ...]
+    fixed: tuple[tuple[int, int, bytes], ...]
+
+
+_layouts: dict[tuple[type[Any], int], _Layout] = {}
 
 
 def decode_block(kind: type[K], data: bytes) -> K:
@@ -30,112 +70,122 @@ def decode_block(kind: type[K], data: bytes) -> K:
     Raises:
         MessageError: the bytes are no such message, or its columns differ in length.
     """
-    try:
-        block: K = _PARSERS[kind](data)
-        _check(block)
-    except (_UnfamiliarError, IndexError, ValueError):
-        return schema.decode(kind, data)
-    return block
+    layout = _layouts.get((kind, len(data)))
+    if layout is None or not _fits(layout, data):
+        try:
+            layout = _layout(kind, data)
+        except (_UnfamiliarError, IndexError, ValueError):
+            return schema.decode(kind, data)
+        if len(_layouts) >= _MOST_LAYOUTS:
+            _layouts.clear()
+        _layouts[kind, len(data)] = layout
+    return _read(kind, layout, data)
 
 
-def _check(block: SampleBlock | EstimateBlock) -> None:
-    n = len(block)
-    columns = block.channels if isinstance(block, SampleBlock) else block.columns
-    for column in columns:
-        if len(column.values) != n or len(column.quality) not in (0, n):
-            raise _UnfamiliarError
-    if isinstance(block, SampleBlock) and len(block.device_us) != n:
+def _fits(layout: _Layout, data: bytes) -> bool:
+    if layout.seq is not None and _varint(data, layout.seq[0])[1] != layout.seq[1]:
+        return False
+    return all(data[start:stop] == part for start, stop, part in layout.fixed)
+
+
+def _read(kind: type[K], layout: _Layout, data: bytes) -> K:
+    n, read = layout.samples, np.frombuffer
+    columns = tuple(
+        [
+            Column(
+                place.name,
+                place.unit,
+                read(data, _F8, n, place.values),
+                _NO_QUALITY if place.quality < 0 else read(data, _U1, n, place.quality),
+            )
+            for place in layout.columns
+        ]
+    )
+    seq = 0 if layout.seq is None else _integer(data, layout.seq)
+    times = [read(data, _I8, n, start) for start in layout.times]
+    return kind(layout.device, layout.boot, seq, *times, columns)  # type: ignore[call-arg, arg-type]
+
+
+def _layout(kind: type[Any], data: bytes) -> _Layout:
+    """Where everything lies in `data`; lengths are checked."""
+    fields = _fields(data, (0, len(data)), {_DEVICE, _BOOT, _SEQ, *_TIMES[kind], _COLUMNS[kind]})
+    times = [_only(fields.get(tag)) for tag in _TIMES[kind]]
+    n, rest = divmod(times[0][1] - times[0][0], _I8.itemsize)
+    if rest or any(stop - start != n * _I8.itemsize for start, stop in times):
         raise _UnfamiliarError
+    columns = [_column(data, span, n) for span in fields.get(_COLUMNS[kind], ())]
+    seq = _only(fields[_SEQ]) if _SEQ in fields else None
+    variable = [seq] if seq else []
+    variable += times + [(place.values, place.values + n * _F8.itemsize) for place in columns]
+    variable += [(place.quality, place.quality + n) for place in columns if place.quality >= 0]
+    return _Layout(
+        n,
+        _text(data, fields.get(_DEVICE)),
+        _integer(data, _only(fields[_BOOT])) if _BOOT in fields else 0,
+        seq,
+        tuple(start for start, _ in times),
+        tuple(columns),
+        _between(data, sorted(variable)),
+    )
 
 
-def _varint(data: bytes, at: int) -> tuple[int, int]:
-    if data[at + 1] < 0x80:
-        return (data[at] & 0x7F) | (data[at + 1] << 7), at + 2
-    value = shift = 0
-    while True:
-        byte = data[at]
-        at += 1
-        value |= (byte & 0x7F) << shift
-        if byte < 0x80:
-            return value, at
-        shift += 7
-        if shift > 63:
-            raise _UnfamiliarError
+def _column(data: bytes, span: Span, n: int) -> _ColumnPlace:
+    fields = _fields(data, span, {_NAME, _UNIT, _VALUES, _QUALITY})
+    values = _only(fields.get(_VALUES))
+    quality = _only(fields[_QUALITY]) if _QUALITY in fields else (-1, n - 1)
+    if values[1] - values[0] != n * _F8.itemsize or quality[1] - quality[0] != n:
+        raise _UnfamiliarError
+    name, unit = (_text(data, fields.get(tag)) for tag in (_NAME, _UNIT))
+    return _ColumnPlace(name, unit, values[0], quality[0])
 
 
-def _fields(data: bytes, at: int, end: int) -> dict[int, Any]:
-    """Fields of the message in data[at:end]: int for a varint, (start, stop) for bytes.
+def _between(data: bytes, variable: list[Span]) -> tuple[tuple[int, int, bytes], ...]:
+    starts = [0, *(stop for _, stop in variable)]
+    stops = [*(start for start, _ in variable), len(data)]
+    return tuple((a, b, data[a:b]) for a, b in zip(starts, stops, strict=True))
 
-    Repeated ones are lists of them; field 6 and above only occur as columns.
-    """
-    found: dict[int, Any] = {}
+
+def _fields(data: bytes, within: Span, tags: Set[int]) -> dict[int, list[Span]]:
+    """Places of the fields of the message that lies `within`, by tag; it has no others."""
+    at, end = within
+    found: dict[int, list[Span]] = {}
     while at < end:
-        tag, value, after = data[at], data[at + 1], at + 2
-        if value >= 0x80:
-            value, after = _varint(data, at + 1)
-        if tag & 7 == _LENGTH_DELIMITED:
-            at = after + value
-            found.setdefault(tag >> 3, []).append((after, at))
-        elif tag & 7 == _VARINT and tag < 0x80:
-            at = after
-            found[tag >> 3] = (value >> 1) ^ -(value & 1)
-        else:
+        tag = data[at]
+        value, after = _varint(data, at + 1)
+        if tag not in tags:
             raise _UnfamiliarError
+        span = (at + 1, after) if tag in (_BOOT, _SEQ) else (after, after + value)
+        found.setdefault(tag, []).append(span)
+        at = span[1]
     if at != end:
         raise _UnfamiliarError
     return found
 
 
-@lru_cache(maxsize=512)
-def _text(data: bytes) -> str:
-    return data.decode()
+def _varint(data: bytes, at: int) -> tuple[int, int]:
+    value = shift = 0
+    while True:
+        byte = data[at]
+        at += 1
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if value >> 64 or shift > 70:
+            raise _UnfamiliarError
+        if byte < 0x80:
+            return value, at
 
 
-def _string(data: bytes, spans: list[tuple[int, int]] | None) -> str:
-    if spans is None:
-        return ""
-    ((start, stop),) = spans
-    return _text(data[start:stop])
+def _integer(data: bytes, span: Span) -> int:
+    """A zigzag varint."""
+    value, _ = _varint(data, span[0])
+    return (value >> 1) ^ -(value & 1)
 
 
-def _array(data: bytes, spans: list[tuple[int, int]] | None, dtype: "np.dtype[Any]") -> Any:
-    if spans is None:
-        return np.zeros(0, dtype)
-    ((start, stop),) = spans
-    count, rest = divmod(stop - start, dtype.itemsize)
-    if rest:
+def _only(spans: list[Span] | None) -> Span:
+    if spans is None or len(spans) != 1:
         raise _UnfamiliarError
-    return np.frombuffer(data, dtype, count, start)
+    return spans[0]
 
 
-def _column(data: bytes, span: tuple[int, int]) -> Column:
-    fields = _fields(data, *span)
-    quality = _array(data, fields[4], _U1) if 4 in fields else _NO_QUALITY
-    name, unit = _string(data, fields.get(1)), _string(data, fields.get(2))
-    return Column(name, unit, _array(data, fields.get(3), _F8), quality)
-
-
-def _samples(data: bytes) -> SampleBlock:
-    get = _fields(data, 0, len(data)).get
-    return SampleBlock(
-        _string(data, get(1)),
-        get(2, 0),
-        get(3, 0),
-        _array(data, get(4), _I8),
-        _array(data, get(5), _I8),
-        tuple([_column(data, span) for span in get(6, ())]),
-    )
-
-
-def _estimates(data: bytes) -> EstimateBlock:
-    get = _fields(data, 0, len(data)).get
-    return EstimateBlock(
-        _string(data, get(1)),
-        get(2, 0),
-        get(3, 0),
-        _array(data, get(4), _I8),
-        tuple([_column(data, span) for span in get(5, ())]),
-    )
-
-
-_PARSERS: dict[Any, Callable[[bytes], Any]] = {SampleBlock: _samples, EstimateBlock: _estimates}
+def _text(data: bytes, spans: list[Span] | None) -> str:
+    return "" if spans is None else data[slice(*_only(spans))].decode()

@@ -1,0 +1,72 @@
+"""The fast reader of blocks says what the general decoder says, for any bytes."""
+
+from collections.abc import Callable
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigwatch.wire import schema
+from rigwatch.wire.errors import MessageError
+from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.session.packed import decode_block
+
+Block = SampleBlock | EstimateBlock
+NAMES = st.sampled_from(["voltage", "position", "", "θ1", "x" * 200])
+INTEGERS = st.integers(-(2**62), 2**62)
+
+
+@st.composite
+def blocks(draw: st.DrawFn) -> Block:
+    n = draw(st.sampled_from([0, 1, 2, 15, 16, 17, 128, 300]))
+    rng = np.random.default_rng(draw(st.integers(0, 99)))
+    columns = tuple(
+        Column(
+            draw(NAMES),
+            draw(NAMES),
+            rng.normal(size=n) * np.array([1.0, np.nan, np.inf])[rng.integers(0, 3, n)],
+            rng.integers(0, 256, n if draw(st.booleans()) else 0).astype(np.uint8),
+        )
+        for _ in range(draw(st.integers(0, 4)))
+    )
+    t_ns = rng.integers(-(2**62), 2**62, n)
+    device, boot, seq = draw(NAMES), draw(INTEGERS), draw(INTEGERS)
+    if draw(st.booleans()):
+        return EstimateBlock(device, boot, seq, t_ns, columns)
+    return SampleBlock(device, boot, seq, t_ns[::-1].copy(), t_ns, columns)
+
+
+def said(kind: type[Block], data: bytes, fast: bool) -> bytes | str:
+    try:
+        decode: Callable[..., Block] = decode_block if fast else schema.decode
+        message = decode(kind, data)
+        return schema.encode(message)
+    except MessageError:
+        return "refused"
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(blocks(), min_size=1, max_size=5))
+def test_blocks_come_back_whatever_came_before(several: list[Block]) -> None:
+    for block in (*several, *several):
+        data = schema.encode(block)
+        assert said(type(block), data, fast=True) == data
+
+
+@settings(max_examples=200, deadline=None)
+@given(blocks(), st.data())
+def test_damaged_bytes_are_judged_alike(block: Block, draw: st.DataObject) -> None:
+    """Behind a checksum such bytes come from another writer, never from the disk."""
+    data = bytearray(schema.encode(block))
+    said(type(block), bytes(data), fast=True)
+    for _ in range(draw.draw(st.integers(1, 3))):
+        if data:
+            data[draw.draw(st.integers(0, min(60, len(data) - 1)))] = draw.draw(st.integers(0, 255))
+    changed = bytes(data)
+    assert said(type(block), changed, fast=True) == said(type(block), changed, fast=False)
+
+
+@given(st.binary(max_size=80))
+def test_garbage_is_judged_alike(data: bytes) -> None:
+    for kind in (SampleBlock, EstimateBlock):
+        assert said(kind, data, fast=True) == said(kind, data, fast=False)
