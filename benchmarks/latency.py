@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from numpy.typing import NDArray
 from benchmarks.live_rig import LiveRig, live_rig
 from benchmarks.table import Row
 from rigwatch.wire.realtime import prepare_for_real_time, raise_priority
+
+if TYPE_CHECKING:
+    from sim_plant.serve.serial_server import SerialServer
 
 PERIOD_MS = 1000.0 / 256.0
 WARM_UP = 2.0
@@ -129,7 +133,7 @@ def device(config: Path, out: Path, stop: threading.Event) -> None:
     np.save(out, np.array(line.times, np.int64))
 
 
-def _serve(server: "SerialServer", stop: threading.Event) -> None:  # type: ignore[name-defined]  # noqa: F821
+def _serve(server: "SerialServer", stop: threading.Event) -> None:
     from sim_plant.serve.source import Pace
 
     pace = Pace(256.0)

@@ -2,7 +2,9 @@
 
 import contextlib
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -30,6 +32,7 @@ class LiveRig:
     def __init__(self, folder: Path, *, needs_model: bool = True) -> None:
         self.folder = folder
         self.path = write_rig_file(find_config("demo.toml"), folder, "web")
+        _set_apart(self.path)
         if needs_model:
             ensure_model(self.path, folder, lambda _: None)
         self.config: RigConfig = load_rig(self.path)
@@ -69,6 +72,15 @@ class LiveRig:
                 process.wait(max(0.1, deadline - time.monotonic()))
             process.kill()
             process.wait()
+
+
+def _set_apart(path: Path) -> None:
+    """A port and a name of its own, so that no other rig on this machine is met on the bus."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    text = re.sub(r"tcp/127\.0\.0\.1:\d+", f"tcp/127.0.0.1:{port}", path.read_text())
+    path.write_text(re.sub(r'(?m)^id = ".*"$', f'id = "bench-{os.getpid()}"', text, count=1))
 
 
 @contextlib.contextmanager
