@@ -15,6 +15,8 @@ from rigwatch.wire.topics import ALIVE_KEY, HEALTH
 ROUTER_TIMEOUT = 3.0
 WORD_TIMEOUT = 3.0
 """Longest wait for a process's health, which it tells every second [s]."""
+WELL = ("running", "recording")
+"""What a process says of itself when all is well."""
 
 
 def check_alive(config: RigConfig, process: str) -> Finding:
@@ -42,7 +44,7 @@ def _check_on_bus(bus: Bus, process: str) -> Finding:
         health: Health | None = words.get(timeout=left)
         if health is not None and health.source.partition("/")[0] == process:
             text = f"{health.state} {health.text}".strip()
-            return judged(process, health.state == "running", text, "look at its output")
+            return judged(process, health.state in WELL, text, "look at its output")
     text = f"has said nothing for {WORD_TIMEOUT:g} s"
     return Finding(process, "fail", text, "look at its output; start it again")
 

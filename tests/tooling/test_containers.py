@@ -14,7 +14,7 @@ from rigwatch.wire.ports import free_port
 
 ROOT = Path(__file__).parents[2]
 STATE, MOUNTED = "/var/lib/rigwatch", "/etc/rigwatch/rig.toml"
-START_TIMEOUT = 90.0
+START_TIMEOUT = 150.0
 
 pytestmark = pytest.mark.xdist_group("rig")
 
