@@ -13,11 +13,13 @@ from pathlib import Path
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import EstimateBlock, Event, Message, RunInfo, SampleBlock, Severity
 from rigwatch.wire.session.reader import SUFFIX
-from rigwatch.wire.session.writer import SessionWriter
+from rigwatch.wire.session.writer import SessionWriter, merge_pending
 
 SOURCE = "recorder"
 RAM_BYTES = 64 << 20
-"""Memory for messages that wait for the disk, about half an hour of them [bytes]."""
+"""Memory for messages that wait for the disk, about a quarter of an hour of them [bytes]."""
+COMPACTED = 256
+"""Length of the blocks that samples are merged into while they wait [samples]."""
 RETRY_AFTER = 1.0
 """Time between attempts to write again [s]."""
 _PLAIN_MESSAGE = 500
@@ -131,6 +133,8 @@ class Store:
             self._waiting.extendleft(reversed(self._writer.pending))
             self._writer.abandon()
             self._writer = None
+        # Single samples take a hundred times the memory of the same samples in one block.
+        self._waiting = deque(merge_pending(self._waiting, COMPACTED))
         self._waiting_bytes = sum(map(weight, self._waiting))
         if not self.failure:
             self._dropped_before = self.dropped_samples + self.dropped_messages

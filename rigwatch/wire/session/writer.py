@@ -158,8 +158,8 @@ class SessionWriter:
             self.abandon()
 
 
-def merge_pending(messages: Iterable[Message]) -> list[Message]:
-    """The messages, with consecutive blocks joined up to `LARGEST_BLOCK` samples.
+def merge_pending(messages: Iterable[Message], largest: int = LARGEST_BLOCK) -> list[Message]:
+    """The messages, with consecutive blocks joined up to `largest` samples.
 
     A joined block stands where its first part stood. Nothing is joined across an operator's
     command, so that the command keeps its place between the samples.
@@ -169,7 +169,7 @@ def merge_pending(messages: Iterable[Message]) -> list[Message]:
     for message in messages:
         if isinstance(message, SampleBlock | EstimateBlock):
             if len(message):
-                _append_block(slots, runs, message)
+                _append_block(slots, runs, message, largest)
             continue
         if isinstance(message, AlarmCommand):
             runs.clear()
@@ -181,11 +181,12 @@ def _append_block(
     slots: list[list[Message]],
     runs: dict[tuple[type[Message], str], tuple[list[Message], int]],
     block: SampleBlock | EstimateBlock,
+    largest: int,
 ) -> None:
     key = (type(block), block.device)
     slot, length = runs.get(key, ([], 0))
     tail = slot[-1] if slot else None
-    fits = length + len(block) <= LARGEST_BLOCK
+    fits = length + len(block) <= largest
     if fits and isinstance(tail, SampleBlock | EstimateBlock) and blocks.continues(tail, block):
         slot.append(block)
         runs[key] = (slot, length + len(block))
