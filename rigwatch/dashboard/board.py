@@ -15,7 +15,7 @@ from rigwatch.dashboard import entities as at
 from rigwatch.dashboard import quantities, words
 from rigwatch.dashboard.batches import Batches
 from rigwatch.dashboard.facts import Facts
-from rigwatch.dashboard.health import counters
+from rigwatch.dashboard.health import counters, entity
 from rigwatch.dashboard.lanes import Lanes
 from rigwatch.dashboard.layout import Windows, blueprint
 from rigwatch.dashboard.status import advice, status
@@ -65,6 +65,7 @@ class Dashboard:
         self._lanes = Lanes(stream, facts.book)
         self._said_ns = self._laid_out_ns = 0
         self._finished = False
+        self._counters: set[tuple[str, str]] = set()
         self._draw: dict[type[Message], Callable[[Any], None]] = {
             SampleBlock: self._samples,
             EstimateBlock: self._estimates,
@@ -133,8 +134,16 @@ class Dashboard:
     def _health(self, health: Health) -> None:
         self.facts.health[health.source] = health
         self._at(health.t_ns)
-        for path, value in counters(health):
-            self._stream.log(path, rr.Scalars(value))
+        for view, name, value in counters(health):
+            if (view, name) not in self._counters:
+                self._add_counter(view, name)
+            self._stream.log(entity(view, name), rr.Scalars(value))
+
+    def _add_counter(self, view: str, name: str) -> None:
+        place = sum(known == view for known, _ in self._counters)
+        self._counters.add((view, name))
+        line = rr.SeriesLines(colors=quantities.colour_at(place), names=name)
+        self._stream.log(entity(view, name), line, static=True)
 
     def _event(self, event: Event) -> None:
         text = f"{event.source}: {event.text}"

@@ -17,4 +17,10 @@ STATUS_VIEW = "Status"
 ALARMS_VIEW = "Alarms over time"
 LOG_VIEW = "Alarm log"
 EVENTS_VIEW = "Events and gaps"
-HEALTH_VIEWS = {"rates": "Rates [Hz]", "latency": "Times [ms]", "counts": "Counts since start"}
+HEALTH_VIEWS = {
+    "rates": "Rates [Hz]",
+    "times": "Times [ms]",
+    "losses": "Losses and errors since start",
+    "clock": "Clock of the device [ppm]",
+    "volumes": "Volumes since start",
+}

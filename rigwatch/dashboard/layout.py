@@ -76,7 +76,8 @@ def _watch(plan: Sequence[PlotPlan], windows: Windows) -> rrb.Container:
     shares = [3.7, 2.3, *[1.65] * len(friction), 1.4]
     columns: list[rrb.Container] = [rrb.Vertical(*right, row_shares=shares)]
     if left := _signal_views(plan, windows):
-        columns.insert(0, rrb.Vertical(*left))
+        # A drive needs less room than what it moves.
+        columns.insert(0, rrb.Vertical(*left, row_shares=[4, *[5] * (len(left) - 1)]))
     return rrb.Vertical(
         _states_view(at.VERDICT, at.VERDICT_VIEW, windows),
         rrb.Horizontal(*columns, column_shares=[6, 5][-len(columns) :]),
@@ -152,4 +153,4 @@ def _health(windows: Windows) -> rrb.Container:
         for kind, title in at.HEALTH_VIEWS.items()
     ]
     log = _log_view(at.EVENTS, at.EVENTS_VIEW)
-    return rrb.Grid(*views, log, grid_columns=2, name="Health")
+    return rrb.Grid(*views, log, grid_columns=3, name="Health")

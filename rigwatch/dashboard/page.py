@@ -1,12 +1,13 @@
 """The viewer's web page, handed on with a rule for the browser: talk to this machine only.
 
 Opened as it comes, the page reports its use to its makers, asks for updates and loads fonts and
-examples from the internet, and it has no switch for that. The rule is a Content-Security-Policy, which
-browsers obey.
+examples from the internet, and it has no switch for that. The rule is a Content-Security-Policy,
+which browsers obey.
 """
 
 import threading
 import urllib.error
+import urllib.parse
 import urllib.request
 from email.message import Message
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -36,7 +37,9 @@ class Page:
 
     def __init__(self, port: int, source_port: int, data_port: int) -> None:
         source = f"http://{HOST}:{source_port}"
-        handler = type("Handler", (_Handler,), {"source": source, "rule": policy(data_port)})
+        data = urllib.parse.quote(f"rerun+http://{HOST}:{data_port}/proxy", safe="")
+        values = {"source": source, "rule": policy(data_port), "start": f"/?url={data}"}
+        handler = type("Handler", (_Handler,), values)
         try:
             self._server = ThreadingHTTPServer((HOST, port), handler)
         except OSError as error:
@@ -62,9 +65,13 @@ def policy(data_port: int) -> str:
 class _Handler(BaseHTTPRequestHandler):
     source = ""
     rule = ""
+    start = "/"
 
     def do_GET(self) -> None:
-        """Hand on what the viewer has at this path."""
+        """Hand on what the viewer has at this path; the bare page is told where its data are."""
+        if self.path == "/":
+            self._send_to_start()
+            return
         request = urllib.request.Request(self.source + self.path)
         request.add_header("Accept-Encoding", self.headers.get("Accept-Encoding", ""))
         try:
@@ -74,6 +81,12 @@ class _Handler(BaseHTTPRequestHandler):
             self._reply(error.code, error.headers, error.read())
         except OSError:
             self.send_error(502, "the viewer does not answer")
+
+    def _send_to_start(self) -> None:
+        self.send_response(302)
+        self.send_header("Location", self.start)
+        self.send_header("Content-Length", "0")
+        self.end_headers()
 
     def _reply(self, status: int, found: Message, body: bytes) -> None:
         self.send_response(status)

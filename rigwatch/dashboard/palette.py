@@ -13,14 +13,23 @@ POSITION: Colour = (76, 205, 140)
 ACCELERATION: Colour = (255, 165, 60)
 MODEL: Colour = (196, 150, 255)
 RESIDUAL: Colour = (120, 116, 84)
-CHANGE: Colour = (240, 226, 90)
+CHANGE: Colour = (232, 208, 56)
 THETA1: Colour = (255, 110, 190)
 THETA2: Colour = (70, 205, 220)
 LIMIT: Colour = (235, 75, 75)
-SIGNATURE: Colour = (245, 245, 245)
+SIGNATURE: Colour = (186, 194, 206)
 DEVIATION: Colour = (255, 140, 105)
 VELOCITY: Colour = (120, 215, 175)
-OTHERS: tuple[Colour, ...] = ((160, 190, 220), (220, 180, 150), (170, 210, 150), (210, 160, 210))
+OTHERS: tuple[Colour, ...] = (
+    (90, 160, 240),
+    (240, 160, 70),
+    (90, 200, 140),
+    (230, 110, 170),
+    (190, 150, 250),
+    (225, 205, 70),
+    (80, 200, 215),
+    (235, 100, 90),
+)
 """For channels and counters that have no colour of their own."""
 
 STATES: dict[AlarmState, tuple[str, Colour]] = {

@@ -133,6 +133,8 @@ SHARES = Plot(
     (
         Series("friction_fit", "explained by friction", palette.THETA1),
         Series("friction_share", "jump at reversals", palette.THETA2),
+        Series("rho", "correlation with the jump", palette.VOLTAGE),
+        Series("together", "explained with all rivals", palette.MODEL),
         Series("rest", "time at rest", palette.POSITION),
     ),
     "What the change looks like, as shares",
@@ -154,11 +156,12 @@ def plots_of(columns: Collection[Column], table: tuple[Plot, ...], others: str) 
     names = {column.name for column in columns}
     strangers = [column.name for column in columns if column.name not in _PLACED]
     own = [
-        _single(f"{others}/{name}", name, name.replace("_", " ").capitalize(), _colour(place))
+        _single(f"{others}/{name}", name, name.replace("_", " ").capitalize(), colour_at(place))
         for place, name in enumerate(strangers)
     ]
     return [plot for plot in table if plot.key in names] + own
 
 
-def _colour(place: int) -> Colour:
+def colour_at(place: int) -> Colour:
+    """The colour of the line at a place among those without a colour of their own."""
     return palette.OTHERS[place % len(palette.OTHERS)]

@@ -91,8 +91,7 @@ class Viewer:
     @property
     def web_url(self) -> str:
         """What a browser opens."""
-        data = f"rerun%2Bhttp%3A%2F%2F{HOST}%3A{self.port}%2Fproxy"
-        return f"http://{HOST}:{self.web_port}/?url={data}"
+        return f"http://{HOST}:{self.web_port}/"
 
     def await_answer(self, tick: Callable[[], None] = lambda: None) -> Self:
         """Wait until it takes data, calling `tick` meanwhile; returns itself.

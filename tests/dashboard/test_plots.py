@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from rigwatch.dashboard import quantities
 from rigwatch.dashboard.batches import Batches
-from rigwatch.dashboard.health import counters
+from rigwatch.dashboard.entities import HEALTH_VIEWS
+from rigwatch.dashboard.health import counters, view_of
 from rigwatch.dashboard.quantities import ESTIMATE_PLOTS, SAMPLE_PLOTS, plots_of
 from rigwatch.dashboard.ranges import around_signature, nice_above, peak, symmetric
 from rigwatch.dashboard.survey import Survey
@@ -106,9 +107,23 @@ def test_no_mark_is_no_line() -> None:
     assert np.isnan(theta1[:, 2]).all()
 
 
-def test_counters_go_to_the_view_of_their_unit() -> None:
-    paths = {name[1:3] == ["rates", "daq rate_hz"] for name, _ in counters(RIG.health(0))}
-    assert True in paths
-    views = {path[2]: path[1] for path, _ in counters(RIG.health(0))}
-    assert views["daq latency_ms"] == "latency"
-    assert views["daq crc_errors"] == "counts"
+@pytest.mark.parametrize(
+    ("name", "view"),
+    [
+        ("rate_mean_hz", "rates"),
+        ("latency_p99_ms", "times"),
+        ("drift_ppm", "clock"),
+        ("lost_samples", "losses"),
+        ("crc_errors", "losses"),
+        ("samples", "volumes"),
+    ],
+)
+def test_counters_go_to_the_view_of_their_kind(name: str, view: str) -> None:
+    assert view_of(name) == view
+    assert view in HEALTH_VIEWS
+
+
+def test_every_counter_is_drawn() -> None:
+    assert {name for _, name, _ in counters(RIG.health(0))} == {
+        f"daq {name}" for name in RIG.health(0).counters
+    }

@@ -50,6 +50,7 @@ def test_web_viewer_is_served_on_this_machine_only(web: Viewer) -> None:
     until(lambda: answers(web.web_port), "the page is served")
     with urllib.request.urlopen(web.web_url, timeout=10) as page:
         assert b"<html" in page.read()
+        assert page.url.endswith(f"/?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A{web.port}%2Fproxy")
         rule = page.headers["Content-Security-Policy"]
     assert f"connect-src 'self' data: blob: http://127.0.0.1:{web.port}" in rule
     assert "https:" not in rule
