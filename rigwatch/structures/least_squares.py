@@ -40,6 +40,7 @@ def solve(errors: FloatArray, slopes: FloatArray, weight: FloatArray, scale: Flo
         slopes: shape (samples, outputs, m).
         weight: of each sample's square, shape (samples,).
         scale: standard deviation to expect of each output, shape (outputs,).
+        least_variance: of the scaled errors, for the covariance, however well they fit.
     """
     factor = np.sqrt(weight)[:, None] / scale
     use = np.isfinite(errors) & (factor > 0)
@@ -53,7 +54,7 @@ def solve(errors: FloatArray, slopes: FloatArray, weight: FloatArray, scale: Flo
     change = across.T @ along / length
     rest = right - rows @ change
     half = across.T * (np.where(seen, 1.0 / np.where(seen, sizes, 1.0), 0.0))
-    variance = float(rest @ rest) / max(len(right) - len(length), 1)
+    variance = max(float(rest @ rest) / max(len(right) - len(length), 1), least_variance)
     covariance = variance * (half @ half.T) / np.outer(length, length)
     blind = np.abs(across[~seen]).max(axis=0, initial=0.0) > 0.05
     return Step(change, covariance, blind)

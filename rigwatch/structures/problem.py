@@ -33,6 +33,18 @@ LOAD_TURN = 0.5
 MOST_SUBSTEPS = 256
 
 
+class Speed(NamedTuple):
+    """How fast a model moves about the record.
+
+    Attributes:
+        whole: largest eigenvalue of its Jacobian, decay included [rad/s].
+        turning: of its oscillations [rad/s].
+    """
+
+    whole: float
+    turning: float
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """One identification.
@@ -46,6 +58,7 @@ class Problem:
         loose: which of them are unknown, shape (k,).
         weight: of each sample from `first` on, shape (samples,).
         substeps: integration steps a sample, where a method may choose.
+        speed: of the fastest motion at the guess.
     """
 
     sweeper: Sweeper
@@ -56,6 +69,7 @@ class Problem:
     loose: IntArray
     weight: FloatArray
     substeps: int
+    speed: Speed
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -152,27 +166,15 @@ def problem_of(
     time = np.arange(first, len(recording), dtype=np.float64) * np.float64(recording.dt)
     made = Problem(
         tools, recording, first, tools.compiled.parameters, initial, loose,
-        weights(weighting, time), substeps or 1,
+        weights(weighting, time), substeps or 1, Speed(0.0, 0.0),
     )  # fmt: skip
     _require_samples(made)
-    speed = fastest(made)
+    speed = _fastest(made)
     require_fine_enough(made, speed.turning, math.pi, "two samples a period")
-    return replace(made, substeps=substeps or _substeps(made, speed.whole))
+    return replace(made, substeps=substeps or _substeps(made, speed.whole), speed=speed)
 
 
-class Speed(NamedTuple):
-    """How fast a model moves about the record.
-
-    Attributes:
-        whole: largest eigenvalue of its Jacobian, decay included [rad/s].
-        turning: of its oscillations [rad/s].
-    """
-
-    whole: float
-    turning: float
-
-
-def fastest(problem: Problem) -> Speed:
+def _fastest(problem: Problem) -> Speed:
     """The fastest motion at the guess, about some of the states that the record shows."""
     nominal = initial_states(problem.sweeper.compiled.system, problem.recording)[problem.first :]
     some = np.unique(np.linspace(0, len(nominal) - 1, 25).astype(int))

@@ -20,7 +20,7 @@ from rigwatch.physics.engine.fit import initial_states
 from rigwatch.structures.identification import Outcome, settled
 from rigwatch.structures.least_squares import Step, require_determined
 from rigwatch.structures.least_squares import solve as least_squares
-from rigwatch.structures.problem import Problem, fastest, require_fine_enough
+from rigwatch.structures.problem import Problem, require_fine_enough
 from rigwatch.structures.sweep import Swept
 
 FloatArray = NDArray[np.float64]
@@ -44,7 +44,7 @@ def solve(problem: Problem, *, iterations: int = 25, scale: FloatArray | None = 
     Raises:
         ModelError: the step is too coarse, or the record does not determine the unknowns.
     """
-    require_fine_enough(problem, fastest(problem).whole, STABLE, "its Runge-Kutta step is stable")
+    require_fine_enough(problem, problem.speed.whole, STABLE, "its Runge-Kutta step is stable")
     follower = _Nominal(problem)
     wanted = np.ones(problem.observed.shape[1]) if scale is None else scale
     found, step = [problem.guess], None

@@ -1,0 +1,173 @@
+"""Multiple shooting with exact sensitivities: short windows first, the whole record last.
+
+Over a short window a trajectory cannot part from the record, whatever the guess: there the fit is
+almost linear in the unknowns. Each window's initial states are free and projected out. What is
+found serves as the guess for windows three times as long, and so on. Last comes one window over the
+whole record, with the initial states that are known held fixed, each signal counted by the noise
+that it turned out to have.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.physics.engine.fit import Recording, fit
+from rigwatch.structures.identification import Outcome, settled
+from rigwatch.structures.least_squares import Step, require_determined
+from rigwatch.structures.least_squares import solve as least_squares
+from rigwatch.structures.problem import Problem
+from rigwatch.wire.errors import ModelError
+
+FloatArray = NDArray[np.float64]
+
+SHORTEST = 20
+"""Samples of the shortest windows; one period of the fastest motion where that is longer."""
+GROWTH = 3
+FOUR_DIGITS = 1e-4
+"""Share of a signal's rms below which no signal's error is believed, whatever the fit says."""
+HALVINGS = 12
+UNCERTAIN = 0.5
+"""Share of an unknown's size that its standard deviation may reach before it is named."""
+
+
+def solve(
+    problem: Problem,
+    *,
+    iterations: int = 30,
+    partial: bool = False,
+    scale: FloatArray | None = None,
+) -> Outcome:
+    """Grow the horizon to the whole record.
+
+    Args:
+        problem: what is unknown.
+        iterations: most over the whole record.
+        partial: name unknowns that the record does not determine instead of refusing.
+        scale: standard deviation of each output's noise; from the residuals if None.
+
+    Raises:
+        ModelError: the record does not determine the unknowns, and `partial` is not set.
+    """
+    found = [*_grown(problem)]
+    whole = _Whole(problem, scale)
+    turns, step, good = whole.refined(found[-1], iterations)
+    found += turns
+    name = problem.sweeper.compiled.system.model.name
+    if not partial:
+        require_determined(problem.names, step.blind, name)
+    return Outcome(found, step.covariance, good, (), _uncertain(problem, found[-1], step))
+
+
+def _uncertain(problem: Problem, found: FloatArray, step: Step) -> tuple[str, ...]:
+    deviation = np.sqrt(np.maximum(np.diag(step.covariance), 0.0))
+    vague = step.blind | (deviation > UNCERTAIN * np.maximum(np.abs(found), 1e-300))
+    return tuple(name for name, flag in zip(problem.names, vague, strict=True) if flag)
+
+
+def _grown(problem: Problem) -> list[FloatArray]:
+    """Unknowns after each horizon that is shorter than the record."""
+    system, unknowns = problem.sweeper.compiled.system, problem.guess
+    found, count = [unknowns], len(problem.free)
+    if not count or not system.states:
+        return found
+    masked = problem.recording.outputs.copy()
+    masked[: problem.first] = np.nan
+    recording = Recording(problem.recording.dt, problem.recording.inputs, masked)
+    for horizon in _horizons(problem):
+        start, _ = problem.split(found[-1])
+        try:
+            fitted = fit(
+                problem.sweeper.compiled, recording, horizon, start=start, substeps=problem.substeps
+            )
+        except (ModelError, ValueError, np.linalg.LinAlgError):
+            continue
+        unknowns = found[-1].copy()
+        unknowns[:count] = fitted.parameters[problem.free]
+        if np.isfinite(unknowns).all():
+            found.append(unknowns)
+    return found
+
+
+def _horizons(problem: Problem) -> list[int]:
+    samples = len(problem.recording) - problem.first
+    speed = max(problem.speed.turning, 1e-9)
+    horizon = max(SHORTEST, int(np.ceil(2 * np.pi / speed / problem.recording.dt)))
+    found = []
+    while horizon * 2 <= samples:
+        found.append(horizon)
+        horizon *= GROWTH
+    return found
+
+
+@dataclass(eq=False)
+class _Whole:
+    """Damped Gauss-Newton over the whole record, counting each signal by its noise."""
+
+    problem: Problem
+    scale: FloatArray | None
+
+    def refined(self, start: FloatArray, iterations: int) -> tuple[list[FloatArray], Step, bool]:
+        """Unknowns after each step, the last linear problem, and whether they settled."""
+        now, found, good = start, list[FloatArray](), False
+        errors, slopes = self._errors(now)
+        if not np.isfinite(slopes).all():
+            raise ModelError(
+                f"{self.problem.sweeper.compiled.system.model.name}: the simulation over the whole"
+                " record leaves the finite numbers; try other guesses"
+            )
+        for _ in range(iterations):
+            scale = self._noise(errors)
+            step = least_squares(errors, slopes, self.problem.weight, scale)
+            moved = self._shorter(now, step.change, errors, scale)
+            if moved is None:
+                good = True
+                break
+            before, (now, errors, slopes) = now, moved
+            found.append(now)
+            if settled(before, now) and np.allclose(scale, self._noise(errors), rtol=0.02):
+                good = True
+                break
+        scale = self._noise(errors)
+        last = least_squares(errors, slopes, self.problem.weight, scale, least_variance=1.0)
+        return found, last, good
+
+    def _shorter(
+        self, now: FloatArray, change: FloatArray, errors: FloatArray, scale: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+        """The step, halved until the error falls; None where no step is left that lowers it."""
+        cost = self._cost(errors, scale)
+        for _ in range(HALVINGS):
+            moved = self._inside(now + change)
+            new_errors, slopes = self._errors(moved)
+            if np.isfinite(slopes).all() and self._cost(new_errors, scale) <= cost:
+                return moved, new_errors, slopes
+            change = change / 2
+        return None
+
+    def _inside(self, unknowns: FloatArray) -> FloatArray:
+        system = self.problem.sweeper.compiled.system
+        free = [system.parameters[name] for name in system.free]
+        unknowns[: len(free)] = np.clip(
+            unknowns[: len(free)], [p.low for p in free], [p.high for p in free]
+        )
+        return unknowns
+
+    def _errors(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        outputs, slopes = self.problem.simulate(unknowns, self.problem.substeps)
+        return self.problem.observed - outputs, slopes
+
+    def _cost(self, errors: FloatArray, scale: FloatArray) -> float:
+        return float(np.nansum(self.problem.weight[:, None] * (errors / scale) ** 2))
+
+    def _noise(self, errors: FloatArray) -> FloatArray:
+        """Standard deviation of each output's errors, not below four digits of the signal."""
+        if self.scale is not None:
+            return self.scale
+        size = np.sqrt(np.nanmean(self.problem.observed**2, axis=0))
+        weight = self.problem.weight[:, None] * np.isfinite(errors)
+        spread = np.nansum(weight * np.nan_to_num(errors) ** 2, axis=0)
+        found = np.sqrt(spread / np.maximum(weight.sum(axis=0), 1e-300))
+        return np.asarray(
+            np.maximum(np.nan_to_num(found), np.nan_to_num(FOUR_DIGITS * size)) + 1e-300
+        )
