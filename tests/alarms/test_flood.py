@@ -1,5 +1,7 @@
 """More alarms than a person can follow: grouped, the first-out and critical ones in sight."""
 
+from itertools import pairwise
+
 from alarm_signals import codes, condition, order, run, spell, steps, time_of, times
 
 from monitor.alarms import AlarmManager, Occasion
@@ -86,3 +88,22 @@ def test_a_flood_does_not_depend_on_the_cut_of_blocks():
 
 def run_quiet(alarms: AlarmManager, seq: int):
     return alarms.update("rig", 7, seq, times(1, seq), [])
+
+
+def test_a_flood_that_ends_within_a_block_ends_before_what_follows_in_it():
+    """An alarm of the last samples comes after the flood's end, in one block as in many."""
+    ends = 10 * 256 + 10 * MINUTE
+    late = condition("sensor_spike.voltage", spell(40, (30, 40)))
+    said = []
+    for cuts in ((0, 40), (0, 10, 25, 40)):
+        alarms = AlarmManager()
+        raised(alarms, 15)
+        heard = []
+        for first, last in pairwise(cuts):
+            part = condition(late.name, late.active[first:last])
+            heard += alarms.update(
+                "rig", 7, ends - 20 + first, times(40, ends - 20)[first:last], [part]
+            )
+        said.append(steps(heard))
+    assert said[0] == said[1]
+    assert said[0][-1] == ("sensor_spike.voltage", "unacknowledged", ends + 12)

@@ -83,3 +83,12 @@ def test_only_what_comes_while_nothing_waits_to_be_seen_is_first_out():
 
 def _arrays(one):
     return one.active, one.value, one.low, one.high
+
+
+def test_a_departure_that_flickers_while_its_name_holds_is_not_announced_again():
+    alarms = AlarmManager()
+    flags = spell(1500, (100, 500), (900, 1400))
+    named = spell(1500, (200, 1500))
+    said = run(alarms, [condition("departure", flags), condition("dry_friction", named)])
+    raised = [name for name, state, _ in steps(said) if state == "unacknowledged"]
+    assert raised == ["departure", "dry_friction"]

@@ -4,6 +4,8 @@ import pytest
 from alarm_signals import codes, condition, order, run, spell, steps, times
 
 from monitor.alarms import AlarmManager, Occasion
+from monitor.alarms.kinds import AlarmSettings
+from monitor.alarms.state import AlarmInstance
 from rigwatch.wire.messages import Alarm, Event
 from rigwatch.wire.rig_config import AlarmSection
 
@@ -164,3 +166,15 @@ def test_a_run_does_not_continue_across_missing_samples():
 
 def _quiet(n: int):
     return times(n, 20), [condition("departure", [0] * n)]
+
+
+def test_the_state_itself_does_not_let_go_of_a_condition_that_holds():
+    alarm = AlarmInstance("departure", AlarmSettings(1, 1, latch=True))
+    alarm.active = True
+    alarm.raise_(Occasion(), first_out=True)
+    alarm.acknowledge()
+    assert not alarm.reset()
+    assert alarm.state == "acknowledged"
+    alarm.active = False
+    assert alarm.reset()
+    assert alarm.state == "normal"
