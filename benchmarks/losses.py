@@ -4,8 +4,8 @@
                                 └▶ recorder ─▶ session
 
 Readers and recorder are killed (SIGKILL) in turn and started again, the router twice. Then every
-sample up to the newest that anybody has must stand in each ledger and in the recording, as delivered
-or as reported lost. What the last moments before the end of the run brought is not counted.
+sample up to the newest that anybody has must stand in each ledger and in the recording, as
+delivered or as reported lost. The last moments before the end of the run are not counted.
 """
 
 import itertools
