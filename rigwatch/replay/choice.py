@@ -1,14 +1,14 @@
 """Which model and which alarm settings a session is replayed with."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
-from monitor.model_file import RigModel, load_model
+from monitor.detectors.selection import detectors_of
+from monitor.model_file import load_model
 from monitor.rig_monitor import RigMonitor
 from rigwatch.replay.run import check_suits
 from rigwatch.wire.config import parse
 from rigwatch.wire.errors import ConfigError, SessionError
-from rigwatch.wire.rig_config import AlarmSection, MonitorSection, RigConfig, load_rig
+from rigwatch.wire.rig_config import MonitorSection, RigConfig, load_rig
 from rigwatch.wire.session.reader import Session
 
 
@@ -28,10 +28,12 @@ def monitor_for(session: Session, model: Path | None, config: Path | None) -> Ri
     path = model or (Path(section.model) if section else None)
     if path is None:
         raise SessionError(f"{session.path}: found no model in its configuration, expected --model")
-    loaded: RigModel = load_model(path)
+    loaded = load_model(path)
     check_suits(session, loaded)
-    settings: Mapping[str, AlarmSection] = section.alarms if section else {}
-    return RigMonitor(loaded, settings, file=file)
+    if section is None:
+        return RigMonitor(loaded)
+    detectors = detectors_of(section.detectors, loaded, file)
+    return RigMonitor(loaded, section.alarms, detectors, file)
 
 
 def _section(session: Session, config: Path | None) -> tuple[MonitorSection | None, str]:

@@ -19,7 +19,7 @@ from rigwatch.wire.session import SessionWriter, open_session
 
 HERE = Path(__file__).parent
 CASES = HERE / "cases.toml"
-NAMES = ["friction", "stiction", "troubled"]
+NAMES = ["friction", "stiction", "detectors", "troubled"]
 
 
 def case(name: str) -> Case:
@@ -44,14 +44,17 @@ def as_bytes(found: Output) -> tuple[bytes, ...]:
 def test_every_field_is_as_in_the_references(capsys: pytest.CaptureFixture[str]) -> None:
     code = main(["verify", str(CASES), "--json"])
     verdicts = json.loads(capsys.readouterr().out)
-    assert [verdict["differences"] for verdict in verdicts] == [[], [], []]
+    assert [verdict["differences"] for verdict in verdicts] == [[]] * len(NAMES)
     assert [verdict["name"] for verdict in verdicts] == NAMES
     assert all(verdict["fields"] > 50 and verdict["samples"] > 2000 for verdict in verdicts)
     assert code == 0
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("block", [1, 3, 8, 4096])
+@pytest.mark.parametrize(
+    ("name", "block"),
+    [("friction", 8), ("stiction", 3), ("detectors", 1), ("detectors", 64)]
+    + [("troubled", size) for size in (1, 3, 8, 4096)],
+)
 def test_the_cut_into_blocks_changes_no_bit(name: str, block: int) -> None:
     assert as_bytes(output(name, block)) == whole(name)
 
@@ -59,10 +62,12 @@ def test_the_cut_into_blocks_changes_no_bit(name: str, block: int) -> None:
 def test_the_cases_see_what_they_are_there_for() -> None:
     raised = {
         name: [a.name for a in output(name, 1 << 30).announcements if isinstance(a, Alarm)]
-        for name in NAMES
+        for name in ("friction", "stiction", "troubled")
     }
     assert "dry_friction" in raised["friction"]
     assert "stiction" in raised["stiction"]
+    fields = {column.name for column in output("detectors", 1 << 30).blocks[0].columns}
+    assert {"condition.parity_arma.active", "condition.unknown_input.value"} <= fields
     assert {"gap", "sensor_non_finite.position", "sensor_saturated.acceleration"} <= set(
         raised["troubled"]
     )
