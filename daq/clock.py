@@ -20,7 +20,8 @@ from rigwatch.wire.messages import IntArray
 
 _BIN_US = 250_000
 _BINS = 240
-_BINS_FOR_DRIFT = 8
+_BINS_FOR_LINE = 8
+_BINS_FOR_DRIFT = 80
 _JUMP_PERIODS = 2.5
 _WALL_STEP_NS = 500_000_000
 
@@ -34,7 +35,8 @@ class DeviceClock:
         unix_minus_monotonic_ns: difference of the host's two clocks at the start.
 
     Attributes:
-        drift_ppm: how much faster the device's clock runs than the host's [1e-6].
+        drift_ppm: how much faster the device's clock runs than the host's [1e-6]; 0 for the first
+            20 s, in which late arrivals would be taken for drift.
         jumps: jumps of the device's clock so far.
     """
 
@@ -123,18 +125,19 @@ class DeviceClock:
         else:
             self._bins.append((relative, late))
             self._fit()
-        if len(self._bins) < _BINS_FOR_DRIFT:
+        if len(self._bins) < _BINS_FOR_LINE:
             self._offset = min(late for _, late in self._bins)
 
     def _fit(self) -> None:
         """Lay the line anew; the newest quarter second has only begun and does not count yet."""
-        if len(self._bins) <= _BINS_FOR_DRIFT:
+        if len(self._bins) <= _BINS_FOR_LINE:
             return
         relative, late = np.array(self._bins)[:-1].T
         self._slope = _median_slope(relative, late)
         self._centre = float(relative[-1])
         self._offset = float(np.median(late - self._slope * (relative - self._centre)))
-        self.drift_ppm = -1e6 * self._slope / self._ns_per_us
+        if len(self._bins) > _BINS_FOR_DRIFT:
+            self.drift_ppm = -1e6 * self._slope / self._ns_per_us
 
 
 def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:

@@ -101,7 +101,7 @@ FAULTS = [
     Fault(
         9,
         "clock fast by 0.1 %",
-        lambda b: (setattr(b.device, "drift_ppm", 1000.0), b.play(3000)),
+        lambda b: (setattr(b.device, "drift_ppm", 1000.0), b.play(5600)),
         events=("clock_drift",),
         figures={"drift_ppm": (900.0, 1100.0)},
     ),
