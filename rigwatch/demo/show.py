@@ -93,7 +93,8 @@ class Show:
             while self._seen < min(seconds, self._named_at() + after_named) * rate:
                 self._check_running(give_up)
                 alarm: Alarm | None = alarms.get(timeout=0.1)
-                if alarm is not None:
+                # Before the simulated device is up, that it is missing is no news.
+                if alarm is not None and self._seen:
                     self._narrator.alarm(alarm)
                 blocks: list[SampleBlock] = samples.drain()
                 if blocks:
