@@ -137,7 +137,7 @@ class DeviceClock:
         self._centre = float(relative[-1])
         self._offset = float(np.median(late - self._slope * (relative - self._centre)))
         if len(self._bins) > _BINS_FOR_DRIFT:
-            self.drift_ppm = -1e6 * self._slope / self._ns_per_us
+            self.drift_ppm = 1e6 * (self._ns_per_us / (self._ns_per_us + self._slope) - 1.0)
 
 
 def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:

@@ -65,7 +65,7 @@ class Watch:
         self._flagged: Counter[str] = Counter()
         self._recent: deque[tuple[int, int]] = deque(maxlen=_SLOW_OVER + 1)
         self._boot: int | None = None
-        self._samples, self._second_samples = 0, 0
+        self._samples, self._first_samples, self._second_samples = 0, 0, 0
         self._first_ns: int | None = None
         self._last_ns: int | None = None
         self._second_ns: int | None = None
@@ -77,7 +77,8 @@ class Watch:
 
     def saw(self, block: SampleBlock, arrived_ns: int) -> None:
         """Take note of samples that are published."""
-        self._first_ns = arrived_ns if self._first_ns is None else self._first_ns
+        if self._first_ns is None:
+            self._first_ns, self._first_samples = arrived_ns, len(block)
         self._last_ns = arrived_ns
         if block.boot != self._boot:
             self._boot = block.boot
@@ -153,10 +154,11 @@ class Watch:
             return
         now = (self._samples - self._second_samples) * 1e9 / (now_ns - self._second_ns)
         whole = self._first_ns <= self._second_ns
+        later = self._samples - self._first_samples
         worst = self._rates["rate_worst_hz"] or np.inf
         self._rates = {
             "rate_hz": now,
-            "rate_mean_hz": self._samples * 1e9 / max(now_ns - self._first_ns, 1),
+            "rate_mean_hz": later * 1e9 / max(now_ns - self._first_ns, 1),
             "rate_worst_hz": min(worst, now) if whole else self._rates["rate_worst_hz"],
         }
         self._second_samples = self._samples
