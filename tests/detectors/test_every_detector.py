@@ -131,6 +131,19 @@ def test_a_long_gap_starts_afresh_without_an_alarm(rig, new):
     assert not condition.active.any()
 
 
+def test_a_short_gap_is_predicted_through_and_columns_stay_in_place(rig, new):
+    healthy = rig.with_fault("coulomb", 0.0, 20.0, seed=14)
+    lost, held = new(), new()
+    lost.update(block(healthy[:3000]))
+    columns, (condition,) = lost.update(block(healthy[3004:], 3004))
+    spoilt = healthy.copy()
+    spoilt[3000:3004] = np.nan
+    expected, (same,) = held.update(block(spoilt))
+    assert len(columns[0].values) == len(healthy) - 3004
+    assert columns[0].values.tobytes() == expected[0].values[3004:].tobytes()
+    assert condition.active.tobytes() == same.active[3004:].tobytes()
+
+
 def test_samples_seen_before_are_passed_over(rig, new):
     healthy = rig.with_fault("coulomb", 0.0, 20.0, seed=13)
     once, twice = new(), new()
