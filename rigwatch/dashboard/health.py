@@ -8,7 +8,7 @@ from rigwatch.wire.messages import Health
 _VIEWS = {"hz": "rates", "ms": "times", "ppm": "clock"}
 _TROUBLE = (
     "lost", "error", "skipped", "dropped", "rejected", "reconnect", "restart", "resync",
-    "duplicate", "foreign", "recovered", "jump", "flagged",
+    "duplicate", "foreign", "recovered", "jump", "flagged", "trouble",
 )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from rigwatch.dashboard.viewer import answers, free_port
 from rigwatch.wire.alarm_list import serve_alarm_list
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.bus_zenoh import open_router
-from rigwatch.wire.messages import Alarm, EstimateBlock, Health, Message, SampleBlock
+from rigwatch.wire.messages import Alarm, EstimateBlock, Health, SampleBlock
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.topics import ALARMS, ESTIMATES, HEALTH, SAMPLES
 from tests.dashboard.rig_messages import RATE, Rig
@@ -67,36 +67,38 @@ def bus(config: RigConfig) -> Iterator[Bus]:
 
 
 class Player(threading.Thread):
-    """Says a rig's messages on the bus in real time, until stopped; notes how long a put took."""
+    """Says a rig's messages on the bus in real time, and tells who asks which alarms stand."""
 
     def __init__(self, bus: Bus, rig: Rig) -> None:
         super().__init__(daemon=True)
         self.bus, self.rig = bus, rig
         self.stopped = threading.Event()
         self.sent = 0
-        self.slowest = 0.0
+        self.standing: dict[str, Alarm] = {}
 
     def run(self) -> None:
         began = time.monotonic()
         for message in self.rig.messages(600.0):
             if isinstance(message, SampleBlock):
-                due = began + message.seq / RATE
+                due = began + (message.seq + len(message)) / RATE
                 if self.stopped.wait(max(0.0, due - time.monotonic())):
                     return
                 self.sent += len(message)
-            self.put(message)
+            if isinstance(message, Alarm):
+                self.standing[message.name] = message
+            self.bus.publish(TOPIC_OF[type(message)], message)
 
-    def put(self, message: Message) -> None:
-        before = time.monotonic()
-        self.bus.publish(TOPIC_OF[type(message)], message)
-        self.slowest = max(self.slowest, time.monotonic() - before)
+    def alarms(self) -> list[Alarm]:
+        return [alarm for alarm in self.standing.values() if alarm.state != "normal"]
 
 
 @contextlib.contextmanager
 def playing(bus: Bus) -> Iterator[Player]:
     player = Player(bus, Rig(friction_at=2.0, start_ns=time.time_ns()))
+    close = serve_alarm_list(bus, player.alarms)
     player.start()
     yield player
+    close()
     player.stopped.set()
     player.join()
 
