@@ -32,7 +32,14 @@ class Step:
     blind: NDArray[np.bool_]
 
 
-def solve(errors: FloatArray, slopes: FloatArray, weight: FloatArray, scale: FloatArray) -> Step:
+def solve(
+    errors: FloatArray,
+    slopes: FloatArray,
+    weight: FloatArray,
+    scale: FloatArray,
+    *,
+    least_variance: float = 0.0,
+) -> Step:
     """The change of the unknowns that makes errors smallest: errors ≈ slopes·change.
 
     Args:
