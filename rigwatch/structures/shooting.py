@@ -2,7 +2,7 @@
 
 Over a short window a trajectory cannot part from the record, whatever the guess: there the fit is
 almost linear in the unknowns. Each window's initial states are free and projected out. What is
-found serves as the guess for windows three times as long, and so on. Last comes one window over the
+found serves as the guess for windows four times as long, and so on. Last comes one window over the
 whole record, with the initial states that are known held fixed, each signal counted by the noise
 that it turned out to have.
 """
@@ -12,20 +12,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.fit import Recording, fit
 from rigwatch.structures.identification import Outcome, settled
 from rigwatch.structures.least_squares import Step, require_determined
 from rigwatch.structures.least_squares import solve as least_squares
 from rigwatch.structures.problem import Problem
+from rigwatch.structures.windows import Windows
 from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
 
 SHORTEST = 20
 """Samples of the shortest windows; one period of the fastest motion where that is longer."""
-GROWTH = 3
+GROWTH = 4
+STEPS = 12
+"""Most Gauss-Newton steps at each horizon but the last."""
 FOUR_DIGITS = 1e-4
 """Share of a signal's rms below which no signal's error is believed, whatever the fit says."""
+FINER = 2
+"""How much shorter the integration steps are over the whole record, where errors add up."""
 HALVINGS = 12
 UNCERTAIN = 0.5
 """Share of an unknown's size that its standard deviation may reach before it is named."""
@@ -67,25 +71,15 @@ def _uncertain(problem: Problem, found: FloatArray, step: Step) -> tuple[str, ..
 
 def _grown(problem: Problem) -> list[FloatArray]:
     """Unknowns after each horizon that is shorter than the record."""
-    system, unknowns = problem.sweeper.compiled.system, problem.guess
-    found, count = [unknowns], len(problem.free)
-    if not count or not system.states:
+    found, count = [problem.guess], len(problem.free)
+    if not count or not problem.sweeper.compiled.system.states:
         return found
-    masked = problem.recording.outputs.copy()
-    masked[: problem.first] = np.nan
-    recording = Recording(problem.recording.dt, problem.recording.inputs, masked)
+    parameters = problem.start
     for horizon in _horizons(problem):
-        start, _ = problem.split(found[-1])
-        try:
-            fitted = fit(
-                problem.sweeper.compiled, recording, horizon, start=start, substeps=problem.substeps
-            )
-        except (ModelError, ValueError, np.linalg.LinAlgError):
-            continue
+        parameters = Windows(problem, horizon).refined(parameters, STEPS)
         unknowns = found[-1].copy()
-        unknowns[:count] = fitted.parameters[problem.free]
-        if np.isfinite(unknowns).all():
-            found.append(unknowns)
+        unknowns[:count] = parameters[problem.free]
+        found.append(unknowns)
     return found
 
 
@@ -154,7 +148,7 @@ class _Whole:
         return unknowns
 
     def _errors(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-        outputs, slopes = self.problem.simulate(unknowns, self.problem.substeps)
+        outputs, slopes = self.problem.simulate(unknowns, FINER * self.problem.substeps)
         return self.problem.observed - outputs, slopes
 
     def _cost(self, errors: FloatArray, scale: FloatArray) -> float:

@@ -1,0 +1,115 @@
+"""Gauss-Newton over many short windows at once, each with its own free initial states.
+
+For errors e_w of window w and its derivatives A_w by the parameters and B_w by its initial states,
+one step solves min Σ_w |e_w − A_w·δp − B_w·δx_w|². The δx_w are projected out window by window
+(Q_w·Q_wᵀ of B_w), so that only a small problem in δp is left, and follow from it afterwards. The
+windows' states are iterated together with the parameters (lifted), hence one simulation a step.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.physics.engine.fit import initial_states
+from rigwatch.structures.problem import Problem
+
+FloatArray = NDArray[np.float64]
+
+ENOUGH = 1e-3
+"""Relative change of the parameters that will do for a guess of the next horizon."""
+HALVINGS = 8
+
+
+@dataclass(eq=False)
+class Windows:
+    """A record from its first sample on, cut into windows of one length."""
+
+    problem: Problem
+    length: int
+
+    def __post_init__(self) -> None:
+        problem, length = self.problem, self.length
+        last = len(problem.recording) - length + 1
+        self._starts = np.arange(problem.first, last, length - 1, dtype=np.int64)
+        rows = self._starts[:, None] + np.arange(length)
+        self._measured = problem.recording.outputs[rows]
+        states = initial_states(problem.sweeper.compiled.system, problem.recording)
+        self._initial = states[self._starts]
+        spread = np.nanstd(problem.observed, axis=0)
+        self._scale = np.where(np.isfinite(spread) & (spread > 0), spread, 1.0)
+        weight = problem.weight[rows - problem.first]
+        self._factor = np.where(np.isfinite(self._measured), np.sqrt(weight)[..., None], 0.0)
+        self._factor = self._factor / self._scale
+
+    def refined(self, parameters: FloatArray, most: int) -> FloatArray:
+        """Better values of the free parameters; all of them are given and returned, shape (n_p,).
+
+        What leaves the finite numbers, or does not lower the errors, is left as it was.
+        """
+        free = self.problem.free
+        now, errors, slopes = parameters, *self._run(parameters, self._initial)
+        for _ in range(most):
+            if not np.isfinite(slopes).all():
+                return parameters
+            change, shift = self._step(errors, slopes)
+            moved = self._shorter(now, change, shift, errors)
+            if moved is None:
+                break
+            before, (now, self._initial, errors, slopes) = now, moved
+            if np.all(np.abs(now - before)[free] <= ENOUGH * np.abs(now[free])):
+                break
+        return now
+
+    def _run(self, parameters: FloatArray, initial: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Scaled errors (windows, k) and slopes (windows, k, m + n)."""
+        problem = self.problem
+        run = problem.sweeper.compiled.simulate(
+            problem.recording.inputs, problem.recording.dt, self._starts, self.length,
+            initial=initial, parameters=parameters, substeps=problem.substeps,
+        )  # fmt: skip
+        errors = np.where(self._factor > 0, self._measured - run.outputs, 0.0) * self._factor
+        slopes = run.slopes * self._factor[..., None]
+        flat = errors.reshape(len(errors), -1)
+        return flat, slopes.reshape(*flat.shape, -1)
+
+    def _step(self, errors: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Changes of the free parameters (m,) and of the initial states (windows, n)."""
+        count = len(self.problem.free)
+        by_parameter, by_start = slopes[..., :count], slopes[..., count:]
+        length = np.linalg.norm(by_start, axis=(0, 1))
+        length = np.where(length > 0, length, 1.0)
+        left, sizes, across = np.linalg.svd(by_start / length, full_matrices=False)
+        seen = sizes > 1e-10 * sizes[:, :1]
+        left = np.where(seen[:, None, :], left, 0.0)
+        rest = errors - np.einsum("wki,wi->wk", left, np.einsum("wki,wk->wi", left, errors))
+        along = np.einsum("wki,wkj->wij", left, by_parameter)
+        clean = by_parameter - left @ along
+        flat = clean.reshape(-1, count)
+        size = np.linalg.norm(flat, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        change = np.linalg.lstsq(flat / size, rest.ravel(), rcond=1e-9)[0] / size
+        inner = np.einsum("wki,wk->wi", left, errors - by_parameter @ change)
+        inner = np.where(seen, inner / np.where(seen, sizes, 1.0), 0.0)
+        return change, np.einsum("wij,wi->wj", across, inner) / length
+
+    def _shorter(
+        self, now: FloatArray, change: FloatArray, shift: FloatArray, errors: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+        """The step, halved until the errors fall; None where none is left that lowers them."""
+        cost = float(np.sum(errors**2))
+        for _ in range(HALVINGS):
+            moved = self._inside(now, change)
+            new_errors, slopes = self._run(moved, self._initial + shift)
+            if np.isfinite(slopes).all() and float(np.sum(new_errors**2)) <= cost:
+                return moved, self._initial + shift, new_errors, slopes
+            change, shift = change / 2, shift / 2
+        return None
+
+    def _inside(self, now: FloatArray, change: FloatArray) -> FloatArray:
+        system, moved = self.problem.sweeper.compiled.system, now.copy()
+        free = [system.parameters[name] for name in system.free]
+        moved[self.problem.free] = np.clip(
+            now[self.problem.free] + change, [p.low for p in free], [p.high for p in free]
+        )
+        return moved
