@@ -68,7 +68,9 @@ def edited(stream: bytes, edits: list[tuple[str, float, int]]) -> bytes:
 
 
 @given(EDITS)
-def test_no_corruption_yields_a_frame_that_was_not_sent(edits: list[tuple[str, float, int]]) -> None:
+def test_no_corruption_yields_a_frame_that_was_not_sent(
+    edits: list[tuple[str, float, int]],
+) -> None:
     sent = numbered(20)
     decoder = FrameDecoder()
     received = decoder.feed(edited(b"".join(map(wire.encode, sent)), edits))
