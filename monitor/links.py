@@ -1,7 +1,7 @@
 """What the monitor notices without a sample: silence, a missing daq, a second source, losses.
 
-Each is an alarm that clears by itself when its reason is gone. `LinkWatch` is told the time and what
-was seen, and reads neither clock nor bus.
+Each is an alarm that clears by itself when its reason is gone. `LinkWatch` is told the time and
+what was seen, and reads neither clock nor bus.
 """
 
 from collections.abc import Iterator

@@ -42,19 +42,16 @@ class MonitorProcess:
     Args:
         config: the rig's configuration, with a section [monitor].
         path: its file, for errors.
+        model: as `suitable_model` gives it.
         bus: where samples come from and results go.
 
     Raises:
-        ConfigError: the model does not suit the configuration.
+        ConfigError: a section of [monitor.alarms] names no alarm, or a detector does not suit.
         SessionError: journal or cursor cannot be opened.
     """
 
-    def __init__(self, config: RigConfig, path: Path | str, bus: Bus) -> None:
-        section = section_or_error(config, "monitor", path)
-        assert isinstance(section, MonitorSection)
-        model = load_model(section.model)
-        check_model(model, config, path, section.model)
-        compile_kernels(model)
+    def __init__(self, config: RigConfig, path: Path | str, model: RigModel, bus: Bus) -> None:
+        section = monitor_section(config, path)
         detectors = detectors_of(section.detectors, model, path)
         self.rig = RigMonitor(model, section.alarms, detectors, str(path))
         self.bus = bus
@@ -176,18 +173,32 @@ class MonitorProcess:
         )
 
 
-def check_model(model: RigModel, config: RigConfig, path: Path | str, file: str) -> None:
-    """Refuse a model that was made for another rig.
+def monitor_section(config: RigConfig, path: Path | str) -> MonitorSection:
+    """The section [monitor].
 
     Raises:
-        ConfigError: it needs channels or a rate that the rig does not have.
+        ConfigError: there is none.
     """
+    section_or_error(config, "monitor", path)
+    assert config.monitor is not None
+    return config.monitor
+
+
+def suitable_model(config: RigConfig, path: Path | str) -> RigModel:
+    """The model that the configuration at `path` names.
+
+    Raises:
+        ConfigError: it cannot be read, or needs channels or a rate that the rig does not have.
+    """
+    file = monitor_section(config, path).model
+    model = load_model(file)
     names = [channel.name for channel in config.channels]
     if missing := [name for name in model.channels if name not in names]:
         raise ConfigError(file, "channels", f"{', '.join(missing)}", f"channels of {path}")
     if model.sample_rate != config.rig.sample_rate:
         found = f"{model.sample_rate:g} Hz"
         raise ConfigError(file, "sample_rate", found, f"{config.rig.sample_rate:g} Hz as in {path}")
+    return model
 
 
 def watch(process: MonitorProcess, stop: threading.Event) -> None:
@@ -213,10 +224,13 @@ def run(path: Path | str) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     config = load_rig(path)
+    model = suitable_model(config, path)
+    # Before the bus is joined, so that one who is seen there is ready to judge.
+    compile_kernels(model)
     raise_priority()
     bus = connect(config, "monitor")
     try:
-        process = MonitorProcess(config, path, bus)
+        process = MonitorProcess(config, path, model, bus)
         watch(process, stop)
         process.close()
     finally:

@@ -14,7 +14,7 @@ from rigwatch.wire.bus import Bus, connect, wait_until
 from rigwatch.wire.rig_config import RigConfig, load_rig
 
 ROOT = Path(__file__).parents[2]
-PATIENCE = 30.0
+PATIENCE = 90.0
 """Longest that anything may take before a test fails; machines are slow at times [s]."""
 
 CONFIG = """

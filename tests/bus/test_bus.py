@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigwatch.wire.bus import MAX_PAYLOAD, Bus, Subscription, connect
@@ -166,6 +166,7 @@ def test_a_question_is_answered_by_the_memory_of_a_reader_that_has_closed_no_mor
     assert asker.query("q") == []
 
 
+@settings(deadline=None)
 @given(payload=st.binary(max_size=200))
 def test_no_payload_makes_a_subscription_raise(payload: bytes) -> None:
     subscription = Subscription(SAMPLES)

@@ -404,6 +404,7 @@ def test_every_sample_is_delivered_or_reported_once_and_in_order(
         assert counters.lost == 0
 
 
+@settings(deadline=None)
 @given(first=st.integers(-5, 5000), last=st.one_of(st.integers(-5, 5000), st.just(OPEN)))
 def test_a_ring_settles_what_it_is_asked_and_invents_nothing(first: int, last: int) -> None:
     store = RingStore(block(0), 512)

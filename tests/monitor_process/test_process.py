@@ -9,7 +9,7 @@ import pytest
 
 from monitor.alarms import Occasion
 from monitor.links import LinkWatch, Seen
-from monitor.process import MonitorProcess
+from monitor.process import MonitorProcess, suitable_model
 from monitor.rig_monitor import RigMonitor
 from rigwatch.wire.alarm_list import ask_alarm_list
 from rigwatch.wire.blocks import concatenate
@@ -22,7 +22,7 @@ from rigwatch.wire.ring import SampleRing
 from rigwatch.wire.schema import encode
 from rigwatch.wire.topics import ALARMS, COMMANDS, ESTIMATES, EVENTS, HEALTH, SAMPLES, Topic
 from tests.bus.publisher import wave
-from tests.bus.rig import TestRig
+from tests.bus.rig import PATIENCE, TestRig
 from tests.monitor_process.model import MODEL, monitor_section
 
 
@@ -41,7 +41,9 @@ class Bench:
 
     def start(self) -> None:
         bus = self.network.bus("bench", "monitor")
-        self.monitor = MonitorProcess(self.config, self.path, bus)
+        self.monitor = MonitorProcess(
+            self.config, self.path, suitable_model(self.config, self.path), bus
+        )
         self.bus = bus
 
     def kill(self) -> None:
@@ -66,7 +68,7 @@ class Bench:
             position = self.monitor.reader.position
             return position is not None and position[1] >= seq
 
-        assert wait_until(done, 20.0, 0.001)
+        assert wait_until(done, PATIENCE, 0.001)
 
     def got(self, topic: Topic) -> list[object]:
         return list(self.heard[topic].drain())
@@ -142,7 +144,7 @@ def test_silence_is_an_alarm_that_samples_clear(bench: Bench) -> None:
         bench.turn()
         return ("stale", "unacknowledged") in bench.alarm_states()
 
-    assert wait_until(stale, 20.0)
+    assert wait_until(stale, PATIENCE)
     bench.send(wave(1, 1, 7, 0))
     bench.turn()
     assert ("stale", "cleared_unacknowledged") in bench.alarm_states()
@@ -157,7 +159,7 @@ def test_a_daq_that_is_gone_is_named(bench: Bench) -> None:
         bench.turn()
         return ("link", "unacknowledged") in bench.alarm_states()
 
-    assert wait_until(named, 20.0)
+    assert wait_until(named, PATIENCE)
     standing = {alarm.name: alarm for alarm in ask_alarm_list(bench.observer)}
     assert "the daq process is not there" in standing["link"].cause
 
@@ -222,7 +224,7 @@ def test_samples_without_a_channel_are_said_to_be_unsuitable(bench: Bench) -> No
         said = [h for h in bench.heard[HEALTH].drain() if isinstance(h, Health)]
         return any(h.state == "unsuitable" and "acceleration" in h.text for h in said)
 
-    assert wait_until(told, 20.0)
+    assert wait_until(told, PATIENCE)
 
 
 def test_health_counts_samples_losses_and_latency(bench: Bench) -> None:
@@ -235,7 +237,7 @@ def test_health_counts_samples_losses_and_latency(bench: Bench) -> None:
         found.extend(h for h in bench.heard[HEALTH].drain() if h.counters["samples"] > 0)
         return bool(found)
 
-    assert wait_until(told, 20.0)
+    assert wait_until(told, PATIENCE)
     assert found[0].source == "monitor"
     assert {"lost_samples", "queue_length", "latency_ms", "latency_p99_ms"} <= set(
         found[0].counters
@@ -258,7 +260,7 @@ def test_a_model_of_another_rig_is_refused(tmp_path: Path, old: str, new: str, t
     path = TestRig(tmp_path, monitor_section(tmp_path)).path
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(ConfigError, match=told):
-        MonitorProcess(load_rig(path), path, MemoryNetwork().bus("bench", "monitor"))
+        suitable_model(load_rig(path), path)
 
 
 def seen(t_s: float, monotonic_s: float, silent: float = 0.0, trouble: str = "") -> Seen:
