@@ -97,21 +97,25 @@ def playing(bus: Bus) -> Iterator[Player]:
     player = Player(bus, Rig(friction_at=2.0, start_ns=time.time_ns()))
     close = serve_alarm_list(bus, player.alarms)
     player.start()
-    yield player
-    close()
-    player.stopped.set()
-    player.join()
+    try:
+        yield player
+    finally:
+        close()
+        player.stopped.set()
+        player.join()
 
 
 @contextlib.contextmanager
 def dashboard(config_file: Path, viewer: str) -> Iterator[subprocess.Popen[str]]:
     command = [sys.executable, "-m", "rigwatch", "dashboard", str(config_file), "--viewer", viewer]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    yield process
-    process.terminate()
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(10)
-    process.kill()
+    try:
+        yield process
+    finally:
+        process.terminate()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(10)
+        process.kill()
 
 
 def test_the_screen_shows_the_rig_and_its_friction(
