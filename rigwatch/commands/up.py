@@ -6,10 +6,10 @@ from pathlib import Path
 
 from rigwatch.supervisor.console import Console, Flow
 from rigwatch.supervisor.plan import PROCESSES, plan
-from rigwatch.wire.ports import endpoint_address, is_free
 from rigwatch.supervisor.supervisor import Supervisor
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.heartbeat import Heartbeat
+from rigwatch.wire.ports import endpoint_address, is_free
 from rigwatch.wire.rig_config import RigConfig, load_rig
 
 HELP = "start and supervise all processes of a rig"
