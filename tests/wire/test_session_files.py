@@ -18,7 +18,6 @@ from rigwatch.wire.messages import (
     Column,
     EstimateBlock,
     Event,
-    FloatArray,
     Gap,
     Health,
     Message,
@@ -33,7 +32,7 @@ STEP = 3_906_250
 def samples(seq: int, n: int, boot: int = 7) -> SampleBlock:
     index = np.arange(seq, seq + n)
     quality = (index % 5 == 0).astype(np.uint8)
-    holes: FloatArray = index * 1e-5
+    holes = index.astype(np.float64)
     holes[index % 11 == 3] = np.nan
     channels = (
         Column("voltage", "V", np.asarray(np.sin(index / 9.0), np.float64), quality),
@@ -44,7 +43,8 @@ def samples(seq: int, n: int, boot: int = 7) -> SampleBlock:
 
 def estimates(seq: int, n: int) -> EstimateBlock:
     index = np.arange(seq, seq + n)
-    return EstimateBlock("rig", 7, seq, T0 + index * STEP, (Column("theta1", "", index * 0.1),))
+    column = Column("theta1", "", index.astype(np.float64))
+    return EstimateBlock("rig", 7, seq, T0 + index * STEP, (column,))
 
 
 def same(first: SampleBlock | EstimateBlock, second: SampleBlock | EstimateBlock) -> bool:
