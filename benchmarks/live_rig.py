@@ -45,6 +45,7 @@ class LiveRig:
             cwd=ROOT,
             env={**os.environ, "PYTHONPATH": str(ROOT)},
             stdout=subprocess.DEVNULL,
+            start_new_session=True,
         )
         self._running.append(process)
         return process

@@ -4,10 +4,12 @@ import contextlib
 import gc
 import os
 import sys
+from pathlib import Path
 
 SWITCH_INTERVAL = 0.0005
 """A thread that waits for the interpreter lock gets it after this at the latest [s]."""
 
+_AUTOGROUP = Path("/proc/self/autogroup")
 NICENESS = -10
 """Above what runs beside, below the kernel's own work."""
 
@@ -16,10 +18,14 @@ def raise_priority() -> None:
     """Be served before other work, where the system allows it (root, CAP_SYS_NICE, systemd's Nice).
 
     To be called before threads are started: on Linux each has its own niceness, taken over from the
-    one that starts it.
+    one that starts it. Where the kernel groups processes by session, niceness counts within the
+    session only, and the session has one of its own; it is raised by the session's leader alone, so
+    that nobody's terminal is raised along.
     """
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, min(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
+        if os.getsid(0) == os.getpid():
+            _AUTOGROUP.write_text(str(NICENESS))
 
 
 def prepare_for_real_time() -> None:
