@@ -70,8 +70,8 @@ def _row(test: int, outcomes: list[Outcome]) -> Row:
         f"detected in {worst * 1e3:.0f} ms, named dry friction in {named * 1e3:.0f} ms",
         f"{bar * 1e3:.0f} ms, dry friction",
         published,
-        f"worst of {len(outcomes)} seeds, two samples of persistence included; called another fault "
-        f"in {wrong}, alarmed before the fault in {early}",
+        f"worst of {len(outcomes)} seeds, two samples of persistence included; called another "
+        f"fault in {wrong}, alarmed before the fault in {early}",
         passed=worst <= bar and named < float("inf") and wrong == 0 and early == 0,
     )
 

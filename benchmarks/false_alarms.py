@@ -1,4 +1,6 @@
-"""False alarms in a day of friction-free running with each experiment's excitation, and what they trade against."""
+"""False alarms in a day of friction-free running with each experiment's excitation, and what they
+trade against.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

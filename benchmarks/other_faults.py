@@ -1,4 +1,6 @@
-"""Other faults: each is alarmed and none is called dry friction. The confusion matrix over every effect the rig declares."""
+"""Other faults: each is alarmed and none is called dry friction. The confusion matrix over every
+effect the rig declares.
+"""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -56,7 +58,7 @@ def judged(effect: Effect, test: int, strength: float, seed: int) -> Case:
 
 
 def visible(effect: Effect, test: int, strength: float) -> bool:
-    """False where a limit lies above what the excitation reaches, so that nothing at all changes."""
+    """False where a limit lies above what the excitation reaches, so that nothing changes."""
     drive = scenario(f"experiment_{test}").excitation
     amplitude, frequency = getattr(drive, "amplitude", 0.0), getattr(drive, "frequency", 0.0)
     value = value_of(effect, strength)

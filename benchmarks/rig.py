@@ -1,4 +1,6 @@
-"""What the benchmarks of the monitor share: scenarios of the simulated rig, a commissioned model, first samples of conditions."""
+"""What the benchmarks of the monitor share: scenarios of the simulated rig, a commissioned model,
+first samples of conditions.
+"""
 
 from collections.abc import Iterator
 from functools import cache
@@ -55,7 +57,9 @@ def record(name: str, role: Role, seed: int) -> Recording:
 
 @cache
 def commissioned(references: bool = False) -> RigModel:
-    """The model of the simulated rig: one chirp, one known friction, one healthy reference or (slower) all there are."""
+    """The model of the simulated rig: one chirp, one known friction, one healthy reference or
+    (slower) all there are.
+    """
     healthy = ["healthy_sine_8hz_1v4"]
     if references:
         healthy = sorted(path.stem for path in SCENARIOS.glob("healthy_*.toml"))
@@ -86,7 +90,9 @@ def column(results: list[Result], name: str) -> NDArray[np.float64]:
 
 
 def delay(results: list[Result], name: str, after_s: float) -> float | None:
-    """Time from `after_s` to the sample that completes the persistence of a condition [s], None where it never does."""
+    """Time from `after_s` to the sample that completes the persistence of a condition [s], None
+    where it never does.
+    """
     first = int(np.ceil(after_s * RATE))
     flags = active(results, name).astype(np.int64)[first:]
     held = np.convolve(flags, np.ones(PERSISTENCE, np.int64))[: flags.size] >= PERSISTENCE

@@ -1,4 +1,6 @@
-"""Windowed least squares against statsmodels, filterpy, padasip and river: time an update, and error after a spike."""
+"""Windowed least squares against statsmodels, filterpy, padasip and river: time an update, and
+error after a spike.
+"""
 
 import time
 from collections.abc import Callable
@@ -18,7 +20,9 @@ RIVALS = ("statsmodels", "filterpy", "padasip", "river")
 
 
 def data(n: int) -> tuple[Floats, Floats]:
-    """Regressors like friction's, shape (n, 2), and y, shape (n,), with one spike two windows before the end."""
+    """Regressors like friction's, shape (n, 2), and y, shape (n,), with one spike two windows
+    before the end.
+    """
     random = np.random.default_rng(1)
     v = np.sin(0.19 * np.arange(n)) + 0.1 * random.standard_normal(n)
     g = np.column_stack([np.sign(v), v])
@@ -68,7 +72,10 @@ def river(g: Floats, y: Floats) -> Floats:
     for k in range(y.size):
         x = {"g1": float(g[k, 0]), "g2": float(g[k, 1])}
         model.learn_one(x, float(y[k]))
-        theta[k] = model.predict_one({"g1": 1.0, "g2": 0.0}), model.predict_one({"g1": 0.0, "g2": 1.0})
+        theta[k] = (
+            model.predict_one({"g1": 1.0, "g2": 0.0}),
+            model.predict_one({"g1": 0.0, "g2": 1.0}),
+        )
     return theta
 
 
@@ -90,7 +97,7 @@ def _fresh(g: Floats, y: Floats, end: int) -> Floats:
 
 
 def _exactness(theta: Floats, g: Floats, y: Floats) -> Row:
-    ends = [y.size - 1, y.size - 2, y.size - WINDOW - 1, y.size // 2]
+    ends = [y.size - 1, y.size - 2, y.size - WINDOW, y.size // 2]
     worst = max(float(np.max(np.abs(theta[end] - _fresh(g, y, end)))) for end in ends)
     return Row(
         f"windowed least squares after {y.size:.0e} updates",
@@ -110,7 +117,8 @@ def _rival(name: str, ours_each: float, length: int) -> Row:
         theta = rival(g, y)
         each = (time.perf_counter() - started) / length
     except ImportError:
-        return Row(f"windowed least squares against {name}", "not installed", "faster", "", "install the dependency group bench", passed=None)  # fmt: skip
+        what, note = f"windowed least squares against {name}", "install the dependency group bench"
+        return Row(what, "not installed", "faster", "", note, passed=None)
     error = float(np.max(np.abs(theta[-1] - _fresh(g, y, y.size - 1))))
     return Row(
         f"windowed least squares against {name}",

@@ -1,8 +1,9 @@
 """Which samples may enter: gaps, restarts and invalid readings become one code a sample.
 
-A short run of missing or invalid samples is predicted through: the last good value is held for the filters, and the sample
-counts in no estimate. A longer run is not: nothing is fed until a good sample comes, and that one starts every filter
-afresh. Missing samples are put in as held ones, so that the count of samples stays the count of periods.
+A short run of missing or invalid samples is predicted through: the last good value is held for the
+filters, and the sample counts in no estimate. A longer run is not: nothing is fed until a good
+sample comes, and that one starts every filter afresh. Missing samples are put in as held ones, so
+that the count of samples stays the count of periods.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,8 @@ from rigwatch.wire.messages import Column, SampleBlock
 from rigwatch.wire.quality import NON_FINITE, SATURATED, SPIKE, STALE, valid
 
 GOOD, HELD, DEAD, RESTART, NEW_BOOT = 0, 1, 2, 3, 4
-"""Codes: good; held; nothing to feed; good after a dead stretch; good and the first of a new boot."""
+"""Codes: good; held; nothing to feed; good after a dead stretch; good and the first of a new boot.
+"""
 
 Codes = NDArray[np.int64]
 
@@ -53,7 +55,9 @@ class Admission:
         longest_hold: samples that are predicted through at most.
     """
 
-    def __init__(self, channels: tuple[str, ...], needed: tuple[str, ...], longest_hold: int) -> None:
+    def __init__(
+        self, channels: tuple[str, ...], needed: tuple[str, ...], longest_hold: int
+    ) -> None:
         self._channels, self._hold = channels, longest_hold
         self._needed = np.array([name in needed for name in channels])
         self._last = np.zeros(len(channels))
@@ -79,7 +83,7 @@ class Admission:
         values, good = self._columns(block, seen, padding)
         code = np.empty(len(values), np.int64)
         run = np.empty(len(values), np.int64)
-        needed_good = good[:, self._needed].all(axis=1)
+        needed_good = np.asarray(good[:, self._needed].all(axis=1))
         _classify(values, good, needed_good, self._last, self._run, self._hold, code, run)
         self._fresh = self._fresh or new_boot
         self._mark_new_boot(code)
@@ -88,9 +92,7 @@ class Admission:
         first = block.seq + seen - padding
         position_valid = good[:, min(1, good.shape[1] - 1)]
         seq = np.arange(first, first + len(values), dtype=np.int64)
-        return Admitted(
-            values, code, position_valid.astype(np.uint8), seq, padding, missing, run
-        )
+        return Admitted(values, code, position_valid.astype(np.uint8), seq, padding, missing, run)
 
     def _mark_new_boot(self, code: Codes) -> None:
         """The first good sample of a boot restarts more than the filters."""
@@ -114,17 +116,19 @@ class Admission:
 
 
 def _usable(column: Column, stuck_counts: bool) -> NDArray[np.bool_]:
-    """Finite and of good quality; a position that stands still may be a mass that sticks, so it counts."""
+    """Finite and of good quality; a position that stands still may be a mass that sticks, so it
+    counts.
+    """
     finite = np.isfinite(column.values)
     if column.quality.size == 0:
         return finite
     if stuck_counts:
-        return finite & valid(column.quality)
-    return finite & ((column.quality & (STALE | SATURATED | NON_FINITE | SPIKE)) == 0)
+        return np.asarray(finite & valid(column.quality))
+    return np.asarray(finite & ((column.quality & (STALE | SATURATED | NON_FINITE | SPIKE)) == 0))
 
 
 @njit(cache=True)
-def _classify(
+def _classify(  # noqa: PLR0917
     values: FloatArray,
     good: NDArray[np.bool_],
     needed_good: NDArray[np.bool_],

@@ -1,8 +1,8 @@
 """Commissioning: recordings in, one model file out.
 
-    chirp or multisine, no friction  ──▶ frequency response ──▶ Ĝ (5.16), (5.19); corner of the accelerometer
-    healthy reference(s)             ──▶ shift, amplitude scale, one healthy period, noise, time to settle
-    known friction                   ──▶ friction filter Ge and γf (5.29)
+chirp or multisine, no friction  ──▶ frequency response ──▶ Ĝ (5.16), (5.19); corner of the
+accelerometer healthy reference(s)             ──▶ shift, amplitude scale, one healthy period,
+noise, time to settle known friction                   ──▶ friction filter Ge and γf (5.29)
 """
 
 from collections.abc import Sequence
@@ -68,9 +68,7 @@ def commission(
     healthy = _of_role(recordings, "healthy")
     plant = _with_shift(plant, healthy, rate)
     references = [_reference(recording, plant, rate) for recording in healthy]
-    velocity = VelocitySection(
-        corner=settings.velocity_corner, sensor_corner=_sensor_corner(chirp)
-    )
+    velocity = VelocitySection(corner=settings.velocity_corner, sensor_corner=_sensor_corner(chirp))
     friction = _friction(_of_role(recordings, "friction"), plant, velocity, rate, settings)
     return RigModel(
         sample_rate=rate,
@@ -116,7 +114,9 @@ def _fit_plant(chirp: Recording, settings: CommissionSettings) -> TransferPlant:
 
 
 def _sensor_corner(chirp: Recording) -> float:
-    """Corner p of the accelerometer's own high-pass [Hz]: a/ẍ = jω/(jω + p) against the double-differentiated LVDT."""
+    """Corner p of the accelerometer's own high-pass [Hz]: a/ẍ = jω/(jω + p) against the
+    double-differentiated LVDT.
+    """
     response: FrequencyResponse = frequency_response(
         chirp.channel("position"), chirp.channel("acceleration"), chirp.sample_rate
     )
@@ -132,10 +132,11 @@ def _sensor_corner(chirp: Recording) -> float:
 
 
 def _with_shift(plant: TransferPlant, healthy: Sequence[Recording], rate: float) -> TransferPlant:
-    """The shift that makes modelled and measured acceleration most alike: a thing to measure (theory 1.2).
+    """The shift that makes modelled and measured acceleration most alike: a thing to measure
+    (theory 1.2).
 
-    Only advances that Ĝ's own delay pays for are tried: a longer one would delay every alarm, and the healthy average takes
-    up what it would have gained.
+    Only advances that Ĝ's own delay pays for are tried: a longer one would delay every alarm, and
+    the healthy average takes up what it would have gained.
     """
     leading = int(np.argmax(np.array(plant.b) != 0.0))
     candidates = [TransferPlant(b=plant.b, a=plant.a, shift=shift) for shift in range(leading + 1)]
@@ -143,7 +144,9 @@ def _with_shift(plant: TransferPlant, healthy: Sequence[Recording], rate: float)
 
 
 def _likeness(plant: TransferPlant, healthy: Recording, rate: float) -> float:
-    """Correlation of modelled and measured acceleration in the later three quarters of a recording."""
+    """Correlation of modelled and measured acceleration in the later three quarters of a
+    recording.
+    """
     signals = _signals(healthy, plant, rate)[:, healthy.channel("voltage").size // 4 :]
     return float(np.corrcoef(signals[2], signals[3])[0, 1])
 
@@ -201,7 +204,9 @@ def _noise(healthy: Sequence[Recording], plant: TransferPlant, rate: float) -> N
 
 
 def _settling(healthy: Recording, plant: TransferPlant, rate: float) -> int:
-    """Samples until the modelled acceleration, started from rest at any phase, has joined its steady course."""
+    """Samples until the modelled acceleration, started from rest at any phase, has joined its
+    steady course.
+    """
     signals, period = _steady(healthy, plant, rate)
     found = averaged(signals, period)
     function, _ = modelled_acceleration(plant, rate)
@@ -218,7 +223,9 @@ def _settling(healthy: Recording, plant: TransferPlant, rate: float) -> int:
 
 @dataclass(frozen=True, eq=False)
 class _Onset:
-    """Velocity, zero before the onset, and change of the residual, around the onset of a known fault."""
+    """Velocity, zero before the onset, and change of the residual, around the onset of a known
+    fault.
+    """
 
     velocity: FloatArray
     change: FloatArray
@@ -264,7 +271,9 @@ def _onset(
 def _change(
     recording: Recording, signals: FloatArray, period: int, rate: float
 ) -> tuple[FloatArray, int]:
-    """Change of the residual against the recording's own healthy beginning, and the sample at which it sets in."""
+    """Change of the residual against the recording's own healthy beginning, and the sample at
+    which it sets in.
+    """
     beginning = max(4, round(rate / period)) * period
     found = averaged(signals[:, :beginning], period)
     scale = _scale(found.mean)
@@ -275,7 +284,9 @@ def _change(
     departed = np.flatnonzero(np.abs(change) > 8.0 * noise)
     late = departed[departed >= beginning]
     if late.size == 0:
-        raise ModelError(f"{recording.name}: found no change in the residual, expected a friction fault")
+        raise ModelError(
+            f"{recording.name}: found no change in the residual, expected a friction fault"
+        )
     if departed[0] < beginning:
         raise ModelError(
             f"{recording.name}: found a residual that is not steady in the first "

@@ -1,4 +1,9 @@
-"""Running mean squares over a short window, exact like `window.py`: a queue made of two stacks, no subtraction."""
+"""Running mean squares over a short window, exact like `window.py`: a queue made of two stacks, no
+subtraction.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
 
 from typing import NamedTuple
 

@@ -1,14 +1,17 @@
-"""A plant that is a mass and nothing else: M·q̈ = force + offset - friction, with force and position measured.
+"""A plant that is a mass and nothing else: M·q̈ = force + offset - friction, with force and
+position measured.
 
 The same pipeline watches it with this in place of the fourth-order model:
 
     modelled   am = (F̃ + offset)/M,   measured  a = w̃''∗q
     regressors g1 = -sgn(v)/M,        g2 = -v/M         so that θ is friction itself [N], [N/(m/s)]
 
-Position is differentiated by one smooth kernel w (a Hann window to the fourth) and its derivatives, and the force is smoothed by
-the same w, so that the equation holds for the smoothed signals exactly. Everything is late by half the kernel.
+Position is differentiated by one smooth kernel w (a Hann window to the fourth) and its
+derivatives, and the force is smoothed by the same w, so that the equation holds for the smoothed
+signals exactly. Everything is late by half the kernel.
 
-Its healthy state has friction, so that its estimates have fixed limits from commissioning, in place of a healthy average.
+Its healthy state has friction, so that its estimates have fixed limits from commissioning, in
+place of a healthy average.
 """
 
 from collections.abc import Sequence
@@ -37,7 +40,9 @@ _LEAST_SPEED = 0.02
 
 
 def kernels(half_width: int, sample_rate: float) -> FloatArray:
-    """w and its first and second derivatives in time, newest sample first, shape (3, 2·half_width + 1)."""
+    """w and its first and second derivatives in time, newest sample first, shape (3, 2·half_width
+    + 1).
+    """
     place = np.arange(-half_width, half_width + 1) / (half_width + 1.0)
     angle = 0.5 * np.pi * place
     w = np.cos(angle) ** 4
@@ -65,14 +70,18 @@ class InertiaResidual:
         self._place = np.zeros(2, np.int64)
 
     def update(self, signals: FloatArray, code: Codes) -> FloatArray:
-        """The next samples, shape (n, 2) of force and position, to the stage's columns, shape (n, 7)."""
+        """The next samples, shape (n, 2) of force and position, to the stage's columns, shape (n,
+        7).
+        """
         out = np.zeros((code.size, 7))
-        _advance(signals, code, self._kernels, self._ring, self._place, self._mass, self._offset, out)
+        _advance(
+            signals, code, self._kernels, self._ring, self._place, self._mass, self._offset, out
+        )
         return out
 
 
 @njit(cache=True)
-def _advance(
+def _advance(  # noqa: PLR0917
     signals: FloatArray,
     code: Codes,
     kernel: FloatArray,
@@ -128,9 +137,14 @@ def commission_inertia(
     (mass, coulomb, viscous, offset), *_ = np.linalg.lstsq(columns, force[moving], rcond=None)
     left = (force[moving] - columns @ np.array([mass, coulomb, viscous, offset])) / mass
     if not (mass > 0.0 and coulomb > 0.0):
-        raise ModelError(f"{recording.name}: found mass {mass:g} kg and friction {coulomb:g} N, expected both above 0")
+        raise ModelError(
+            f"{recording.name}: found mass {mass:g} kg and friction {coulomb:g} N, "
+            "expected both above 0"
+        )
     length = window or int(6 * rate)
-    spread = np.array([0.5 * coulomb, max(0.5 * abs(viscous), 0.5 * coulomb / np.max(np.abs(speed)))])
+    spread = np.array(
+        [0.5 * coulomb, max(0.5 * abs(viscous), 0.5 * coulomb / np.max(np.abs(speed)))]
+    )
     healthy = np.array([coulomb, viscous])
     return RigModel(
         sample_rate=rate,
@@ -146,14 +160,14 @@ def commission_inertia(
             low=(float((healthy - spread)[0]), float((healthy - spread)[1])),
             high=(float((healthy + spread)[0]), float((healthy + spread)[1])),
         ),
-        recording=(
-            RecordingSection(role="healthy", name=recording.name, sha256=recording.sha256),
-        ),
+        recording=(RecordingSection(role="healthy", name=recording.name, sha256=recording.sha256),),
     )
 
 
 def smoothed(recording: Recording, half_width: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Force [N], velocity [m/s] and acceleration [m/s^2] of a recording, all smoothed by the kernel, edges left out."""
+    """Force [N], velocity [m/s] and acceleration [m/s^2] of a recording, all smoothed by the
+    kernel, edges left out.
+    """
     w, first, second = kernels(half_width, recording.sample_rate)
     force, position = recording.channel("force"), recording.channel("position")
     position = position - position.mean()

@@ -3,19 +3,24 @@
 The change of the residual since its onset is put before two explanations over the same samples:
 
     friction   y = θ1·Ge[sgn v] + θ2·Ge[v]                                                 (5.33)
-    rivals     any change that is smooth in the healthy motion: gain, lag, delay, lost pressure, spring, mass,
-               damping, bias, and what bends them; as  A, dA, X, dX, 1, the first two growing in time, and the
-               products X², X·dX, X³, X²·dX, with A and X one healthy period of acceleration and position and
-               d a difference of neighbours
+    rivals     any change that is smooth in the healthy motion: gain, lag, delay, lost pressure,
+        spring, mass,
+               damping, bias, and what bends them; as  A, dA, X, dX, 1, the first two growing in
+               time, and the products X², X·dX, X³, X²·dX, with A and X one healthy period of
+               acceleration and position and d a difference of neighbours
 
-Other faults are smooth in the healthy motion or nearly so. Dry friction is not: it jumps where the velocity turns. So the
-question is what the jump explains that no rival can,
+Other faults are smooth in the healthy motion or nearly so. Dry friction is not: it jumps where the
+velocity turns. So the question is what the jump explains that no rival can,
 
-    share = (part of y that Ge[sgn v] explains beyond the rivals)² / y²,   ρ = the same over what the rivals leave,
+    share = (part of y that Ge[sgn v] explains beyond the rivals)² / y²,   ρ = the same over what
+    the rivals leave,
 
-with the sign that takes energy out (θ1 > 0). A mass that stands still where the healthy one moves, by position and
-acceleration alike, is stick; no smooth fault does that either.
+with the sign that takes energy out (θ1 > 0). A mass that stands still where the healthy one moves,
+by position and acceleration alike, is stick; no smooth fault does that either.
 """
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
 
 from typing import NamedTuple
 
@@ -29,7 +34,9 @@ from rigwatch.physics.transfer_function import FloatArray, filter_sample
 HISTORY = 512
 """Samples that are kept for judging."""
 Y, SIGN_PART, SPEED_PART, SPEED, AT_REST, VOLTS = range(6)
-"""Columns of the history: change of the residual, g1, g2, velocity, 1 at rest, change of the voltage."""
+"""Columns of the history: change of the residual, g1, g2, velocity, 1 at rest, change of the
+voltage.
+"""
 _RIVALS = 11
 
 
@@ -47,7 +54,8 @@ class Evidence(NamedTuple):
 
     Args:
         explained: share of y² that friction explains.
-        share: share of y² that the jump explains beyond the rivals, negative where it would put energy in.
+        share: share of y² that the jump explains beyond the rivals, negative where it would put
+            energy in.
         rho: correlation of the jump with what the rivals leave.
         rest: share of the samples at rest.
         rivals: share of y² that the rivals explain.
@@ -72,7 +80,7 @@ def new_history(b: FloatArray, a: FloatArray) -> History:
 
 
 @njit(cache=True, inline="always")
-def remember(
+def remember(  # noqa: PLR0917
     history: History, y: float, g1: float, g2: float, speed: float, rest: float, volts: float
 ) -> None:
     """Keep one sample."""
@@ -90,7 +98,8 @@ def weigh(history: History, ref: Reference, seq: int, since: int, count: int) ->
     Args:
         history: the newest samples, the last of them number `seq`.
         ref: one period of the healthy rig.
-        since: samples since the onset of the change, the regressors start from rest there where it is kept.
+        since: samples since the onset of the change, the regressors start from rest there where it
+            is kept.
         count: samples that are judged, at most HISTORY and `since`.
     """
     n = min(count, HISTORY)
@@ -108,7 +117,9 @@ def weigh(history: History, ref: Reference, seq: int, since: int, count: int) ->
 
 @njit(cache=True)
 def swing_of_voltage_change(history: History, count: int) -> float:
-    """Standard deviation of the voltage's change over the newest `count` samples [V]; a shifted mean is none."""
+    """Standard deviation of the voltage's change over the newest `count` samples [V]; a shifted
+    mean is none.
+    """
     mean = square = 0.0
     for k in range(count):
         volts = history.rows[(history.head[0] - 1 - k) % HISTORY, VOLTS]
@@ -186,7 +197,9 @@ def _compare(gram: FloatArray, rest: float) -> Evidence:
 
 @njit(cache=True)
 def _eliminate(gram: FloatArray, pivot: int, least: float) -> None:
-    """Take out of every column what column `pivot` explains; a column that others explained already is skipped."""
+    """Take out of every column what column `pivot` explains; a column that others explained
+    already is skipped.
+    """
     strength = gram[pivot, pivot]
     if strength <= least or strength <= 0.0:
         return

@@ -1,12 +1,14 @@
 """How far is too far: the factors behind the thresholds, from one allowed chance of a false alarm.
 
-A healthy deviation D² of two estimates follows χ² with two degrees of freedom, so P(D > k) = exp(-k²/2) at each look. With one
-look a sample, n looks a year and an allowed chance P of any false alarm in a year,
+A healthy deviation D² of two estimates follows χ² with two degrees of freedom, so P(D > k) =
+exp(-k²/2) at each look. With one look a sample, n looks a year and an allowed chance P of any
+false alarm in a year,
 
     k = √( 2·ln(n·g/P) ),   g = 3 statistics that are watched together.
 
-Neighbouring looks share samples, so there are fewer independent ones: counting every look errs to the safe side. The
-energies over m samples follow χ² with m degrees of freedom and get the same chance.
+Neighbouring looks share samples, so there are fewer independent ones: counting every look errs to
+the safe side. The energies over m samples follow χ² with m degrees of freedom and get the same
+chance.
 """
 
 import numpy as np

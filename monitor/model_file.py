@@ -1,11 +1,12 @@
-"""The model file: all that commissioning found out about a rig, as one TOML file that people can read.
+"""The model file: all that commissioning found out about a rig, as one TOML file that people can
+read.
 
-`load_model` reads it, `model_text` prints it. Numbers are printed with all their digits, so a file read back gives the same
-estimates to the last bit.
+`load_model` reads it, `model_text` prints it. Numbers are printed with all their digits, so a file
+read back gives the same estimates to the last bit.
 """
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta, field, structs
 
@@ -17,7 +18,7 @@ Floats = tuple[float, ...]
 Positive = Annotated[float, Meta(gt=0)]
 
 
-class FunctionSection(Section):
+class FunctionSection(Section, frozen=True, kw_only=True):
     """B(q⁻¹)/A(q⁻¹), ascending powers of q⁻¹."""
 
     b: Annotated[Floats, Meta(min_length=1, description="numerator")]
@@ -28,7 +29,9 @@ class FunctionSection(Section):
         return TransferFunction.of(self.b, self.a)
 
 
-class TransferPlant(FunctionSection, tag="transfer_function", tag_field="kind"):
+class TransferPlant(
+    FunctionSection, frozen=True, kw_only=True, tag="transfer_function", tag_field="kind"
+):
     """[plant] kind = "transfer_function": voltage [V] to position [m], (5.16)."""
 
     shift: Annotated[
@@ -36,7 +39,7 @@ class TransferPlant(FunctionSection, tag="transfer_function", tag_field="kind"):
     ] = 1
 
 
-class InertiaPlant(Section, tag="inertia", tag_field="kind"):
+class InertiaPlant(Section, frozen=True, kw_only=True, tag="inertia", tag_field="kind"):
     """[plant] kind = "inertia": M·q̈ = force + offset."""
 
     mass: Annotated[float, Meta(gt=0, description="moving mass M [kg]")]
@@ -49,7 +52,7 @@ class InertiaPlant(Section, tag="inertia", tag_field="kind"):
 Plant = TransferPlant | InertiaPlant
 
 
-class VelocitySection(Section):
+class VelocitySection(Section, frozen=True, kw_only=True):
     """[velocity] — velocity from the accelerometer (theory 1.3)."""
 
     corner: Annotated[float, Meta(gt=0, description="corner of the high-pass [Hz]")] = 0.5
@@ -58,14 +61,14 @@ class VelocitySection(Section):
     ] = 0.0
 
 
-class FrictionSection(FunctionSection):
+class FrictionSection(FunctionSection, frozen=True, kw_only=True):
     """[friction] — friction filter Ge and signature (5.29)."""
 
     gamma: Annotated[float, Meta(ge=0, description="signature (1, gamma) [s/m]")]
     explained: Annotated[float, Meta(le=1, description="share of the known fault explained")] = 0.0
 
 
-class WindowSection(Section):
+class WindowSection(Section, frozen=True, kw_only=True):
     """[window] — windowed least squares (5.39)."""
 
     length: Annotated[
@@ -74,7 +77,7 @@ class WindowSection(Section):
     hop: Annotated[int, Meta(ge=1, description="samples between estimates")] = 1
 
 
-class NoiseSection(Section):
+class NoiseSection(Section, frozen=True, kw_only=True):
     """[noise] — what a healthy rig leaves unexplained, standard deviations."""
 
     residual: Annotated[float, Meta(gt=0, description="acceleration residual [m/s^2]")]
@@ -82,30 +85,32 @@ class NoiseSection(Section):
     voltage: Annotated[float, Meta(gt=0, description="voltage [V]")] = 1e-3
 
 
-class DecisionSection(Section):
+class DecisionSection(Section, frozen=True, kw_only=True):
     """[decision] — when an estimate has left, and what counts as friction."""
 
     false_alarm: Annotated[
         float, Meta(gt=0, lt=1, description="allowed chance of a false alarm in a year")
     ] = 1e-3
-    settle: Annotated[int, Meta(ge=0, description="samples after a start that are not judged")] = 128
+    settle: Annotated[int, Meta(ge=0, description="samples after a start that are not judged")] = (
+        128
+    )
     learn: Annotated[int, Meta(ge=16, description="samples the run's own reference takes")] = 256
     longest_period: Annotated[int, Meta(ge=4, description="samples a period may have")] = 1024
-    longest_hold: Annotated[int, Meta(ge=0, description="samples predicted through")] = 8
+    longest_hold: Annotated[int, Meta(ge=0, description="samples predicted through")] = 2
     least_velocity: Annotated[
         float, Meta(ge=0, description="rms below which friction is not observable [m/s]")
     ] = 0.005
     worst_condition: Annotated[float, Meta(gt=1, description="of the normal matrix")] = 1e8
 
 
-class BandSection(Section):
+class BandSection(Section, frozen=True, kw_only=True):
     """[band] — fixed limits of the estimates, for plants whose healthy state has friction."""
 
     low: Annotated[tuple[float, float], Meta(description="of (theta1, theta2)")]
     high: Annotated[tuple[float, float], Meta(description="of (theta1, theta2)")]
 
 
-class ReferenceSection(Section):
+class ReferenceSection(Section, frozen=True, kw_only=True):
     """[[reference]] — one period of the healthy rig under one excitation."""
 
     periods: Annotated[int, Meta(ge=1, description="periods that were averaged")]
@@ -116,7 +121,7 @@ class ReferenceSection(Section):
     modelled: Annotated[Floats, Meta(description="modelled, before the scale [m/s^2]")]
 
 
-class RecordingSection(Section):
+class RecordingSection(Section, frozen=True, kw_only=True):
     """[[recording]] — what the model was made from."""
 
     role: Annotated[str, Meta(description="chirp, healthy or friction")]
@@ -124,7 +129,7 @@ class RecordingSection(Section):
     sha256: Annotated[str, Meta(description="hash of the file or of its samples")] = ""
 
 
-class RigModel(Section):
+class RigModel(Section, frozen=True, kw_only=True):
     """The whole model file."""
 
     sample_rate: Annotated[float, Meta(gt=0, description="[Hz]")]
@@ -174,7 +179,10 @@ _COLUMNS = ("voltage", "position", "acceleration", "modelled")
 
 def model_text(model: RigModel) -> str:
     """The model as TOML."""
-    lines = ["# Made by `rigwatch commission`; read by `rigwatch monitor` and `rigwatch replay`.", ""]
+    lines = [
+        "# Made by `rigwatch commission`; read by `rigwatch monitor` and `rigwatch replay`.",
+        "",
+    ]
     tables: list[str] = []
     for key, value in structs.asdict(model).items():
         if value is None:

@@ -38,7 +38,9 @@ class Averaged:
 
 
 def averaged(signals: FloatArray, period: int) -> Averaged:
-    """Average of whole periods of `signals`, shape (signals, n), from the first sample on; at least two periods."""
+    """Average of whole periods of `signals`, shape (signals, n), from the first sample on; at
+    least two periods.
+    """
     periods = signals.shape[1] // period
     folded = signals[:, : periods * period].reshape(len(signals), periods, period)
     mean = folded.mean(axis=1)
@@ -48,7 +50,9 @@ def averaged(signals: FloatArray, period: int) -> Averaged:
 
 
 def same_excitation(voltage: FloatArray, reference: FloatArray) -> int | None:
-    """Turn by which one period `voltage` has to be shifted to match `reference`, None where it is another excitation."""
+    """Turn by which one period `voltage` has to be shifted to match `reference`, None where it is
+    another excitation.
+    """
     if voltage.size != reference.size:
         return None
     swing = float(np.std(reference))

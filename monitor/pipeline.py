@@ -1,9 +1,10 @@
 """The monitor as one pure object: sample blocks in, estimates and conditions out.
 
-    SampleBlock ─▶ admission ─▶ residual ─▶ watch (reference, estimates, departure, verdict) ─▶ Result
+    SampleBlock ─▶ admission ─▶ residual ─▶ watch (reference, estimates, departure, verdict) ─▶
+    Result
 
-It knows no clock, bus or file, and every stage goes sample by sample with carried state: the same samples give the same
-numbers to the last bit, live or replayed, however they are cut into blocks.
+It knows no clock, bus or file, and every stage goes sample by sample with carried state: the same
+samples give the same numbers to the last bit, live or replayed, however they are cut into blocks.
 """
 
 from dataclasses import dataclass
@@ -16,9 +17,9 @@ from monitor import watch as w
 from monitor.admission import Admission, Admitted
 from monitor.conditions import Condition
 from monitor.energies import new_energies
+from monitor.inertia import InertiaResidual
 from monitor.isolation import new_history
 from monitor.limits import rules_for
-from monitor.inertia import InertiaResidual
 from monitor.model_file import InertiaPlant, RigModel
 from monitor.reference import ReferenceRules, new_reference
 from monitor.residual import TransferResidual
@@ -55,7 +56,8 @@ class Result:
     """What one sample block gave.
 
     Args:
-        estimates: the published columns, one row a sample of the block that had not been seen before.
+        estimates: the published columns, one row a sample of the block that had not been seen
+            before.
         conditions: one of each of `conditions.CONDITION_KINDS`, of the same length.
     """
 
@@ -128,11 +130,23 @@ class Monitor:
         sticks = verdict == w.STICKING
         moving = ~armed | (out[w.SPEED_RMS] >= decision.least_velocity)
         return (
-            _above(kinds.DEPARTURE, armed & (out[w.DEVIATION] > rules.factor), out[w.DEVIATION], rules.factor),
-            _above(kinds.DRY_FRICTION, armed & ((verdict == w.FRICTION) | sticks), out[w.THETA1], 0.0),
+            _above(
+                kinds.DEPARTURE,
+                armed & (out[w.DEVIATION] > rules.factor),
+                out[w.DEVIATION],
+                rules.factor,
+            ),
+            _above(
+                kinds.DRY_FRICTION, armed & ((verdict == w.FRICTION) | sticks), out[w.THETA1], 0.0
+            ),
             _above(kinds.STICTION, armed & sticks, out[w.REST], 0.5),
             _above(kinds.OTHER_FAULT, armed & (verdict == w.OTHER), out[w.EXPLAINED], np.inf),
-            _above(kinds.EXCITATION_CHANGED, armed & (verdict == w.NEW_EXCITATION), out[w.MOVED_VOLTAGE], 0.1),
+            _above(
+                kinds.EXCITATION_CHANGED,
+                armed & (verdict == w.NEW_EXCITATION),
+                out[w.MOVED_VOLTAGE],
+                0.1,
+            ),
             _below(kinds.NOT_OBSERVABLE, ~moving, out[w.SPEED_RMS], decision.least_velocity),
             _above(
                 kinds.ILL_CONDITIONED,
@@ -141,18 +155,24 @@ class Monitor:
                 decision.worst_condition,
             ),
             _above(kinds.GAP, lost != 0.0, lost, 0.0),
-            _above(kinds.SENSOR_INVALID, run > decision.longest_hold, invalid, decision.longest_hold),
+            _above(
+                kinds.SENSOR_INVALID, run > decision.longest_hold, invalid, decision.longest_hold
+            ),
         )
 
 
 def _above(name: str, active: NDArray[np.bool_], value: FloatArray, high: float) -> Condition:
     n = active.size
-    return Condition(name, active.astype(np.uint8), value.copy(), np.full(n, -np.inf), np.full(n, float(high)))
+    return Condition(
+        name, active.astype(np.uint8), value.copy(), np.full(n, -np.inf), np.full(n, float(high))
+    )
 
 
 def _below(name: str, active: NDArray[np.bool_], value: FloatArray, low: float) -> Condition:
     n = active.size
-    return Condition(name, active.astype(np.uint8), value.copy(), np.full(n, low), np.full(n, np.inf))
+    return Condition(
+        name, active.astype(np.uint8), value.copy(), np.full(n, low), np.full(n, np.inf)
+    )
 
 
 def _arming_rules(model: RigModel) -> ReferenceRules:

@@ -41,7 +41,7 @@ class Recording:
         """
         if name not in self.channels:
             raise ModelError(
-                f"{self.name}: found channels {', '.join(self.channels)}, expected one called {name}"
+                f"{self.name}: found channels {', '.join(self.channels)}, expected one {name!r}"
             )
         return self.channels[name]
 

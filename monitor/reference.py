@@ -1,18 +1,23 @@
-"""The healthy rig under the present excitation: one period of each signal, and how much they scatter about it.
+"""The healthy rig under the present excitation: one period of each signal, and how much they
+scatter about it.
 
-A linear model leaves about a tenth of the acceleration of a pneumatic rig unexplained. That part is no noise: it repeats with
-the excitation. Its average over whole periods is subtracted, so that what remains is the change of the residual
+A linear model leaves about a tenth of the acceleration of a pneumatic rig unexplained. That part
+is no noise: it repeats with the excitation. Its average over whole periods is subtracted, so that
+what remains is the change of the residual
 
     y(φ) = [ a(φ) - s·am(φ) ] - [ A(φ) - s·AM(φ) ],   s = Σ A·AM / Σ AM²
 
-with φ the place in the period, A and AM the averages of measured and modelled acceleration, s the amplitude scale.
-The average comes from the model file where that holds this very excitation, else from the first second of the run, and it
-goes on growing while the rig is plainly healthy.
+with φ the place in the period, A and AM the averages of measured and modelled acceleration, s the
+amplitude scale. The average comes from the model file where that holds this very excitation, else
+from the first second of the run, and it goes on growing while the rig is plainly healthy.
 
     SETTLING ──settled, period found──▶ LEARNING ──enough periods, quiet──▶ ARMED
         ▲    ──a reference of the model file fits and agrees─────────────────▲
         └─────────── another excitation, or a new boot ────────────────────────┘
 """
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
 
 from typing import NamedTuple
 
@@ -26,8 +31,10 @@ SETTLING, LEARNING, ARMED, RESUMING = 0, 1, 2, 3
 NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC, FIXED = 0, 1, 2, 3, 4
 
 MODE, SOURCE, SINCE, PERIOD, ANCHOR, LEARNT, RING_FILL, RING_HEAD, DEPTH = range(9)
-"""Integers of the state: mode, where the reference is from, samples since the last restart, period [samples], sample number of
-its first place, samples learnt, fill and head of the voltage ring, periods averaged."""
+"""Integers of the state: mode, where the reference is from, samples since the last restart, period
+[samples], sample number of its first place, samples learnt, fill and head of the voltage ring,
+periods averaged.
+"""
 SCALE, NOISE, POSITION_NOISE, VOLTAGE_NOISE, SWING, POSITION_SWING, ACCELERATION_SWING = range(7)
 """Floats: amplitude scale; noise of y, x, V; rms of the periodic part of V, x, a."""
 
@@ -36,7 +43,9 @@ LONGEST_AVERAGE = 512
 
 
 class Reference(NamedTuple):
-    """State. Templates and sums have one row a signal (V, x, a, am) and one column a place in the period."""
+    """State. Templates and sums have one row a signal (V, x, a, am) and one column a place in the
+    period.
+    """
 
     number: NDArray[np.int64]
     value: FloatArray
@@ -62,9 +71,7 @@ class ReferenceRules(NamedTuple):
     fixed: bool
 
 
-def new_reference(
-    rules: ReferenceRules, known: list[tuple[FloatArray, float, int]]
-) -> Reference:
+def new_reference(rules: ReferenceRules, known: list[tuple[FloatArray, float, int]]) -> Reference:
     """A state that knows the model file's references: ((4, P) signals, scale, periods averaged)."""
     longest = max([rules.longest_period, *[signals.shape[1] for signals, _, _ in known]])
     stored = np.zeros((len(known), 4, longest))
@@ -126,7 +133,7 @@ def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) ->
 
 @njit(cache=True)
 def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
-    """No healthy average: the residual is friction itself, and its limits stand in the model file."""
+    """No healthy average: the residual is friction itself, its limits stand in the model file."""
     ref.template[:, :] = 0.0
     ref.number[PERIOD], ref.number[ANCHOR], ref.number[DEPTH] = 1, 0, LONGEST_AVERAGE
     ref.number[SOURCE], ref.number[MODE] = FIXED, ARMED
@@ -209,7 +216,9 @@ def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: 
 
 @njit(cache=True)
 def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
-    """Place in the known period that the newest voltage belongs to, -1 where it is another excitation."""
+    """Place in the known period that the newest voltage belongs to, -1 where it is another
+    excitation.
+    """
     best, best_turn = (0.02 * swing) ** 2 * period, -1
     for turn in range(period):
         total = 0.0
@@ -224,7 +233,9 @@ def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
 
 @njit(cache=True)
 def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) -> None:
-    """The model file's reference holds for this run: no learning, and a fault from the start shows."""
+    """The model file's reference holds for this run: no learning, and a fault from the start
+    shows.
+    """
     for row in range(4):
         for place in range(period):
             ref.template[row, place] = ref.known[index, row, place]
@@ -255,7 +266,9 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
 
 @njit(cache=True)
 def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
-    """Averages, amplitude scale and scatter; start over where the scatter says that the rig has not settled."""
+    """Averages, amplitude scale and scatter; start over where the scatter says that the rig has
+    not settled.
+    """
     number, value, period = ref.number, ref.value, ref.number[PERIOD]
     for i in range(4):
         for place in range(period):

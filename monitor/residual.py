@@ -1,10 +1,12 @@
-"""From samples to the acceleration residual's ingredients (theory 1.2 to 1.4), rig with a transfer function.
+"""From samples to the acceleration residual's ingredients (theory 1.2 to 1.4), rig with a transfer
+function.
 
     modelled   am = fs²·(1 - q⁻¹)²·q^s·Ĝ(q⁻¹)·V      advanced by the measured shift s [samples]
     velocity   v  = high-pass and integrator of a    [m/s]
     regressors g1 = Ge[sgn v], g2 = Ge[v]            [m/s^2] per unit of θ
 
-Ĝ begins with q⁻¹, so one sample of advance costs nothing; a longer one delays the measured signals instead.
+Ĝ begins with q⁻¹, so one sample of advance costs nothing; a longer one delays the measured signals
+instead.
 """
 
 from typing import NamedTuple
@@ -39,7 +41,9 @@ class _Filters(NamedTuple):
 
 
 def modelled_acceleration(plant: TransferPlant, sample_rate: float) -> tuple[TransferFunction, int]:
-    """Voltage [V] to modelled acceleration [m/s^2], and the delay that the measured signals need [samples]."""
+    """Voltage [V] to modelled acceleration [m/s^2], and the delay that the measured signals need
+    [samples].
+    """
     function = plant.function()
     leading = int(np.argmax(function.b != 0.0))
     advance = min(plant.shift, leading)

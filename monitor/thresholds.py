@@ -1,8 +1,9 @@
 """Thresholds of the estimates, from a stretch that is known to be healthy.
 
-The thesis takes mean ± 3·sd of the first 50 estimates. That is right for its few hundred estimates; at 256 a second a
-normal estimate leaves three standard deviations every second or two. `tail_factor` says how many it takes: for n
-independent looks and an allowed probability P of one false alarm among them,
+The thesis takes mean ± 3·sd of the first 50 estimates. That is right for its few hundred
+estimates; at 256 a second a normal estimate leaves three standard deviations every second or two.
+`tail_factor` says how many it takes: for n independent looks and an allowed probability P of one
+false alarm among them,
 
     k = Φ⁻¹(1 - P/(2·n))
 
@@ -32,7 +33,8 @@ class Thresholds:
 
     def left(self, theta: FloatArray) -> FloatArray:
         """1.0 where an estimate lies outside, shape (n,); `theta` of shape (n, 2)."""
-        return np.any((theta < self.low) | (theta > self.high), axis=1).astype(np.float64)
+        outside = np.any((theta < self.low) | (theta > self.high), axis=1)
+        return np.asarray(outside, dtype=np.float64)
 
 
 def thesis_thresholds(theta: FloatArray, factor: float = THESIS_FACTOR) -> Thresholds:
@@ -42,7 +44,8 @@ def thesis_thresholds(theta: FloatArray, factor: float = THESIS_FACTOR) -> Thres
 
 
 def tail_factor(false_alarm: float, looks: float) -> float:
-    """How many standard deviations keep the chance of one false alarm in `looks` looks below `false_alarm`.
+    """How many standard deviations keep the chance of one false alarm in `looks` looks below
+    `false_alarm`.
 
     Args:
         false_alarm: allowed probability, above 0 and below 1.

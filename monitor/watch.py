@@ -2,11 +2,15 @@
 
     D² = Σ explained / (σ²·(1 + 4/depth)),   θ leaves its thresholds where D > k
 
-D is how far (θ1, θ2) lies from healthy in standard deviations, both taken together: the thresholds are the ellipse that the
-normal matrix gives, and the printed limits ±k·sd its half axes. `depth` is the number of periods in the healthy average,
-whose own error does not average out. Beside the estimates stand the change's energy over 8 and 64 samples, and how far
-position and voltage have moved from the healthy period: a fault of one sensor shows in one channel alone.
+D is how far (θ1, θ2) lies from healthy in standard deviations, both taken together: the thresholds
+are the ellipse that the normal matrix gives, and the printed limits ±k·sd its half axes. `depth`
+is the number of periods in the healthy average, whose own error does not average out. Beside the
+estimates stand the change's energy over 8 and 64 samples, and how far position and voltage have
+moved from the healthy period: a fault of one sensor shows in one channel alone.
 """
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
 
 from typing import NamedTuple
 
@@ -46,8 +50,8 @@ NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
 
 (
     MODELLED, RESIDUAL, CHANGE, SPEED, THETA1, THETA2, LOW1, HIGH1, LOW2, HIGH2,
-    OBSERVABLE, ARMED_FLAG, DEVIATION, EXPLAINED, SHARE, RHO, REST, VERDICT, CONDITION, MOVED_VOLTAGE, SPEED_RMS,
-    TOGETHER,
+    OBSERVABLE, ARMED_FLAG, DEVIATION, EXPLAINED, SHARE, RHO, REST, VERDICT, CONDITION,
+    MOVED_VOLTAGE, SPEED_RMS, TOGETHER,
 ) = range(22)  # fmt: skip
 OUTPUTS = 22
 
@@ -88,7 +92,7 @@ class WatchState(NamedTuple):
 
 
 @njit(cache=True)
-def watch_block(
+def watch_block(  # noqa: PLR0917
     data: FloatArray,
     code: Codes,
     position_valid: NDArray[np.uint8],
@@ -99,7 +103,9 @@ def watch_block(
     state: WatchState,
     out: FloatArray,
 ) -> None:
-    """Take the residual stage's columns for samples `first`, `first` + 1, … and fill `out`, shape (n, OUTPUTS)."""
+    """Take the residual stage's columns for samples `first`, `first` + 1, … and fill `out`, shape
+    (n, OUTPUTS).
+    """
     row = np.empty(4)
     for k in range(code.size):
         seq = first + k
@@ -149,7 +155,7 @@ def _skip(state: WatchState) -> None:
 
 
 @njit(cache=True, inline="always")
-def _judge(
+def _judge(  # noqa: PLR0917
     data: FloatArray,
     row: FloatArray,
     seq: int,
@@ -187,10 +193,10 @@ def _at_rest(row: FloatArray, ref: Reference, state: WatchState) -> float:
     for n in range(3):
         recent[n], recent[n + 4] = recent[n + 1], recent[n + 5]
     recent[3], recent[7] = row[1], row[2]
-    spread = max(max(recent[0], recent[1]), max(recent[2], recent[3]))
-    spread -= min(min(recent[0], recent[1]), min(recent[2], recent[3]))
-    shaken = max(max(recent[4], recent[5]), max(recent[6], recent[7]))
-    shaken -= min(min(recent[4], recent[5]), min(recent[6], recent[7]))
+    spread = max(recent[0], recent[1], recent[2], recent[3])
+    spread -= min(recent[0], recent[1], recent[2], recent[3])
+    shaken = max(recent[4], recent[5], recent[6], recent[7])
+    shaken -= min(recent[4], recent[5], recent[6], recent[7])
     weak = abs(recent[7]) < 0.15 * ref.value[ACCELERATION_SWING] + 5.0 * ref.value[NOISE]
     still = spread < 6.0 * ref.value[POSITION_NOISE] and shaken < 10.0 * ref.value[NOISE] and weak
     return 1.0 if still else 0.0
@@ -213,6 +219,8 @@ def _estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
     held[CONDITION], held[SPEED_RMS] = condition, speed
     observable = speed >= rules.least_velocity and state.window.place[FILL] >= 8
     held[OBSERVABLE] = 1.0 if observable else 0.0
+    if not observable:
+        held[CONDITION] = 1.0
     if not observable or not condition < rules.worst_condition:
         held[DEVIATION] = 0.0
         return
@@ -260,7 +268,9 @@ def _voltage_limit(rules: Rules, ref: Reference) -> float:
 
 @njit(cache=True, inline="always")
 def _departure(rules: Rules, ref: Reference, state: WatchState) -> bool:
-    """Whether anything has left its limits; the largest of all goes into the deviation, in units of k."""
+    """Whether anything has left its limits; the largest of all goes into the deviation, in units
+    of k.
+    """
     held, energies = state.held, state.energies
     if ref.number[SOURCE] == FIXED:
         return held[DEVIATION] > rules.factor
@@ -279,7 +289,7 @@ def _departure(rules: Rules, ref: Reference, state: WatchState) -> bool:
 
 
 @njit(cache=True, inline="always")
-def _follow(
+def _follow(  # noqa: PLR0917
     departed: bool,
     seq: int,
     place: int,
@@ -322,9 +332,7 @@ def _decide(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     spread = _spread(ref)
     moved_v = _moved(energies, _V, count)
     moved_x = _moved(energies, _X, count) > _position_limit(rules, ref)
-    moved_a = _moved(energies, _A, count) > max(
-        3.0 * spread, 0.002 * ref.value[ACCELERATION_SWING]
-    )
+    moved_a = _moved(energies, _A, count) > max(3.0 * spread, 0.002 * ref.value[ACCELERATION_SWING])
     span = max(32, min(ref.number[PERIOD], 256))
     evidence = weigh(state.history, ref, seq, min(since, HISTORY), min(since, 2 * span))
     held[EXPLAINED], held[SHARE] = evidence.explained, evidence.share
@@ -336,9 +344,7 @@ def _decide(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
 
 
 @njit(cache=True)
-def _verdict(
-    before, since, span, moved_v, moved_x, moved_a, rules, ref, state, evidence, spread
-):  # type: ignore[no-untyped-def]
+def _verdict(before, since, span, moved_v, moved_x, moved_a, rules, ref, state, evidence, spread):  # type: ignore[no-untyped-def]  # noqa: PLR0917
     """The verdict after one more look; dry friction, once found, stays until the episode ends."""
     limit_v = _voltage_limit(rules, ref)
     if moved_v > limit_v and not moved_a:
@@ -361,7 +367,7 @@ def _verdict(
     sure = moved_x or evidence.share > 0.1
     friction = moved_a and sure and (certain or jumps or follows or thin or slips)
     state.number[_AGREED] = state.number[_AGREED] + 1 if friction else 0
-    if before == FRICTION or before == STICKING or state.number[_AGREED] >= 3:
+    if before in (FRICTION, STICKING) or state.number[_AGREED] >= 3:
         return STICKING if evidence.rest >= 0.5 and moved_a else FRICTION
     if since >= 2 * span + 64:
         return OTHER
@@ -369,16 +375,14 @@ def _verdict(
 
 
 @njit(cache=True, inline="always")
-def _write(
-    data: FloatArray, code: int, ref: Reference, state: WatchState, out: FloatArray
-) -> None:
+def _write(data: FloatArray, code: int, ref: Reference, state: WatchState, out: FloatArray) -> None:
     for i in range(out.size):
         out[i] = state.held[i]
     scale = ref.value[SCALE]
     out[MODELLED] = scale * data[3]
     out[RESIDUAL] = data[2] - scale * data[3]
     out[SPEED] = data[4]
-    armed = ref.number[MODE] == ARMED and code != DEAD
+    armed = ref.number[MODE] == ARMED and code != DEAD and state.energies.place[FILL] > 0
     out[ARMED_FLAG] = 1.0 if armed else 0.0
     if not armed:
         out[DEVIATION] = 0.0

@@ -22,7 +22,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     roles = (
         ("chirp", "chirp or multisine without friction"),
         ("healthy", "healthy reference under a running excitation, may be given several times"),
-        ("friction", "a healthy beginning, then a known friction fault, may be given several times"),
+        (
+            "friction",
+            "a healthy beginning, then a known friction fault, may be given several times",
+        ),
     )
     for role, text in roles:
         parser.add_argument(
@@ -61,7 +64,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(_summary(model, arguments.output))
     else:
-        print("\n".join(f"{key}: {value}" for key, value in _summary(model, arguments.output).items()))
+        print(
+            "\n".join(f"{key}: {value}" for key, value in _summary(model, arguments.output).items())
+        )
     return 0
 
 

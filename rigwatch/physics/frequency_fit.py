@@ -2,9 +2,10 @@
 
     min over θ of Σ | (B(z⁻¹)/A(z⁻¹) - G)·W |²,   z = exp(jωT)
 
-Three steps: Levy's linear problem |A·G - B|²·W² gives a start; Sanathanan and Koerner's iteration divides its weight by
-the last |A|, which removes Levy's bias to high frequencies; Gauss-Newton with Levenberg's damping minimises (5.19)
-itself. Poles that wander out of the unit circle are mirrored back after each step.
+Three steps: Levy's linear problem |A·G - B|²·W² gives a start; Sanathanan and Koerner's iteration
+divides its weight by the last |A|, which removes Levy's bias to high frequencies; Gauss-Newton
+with Levenberg's damping minimises (5.19) itself. Poles that wander out of the unit circle are
+mirrored back after each step.
 """
 
 import numpy as np
@@ -33,7 +34,8 @@ def fit_transfer_function(
     """
     if measured.frequency.size < (poles + zeros + 1):
         raise ModelError(
-            f"transfer function: found {measured.frequency.size} lines, expected more than {poles + zeros}"
+            f"transfer function: found {measured.frequency.size} lines, "
+            f"expected more than {poles + zeros}"
         )
     problem = _Problem(measured, poles, zeros, delay)
     theta = problem.linear_start()
@@ -72,7 +74,8 @@ class _Problem:
 
     def _levy(self, weight: FloatArray) -> FloatArray:
         rows = np.hstack([self.numerator, -self.g[:, None] * self.denominator]) * weight[:, None]
-        return _real_lstsq(rows, self.g * weight)
+        target = np.asarray(self.g * weight, dtype=np.complex128)
+        return _real_lstsq(np.asarray(rows, dtype=np.complex128), target)
 
     def _stable(self, theta: FloatArray) -> FloatArray:
         a = reflected(np.concatenate([[1.0], theta[self.zeros + 1 :]]))
@@ -80,11 +83,15 @@ class _Problem:
 
     def _best_numerator(self, a: FloatArray) -> FloatArray:
         scale = self.w / (1.0 + self.denominator @ a)
-        return _real_lstsq(self.numerator * scale[:, None], self.g * self.w)
+        return _real_lstsq(
+            self.numerator * scale[:, None], np.asarray(self.g * self.w, dtype=np.complex128)
+        )
 
     def _errors(self, theta: FloatArray) -> Complex:
         model = self.numerator @ theta[: self.zeros + 1]
-        return np.asarray((self.g - model / (1.0 + self.denominator @ theta[self.zeros + 1 :])) * self.w)
+        return np.asarray(
+            (self.g - model / (1.0 + self.denominator @ theta[self.zeros + 1 :])) * self.w
+        )
 
     def _cost(self, theta: FloatArray) -> float:
         cost = float(np.sum(np.abs(self._errors(theta)) ** 2))
@@ -99,7 +106,9 @@ class _Problem:
     def gauss_newton(self, theta: FloatArray, steps: int = 200) -> FloatArray:
         cost, damping = self._cost(theta), 1e-3
         for _ in range(steps):
-            trial = self._stable(theta + _damped_step(self._gradient(theta), self._errors(theta), damping))
+            trial = self._stable(
+                theta + _damped_step(self._gradient(theta), self._errors(theta), damping)
+            )
             trial_cost = self._cost(trial)
             gained = cost - trial_cost
             if gained <= 0.0:
@@ -116,7 +125,9 @@ class _Problem:
 def _real_lstsq(rows: Complex, target: Complex) -> FloatArray:
     stacked = np.vstack([rows.real, rows.imag])
     scale = np.linalg.norm(stacked, axis=0)
-    solution = np.linalg.lstsq(stacked / scale, np.concatenate([target.real, target.imag]), rcond=None)
+    solution = np.linalg.lstsq(
+        stacked / scale, np.concatenate([target.real, target.imag]), rcond=None
+    )
     return np.asarray(solution[0] / scale)
 
 

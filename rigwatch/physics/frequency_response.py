@@ -2,8 +2,8 @@
 
     H1 = Suy / Suu,   γ² = |Suy|² / (Suu·Syy)
 
-averaged over overlapping Hann segments (Welch). The variance of H1 is about |H1|²·(1 - γ²)/(2·n·γ²) for n segments,
-which is where the weights of the fit come from.
+averaged over overlapping Hann segments (Welch). The variance of H1 is about |H1|²·(1 -
+γ²)/(2·n·γ²) for n segments, which is where the weights of the fit come from.
 """
 
 from dataclasses import dataclass
@@ -32,9 +32,7 @@ class FrequencyResponse:
     coherence: FloatArray
     sample_rate: float
 
-    def band(
-        self, low: float, high: float, least_coherence: float = 0.0
-    ) -> "FrequencyResponse":
+    def band(self, low: float, high: float, least_coherence: float = 0.0) -> "FrequencyResponse":
         """The lines from `low` to `high` [Hz] with at least that coherence.
 
         Raises:
@@ -44,7 +42,8 @@ class FrequencyResponse:
         keep &= self.coherence >= least_coherence
         if np.count_nonzero(keep) < 8:
             raise ModelError(
-                f"frequency response: found {np.count_nonzero(keep)} lines from {low:g} to {high:g} Hz with "
+                f"frequency response: found {np.count_nonzero(keep)} lines "
+                f"from {low:g} to {high:g} Hz with "
                 f"coherence {least_coherence:g} or more, expected at least 8"
             )
         return FrequencyResponse(
@@ -52,7 +51,9 @@ class FrequencyResponse:
         )
 
     def weights(self) -> FloatArray:
-        """Weights for relative errors: √(γ²/(1 - γ²))/|H|, capped at a coherence of 0.999, shape (m,)."""
+        """Weights for relative errors: √(γ²/(1 - γ²))/|H|, capped at a coherence of 0.999, shape
+        (m,).
+        """
         coherence = np.clip(self.coherence, 1e-6, 0.999)
         return np.asarray(np.sqrt(coherence / (1.0 - coherence)) / np.abs(self.response))
 
@@ -65,7 +66,8 @@ def frequency_response(
     Args:
         u, y: input and output, shape (n,), finite.
         sample_rate: [Hz].
-        segment: length of an averaged segment [s]; shorter recordings use a quarter of their length.
+        segment: length of an averaged segment [s]; shorter recordings use a quarter of their
+            length.
 
     Raises:
         ModelError: the recording is shorter than 64 samples, or the input does not move.

@@ -1,9 +1,11 @@
-"""Output-error model by the prediction error method (5.29); L. Ljung, System Identification, chapters 7 and 10.
+"""Output-error model by the prediction error method (5.29); L. Ljung, System Identification,
+chapters 7 and 10.
 
     ŷ(t) = q⁻ⁿᵏ·B(q⁻¹)/F(q⁻¹)·u(t),   min over B, F of Σ (y - ŷ)²
 
-The gradient is filtered data: ∂ŷ/∂b_k = q⁻ᵏ/F·u and ∂ŷ/∂f_k = -q⁻ᵏ/F·ŷ. The search starts from the best of several
-Steiglitz-McBride iterations, runs Gauss-Newton with Levenberg's damping, and keeps F stable throughout.
+The gradient is filtered data: ∂ŷ/∂b_k = q⁻ᵏ/F·u and ∂ŷ/∂f_k = -q⁻ᵏ/F·ŷ. The search starts from the
+best of several Steiglitz-McBride iterations, runs Gauss-Newton with Levenberg's damping, and keeps
+F stable throughout.
 """
 
 from dataclasses import dataclass

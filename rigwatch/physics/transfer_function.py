@@ -2,9 +2,12 @@
 
     y(t) = B(q⁻¹)/A(q⁻¹)·u(t),   A = 1 + a1·q⁻¹ + … + an·q⁻ⁿ
 
-The filter carries its state from call to call, in transposed direct form II, so that cutting a signal into blocks
-changes no bit of the result.
+The filter carries its state from call to call, in transposed direct form II, so that cutting a
+signal into blocks changes no bit of the result.
 """
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
 
 from dataclasses import dataclass
 

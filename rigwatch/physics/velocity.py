@@ -1,15 +1,16 @@
 """Velocity from an accelerometer alone (theory 1.3), without the lead that a high-pass brings.
 
-A third-order Butterworth high-pass H(s) = s³/D(s), D = s³ + 2·c·s² + 2·c²·s + c³, removes what a piezo cannot know, and
-an integrator does the rest. Well above the corner c [rad/s] the high-pass leads by 2·c/ω, and the piezo's own corner p
-[rad/s] by another p/ω: enough to move the zero crossings of v, and with them sgn(v), by several samples. A zero at
--(2·c + p) in place of one at the origin takes both back to first order:
+A third-order Butterworth high-pass H(s) = s³/D(s), D = s³ + 2·c·s² + 2·c²·s + c³, removes what a
+piezo cannot know, and an integrator does the rest. Well above the corner c [rad/s] the high-pass
+leads by 2·c/ω, and the piezo's own corner p [rad/s] by another p/ω: enough to move the zero
+crossings of v, and with them sgn(v), by several samples. A zero at -(2·c + p) in place of one at
+the origin takes both back to first order:
 
     v/a = s·(s + 2·c + p) / D(s)          lead-compensated
     v/a = s² / D(s)                       plain
 
-Both have a zero at the origin left, so a bias of the accelerometer does not become a velocity. The bilinear transform
-makes the integrator trapezoidal; its pole has cancelled, so nothing drifts.
+Both have a zero at the origin left, so a bias of the accelerometer does not become a velocity. The
+bilinear transform makes the integrator trapezoidal; its pole has cancelled, so nothing drifts.
 """
 
 import numpy as np

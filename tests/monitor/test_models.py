@@ -1,0 +1,143 @@
+"""Commissioning, model files, friction filter, limits, and the measured EMPS."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from monitor_rig import RATE, SINE, friction, model, run
+from scipy.io import loadmat
+from scipy.stats import chi2
+
+from monitor.commission import commission
+from monitor.friction_filter import fit_friction_filter
+from monitor.inertia import commission_inertia, kernels
+from monitor.limits import chance_a_look, rules_for
+from monitor.model_file import RigModel, load_model, model_text
+from monitor.pipeline import Monitor
+from monitor.recordings import Recording, recording_of
+from monitor.thresholds import tail_factor, thesis_thresholds
+from rigwatch.physics.transfer_function import TransferFunction
+from rigwatch.wire.errors import ConfigError, ModelError
+from rigwatch.wire.messages import Column, SampleBlock
+
+
+def saved(found: RigModel, folder: Path) -> Path:
+    path = folder / "model.toml"
+    path.write_text(model_text(found), encoding="utf-8")
+    return path
+
+
+def test_a_model_file_read_back_is_the_same(tmp_path: Path) -> None:
+    assert load_model(saved(model(), tmp_path)) == model()
+
+
+def test_commissioning_finds_the_rig() -> None:
+    found = model()
+    assert found.velocity.sensor_corner == pytest.approx(0.5, abs=0.1)
+    assert found.noise.residual == pytest.approx(0.03, rel=0.2)
+    assert found.friction.explained > 0.99
+    assert found.signature[1] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("hop = 1", "hopp = 1", "hop"),
+        ("hop = 1", "hop = 0", "window.hop"),
+        ('"acceleration"]', '"acceleration", "more"]', "channels"),
+        ("a = [1.0, -", "a = [1.0, -9", "stable"),
+    ],
+)
+def test_a_wrong_model_file_is_told(tmp_path: Path, old: str, new: str, says: str) -> None:
+    path = saved(model(), tmp_path)
+    path.write_text(path.read_text().replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(ConfigError, match=says):
+        load_model(path)
+
+
+def test_a_missing_recording_is_told() -> None:
+    healthy = recording_of("healthy", "healthy", RATE, run(SINE, 8.0))
+    with pytest.raises(ModelError, match="no chirp recording"):
+        commission([healthy])
+
+
+def test_a_friction_recording_without_friction_is_told() -> None:
+    parts = [
+        recording_of("chirp", "chirp", RATE, run(SINE, 40.0)),
+        recording_of("healthy", "healthy", RATE, run(SINE, 10.0)),
+        recording_of("friction", "calm", RATE, run(SINE, 10.0)),
+    ]
+    with pytest.raises(ModelError):
+        commission(parts)
+
+
+def test_the_friction_filter_is_found_with_its_signature() -> None:
+    true = TransferFunction.of([-1.0, 1.8, -0.8], [1.0, -1.8, 0.803])
+    t = np.arange(1200)
+    v = 0.5 * np.sin(0.196 * t) + 0.1 * np.sin(0.05 * t)
+    y = true.simulate(np.sign(v) + 1.2 * v)
+    y = y + 0.002 * np.random.default_rng(5).standard_normal(t.size)
+    found = fit_friction_filter(v, y, skip=0, gammas=np.arange(0.0, 2.6, 0.2))
+    assert found.gamma == pytest.approx(1.2, abs=0.21)
+    assert found.explained > 0.999
+
+
+def test_known_friction_of_another_level_scales_the_estimate() -> None:
+    weak = recording_of("friction", "weak", RATE, run(SINE, 16.0, friction(10.0, 0.2), seed=31))
+    strong = recording_of("friction", "known", RATE, run(SINE, 16.0, friction(10.0), seed=13))
+    assert weak.sha256 != strong.sha256
+
+
+def test_the_factor_keeps_the_chance_it_promises() -> None:
+    rules = rules_for(model())
+    chance = chance_a_look(model().decision.false_alarm, model().sample_rate)
+    assert np.exp(-(rules.factor**2) / 2.0) == pytest.approx(chance, rel=1e-6)
+    assert chi2.sf(rules.limit_64, 64) == pytest.approx(chance, rel=1e-3)
+    assert 5.0 < tail_factor(1e-3, 1e6) < 6.5
+
+
+def test_published_thresholds_are_mean_and_three_deviations() -> None:
+    theta = np.random.default_rng(6).standard_normal((50, 2)) + 5.0
+    limits = thesis_thresholds(theta)
+    assert np.allclose(limits.high - limits.low, 6.0 * theta.std(axis=0, ddof=1))
+    assert limits.left(np.array([[50.0, 5.0]]))[0] == 1.0
+
+
+def test_kernels_differentiate_parabolas_exactly() -> None:
+    w, first, second = kernels(20, 1000.0)
+    time = -np.arange(-20, 21) / 1000.0
+    assert w.sum() == pytest.approx(1.0)
+    assert first @ (2.0 * time) == pytest.approx(2.0)
+    assert second @ (3.0 * time**2 + time + 7.0) == pytest.approx(6.0, rel=1e-6)
+
+
+def measured(name: str) -> Recording:
+    folder = os.environ.get("RIGWATCH_DATA", "")
+    if not folder:
+        if os.environ.get("CI"):
+            pytest.fail("RIGWATCH_DATA is not set: it names the folder with the measured data")
+        pytest.skip("RIGWATCH_DATA is not set")
+    data = loadmat(Path(folder) / "emps" / name)
+    force = float(np.ravel(data["gtau"])[0]) * data["vir"].ravel()
+    return recording_of("healthy", name, 1000.0, {"force": force, "position": data["qm"].ravel()})
+
+
+def test_emps_estimates_settle_at_the_published_friction() -> None:
+    """Published: 20.39 N Coulomb, 203.5 N/(m/s) viscous, 95.11 kg (Janot, Gautier, Brunot 2019)."""
+    recording = measured("DATA_EMPS.mat")
+    found = commission_inertia([recording])
+    assert found.plant.mass == pytest.approx(95.11, rel=0.01)  # type: ignore[union-attr]
+    at = np.arange(recording.channel("force").size, dtype=np.int64)
+    columns = tuple(
+        Column(name, unit, recording.channel(name))
+        for name, unit in (("force", "N"), ("position", "m"))
+    )
+    block = SampleBlock("emps", 1, 0, at * 1000, at * 1_000_000, columns)
+    result = Monitor(found).update(block)
+    assert result is not None
+    for name, published in (("theta1", 20.39), ("theta2", 203.5)):
+        settled = result.estimates.column(name).values[8000:]
+        assert np.max(np.abs(settled / published - 1.0)) < 0.05
+    departure = next(c for c in result.conditions if c.name == "departure")
+    assert not departure.active.any()
