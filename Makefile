@@ -1,4 +1,4 @@
-# `make demo` and `make test` do all the set-up on a machine with Python 3.11 to 3.13 and make.
+# `make demo` and `make test` do all the set-up on a machine with Python 3.11 or newer and make.
 
 VENV ?= .venv
 PYTHON_IN := $(VENV)/bin/python

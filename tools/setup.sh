@@ -1,7 +1,7 @@
 #!/bin/sh
 # Makes the virtual environment and puts the locked packages into it: setup.sh VENV LOCK...
 #
-# Needs a Python from 3.11 to 3.13 and nothing else. Files that the locks do not name by hash are
+# Needs a Python from 3.11 to 3.14, for which the locks have files, and nothing else. Files that the locks do not name by hash are
 # refused; which index pip asks is the user's own setting.
 set -eu
 cd "$(dirname "$0")/.."
@@ -9,18 +9,18 @@ venv=$1
 shift
 
 fits() {
-    "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null
+    "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))' 2>/dev/null
 }
 
 find_python() {
-    for candidate in ${PYTHON:-} python3 python3.13 python3.12 python3.11 python; do
+    for candidate in ${PYTHON:-} python3 python3.14 python3.13 python3.12 python3.11 python; do
         if fits "$candidate"; then
             echo "$candidate"
             return
         fi
     done
     found=$(python3 --version 2>&1) || found="no python3"
-    echo "setup: found $found, expected Python 3.11, 3.12 or 3.13" >&2
+    echo "setup: found $found, expected Python 3.11, 3.12, 3.13 or 3.14" >&2
     echo "setup: install one of them, or name it: make PYTHON=/path/to/python3.12 ..." >&2
     exit 1
 }
