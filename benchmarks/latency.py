@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from benchmarks.live_rig import LiveRig, live_rig
 from benchmarks.table import Row
-from rigwatch.wire.realtime import prepare_for_real_time, raise_priority
+from rigwatch.wire.realtime import MONITOR, prepare_for_real_time, raise_priority
 
 if TYPE_CHECKING:
     from sim_plant.serve.serial_server import SerialServer
@@ -178,7 +178,7 @@ def main(role: str, config: str, out: str) -> None:
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
-    raise_priority()
+    raise_priority(MONITOR)
     ROLES[role](Path(config), Path(out), stop)
 
 

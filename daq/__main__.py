@@ -17,7 +17,7 @@ from daq.supervisor import Supervisor
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.heartbeat import Heartbeat
-from rigwatch.wire.realtime import prepare_for_real_time, raise_priority
+from rigwatch.wire.realtime import DAQ, prepare_for_real_time, raise_priority
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.ring import SampleRing
 
@@ -53,7 +53,7 @@ def run(path: Path | str, stop: threading.Event) -> None:
     """
     config = load_rig(path)
     adapter = adapter_for(config.daq.device, config.channels)
-    raise_priority()
+    raise_priority(DAQ)
     bus = connect(config, "daq")
     try:
         acquire(config, adapter, bus, stop)

@@ -23,7 +23,7 @@ from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.heartbeat import Heartbeat
 from rigwatch.wire.messages import Alarm, Event, Gap, SampleBlock
-from rigwatch.wire.realtime import prepare_for_real_time, raise_priority
+from rigwatch.wire.realtime import MONITOR, prepare_for_real_time, raise_priority
 from rigwatch.wire.rig_config import MonitorSection, RigConfig, load_rig, section_or_error
 from rigwatch.wire.sample_reader import SampleReader
 from rigwatch.wire.topics import ALARMS, ALIVE_KEY, COMMANDS, ESTIMATES, EVENTS, HEALTH
@@ -227,7 +227,7 @@ def run(path: Path | str) -> int:
     model = suitable_model(config, path)
     # Before the bus is joined, so that one who is seen there is ready to judge.
     compile_kernels(model)
-    raise_priority()
+    raise_priority(MONITOR)
     bus = connect(config, "monitor")
     try:
         process = MonitorProcess(config, path, model, bus)

@@ -20,7 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Route until a signal ends it."""
     from rigwatch.wire.bus_zenoh import open_router
     from rigwatch.wire.heartbeat import Heartbeat
-    from rigwatch.wire.realtime import raise_priority
+    from rigwatch.wire.realtime import ROUTER, raise_priority
     from rigwatch.wire.rig_config import load_rig
 
     endpoint = load_rig(arguments.config).bus.listen
@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     heartbeat = Heartbeat("router")
-    raise_priority()
+    raise_priority(ROUTER)
     close = open_router(endpoint)
     heartbeat.ready(f"listens at {endpoint}")
     # Samples do not go through this loop: it only says that it turns.

@@ -4,28 +4,31 @@ import contextlib
 import gc
 import os
 import sys
-from pathlib import Path
 
 SWITCH_INTERVAL = 0.0005
 """A thread that waits for the interpreter lock gets it after this at the latest [s]."""
 
-_AUTOGROUP = Path("/proc/self/autogroup")
 NICENESS = -10
-"""Above what runs beside, below the kernel's own work."""
+"""Where real time is not allowed; of no use between sessions if the kernel groups by session."""
+MONITOR, DAQ, ROUTER = 1, 2, 3
+"""A monitor that catches up must hold up neither the samples nor what carries them."""
 
 
-def raise_priority() -> None:
-    """Be served before other work, where the system allows it (root, CAP_SYS_NICE, systemd's Nice).
+def raise_priority(urgency: int) -> None:
+    """Be served before other work, where the system allows it (root, CAP_SYS_NICE, systemd).
 
-    To be called before threads are started: on Linux each has its own niceness, taken over from the
-    one that starts it. Where the kernel groups processes by session, niceness counts within the
-    session only, and the session has one of its own; it is raised by the session's leader alone, so
-    that nobody's terminal is raised along.
+    Takes the real-time class SCHED_RR, else a lower niceness, else nothing. To be called before
+    threads are started, which take it over, and after long work such as compiling. The kernel
+    keeps a share of each core for the rest even from a process that runs wild.
+
+    Args:
+        urgency: who goes first among those that call this: `MONITOR`, `DAQ` or `ROUTER`.
     """
     with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(urgency))
+        return
+    with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, 0, min(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
-        if os.getsid(0) == os.getpid():
-            _AUTOGROUP.write_text(str(NICENESS))
 
 
 def prepare_for_real_time() -> None:
