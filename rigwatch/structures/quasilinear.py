@@ -27,6 +27,8 @@ FloatArray = NDArray[np.float64]
 
 STABLE = 2.78
 """Radians a step up to which the classical Runge-Kutta method does not blow up."""
+BLOWN_UP = 1e60
+"""What no sensitivity of a stable linear solution reaches."""
 UNOBSERVED = (
     "states that no signal shows follow the model from the guess, not the record",
     "they are replaced by the linear solution of each iteration",
@@ -50,6 +52,8 @@ def solve(problem: Problem, *, iterations: int = 25, scale: FloatArray | None = 
     found, step = [problem.guess], None
     for turn in range(iterations):
         swept = follower.sweep(found[-1])
+        if not np.abs(swept.slopes).max() < BLOWN_UP:
+            return Outcome(found[1:] or found, None, False, ("the linear solution blew up",))
         step = least_squares(problem.observed - swept.outputs, swept.slopes, problem.weight, wanted)
         if not turn:
             name = problem.sweeper.compiled.system.model.name

@@ -7,11 +7,12 @@ whole record, with the initial states that are known held fixed, each signal cou
 that it turned out to have.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rigwatch.structures.direct import solve as regression
 from rigwatch.structures.identification import Outcome, settled
 from rigwatch.structures.least_squares import Step, require_determined
 from rigwatch.structures.least_squares import solve as least_squares
@@ -21,8 +22,8 @@ from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
 
-SHORTEST = 20
-"""Samples of the shortest windows; one period of the fastest motion where that is longer."""
+SHORTEST = 4
+"""Samples of the shortest windows; a period of the guess's fastest motion if longer."""
 GROWTH = 4
 STEPS = 12
 """Most Gauss-Newton steps at each horizon but the last."""
@@ -30,6 +31,10 @@ FOUR_DIGITS = 1e-4
 """Share of a signal's rms below which no signal's error is believed, whatever the fit says."""
 FINER = 2
 """How much shorter the integration steps are over the whole record, where errors add up."""
+SMALLEST = 1e-150
+"""Noise of a signal that is always zero."""
+ROUNDING = 0.01
+"""Share of the last step that may not matter where rounding keeps the errors from falling."""
 HALVINGS = 12
 UNCERTAIN = 0.5
 """Share of an unknown's size that its standard deviation may reach before it is named."""
@@ -74,13 +79,29 @@ def _grown(problem: Problem) -> list[FloatArray]:
     found, count = [problem.guess], len(problem.free)
     if not count or not problem.sweeper.compiled.system.states:
         return found
-    parameters = problem.start
+    starts = [problem.start, *_regressed(problem)]
     for horizon in _horizons(problem):
-        parameters = Windows(problem, horizon).refined(parameters, STEPS)
+        tried = [Windows(problem, horizon) for _ in starts]
+        ends = [one.refined(start, STEPS) for one, start in zip(tried, starts, strict=True)]
+        starts = [ends[int(np.argmin([one.cost for one in tried]))]]
         unknowns = found[-1].copy()
-        unknowns[:count] = parameters[problem.free]
+        unknowns[:count] = starts[0][problem.free]
         found.append(unknowns)
     return found
+
+
+def _regressed(problem: Problem) -> list[FloatArray]:
+    """All parameters as the direct approach finds them, where it finds any: a rival of the guess.
+
+    Nothing is simulated there, so that no guess is too far off for it.
+    """
+    try:
+        found = regression(replace(problem, loose=problem.loose[:0]))
+    except (ModelError, np.linalg.LinAlgError):
+        return []
+    parameters = problem.start.copy()
+    parameters[problem.free] = found.iterations[-1]
+    return [parameters] if np.isfinite(parameters).all() else []
 
 
 def _horizons(problem: Problem) -> list[int]:
@@ -115,7 +136,7 @@ class _Whole:
             step = least_squares(errors, slopes, self.problem.weight, scale)
             moved = self._shorter(now, step.change, errors, scale)
             if moved is None:
-                good = True
+                good = settled(now, now + ROUNDING * step.change)
                 break
             before, (now, errors, slopes) = now, moved
             found.append(now)
@@ -158,10 +179,8 @@ class _Whole:
         """Standard deviation of each output's errors, not below four digits of the signal."""
         if self.scale is not None:
             return self.scale
-        size = np.sqrt(np.nanmean(self.problem.observed**2, axis=0))
         weight = self.problem.weight[:, None] * np.isfinite(errors)
-        spread = np.nansum(weight * np.nan_to_num(errors) ** 2, axis=0)
-        found = np.sqrt(spread / np.maximum(weight.sum(axis=0), 1e-300))
-        return np.asarray(
-            np.maximum(np.nan_to_num(found), np.nan_to_num(FOUR_DIGITS * size)) + 1e-300
-        )
+        total = np.maximum(weight.sum(axis=0), 1e-300)
+        found = np.sqrt((weight * np.nan_to_num(errors) ** 2).sum(axis=0) / total)
+        size = np.sqrt((weight * np.nan_to_num(self.problem.observed) ** 2).sum(axis=0) / total)
+        return np.asarray(np.maximum(np.maximum(found, FOUR_DIGITS * size), SMALLEST))

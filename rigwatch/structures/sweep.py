@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rigwatch.physics.engine.compiled import CompiledSystem, compile_system, load_source
 from rigwatch.physics.engine.scope import symbol
 from rigwatch.physics.engine.system import System
+from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
 
@@ -212,6 +213,12 @@ class Sweeper:
 
 
 def sweeper(system: System) -> Sweeper:
-    """The kernels of `system` without its probes, from the cache where they are known."""
+    """The kernels of `system` without its probes, from the cache where they are known.
+
+    Raises:
+        ModelError: the system has no states.
+    """
     compiled = compile_system(without_probes(system))
+    if not isinstance(compiled.kernel, ModuleType):
+        raise ModelError(f"{system.model.name}: found no states, expected equations of motion")
     return Sweeper(compiled, load_source(_SOURCE.replace("{name}", compiled.kernel.__name__)))

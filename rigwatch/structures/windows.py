@@ -21,12 +21,26 @@ ENOUGH = 1e-3
 HALVINGS = 8
 
 
+def spreads(signals: FloatArray) -> FloatArray:
+    """Standard deviation of each column (samples, k) over what is not missing; 1 if that is 0."""
+    there = np.isfinite(signals)
+    count = np.maximum(there.sum(axis=0), 1)
+    mean = np.where(there, signals, 0.0).sum(axis=0) / count
+    found = np.sqrt(np.where(there, (signals - mean) ** 2, 0.0).sum(axis=0) / count)
+    return np.where(found > 0, found, 1.0)
+
+
 @dataclass(eq=False)
 class Windows:
-    """A record from its first sample on, cut into windows of one length."""
+    """A record from its first sample on, cut into windows of one length.
+
+    Attributes:
+        cost: sum of the scaled squares of the errors after the last refinement.
+    """
 
     problem: Problem
     length: int
+    cost: float = np.inf
 
     def __post_init__(self) -> None:
         problem, length = self.problem, self.length
@@ -36,8 +50,7 @@ class Windows:
         self._measured = problem.recording.outputs[rows]
         states = initial_states(problem.sweeper.compiled.system, problem.recording)
         self._initial = states[self._starts]
-        spread = np.nanstd(problem.observed, axis=0)
-        self._scale = np.where(np.isfinite(spread) & (spread > 0), spread, 1.0)
+        self._scale = spreads(problem.observed)
         weight = problem.weight[rows - problem.first]
         self._factor = np.where(np.isfinite(self._measured), np.sqrt(weight)[..., None], 0.0)
         self._factor = self._factor / self._scale
@@ -49,6 +62,7 @@ class Windows:
         """
         free = self.problem.free
         now, errors, slopes = parameters, *self._run(parameters, self._initial)
+        self.cost = float(np.sum(errors**2))
         for _ in range(most):
             if not np.isfinite(slopes).all():
                 return parameters
@@ -57,6 +71,7 @@ class Windows:
             if moved is None:
                 break
             before, (now, self._initial, errors, slopes) = now, moved
+            self.cost = float(np.sum(errors**2))
             if np.all(np.abs(now - before)[free] <= ENOUGH * np.abs(now[free])):
                 break
         return now
