@@ -62,6 +62,7 @@ class Evidence(NamedTuple):
         jump: energy explained by the jump beyond the rivals [(m/s^2)^2].
         together: share of y² that rivals and jump explain together.
         dry: share of y² in the Coulomb part of the friction fit, zero where θ1 is negative.
+        peak: share of y² in its largest sample; near 1 for a spike.
     """
 
     explained: float
@@ -72,6 +73,7 @@ class Evidence(NamedTuple):
     jump: float
     together: float
     dry: float
+    peak: float
 
 
 def new_history(b: FloatArray, a: FloatArray) -> History:
@@ -106,13 +108,14 @@ def weigh(history: History, ref: Reference, seq: int, since: int, count: int) ->
     data = np.zeros((n, _RIVALS + 3))
     _fill_rivals(data, ref, seq, n)
     _fill_friction(data, history, since, n)
-    rest = 0.0
+    rest = peak = 0.0
     for k in range(n):
         at = (history.head[0] - n + k) % HISTORY
         data[k, _RIVALS + 2] = history.rows[at, Y]
         rest += history.rows[at, AT_REST] / n
+        peak = max(peak, history.rows[at, Y] ** 2)
     gram = data.T @ data
-    return _compare(gram, rest)
+    return _compare(gram, rest, peak)
 
 
 @njit(cache=True)
@@ -171,7 +174,7 @@ def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> No
 
 
 @njit(cache=True)
-def _compare(gram: FloatArray, rest: float) -> Evidence:
+def _compare(gram: FloatArray, rest: float, peak: float) -> Evidence:
     size = gram.shape[0]
     y, g1, g2 = size - 1, _RIVALS, _RIVALS + 1
     yy = max(gram[y, y], 1e-30)
@@ -192,7 +195,8 @@ def _compare(gram: FloatArray, rest: float) -> Evidence:
     sign = 1.0 if left[g1, y] > 0.0 else -1.0
     rho = sign * np.sqrt(min(jump / remains, 1.0)) if remains > 0.0 else 0.0
     together = 1.0 - (remains - jump) / yy
-    return Evidence(explained, sign * jump / yy, rho, rest, 1.0 - remains / yy, jump, together, dry)
+    rivals, share = 1.0 - remains / yy, sign * jump / yy
+    return Evidence(explained, share, rho, rest, rivals, jump, together, dry, peak / yy)
 
 
 @njit(cache=True)

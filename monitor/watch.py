@@ -365,7 +365,8 @@ def _verdict(before, since, span, moved_v, moved_x, moved_a, rules, ref, state, 
     thin = evidence.share > 0.3 and evidence.rho > 0.6 and since >= span
     slips = evidence.rest > 0.03 and evidence.together > 0.7 and since >= span and before != OTHER
     sure = moved_x or evidence.share > 0.1
-    friction = moved_a and sure and (certain or jumps or follows or thin or slips)
+    spike = evidence.peak > 0.5
+    friction = moved_a and sure and not spike and (certain or jumps or follows or thin or slips)
     state.number[_AGREED] = state.number[_AGREED] + 1 if friction else 0
     if before in (FRICTION, STICKING) or state.number[_AGREED] >= 3:
         return STICKING if evidence.rest >= 0.5 and moved_a else FRICTION
