@@ -95,7 +95,7 @@ def run_tool(name: str, *words: str, path: Path) -> "subprocess.CompletedProcess
 def test_without_a_python_that_fits_one_is_told_which_do(bare_path: Path, tmp_path: Path) -> None:
     done = run_tool("setup.sh", str(tmp_path / "venv"), "requirements/lock.txt", path=bare_path)
     assert done.returncode == 1
-    assert "found Python 3.9.2, expected Python 3.11, 3.12 or 3.13" in done.stderr
+    assert "found Python 3.9.2, expected Python 3.11, 3.12, 3.13 or 3.14" in done.stderr
     assert not (tmp_path / "venv").exists()
 
 
