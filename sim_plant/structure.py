@@ -84,7 +84,7 @@ def simulate(
         ConfigError: the file cannot be read, or lacks what a simulation needs.
     """
     raw = _read(Path(file))
-    time: Floats = np.arange(round(duration / dt) + 1, dtype=np.float64) * np.float64(dt)
+    time = sample_times(dt, duration)
     try:
         _replace(raw, values or {})
         chosen = raw.get("loads", {}) if loads is None else loads
@@ -99,6 +99,11 @@ def simulate(
         for index, node in enumerate(raw["nodes"])
     }
     return StructureRecord(time, columns | dict(recorded or {}))
+
+
+def sample_times(dt: float, duration: float) -> Floats:
+    """Times from 0 to `duration`, both included, shape (n,) [s]."""
+    return np.arange(round(duration / dt) + 1, dtype=np.float64) * np.float64(dt)
 
 
 def with_noise(

@@ -39,10 +39,12 @@ class Speed(NamedTuple):
     Attributes:
         whole: largest eigenvalue of its Jacobian, decay included [rad/s].
         turning: of its oscillations [rad/s].
+        growing: largest rate at which a disturbance grows [1/s]; 0 where all is stable.
     """
 
     whole: float
     turning: float
+    growing: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +168,7 @@ def problem_of(
     time = np.arange(first, len(recording), dtype=np.float64) * np.float64(recording.dt)
     made = Problem(
         tools, recording, first, tools.compiled.parameters, initial, loose,
-        weights(weighting, time), substeps or 1, Speed(0.0, 0.0),
+        weights(weighting, time), substeps or 1, Speed(0.0, 0.0, 0.0),
     )  # fmt: skip
     _require_samples(made)
     speed = _fastest(made)
@@ -183,9 +185,10 @@ def _fastest(problem: Problem) -> Speed:
     )
     n = nominal.shape[1]
     if not n or not np.isfinite(slopes).all():
-        return Speed(0.0, 0.0)
+        return Speed(0.0, 0.0, 0.0)
     values = np.linalg.eigvals(slopes[..., -n:])
-    return Speed(float(np.abs(values).max()), float(np.abs(values.imag).max()))
+    growing = max(float(np.mean(values.real.max(axis=-1))), 0.0)
+    return Speed(float(np.abs(values).max()), float(np.abs(values.imag).max()), growing)
 
 
 def require_fine_enough(problem: Problem, omega: float, limit: float, reason: str) -> None:

@@ -33,6 +33,8 @@ FINER = 2
 """How much shorter the integration steps are over the whole record, where errors add up."""
 SMALLEST = 1e-150
 """Noise of a signal that is always zero."""
+MOST_GROWTH = 4.0
+"""Natural logarithm of what a disturbance may grow by within a window."""
 ROUNDING = 0.01
 """Share of the last step that may not matter where rounding keeps the errors from falling."""
 HALVINGS = 12
@@ -58,7 +60,9 @@ def solve(
     Raises:
         ModelError: the record does not determine the unknowns, and `partial` is not set.
     """
-    found = [*_grown(problem)]
+    found = _grown(problem)
+    if _unstable(problem):
+        return _windowed(problem, found, iterations, partial)
     whole = _Whole(problem, scale)
     turns, step, good = whole.refined(found[-1], iterations)
     found += turns
@@ -66,6 +70,34 @@ def solve(
     if not partial:
         require_determined(problem.names, step.blind, name)
     return Outcome(found, step.covariance, good, (), _uncertain(problem, found[-1], step))
+
+
+def _unstable(problem: Problem) -> bool:
+    """Whether a disturbance would grow beyond use over the whole record."""
+    duration = (len(problem.recording) - problem.first) * problem.recording.dt
+    return problem.speed.growing * duration > MOST_GROWTH
+
+
+def _windowed(problem: Problem, found: list[FloatArray], iterations: int, partial: bool) -> Outcome:
+    """The end for a plant that runs away: windows only as long as it can be followed."""
+    if len(problem.loose):
+        raise ModelError(
+            f"{problem.sweeper.compiled.system.model.name}: found a model that runs away, which"
+            " does not determine initial states from the whole record; expected known ones"
+        )
+    parameters, _ = problem.split(found[-1])
+    windows = Windows(problem, _horizons(problem)[-1])
+    last = windows.refined(parameters, iterations, 1e-6)
+    step = windows.judged(last)
+    found.append(last[problem.free])
+    if not partial:
+        name = problem.sweeper.compiled.system.model.name
+        require_determined(problem.names, step.blind, name)
+    vague = _uncertain(problem, found[-1], step)
+    remark = "the model runs away: fitted over windows with states of their own"
+    return Outcome(
+        found, step.covariance, settled(found[-1], found[-1] + step.change), (remark,), vague
+    )
 
 
 def _uncertain(problem: Problem, found: FloatArray, step: Step) -> tuple[str, ...]:
@@ -106,12 +138,15 @@ def _regressed(problem: Problem) -> list[FloatArray]:
 
 def _horizons(problem: Problem) -> list[int]:
     samples = len(problem.recording) - problem.first
-    speed = max(problem.speed.turning, 1e-9)
-    horizon = max(SHORTEST, int(np.ceil(2 * np.pi / speed / problem.recording.dt)))
-    found = []
-    while horizon * 2 <= samples:
-        found.append(horizon)
-        horizon *= GROWTH
+    speed, dt = problem.speed, problem.recording.dt
+    longest = samples / 2
+    if speed.growing > 0:
+        longest = min(longest, MOST_GROWTH / speed.growing / dt)
+    period = 2 * np.pi / max(speed.whole, 1e-9) / dt
+    horizon = int(max(min(np.ceil(period), longest), min(SHORTEST, samples)))
+    found = [horizon]
+    while found[-1] * GROWTH <= longest:
+        found.append(found[-1] * GROWTH)
     return found
 
 

@@ -6,12 +6,14 @@ one step solves min Σ_w |e_w − A_w·δp − B_w·δx_w|². The δx_w are proj
 windows' states are iterated together with the parameters (lifted), hence one simulation a step.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.physics.engine.fit import initial_states
+from rigwatch.structures.least_squares import Step
+from rigwatch.structures.least_squares import solve as least_squares
 from rigwatch.structures.problem import Problem
 
 FloatArray = NDArray[np.float64]
@@ -28,6 +30,33 @@ def spreads(signals: FloatArray) -> FloatArray:
     mean = np.where(there, signals, 0.0).sum(axis=0) / count
     found = np.sqrt(np.where(there, (signals - mean) ** 2, 0.0).sum(axis=0) / count)
     return np.where(found > 0, found, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Starts:
+    """Singular vectors of the derivatives by the initial states, window by window."""
+
+    left: FloatArray
+    inverse: FloatArray
+
+    @classmethod
+    def of(cls, slopes: FloatArray) -> "_Starts":
+        length = np.linalg.norm(slopes, axis=(0, 1))
+        length = np.where(length > 0, length, 1.0)
+        left, sizes, across = np.linalg.svd(slopes / length, full_matrices=False)
+        seen = sizes > 1e-10 * sizes[:, :1]
+        inverse = np.where(seen, 1.0 / np.where(seen, sizes, 1.0), 0.0)
+        back = np.swapaxes(across, 1, 2) / length[:, None] * inverse[:, None, :]
+        return cls(np.where(seen[:, None, :], left, 0.0), back)
+
+    def without(self, columns: FloatArray) -> FloatArray:
+        """What no initial states could have made of `columns` (windows, k, c)."""
+        return np.asarray(columns - self.left @ (np.swapaxes(self.left, 1, 2) @ columns))
+
+    def solved(self, errors: FloatArray) -> FloatArray:
+        """The initial states that explain `errors` (windows, k) best, shape (windows, n)."""
+        along = np.einsum("wki,wk->wi", self.left, errors)
+        return np.asarray(np.einsum("wni,wi->wn", self.inverse, along))
 
 
 @dataclass(eq=False)
@@ -55,7 +84,7 @@ class Windows:
         self._factor = np.where(np.isfinite(self._measured), np.sqrt(weight)[..., None], 0.0)
         self._factor = self._factor / self._scale
 
-    def refined(self, parameters: FloatArray, most: int) -> FloatArray:
+    def refined(self, parameters: FloatArray, most: int, enough: float = ENOUGH) -> FloatArray:
         """Better values of the free parameters; all of them are given and returned, shape (n_p,).
 
         What leaves the finite numbers, or does not lower the errors, is left as it was.
@@ -72,7 +101,7 @@ class Windows:
                 break
             before, (now, self._initial, errors, slopes) = now, moved
             self.cost = float(np.sum(errors**2))
-            if np.all(np.abs(now - before)[free] <= ENOUGH * np.abs(now[free])):
+            if np.all(np.abs(now - before)[free] <= enough * np.abs(now[free])):
                 break
         return now
 
@@ -91,22 +120,26 @@ class Windows:
     def _step(self, errors: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Changes of the free parameters (m,) and of the initial states (windows, n)."""
         count = len(self.problem.free)
-        by_parameter, by_start = slopes[..., :count], slopes[..., count:]
-        length = np.linalg.norm(by_start, axis=(0, 1))
-        length = np.where(length > 0, length, 1.0)
-        left, sizes, across = np.linalg.svd(by_start / length, full_matrices=False)
-        seen = sizes > 1e-10 * sizes[:, :1]
-        left = np.where(seen[:, None, :], left, 0.0)
-        rest = errors - np.einsum("wki,wi->wk", left, np.einsum("wki,wk->wi", left, errors))
-        along = np.einsum("wki,wkj->wij", left, by_parameter)
-        clean = by_parameter - left @ along
-        flat = clean.reshape(-1, count)
-        size = np.linalg.norm(flat, axis=0)
+        starts = _Starts.of(slopes[..., count:])
+        clean = starts.without(slopes[..., :count]).reshape(-1, count)
+        rest = starts.without(errors[..., None]).ravel()
+        size = np.linalg.norm(clean, axis=0)
         size = np.where(size > 0, size, 1.0)
-        change = np.linalg.lstsq(flat / size, rest.ravel(), rcond=1e-9)[0] / size
-        inner = np.einsum("wki,wk->wi", left, errors - by_parameter @ change)
-        inner = np.where(seen, inner / np.where(seen, sizes, 1.0), 0.0)
-        return change, np.einsum("wij,wi->wj", across, inner) / length
+        change = np.linalg.lstsq(clean / size, rest, rcond=1e-9)[0] / size
+        return change, starts.solved(errors - slopes[..., :count] @ change)
+
+    def judged(self, parameters: FloatArray) -> Step:
+        """The last linear problem at what `refined` returned, with its covariance."""
+        errors, slopes = self._run(parameters, self._initial)
+        count = len(self.problem.free)
+        starts = _Starts.of(slopes[..., count:])
+        clean = starts.without(slopes[..., :count]).reshape(-1, 1, count)
+        rest = starts.without(errors[..., None]).reshape(-1, 1)
+        used = int((self._factor > 0).sum())
+        left = max(used - self._initial.size - count, 1)
+        step = least_squares(rest, clean, np.ones(len(rest)), np.ones(1))
+        more = (len(rest) - count) / left
+        return replace(step, covariance=step.covariance * more)
 
     def _shorter(
         self, now: FloatArray, change: FloatArray, shift: FloatArray, errors: FloatArray
