@@ -84,6 +84,12 @@ class Windows:
         self._factor = np.where(np.isfinite(self._measured), np.sqrt(weight)[..., None], 0.0)
         self._factor = self._factor / self._scale
 
+    @property
+    def rms(self) -> float:
+        """Root mean square error after the last refinement, in standard deviations of a signal."""
+        used = int((self._factor > 0).sum()) - self._initial.size - len(self.problem.free)
+        return float(np.sqrt(self.cost / max(used, 1)))
+
     def refined(self, parameters: FloatArray, most: int, enough: float = ENOUGH) -> FloatArray:
         """Better values of the free parameters; all of them are given and returned, shape (n_p,).
 
