@@ -1,4 +1,4 @@
-"""The numerical validation of theory 1.5: second-order plant, three faults, twenty seeds of noise.
+"""The numerical validation of theory 1.5: second-order plant, three faults, a hundred seeds of noise.
 
 The scheme as published: friction filter [3, 2, 0] from a recording with the known fault, window of
 300 samples moved on by 20, first 100 and last 200 samples left out, thresholds mean ± 3·sd of the
@@ -14,7 +14,7 @@ from benchmarks.table import Row
 from monitor.friction_filter import GAMMAS, VALIDATION_ORDERS, FrictionFilter, fit_friction_filter
 from monitor.thresholds import Thresholds, thesis_thresholds
 from monitor.window import new_window, windowed_least_squares
-from rigwatch.physics.transfer_function import FloatArray
+from rigwatch.physics.transfer_function import FloatArray, TransferFunction
 from sim_plant.second_order import FAULT_TIME, NOISE, STEP, Validation, validation
 
 WINDOW, HOP = 300, 20
@@ -25,7 +25,13 @@ TOP_SPEED = 0.1
 """Of the faulty plant, about."""
 SETTLED = FAULT_TIME + WINDOW * STEP
 """From here on the window holds nothing but faulty data [s]."""
-FILTER_SEEDS = range(900, 910)
+FILTER_SEEDS = range(900, 920)
+VELOCITY_SHARE = 0.2
+"""Share of the measured velocity in the one whose sign is taken; the rest is the integrated
+acceleration. Less of it lets the trapezoids' errors at the jumps last longer, more lets noise in.
+"""
+JUDGED = range(1000, 1100)
+"""Seeds of noise; none of them had a part in choosing anything here."""
 PUBLISHED = {
     1: "signature (0, 10), tracks within 1.6 s",
     2: "signature (1, 0.2), tracks within 1.5 s",
@@ -59,7 +65,7 @@ def known_fault(case: int) -> FrictionFilter:
     """
     runs = [validation(case, seed) for seed in FILTER_SEEDS]
     begun = runs[0].time >= FAULT_TIME
-    velocity = begun * np.mean([run.velocity_measured for run in runs], axis=0)
+    velocity = begun * np.mean([steadied(run) for run in runs], axis=0)
     residual = np.mean([_residual(run) for run in runs], axis=0)
     part = slice(int(FAULT_TIME / STEP) - HEAD, -TAIL)
     known = (velocity[part], residual[part], VALIDATION_ORDERS)
@@ -68,20 +74,37 @@ def known_fault(case: int) -> FrictionFilter:
     return viscous if viscous.explained > both.explained else both
 
 
-def sure(velocity: FloatArray) -> NDArray[np.bool_]:
-    """Samples whose sign the noise cannot have turned round, shape (n,).
+def steadied(run: Validation) -> FloatArray:
+    """Velocity from both sensors: the integrated acceleration, led back to the measured velocity,
+    shape (n,).
 
-    The others do not count in the window: a false sign is noise in a regressor, and takes from θ1
-    what it adds to θ2.
+        w(t) = (1 - K)·[ w(t-1) + h·(a(t-1) + a(t))/2 ] + K·v(t)
+
+    White noise of v comes through with √(K/(2 - K)) of its size, a third for K = 0.2. False signs
+    near v = 0 are noise in the regressor Ge[sgn v] and, as Ge remembers them, stay in it after v has
+    left: they take from θ1 what they add to θ2.
     """
-    bound = NOISE * np.max(np.abs(velocity[: int(FAULT_TIME / STEP)]))
+    a, v = run.acceleration_measured, run.velocity_measured
+    steps = np.concatenate([[0.0], 0.5 * STEP * (a[1:] + a[:-1])])
+    keeps = 1.0 - VELOCITY_SHARE
+    driven = keeps * steps + VELOCITY_SHARE * v
+    return TransferFunction.of([1.0], [1.0, -keeps]).simulate(driven)
+
+
+def sure(velocity: FloatArray) -> NDArray[np.bool_]:
+    """Samples whose sign what is left of the noise does not turn round, shape (n,); the others do
+    not count in the window.
+    """
+    bound = 0.5 * NOISE * np.max(np.abs(velocity[: int(FAULT_TIME / STEP)]))
     return np.asarray(np.abs(velocity) > bound)
 
 
 def track(run: Validation, friction: FrictionFilter) -> Track:
     """Windowed estimates of one run, with their thresholds."""
-    counts = sure(run.velocity_measured)
-    g1 = counts * friction.function.simulate(np.sign(run.velocity_measured))
+    velocity = steadied(run)
+    counts = sure(velocity)
+    g1 = counts * friction.function.simulate(np.sign(velocity))
+    # The measured velocity here: the steadied one shares the noise of the residual.
     g2 = counts * friction.function.simulate(run.velocity_measured)
     y = counts * _residual(run)
     part = slice(HEAD, run.time.size - TAIL)
@@ -102,7 +125,7 @@ def _residual(run: Validation) -> FloatArray:
 
 def run(quick: bool) -> list[Row]:
     """Two rows a case: the estimates, and the time at which they leave their thresholds."""
-    seeds = range(4 if quick else 20)
+    seeds = JUDGED[:4] if quick else JUDGED
     return [row for case in (1, 2, 3) for row in _rows(case, seeds)]
 
 
