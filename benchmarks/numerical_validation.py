@@ -1,4 +1,4 @@
-"""The numerical validation of theory 1.5: second-order plant, three faults, a hundred seeds of noise.
+"""The numerical validation of theory 1.5: second-order plant, three faults, 100 seeds of noise.
 
 The scheme as published: friction filter [3, 2, 0] from a recording with the known fault, window of
 300 samples moved on by 20, first 100 and last 200 samples left out, thresholds mean ± 3·sd of the
@@ -81,8 +81,8 @@ def steadied(run: Validation) -> FloatArray:
         w(t) = (1 - K)·[ w(t-1) + h·(a(t-1) + a(t))/2 ] + K·v(t)
 
     White noise of v comes through with √(K/(2 - K)) of its size, a third for K = 0.2. False signs
-    near v = 0 are noise in the regressor Ge[sgn v] and, as Ge remembers them, stay in it after v has
-    left: they take from θ1 what they add to θ2.
+    near v = 0 are noise in the regressor Ge[sgn v] and, as Ge remembers them, stay in it after v
+    has left: they take from θ1 what they add to θ2.
     """
     a, v = run.acceleration_measured, run.velocity_measured
     steps = np.concatenate([[0.0], 0.5 * STEP * (a[1:] + a[:-1])])
