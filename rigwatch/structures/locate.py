@@ -1,0 +1,192 @@
+"""Which spring changed: every coefficient of every spring tried against what was observed.
+
+First pass: one linear sweep along the observed trajectory gives the residual and its derivative by
+every candidate and every unknown first state at once (thesis 4.13, 4.14); the engine's score test
+ranks the candidates. Second pass: the best few are refitted with unknown first states and ranked by
+what they leave unexplained. Candidates whose directions, freed of the first states, have a cosine
+above 0.95 cannot be told apart by the record and stand in one class.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
+from rigwatch.structures.damage_refit import Refit, Stretch
+from rigwatch.structures.spring_model import SpringModel, split
+
+FloatArray = NDArray[np.float64]
+
+REFITTED = 5
+"""Candidates of the first pass that are refitted."""
+WORTH = 0.3
+"""Share of the best candidate's score that one must reach to be refitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One coefficient as the place of the damage.
+
+    Attributes:
+        name: of the coefficient.
+        spring: where it is.
+        kind: stiffness, quadratic or cubic.
+        score: χ²(1) of the first pass.
+        p_value: of this score as the best of all candidates by chance.
+        before: its value in the undamaged structure.
+        after: its value now, refitted where it was, else to first order.
+        deviation: standard deviation of `after`, NaN where it was not refitted.
+        chi2: what the refit leaves per degree of freedom, NaN where there was none.
+        alike: other candidates that the record cannot tell from it.
+        refit: the whole refit.
+    """
+
+    name: str
+    spring: str
+    kind: str
+    score: float
+    p_value: float
+    before: float
+    after: float
+    deviation: float
+    chi2: float
+    alike: tuple[str, ...]
+    refit: Refit | None
+
+    @property
+    def words(self) -> str:
+        """What happened to the spring."""
+        up = self.after > self.before
+        return {
+            "stiffness": "stiffer" if up else "softer",
+            "quadratic": "one-sided",
+            "cubic": "hardening" if up else "softening",
+        }[self.kind]
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """Candidates, the most likely first.
+
+    Attributes:
+        candidates: all of them.
+        first, last: samples that were used, the last excluded.
+        unseen: coefficients that hardly move the record, whatever becomes of them.
+    """
+
+    candidates: tuple[Candidate, ...]
+    first: int
+    last: int
+    unseen: tuple[str, ...]
+
+    @property
+    def best(self) -> Candidate:
+        """The most likely one."""
+        return self.candidates[0]
+
+
+def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Ranking:
+    """Rank every coefficient of every spring as the place of the damage.
+
+    Args:
+        stretch: data after the damage, with the undamaged parameters.
+        path: the undamaged model's states over the whole record, shape (samples, n).
+        refitted: how many candidates the second pass takes.
+    """
+    model, count = stretch.model, len(stretch.model.candidates)
+    residual, rows, fitted, scores = _scored(stretch, path)
+    shifts = _first_states(residual, rows, scores.strength)
+    state = model.shown_state(path, stretch.first)
+    listed = [_first_pass(stretch, scores, i) for i in np.argsort(-scores.score).tolist()]
+    chosen = [c for c in listed[:refitted] if c.score >= WORTH * listed[0].score]
+    places = {name: i for i, name in enumerate(model.candidates)}
+    done = [_refitted(stretch, c, state + shifts[places[c.name]]) for c in chosen]
+    done.sort(key=lambda c: c.chi2)
+    best = _with_classes(done[0], model, count)
+    weak = _unseen(model, stretch, rows, fitted, count)
+    return Ranking((best, *done[1:], *listed[len(chosen) :]), stretch.first, stretch.last, weak)
+
+
+def best_score(stretch: Stretch, path: FloatArray) -> float:
+    """Score of the best candidate over the stretch; arguments as of `locate`."""
+    return float(_scored(stretch, path)[3].score.max())
+
+
+def _scored(stretch: Stretch, path: FloatArray) -> tuple[FloatArray, FloatArray, Projector, Scores]:
+    """Scaled residual (k,), slopes (k, c + n), what the first states explain, and the scores."""
+    model = stretch.model
+    errors, slopes = model.along_record(stretch.parameters, path, stretch.first, stretch.last)
+    use, count = np.isfinite(errors), len(model.candidates)
+    residual = (errors / stretch.sigma)[use]
+    rows = (slopes / stretch.sigma[:, None])[use]
+    fitted = Projector(np.zeros((1, len(rows), 0)), rows[None, :, count:])
+    scores = score(residual[None], rows[None, :, :count], fitted, 1.0)
+    return residual, rows, fitted, scores
+
+
+def _first_states(residual: FloatArray, rows: FloatArray, strength: FloatArray) -> FloatArray:
+    """First-order change of the first states that goes with each candidate, shape (c, n)."""
+    count = len(strength)
+    left = residual[:, None] - rows[:, :count] * strength
+    return np.asarray(np.linalg.lstsq(rows[:, count:], left, rcond=1e-10)[0].T)
+
+
+def _first_pass(stretch: Stretch, scores: Scores, index: int) -> Candidate:
+    model = stretch.model
+    name = model.candidates[index]
+    names = list(model.problem.sweeper.compiled.system.parameters)
+    before = float(stretch.parameters[names.index(name)])
+    after = before + float(scores.strength[index])
+    spring, kind = split(name, model.structure)
+    numbers = float(scores.score[index]), float(scores.corrected[index])
+    nan = float("nan")
+    return Candidate(name, spring, kind, *numbers, before, after, nan, nan, (), None)
+
+
+def _refitted(stretch: Stretch, candidate: Candidate, state: FloatArray) -> Candidate:
+    begin = max(candidate.after, 0.0) if candidate.kind == "stiffness" else candidate.after
+    found = stretch.refit({candidate.name: begin}, state)
+    return replace(
+        candidate,
+        after=found.values[candidate.name],
+        deviation=found.deviations[candidate.name],
+        chi2=found.chi2 / max(found.freedom, 1),
+        refit=found,
+    )
+
+
+def _with_classes(best: Candidate, model: SpringModel, count: int) -> Candidate:
+    """The best with what looks like it along its own refitted trajectory."""
+    if best.refit is None:
+        return best
+    unit = _freed(best.refit.slopes[:, :count], best.refit.slopes[:, count:])
+    place = model.candidates.index(best.name)
+    cosines = np.abs(unit.T @ unit[:, place])
+    others = [i for i in np.argsort(-cosines).tolist() if i != place and cosines[i] > ALIKE]
+    return replace(best, alike=tuple(model.candidates[i] for i in others))
+
+
+def _freed(candidates: FloatArray, states: FloatArray) -> FloatArray:
+    """Unit directions without what the first states could have made."""
+    basis = np.linalg.qr(states).Q
+    rest = candidates - basis @ (basis.T @ candidates)
+    length = np.linalg.norm(rest, axis=0)
+    return np.asarray(rest / np.where(length > 0, length, 1.0))
+
+
+def _unseen(
+    model: SpringModel, stretch: Stretch, rows: FloatArray, fitted: Projector, count: int
+) -> tuple[str, ...]:
+    """Springs of which the record would not show that they lost a tenth of their stiffness."""
+    names = list(model.problem.sweeper.compiled.system.parameters)
+    left = fitted.clean(rows[None, :, :count])
+    size = np.linalg.norm(left, axis=0)
+    limit = np.sqrt(chi2.isf(0.01 / count, 1))
+    weak = []
+    for index, name in enumerate(model.candidates):
+        value = stretch.parameters[names.index(name)]
+        if name in model.structure.springs and 0.1 * abs(value) * size[index] < limit:
+            weak.append(name)
+    return tuple(weak)
