@@ -36,6 +36,7 @@ COMMANDS: dict[str, str] = {
     "doctor": "doctor",
     "dashboard": "dashboard",
     "view": "view",
+    "structure": "structure",
     "info": "info",
     "trim": "trim",
     "recover": "recover",

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import TypeVar
 
 import msgspec
@@ -80,8 +81,11 @@ def require_known(structure: Structure, names: Iterable[str]) -> None:
     known = coefficients(structure)
     for name in names:
         if name not in known:
+            close = get_close_matches(name, known, 3, 0.4)
+            expected = f"such as {', '.join(close)}" if close else f"such as {next(iter(known))}"
             raise ModelError(
-                f"{structure.name}: found the unknown {name!r}, expected one of {', '.join(known)}"
+                f"{structure.name}: found the unknown {name!r}, expected a mass, spring, damper or"
+                f" start, {expected}"
             )
 
 

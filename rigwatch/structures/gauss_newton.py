@@ -19,6 +19,10 @@ from rigwatch.structures.problem import Problem
 FloatArray = NDArray[np.float64]
 
 
+LARGE = 0.2
+"""Share of the signals that errors may be before it is remarked on."""
+
+
 def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outcome:
     """Iterate until four digits stay the same.
 
@@ -48,9 +52,16 @@ def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outc
         found.append(found[-1] + step.change)
         covariance = step.covariance
         if turn and settled(found[-2], found[-1]):
-            return Outcome(found[1:], covariance, True)
+            return Outcome(found[1:], covariance, True, _remarks(problem.observed - outputs, scale))
     remark = "the model's trajectory parted from the record"
     return Outcome(found[1:] or found, covariance, False, (remark,))
+
+
+def _remarks(errors: FloatArray, scale: FloatArray) -> tuple[str, ...]:
+    share = float(np.sqrt(np.nanmean((errors / scale) ** 2)))
+    if share < LARGE:
+        return ()
+    return (f"it settled where errors are {100 * share:.0f} % of the signals: a wrong minimum?",)
 
 
 def _with_prior(  # noqa: PLR0917 -- a step's rows with what belongs to them

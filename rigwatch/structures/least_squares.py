@@ -13,6 +13,8 @@ from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
 
+FOUR_DIGITS = 1e-4
+"""Share of a signal's rms below which no signal's error is believed, whatever the fit says."""
 BLIND = 1e-9
 """Share of the largest singular value below which a combination of unknowns is not determined."""
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from rigwatch.structures.direct import solve as regression
 from rigwatch.structures.identification import Outcome, settled
-from rigwatch.structures.least_squares import Step, require_determined
+from rigwatch.structures.least_squares import FOUR_DIGITS, Step, require_determined
 from rigwatch.structures.problem import Problem
-from rigwatch.structures.whole_record import FOUR_DIGITS, WholeRecord
+from rigwatch.structures.whole_record import WholeRecord
 from rigwatch.structures.windows import Windows
 from rigwatch.wire.errors import ModelError
 

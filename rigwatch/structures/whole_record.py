@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.structures.identification import settled
-from rigwatch.structures.least_squares import Step
+from rigwatch.structures.least_squares import FOUR_DIGITS, Step
 from rigwatch.structures.least_squares import solve as least_squares
 from rigwatch.structures.problem import Problem
 from rigwatch.structures.windows import spreads
@@ -18,8 +18,6 @@ from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
 
-FOUR_DIGITS = 1e-4
-"""Share of a signal's rms below which no signal's error is believed, whatever the fit says."""
 FINER = 2
 """How much shorter the integration steps are over the whole record, where errors add up."""
 SMALLEST = 1e-150

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.physics.engine.fit import initial_states
-from rigwatch.structures.least_squares import Step
+from rigwatch.structures.least_squares import FOUR_DIGITS, Step
 from rigwatch.structures.least_squares import solve as least_squares
 from rigwatch.structures.problem import Problem
 
@@ -143,9 +143,9 @@ class Windows:
         rest = starts.without(errors[..., None]).reshape(-1, 1)
         used = int((self._factor > 0).sum())
         left = max(used - self._initial.size - count, 1)
-        step = least_squares(rest, clean, np.ones(len(rest)), np.ones(1))
-        more = (len(rest) - count) / left
-        return replace(step, covariance=step.covariance * more)
+        least = FOUR_DIGITS**2 * left / max(len(rest) - count, 1)
+        step = least_squares(rest, clean, np.ones(len(rest)), np.ones(1), least_variance=least)
+        return replace(step, covariance=step.covariance * (len(rest) - count) / left)
 
     def _shorter(
         self, now: FloatArray, change: FloatArray, shift: FloatArray, errors: FloatArray

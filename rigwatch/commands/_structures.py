@@ -1,0 +1,99 @@
+"""What the actions of `rigwatch structure` share: files, unknowns, figures for people."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.wire.errors import ModelError
+
+if TYPE_CHECKING:
+    from rigwatch.physics.engine.model import Model
+    from rigwatch.structures.description import Structure
+    from rigwatch.structures.identification import Identification
+
+
+def add_problem(parser: argparse.ArgumentParser) -> None:
+    """Arguments that say what is identified from what."""
+    parser.add_argument("structure", type=Path, help="structure or model file (.toml)")
+    parser.add_argument("record", type=Path, help="record with columns t, x6, ... (.csv or .npz)")
+    parser.add_argument(
+        "--unknown",
+        action="append",
+        metavar="NAME[=GUESS]",
+        help="an unknown with its guess, such as k1_6=1300, m4 or v6(0); instead of the file's",
+    )
+    parser.add_argument(
+        "--weighting", default="uniform", help="uniform, exponential:SECONDS or jacobi:A,B"
+    )
+    parser.add_argument(
+        "--first", type=int, default=0, metavar="SAMPLE", help="first sample that counts"
+    )
+
+
+def unknowns_of(arguments: argparse.Namespace) -> tuple[list[str] | None, dict[str, float]]:
+    """Names and guesses of `--unknown`; None where the file's are taken.
+
+    Raises:
+        ModelError: a guess is no number.
+    """
+    if not arguments.unknown:
+        return None, {}
+    names, guesses = [], {}
+    for text in arguments.unknown:
+        name, equals, number = text.partition("=")
+        names.append(name)
+        if equals:
+            try:
+                guesses[name] = float(number)
+            except ValueError:
+                raise ModelError(f"--unknown {name}: found {number!r}, expected a number") from None
+    return names, guesses
+
+
+def subject_of(path: Path) -> "Structure | Model":
+    """The structure in the file, or the model where it has equations of its own.
+
+    Raises:
+        ConfigError: it is neither.
+    """
+    import tomllib
+
+    from rigwatch.physics.engine.model import load_model
+    from rigwatch.structures.description import load_structure
+
+    try:
+        has_equations = "states" in tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        has_equations = False
+    return load_model(path) if has_equations else load_structure(path)
+
+
+def figures(found: "Identification") -> list[str]:
+    """One line an unknown: estimate and 95 % interval."""
+    width = max(len(name) for name in found.names)
+    lines = []
+    for name in found.names:
+        low, high = found.intervals[name]
+        vague = "  not determined by this record" if name in found.undetermined else ""
+        lines.append(
+            f"  {name:<{width}}  {found.parameters[name]:>13.6g}   [{low:.6g}, {high:.6g}]{vague}"
+        )
+    return lines
+
+
+def plain(found: "Identification") -> dict[str, object]:
+    """The identification as plain data, for JSON."""
+    return {
+        "method": found.method,
+        "converged": found.converged,
+        "seconds": found.seconds,
+        "iterations": [
+            dict(zip(found.names, row.tolist(), strict=True)) for row in found.iterations
+        ],
+        "parameters": {
+            name: {"value": found.parameters[name], "interval": list(found.intervals[name])}
+            for name in found.names
+        },
+        "undetermined": list(found.undetermined),
+        "remarks": list(found.remarks),
+    }

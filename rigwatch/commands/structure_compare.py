@@ -1,0 +1,54 @@
+"""`rigwatch structure compare`: every method of identification on the same record."""
+
+import argparse
+
+from rigwatch.commands._sessions import print_json
+from rigwatch.commands._structures import add_problem, figures, plain, subject_of, unknowns_of
+
+HELP = "run every method of identification on the same record"
+EXAMPLE = "  rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    add_problem(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when at least one method converged, 1 when none did."""
+    from rigwatch.structures.identification import METHODS, Identification, solved
+    from rigwatch.structures.problem import problem_of
+    from rigwatch.structures.record import read_record
+    from rigwatch.wire.errors import ModelError
+
+    names, guesses = unknowns_of(arguments)
+    problem = problem_of(
+        subject_of(arguments.structure), read_record(arguments.record), names, guesses,
+        weighting=arguments.weighting, first=arguments.first,
+    )  # fmt: skip
+    results: dict[str, Identification | str] = {}
+    for method in METHODS:
+        try:
+            results[method] = solved(method, problem)
+        except ModelError as error:
+            results[method] = str(error)
+    if arguments.json:
+        print_json(
+            {m: {"error": r} if isinstance(r, str) else plain(r) for m, r in results.items()}
+        )
+    else:
+        for method, result in results.items():
+            _print(method, result)
+    good = any(not isinstance(r, str) and r.converged for r in results.values())
+    return 0 if good else 1
+
+
+def _print(method: str, result: object) -> None:
+    from rigwatch.structures.identification import Identification
+
+    if not isinstance(result, Identification):
+        print(f"{method}: {result}")
+        return
+    state = "converged" if result.converged else "did not converge"
+    print(f"{method}: {state} in {len(result.iterations)} iterations, {result.seconds:.2f} s")
+    print("\n".join([*figures(result), *(f"  note: {remark}" for remark in result.remarks)]))

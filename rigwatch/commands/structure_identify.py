@@ -1,0 +1,48 @@
+"""`rigwatch structure identify`: unknown masses, springs and dampers from a record of motion."""
+
+import argparse
+
+from rigwatch.commands._sessions import print_json
+from rigwatch.commands._structures import add_problem, figures, plain, subject_of, unknowns_of
+
+HELP = "identify what is unknown of a structure from a record"
+EXAMPLE = """\
+  rigwatch structure identify configs/structures/kabe_antenna.toml antenna.csv
+  rigwatch structure identify antenna.toml antenna.csv --method quasilinearization
+  rigwatch structure identify antenna.toml antenna.csv --unknown k1_6=1300 --unknown m4=0.8"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    add_problem(parser)
+    parser.add_argument(
+        "--method",
+        default="shooting",
+        help="shooting (default), quasilinearization, gauss-newton, kalman or direct",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the method converged, 1 when it did not."""
+    from rigwatch.structures.identification import identify
+    from rigwatch.structures.record import read_record
+
+    names, guesses = unknowns_of(arguments)
+    found = identify(
+        arguments.method,
+        subject_of(arguments.structure),
+        read_record(arguments.record),
+        names,
+        guesses,
+        weighting=arguments.weighting,
+        first=arguments.first,
+    )
+    if arguments.json:
+        print_json(plain(found))
+    else:
+        state = "converged" if found.converged else "did not converge"
+        print(
+            f"{found.method}: {state} in {len(found.iterations)} iterations, {found.seconds:.2f} s"
+        )
+        print("\n".join([*figures(found), *(f"  note: {remark}" for remark in found.remarks)]))
+    return 0 if found.converged else 1
