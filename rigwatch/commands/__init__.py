@@ -42,6 +42,11 @@ COMMANDS: dict[str, str] = {
     "recover": "recover",
     "replay": "replay",
     "verify": "verify",
+    "study": "study",
+    "compare": "compare",
+    "explain": "explain",
+    "add": "add",
+    "undo": "undo",
     "import": "import_",
     "export": "export",
 }

@@ -121,6 +121,9 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
         arguments = ", ".join(self._print(argument) for argument in expr.args)
         return f"math.{type(expr).__name__}({arguments})"
 
+    def _print_floor(self, expr: sympy.Expr) -> str:
+        return f"math.floor({self._print(expr.args[0])})"
+
     _print_tanh = _print_exp = _print_log = _print_sin = _print_cos = _print_atan = _print_Function
 
     def _print_Pow(self, expr: sympy.Expr, **_: object) -> str:  # noqa: N802 -- SymPy's name
@@ -220,6 +223,8 @@ def _with(row: Sequence[sympy.Expr], rest: Iterator[str]) -> list[tuple[sympy.Ex
 
 def derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
     """∂expression/∂by, with jumps counted as having none."""
-    slope = sympy.diff(expression, by)
+    steps = {step: sympy.Dummy(real=True) for step in expression.atoms(sympy.floor)}
+    back = {dummy: step for step, dummy in steps.items()}
+    slope = sympy.diff(expression.xreplace(steps), by).xreplace(back)
     slope = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
     return slope.replace(sympy.Heaviside, lambda at, *_: sympy.Piecewise((1, at > 0), (0, True)))

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.physics.engine.codegen import source
+from rigwatch.physics.engine.numeric import StaticKernel
 from rigwatch.physics.engine.system import System
 from rigwatch.wire.errors import ModelError
 
@@ -68,7 +69,7 @@ class CompiledSystem:
     """A system that can be simulated."""
 
     system: System
-    kernel: ModuleType
+    kernel: Any
 
     @property
     def parameters(self) -> FloatArray:
@@ -175,7 +176,12 @@ class CompiledSystem:
 
 
 def compile_system(system: System) -> CompiledSystem:
-    """The kernel of `system`, from the cache where it has been compiled before."""
+    """The kernel of `system`, from the cache where it has been compiled before.
+
+    A system without states needs none: it is evaluated by NumPy.
+    """
+    if not system.states:
+        return CompiledSystem(system, StaticKernel(system))
     return CompiledSystem(system, load_source(source(system)))
 
 

@@ -26,8 +26,10 @@ from rigwatch.physics.engine.compiled import (
 )
 from rigwatch.physics.engine.effect import Effect
 from rigwatch.physics.engine.expression import parse
-from rigwatch.physics.engine.model import Input, Model, Output, State
+from rigwatch.physics.engine.model import Input, Model, Output, Parameter, State
+from rigwatch.physics.engine.numeric import numpy_function
 from rigwatch.physics.engine.scope import symbol
+from rigwatch.physics.engine.stability import stable_substeps
 from rigwatch.physics.engine.system import PROBE, TIME, System
 
 RATE = "rate"
@@ -49,7 +51,7 @@ def shaped(name: str, effect: Effect, port: str) -> list[Candidate]:
     grids = [
         [(key, value) for value in (p.tried or (p.value,))]
         for key, p in effect.parameters.items()
-        if p.role != "strength"
+        if p.role not in ("strength", "switch")
     ]
     combinations: list[list[tuple[str, float]]] = [[]]
     for grid in grids:
@@ -127,9 +129,9 @@ def _push(at: Trajectory, candidate: Candidate) -> FloatArray:
     signals = _signals(at, candidate.port)
     names = {name: symbol(name) for name in (*signals, *candidate.effect.states)}
     names |= {name: symbol(name) for name in candidate.effect.parameters}
-    if candidate.effect.states:
-        signals = signals | _memory(at, candidate, signals, names)
     expression = _at_neutral(_direction(candidate.effect, names), candidate)
+    if expression.free_symbols & {symbol(name) for name in candidate.effect.states}:
+        signals = signals | _memory(at, candidate, signals, names)
     return _evaluated(expression, signals, at.time.shape)
 
 
@@ -141,16 +143,14 @@ def _direction(effect: Effect, names: dict[str, sympy.Symbol]) -> sympy.Expr:
 
 
 def _at_neutral(expression: sympy.Expr, candidate: Candidate) -> sympy.Expr:
-    strength = candidate.effect.strength
-    neutral = candidate.effect.parameters[strength].neutral
-    numbers = {**candidate.shape, strength: neutral}
+    numbers = _neutral_values(candidate)
     return expression.subs({symbol(name): value for name, value in numbers.items()})
 
 
 def _evaluated(
     expression: sympy.Expr, signals: dict[str, FloatArray], shape: tuple[int, ...]
 ) -> FloatArray:
-    function = sympy.lambdify([symbol(name) for name in signals], expression, "numpy", cse=True)
+    function = numpy_function(list(signals), expression)
     return np.broadcast_to(np.asarray(function(*signals.values()), np.float64), shape)
 
 
@@ -198,34 +198,51 @@ def _memory(
     signals: dict[str, FloatArray],
     names: dict[str, sympy.Symbol],
 ) -> dict[str, FloatArray]:
-    """The effect's own states at strength zero, driven by what it sees."""
+    """The effect's own states at strength zero, driven by what it sees.
+
+    Shapes stay parameters of the kernel, so that it is compiled once for all of them.
+    """
     effect, count = candidate.effect, at.time.shape[1]
+    values = _neutral_values(candidate)
     rates = {
-        name: _at_neutral(parse(state.derivative, names, f"state {name}"), candidate)
+        name: parse(state.derivative, names, f"state {name}")
         for name, state in effect.states.items()
     }
     model = Model(
-        name=f"memory of {candidate.name}",
+        name="memory of an effect",
         summary="the states of one effect",
         inputs={name: Input(unit="1") for name in signals if name != TIME},
-        parameters={},
+        parameters={name: Parameter(value=0.0, unit="1", fixed=True) for name in values},
         outputs={name: Output(unit="1", expression=name) for name in effect.states},
     )
     states = {n: State(unit="1", derivative=s.derivative) for n, s in effect.states.items()}
     read = {name: symbol(name) for name in effect.states}
-    compiled = compile_system(System(model, (), states, {}, rates, read, {}, ()))
+    system = System(model, (), states, model.parameters, rates, read, {}, ())
+    compiled = compile_system(system)
     driving = np.stack([signals[name].ravel() for name in model.inputs], axis=-1)
     starts = np.arange(0, len(driving), count, dtype=np.int64)
     first = np.tile([state.start for state in effect.states.values()], (len(starts), 1))
+    parameters = compiled.vector(values)
+    spacing = at.run.spacing
     run = compiled.simulate(
-        driving, at.run.spacing, starts, count, initial=first, parameters=np.zeros(0)
-    )
+        driving, spacing, starts, count, initial=first, parameters=parameters,
+        substeps=stable_substeps(system, list(states), driving, None, parameters, spacing),
+    )  # fmt: skip
     return dict(zip(effect.states, np.moveaxis(run.outputs, -1, 0), strict=True))
+
+
+def _neutral_values(candidate: Candidate) -> dict[str, float]:
+    strength = candidate.effect.strength
+    neutral = candidate.effect.parameters[strength].neutral
+    return {**candidate.shape, strength: neutral}
 
 
 def _propagated(run: Linearisation, free: int, pushes: FloatArray, columns: IntArray) -> FloatArray:
     """Outputs moved by pushes at probes, shape (windows, samples, outputs, candidates)."""
     n = run.states.shape[2]
+    if n == 0:
+        direct = run.read_slopes[..., columns]
+        return np.asarray(direct * pushes[:, :: run.substeps, None, :])
     along = np.ascontiguousarray(run.rate_slopes[..., free : free + n])
     across = np.ascontiguousarray(run.rate_slopes[..., columns])
     reads = np.ascontiguousarray(run.read_slopes[..., free : free + n])

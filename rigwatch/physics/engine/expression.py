@@ -20,6 +20,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "atan": sympy.atan,
     "cos": sympy.cos,
     "exp": sympy.exp,
+    "floor": sympy.floor,
     "log": sympy.log,
     "max": sympy.Max,
     "min": sympy.Min,

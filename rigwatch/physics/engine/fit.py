@@ -6,6 +6,7 @@ with Kaufman's gradient: G. Golub and V. Pereyra, Inverse Problems 19, 2003), so
 bounded least squares sees the parameters alone.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.signal import savgol_filter
 
 from rigwatch.physics.engine.compiled import CompiledSystem, FloatArray, IntArray
 from rigwatch.physics.engine.system import System
+from rigwatch.physics.engine.thinning import Thinning
 from rigwatch.wire.errors import ModelError
 
 START_STEPS = 2
@@ -28,11 +30,13 @@ class Recording:
         dt: time between samples [s].
         inputs: in the order of the model's inputs, shape (n, n_u).
         outputs: in the order of its outputs, shape (n, n_y); NaN where nothing valid was measured.
+        thinning: how residuals and sensitivities are filtered and thinned, None where they are not.
     """
 
     dt: float
     inputs: FloatArray
     outputs: FloatArray
+    thinning: Thinning | None = None
 
     def __len__(self) -> int:
         return len(self.inputs)
@@ -52,7 +56,7 @@ class Windows:
 
 
 def windows(system: System, samples: int, horizon: int) -> Windows:
-    """Consecutive windows of `horizon` samples; a model without states is one window.
+    """Consecutive windows of `horizon` samples; without states the recording is one window.
 
     Raises:
         ModelError: the recording is shorter than one window.
@@ -72,8 +76,11 @@ class Fit:
         parameters: all of them, shape (n_p,).
         covariance: of the free ones, shape (m, m), for white residuals of the size found.
         initial: initial states of the windows, shape (windows, states).
-        residuals: measured less modelled, shape (windows, length, outputs).
+        residuals: measured less modelled, shape (windows, length, outputs), thinned where the
+            recording is; else NaN where nothing valid was measured.
         scale: what each output's residuals were divided by, shape (outputs,).
+        error: scaled residuals, initial states projected out, shape (windows, k).
+        jacobian: ∂error/∂(free parameters), shape (windows, k, m).
     """
 
     compiled: CompiledSystem
@@ -82,6 +89,8 @@ class Fit:
     initial: FloatArray
     residuals: FloatArray
     scale: FloatArray
+    error: FloatArray
+    jacobian: FloatArray
 
     @property
     def rms(self) -> FloatArray:
@@ -129,8 +138,13 @@ def fit(
     free = problem.free
     inside = np.clip(begin[free], low, high)
     problem.settle(problem.whole(begin, inside))
+    if not np.isfinite(problem.tried(problem.whole(begin, inside))).all():
+        raise ModelError(
+            f"{compiled.system.model.name}: the simulation leaves the finite numbers at the start;"
+            " try other starting values or more substeps"
+        )
     found = least_squares(
-        lambda theta: problem.projected(problem.whole(begin, theta))[0],
+        lambda theta: problem.tried(problem.whole(begin, theta)),
         inside,
         jac=lambda theta: problem.projected(problem.whole(begin, theta))[1],
         bounds=(low, high),
@@ -194,6 +208,8 @@ class _Problem:
         missing = np.isnan(error)
         if missing.any():
             error, slopes = np.where(missing, 0.0, error), np.where(missing[..., None], 0.0, slopes)
+        if r.thinning:
+            error, slopes = r.thinning.apply(error), r.thinning.apply(slopes)
         flat = error.reshape(len(error), -1)
         return flat, slopes.reshape(*flat.shape, slopes.shape[-1])
 
@@ -222,6 +238,25 @@ class _Problem:
             self._last = (key, self._project(parameters))
         return self._last[1]
 
+    def tried(self, parameters: FloatArray) -> FloatArray:
+        """Residuals for the solver; NaN where the simulation blows up, and it steps back."""
+        before = self._initial
+        try:
+            residual = self.projected(parameters)[0]
+        except ModelError:
+            residual = np.full(self.count, np.nan)
+        if not np.isfinite(residual).all():
+            self._initial = before
+        return residual
+
+    @property
+    def count(self) -> int:
+        """Residuals that the solver sees."""
+        shape = (self._measured.shape[0], self._measured.shape[1], 1)
+        thinning = self._recording.thinning
+        thinned = thinning.apply(np.zeros(shape)).shape if thinning else shape
+        return math.prod(thinned) * int(self._measured.shape[2])
+
     def _project(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         m = len(self.free)
         self.settle(parameters, START_STEPS)
@@ -241,14 +276,18 @@ class _Problem:
         used = residual.size - self._initial.size - len(self.free)
         variance = float(residual @ residual) / max(used, 1)
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * variance, np.float64)
-        sizes = self._measured.shape
+        left = error.reshape(len(error), -1, self._measured.shape[2]) * self.scale
+        if self._recording.thinning is None:
+            left = np.where(np.isnan(self._measured), np.nan, left)
         return Fit(
             self._compiled,
             parameters,
             covariance,
             self._initial,
-            error.reshape(sizes) * self.scale,
+            left,
             self.scale,
+            residual.reshape(len(error), -1),
+            jacobian.reshape(len(error), -1, len(self.free)),
         )
 
 

@@ -32,6 +32,7 @@ class Scores:
         strength: first-order estimate, shape (k,).
         explained: share of the residual's energy, shape (k,).
         cosines: between projected directions, absolute, shape (k, k).
+        parts: of each sample in the unit direction times residual, shape (windows·samples, k).
     """
 
     score: FloatArray
@@ -40,6 +41,7 @@ class Scores:
     strength: FloatArray
     explained: FloatArray
     cosines: FloatArray
+    parts: FloatArray
 
     def classes(self, alike: float = ALIKE) -> list[list[int]]:
         """For each candidate the candidates that it cannot be told from, itself first."""
@@ -60,7 +62,7 @@ class Projector:
     def __init__(self, by_parameter: FloatArray, by_start: FloatArray) -> None:
         self._starts = np.linalg.qr(by_start).Q
         clean = self._without_starts(by_parameter)
-        self._parameters = np.linalg.qr(clean.reshape(-1, clean.shape[-1])).Q
+        self._parameters = np.linalg.qr(np.concatenate(clean)).Q
 
     def _without_starts(self, signals: FloatArray) -> FloatArray:
         along = np.einsum("wki,wkc->wic", self._starts, signals)
@@ -97,4 +99,5 @@ def score(
         along / size,
         along**2 / max(float(r @ r), 1e-300),
         np.abs(unit.T @ unit),
+        unit * r[:, None],
     )

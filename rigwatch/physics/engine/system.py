@@ -198,11 +198,11 @@ class _Composer:
     def _adopt(self, placement: Placement, units: Mapping[str, str]) -> None:
         for name, p in placement.effect.parameters.items():
             self._parameters[placement.prefix + name] = Parameter(
-                value=p.value,
+                value=1.0 if p.role == "switch" else p.value,
                 unit=_resolved(p.unit, units, placement),
                 low=p.low,
                 high=p.high,
-                fixed=p.role == "constant",
+                fixed=p.role in ("constant", "switch"),
                 meaning=f"{placement.name}, {name}",
             )
         for name, s in placement.effect.states.items():

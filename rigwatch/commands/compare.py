@@ -1,0 +1,28 @@
+"""`rigwatch compare`: fit a model and show its errors on training and held-out recordings."""
+
+import argparse
+from pathlib import Path
+
+from rigwatch.commands._sessions import print_json
+
+HELP = "fit a model and show its errors on training and held-out recordings"
+EXAMPLE = "  rigwatch compare emps"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("study", type=Path, help="the study's folder")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 on success."""
+    from rigwatch.workbench.compare import compare
+    from rigwatch.workbench.study import open_study
+    from rigwatch.workbench.words import comparison_lines
+
+    found = compare(open_study(arguments.study))
+    if arguments.json:
+        print_json(found)
+        return 0
+    print("\n".join(comparison_lines(found)))
+    return 0

@@ -1,0 +1,105 @@
+"""Expressions as NumPy functions, and the kernel of a model that has no states.
+
+Without states nothing is integrated, so nothing needs to be compiled either: a regression is ready
+in milliseconds. The kernel has the functions that a compiled one has, with the same arguments.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any
+
+import numpy as np
+import sympy
+from numpy.typing import NDArray
+from sympy.printing.numpy import NumPyPrinter
+
+from rigwatch.physics.engine.codegen import derivative
+from rigwatch.physics.engine.scope import symbol
+from rigwatch.physics.engine.system import TIME, System
+
+FloatArray = NDArray[np.float64]
+
+
+def numpy_function(names: Sequence[str], expressions: Any) -> Callable[..., Any]:
+    """A function of arrays called `names` that gives the expression, or a list of them."""
+    several = isinstance(expressions, list | tuple)
+    ready = list(expressions) if several else expressions
+    arguments = [symbol(name) for name in names]
+    function = sympy.lambdify(arguments, ready, "numpy", printer=_Printer, cse=True)
+
+    def quiet(*arguments: Any) -> Any:
+        # A choice is computed on all its branches, also where a branch divides by zero.
+        with np.errstate(all="ignore"):
+            return function(*arguments)
+
+    return quiet
+
+
+class _Printer(NumPyPrinter):  # type: ignore[misc]
+    """Pairs instead of lists, whose members would all have to be of one shape."""
+
+    def __init__(self, settings: dict[str, Any] | None = None) -> None:
+        whole = {"fully_qualified_modules": False, "inline": True, "allow_unknown_functions": True}
+        super().__init__(whole | (settings or {}))
+
+    def _pairs(self, function: str, arguments: Sequence[sympy.Expr]) -> str:
+        return str(reduce(lambda a, b: f"{function}({a}, {b})", map(self._print, arguments)))
+
+    def _print_Max(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
+        return self._pairs("maximum", expr.args)
+
+    def _print_Min(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
+        return self._pairs("minimum", expr.args)
+
+    def _print_And(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
+        return self._pairs("logical_and", expr.args)
+
+    def _print_Or(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
+        return self._pairs("logical_or", expr.args)
+
+    def _print_Piecewise(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
+        *choices, last = expr.args
+        text = self._print(last.expr) if last.cond == sympy.true else "nan"
+        rest = [last] if last.cond != sympy.true else []
+        for choice in reversed([*choices, *rest]):
+            text = f"where({self._print(choice.cond)}, {self._print(choice.expr)}, {text})"
+        return text
+
+
+class StaticKernel:
+    """Outputs and their slopes of a system without states, as arrays over all samples."""
+
+    def __init__(self, system: System) -> None:
+        outputs = list(system.outputs.values())
+        names = (TIME, *system.model.inputs, *system.parameters)
+        at_rest = {symbol(probe): 0 for probe in system.probes}
+        by = [symbol(name) for name in (*system.free, *system.probes)]
+        slopes = [derivative(output, s) for output in outputs for s in by]
+        whole = [e.subs(at_rest) for e in (*outputs, *slopes)]
+        self._function = numpy_function(names, whole)
+        self._outputs, self._free, self._all = len(outputs), len(system.free), len(by)
+
+    def _evaluate(
+        self, u: FloatArray, dt: float, starts: NDArray[np.int64], length: int, p: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        rows = starts[:, None] + np.arange(length)
+        signals = [rows * dt, *np.moveaxis(u[rows], -1, 0)]
+        values = self._function(*signals, *p)
+        whole = np.stack([np.broadcast_to(value, rows.shape) for value in values], axis=-1)
+        slopes = whole[..., self._outputs :].reshape(*rows.shape, self._outputs, self._all)
+        return whole[..., : self._outputs], slopes
+
+    def simulate(  # noqa: PLR0917 -- the arguments of a compiled kernel
+        self, u: Any, dt: Any, _s: Any, _h: Any, starts: Any, _x: Any, p: Any, y: Any, dy: Any
+    ) -> None:
+        """Fill outputs (windows, samples, outputs) and their slopes by the free parameters."""
+        y[:], slopes = self._evaluate(u, dt, starts, y.shape[1], p)
+        dy[:] = slopes[..., : self._free]
+
+    def linearise(  # noqa: PLR0917 -- the arguments of a compiled kernel
+        self, u: Any, dt: Any, substeps: Any, _h: Any, starts: Any, _x: Any, p: Any,
+        _nodes: Any, _slopes: Any, y: Any, dy: Any,
+    ) -> None:  # fmt: skip
+        """The same with the slopes by the probes behind those by the parameters."""
+        del substeps
+        y[:], dy[:] = self._evaluate(u, dt, starts, y.shape[1], p)

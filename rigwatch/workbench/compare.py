@@ -1,0 +1,111 @@
+"""Compares the model of a study with its recordings: errors, noise floor, parameters."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigwatch.workbench.fitted import Fitted, fit_base
+from rigwatch.workbench.intervals import Value, values
+from rigwatch.workbench.ledger import check_data
+from rigwatch.workbench.noise_floor import METHODS, NoiseFloor, from_residual, quiet_scale
+from rigwatch.workbench.signals import Data, prepare
+from rigwatch.workbench.study import Study
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Errors of one output, in its unit."""
+
+    train_error: float
+    held_out_error: float
+    noise_floor: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How well the model does.
+
+    Attributes:
+        train_error, held_out_error, noise_floor: over all channels, in `unit`.
+        unit: the channel's where there is one, else "noise floors".
+        noise_from: how the floor is known.
+        channels: by output.
+        parameters: by name.
+        effects: accepted so far, as "effect@port".
+        remarks: what was noticed, for people.
+    """
+
+    train_error: float
+    held_out_error: float
+    noise_floor: float
+    unit: str
+    noise_from: str
+    channels: dict[str, Channel]
+    parameters: dict[str, Value]
+    effects: list[str]
+    remarks: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A study with its data and its model fitted: what every step starts from."""
+
+    study: Study
+    data: Data
+    base: Fitted
+    floor: NoiseFloor
+
+
+def open_bench(study: Study) -> Bench:
+    """Read and fit a study.
+
+    Raises:
+        ModelError: data have changed, or do not suit the model.
+    """
+    check_data(study)
+    data = prepare(study)
+    scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
+    base = fit_base(study, data, scale)
+    return Bench(study, data, base, noise_floor(study, data, base))
+
+
+def noise_floor(study: Study, data: Data, base: Fitted) -> NoiseFloor:
+    """The floor of the held-out recordings' error."""
+    if data.healthy is not None:
+        healthy = Data(data.healthy, data.healthy, None, data.horizon, ())
+        bare = fit_base(study, healthy, base.train.scale)
+        return NoiseFloor(bare.train.rms, "healthy")
+    return from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
+
+
+def compare(study: Study) -> Comparison:
+    """Errors, noise floor and parameters of the study's model as it is."""
+    return comparison(open_bench(study))
+
+
+def comparison(bench: Bench) -> Comparison:
+    """The same of a bench that is open."""
+    base, floor = bench.base, bench.floor
+    outputs = bench.study.model.outputs
+    channels = {
+        name: Channel(float(a), float(b), float(c), output.unit)
+        for (name, output), a, b, c in zip(
+            outputs.items(), base.train.rms, base.held_out.rms, floor.rms, strict=True
+        )
+    }
+    alone = len(channels) == 1
+    total = floor.rms[0] if alone else np.sqrt(np.mean((floor.rms / base.train.scale) ** 2))
+    found = values(base.train)
+    weak = [f"{name}: {value.note}" for name, value in found.items() if value.note]
+    return Comparison(
+        base.train_error,
+        base.held_out_error,
+        float(total),
+        next(iter(channels.values())).unit if alone else "noise floors",
+        METHODS[floor.method],
+        channels,
+        found,
+        [f"{a.effect}@{a.port}" for a in bench.study.file.effects],
+        [*bench.data.remarks, *weak],
+    )

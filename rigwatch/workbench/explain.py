@@ -1,0 +1,112 @@
+"""Explains the gap: ranks what may be missing, gives a verdict and says what to do next."""
+
+from dataclasses import dataclass, field
+
+from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
+from rigwatch.workbench.intervals import Value, values
+from rigwatch.workbench.rank import Ranked, rank
+from rigwatch.workbench.study import Study
+from rigwatch.workbench.verdict import Verdict, judge
+
+
+@dataclass(frozen=True)
+class Row:
+    """One effect of the ranking.
+
+    Attributes:
+        effect, port: which one.
+        train_error, held_out_error: with it in the model, None where it was not fitted.
+        p_value: corrected for the number of candidates.
+        class_: effects that it cannot be told from on this recording, as "effect@port".
+        parameters: its own, by name.
+        accepted: whether the held-out error falls beyond chance.
+        reason: in words.
+    """
+
+    effect: str
+    port: str
+    train_error: float | None
+    held_out_error: float | None
+    p_value: float
+    class_: list[str]
+    parameters: dict[str, Value]
+    accepted: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What a study learns from its recordings.
+
+    Attributes:
+        verdict: nothing_missing, missing_effect, undetermined or unknown_effect.
+        text: the verdict in a sentence.
+        comparison: the model as it is.
+        ranking: best first.
+        rivals: of different physics that the recording cannot tell from the best.
+        next_experiment: what would tell them apart, None where nothing needs to be told.
+    """
+
+    verdict: str
+    text: str
+    comparison: Comparison
+    ranking: list[Row]
+    rivals: list[str] = field(default_factory=list)
+    next_experiment: dict[str, object] | None = None
+
+
+def explain(study: Study) -> Explanation:
+    """Rank every effect at every port and judge.
+
+    Raises:
+        ModelError: data have changed, or do not suit the model.
+    """
+    bench = open_bench(study)
+    rows, verdict = ranking(bench)
+    return explanation(bench, rows, verdict)
+
+
+def ranking(bench: Bench) -> tuple[list[Ranked], Verdict]:
+    """The ranking, what the verdict names in front, and the verdict."""
+    rows = rank(bench.study, bench.data, bench.base)
+    verdict = judge(bench.base, rows, bench.study.effects, bench.floor)
+    if verdict.best is not None:
+        rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
+    return rows, verdict
+
+
+def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
+    """The same for people and programs."""
+    members, rivals = list(verdict.members), list(verdict.rivals)
+    told = [_row(row, members if row is verdict.best else row.alike) for row in rows]
+    return Explanation(verdict.word, verdict.text, comparison(bench), told, rivals)
+
+
+def _row(row: Ranked, alike: list[str]) -> Row:
+    found: dict[str, Value] = {}
+    if row.fitted is not None and row.placement is not None:
+        prefix = row.placement.prefix
+        every = values(row.fitted.train)
+        found = {n[len(prefix) :]: v for n, v in every.items() if n.startswith(prefix)}
+    others = [label for label in alike if label != row.label]
+    return Row(
+        row.effect,
+        row.port,
+        row.fitted.train_error if row.fitted else None,
+        row.fitted.held_out_error if row.fitted else None,
+        row.p_value,
+        others,
+        found,
+        row.accepted,
+        row.reason,
+    )
+
+
+def as_data(found: Explanation) -> dict[str, object]:
+    """What `rigwatch explain --json` prints."""
+    ranking = [
+        {name.rstrip("_"): getattr(row, name) for name in row.__dataclass_fields__}
+        for row in found.ranking
+    ]
+    whole = {name: getattr(found, name) for name in found.__dataclass_fields__}
+    return whole | {"ranking": ranking}

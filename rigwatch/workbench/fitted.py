@@ -1,0 +1,130 @@
+"""A model with some effects, fitted to the training recordings and judged on those held out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigwatch.physics.engine.compiled import CompiledSystem, FloatArray, compile_system
+from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
+from rigwatch.physics.engine.stability import stable_substeps
+from rigwatch.physics.engine.system import Placement, System, compose
+from rigwatch.workbench.signals import Data, parameters_of
+from rigwatch.workbench.sizes import port_sizes
+from rigwatch.workbench.study import Study
+
+BLOCKS = 40
+"""Blocks that a recording of a model without states is cut into for statistics."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """One model, fitted and judged.
+
+    Attributes:
+        placements: its effects.
+        train, held_out: the fit, and the same parameters on the other recordings.
+        substeps: integration steps a sample.
+        horizon: samples from one re-initialisation to the next.
+    """
+
+    placements: tuple[Placement, ...]
+    train: Fit
+    held_out: Fit
+    substeps: int
+    horizon: int
+
+    @property
+    def compiled(self) -> CompiledSystem:
+        """The compiled system."""
+        return self.train.compiled
+
+    def errors(self, fitted: Fit) -> float:
+        """One number for all channels: in the channel's unit where there is one, else scaled."""
+        return overall(fitted)
+
+    @property
+    def train_error(self) -> float:
+        """Overall error on the training recordings."""
+        return overall(self.train)
+
+    @property
+    def held_out_error(self) -> float:
+        """Overall error on the recordings held out."""
+        return overall(self.held_out)
+
+
+def overall(fitted: Fit) -> float:
+    """Error over all channels: in the channel's unit where there is one, else in noise floors."""
+    if len(fitted.scale) == 1:
+        return float(fitted.rms[0])
+    return float(np.sqrt(np.mean((fitted.rms / fitted.scale) ** 2)))
+
+
+def block_errors(fitted: Fit) -> FloatArray:
+    """Mean squared error of each block, shape (blocks,): windows, or pieces of a long recording."""
+    scale = fitted.scale if len(fitted.scale) > 1 else 1.0
+    squared = (fitted.residuals / scale) ** 2
+    return np.array([np.nanmean(piece) for piece in blocks(squared) if np.isfinite(piece).any()])
+
+
+def blocks(windowed: FloatArray) -> list[FloatArray]:
+    """Windows (windows, samples, …) as blocks; few long windows are cut into pieces."""
+    pieces = max(1, -(-BLOCKS // len(windowed)))
+    cut = [np.array_split(window, min(pieces, len(window))) for window in windowed]
+    return [piece for window in cut for piece in window]
+
+
+def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
+    """The accepted effects, with their bounds in sizes of the recording."""
+    sizes = port_sizes(study.model, recording)
+    return tuple(
+        Placement(a.effect, study.effect(a.effect).scaled(sizes[a.port]), a.port)
+        if a.port in sizes
+        else Placement(a.effect, study.effect(a.effect), a.port)
+        for a in study.file.effects
+    )
+
+
+def fit_base(study: Study, data: Data, scale: FloatArray | None = None) -> Fitted:
+    """The model of a study with the effects accepted so far."""
+    placements = placements_of(study, data.train)
+    return fit_model(study, data, placements, parameters_of(study.file), scale)
+
+
+def fit_model(
+    study: Study,
+    data: Data,
+    placements: Sequence[Placement],
+    start: Mapping[str, float],
+    scale: FloatArray | None = None,
+) -> Fitted:
+    """The study's model with `placements`, fitted from `start`.
+
+    Raises:
+        ModelError: an effect does not fit its port, or the simulation leaves the finite numbers.
+    """
+    compiled = compile_system(compose(study.model, placements))
+    horizon = data.horizon if study.model.states else len(data.train)
+    begin = compiled.vector(start)
+    substeps = max(study.file.substeps, _needed(compiled.system, data.train, begin))
+    found = fit(compiled, data.train, horizon, start=begin, scale=scale, substeps=substeps)
+    beside = data.horizon if study.model.states else len(data.held_out)
+    judged = evaluate(found, data.held_out, beside, substeps=substeps)
+    return Fitted(tuple(placements), found, judged, substeps, horizon)
+
+
+def _needed(system: System, recording: Recording, parameters: FloatArray) -> int:
+    """Substeps that keep the effects' memory stable wherever its parameters may go."""
+    memory = [name for name in system.states if name not in system.model.states]
+    if not memory:
+        return 1
+    states = initial_states(system, recording)
+    corners = []
+    for bound in ("low", "high"):
+        at = np.array([getattr(p, bound) for p in system.parameters.values()])
+        corners.append(np.where(np.isfinite(at), at, parameters))
+    return max(
+        stable_substeps(system, memory, recording.inputs, states, corner, recording.dt)
+        for corner in corners
+    )

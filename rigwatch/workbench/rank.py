@@ -1,0 +1,296 @@
+"""Ranks every effect at every port: scored along the fitted model, the best fitted and judged.
+
+The score test asks all candidates at once which of them the residual looks like, with what has been
+fitted already taken out. Its p-value stands on whole blocks, as residuals of a wrong model hang
+together, and is corrected for the number of candidates. The best are then fitted in full, and the
+recordings held out decide: an effect counts only if their error falls, block by block, by more
+than chance would do.
+"""
+
+import ast
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import t as student
+
+from rigwatch.physics.engine.compiled import FloatArray
+from rigwatch.physics.engine.directions import RATE, Candidate, directions, shaped, trajectory
+from rigwatch.physics.engine.effect import Effect
+from rigwatch.physics.engine.fit import Recording, windows
+from rigwatch.physics.engine.model import Model, Port
+from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
+from rigwatch.physics.engine.system import Placement
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.fitted import Fitted, block_errors, blocks, fit_model
+from rigwatch.workbench.signals import Data
+from rigwatch.workbench.sizes import port_sizes
+from rigwatch.workbench.study import Study
+
+LEVEL = 0.01
+"""Corrected p-value below which an effect is worth a fit."""
+MATERIAL = 0.03
+"""Share by which the held-out error must fall at least to be worth an effect."""
+STEP = 0.025
+"""One-sided level at which the held-out error must fall."""
+MOST_FITS = {"static": 24, "dynamic": 6}
+
+
+@dataclass(eq=False)
+class Ranked:
+    """One effect at one port.
+
+    Attributes:
+        effect, port: which one.
+        kind: of the port: force, actuator or sensor.
+        p_value: of the score, corrected for the number of candidates.
+        explained: share of the residual's energy in training that it explains to first order.
+        start: values that its fit starts from.
+        alike: effects whose effect on this recording is nearly parallel, as "effect@port".
+        fitted: with it in the model; None where it was not worth a fit or the fit failed.
+        gain: fall of the held-out mean squared error, None without a fit.
+        gain_deviation: standard deviation of `gain`.
+        accepted: whether the held-out error falls by more than chance.
+        reason: in words.
+        trouble: why it cannot be fitted, empty where it can.
+    """
+
+    effect: str
+    port: str
+    kind: str
+    p_value: float
+    explained: float
+    start: dict[str, float]
+    alike: list[str]
+    fitted: Fitted | None = None
+    gain: float | None = None
+    gain_deviation: float | None = None
+    accepted: bool = False
+    reason: str = "not like the residual"
+    trouble: str = ""
+    placement: Placement | None = field(default=None, repr=False)
+
+    @property
+    def label(self) -> str:
+        """Effect and port in one word."""
+        return f"{self.effect}@{self.port}"
+
+    @property
+    def held_out_error(self) -> float:
+        """Held-out error with it, infinite without a fit."""
+        return self.fitted.held_out_error if self.fitted else float("inf")
+
+
+def candidates(study: Study, recording: Recording) -> list[Candidate]:
+    """Every effect at every port where it makes sense and does not stand yet."""
+    sizes = port_sizes(study.model, recording)
+    placed = {(a.effect, a.port) for a in study.file.effects}
+    return [
+        candidate
+        for port, place in study.model.ports.items()
+        for name, effect in study.effects.items()
+        if (name, port) not in placed and suits(effect, place, study.model)
+        for candidate in shaped(name, effect.scaled(sizes[port]), port)
+    ]
+
+
+def suits(effect: Effect, port: Port, model: Model) -> bool:
+    """Whether the effect can stand at the port and finds all that its equations name there."""
+    if not effect.fits(port.kind):
+        return False
+    if effect.states and port.kind != "force" and not model.states:
+        return False
+    texts = [effect.expression, *(s.derivative for s in effect.states.values())]
+    used = {n.id for text in texts for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)}
+    functions = {
+        n.func.id
+        for text in texts
+        for n in ast.walk(ast.parse(text))
+        if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
+    }
+    own = {*effect.parameters, *effect.states, "t", RATE, *({"u"} if port.kind != "force" else ())}
+    return used - functions - own <= set(port.variables)
+
+
+def score_all(
+    data: Data, base: Fitted, found: Sequence[Candidate], variance: float | None
+) -> Scores:
+    """Scores of all candidates along the fitted base model.
+
+    Args:
+        data, base: the model and what it was fitted to.
+        found: the candidates.
+        variance: of the scaled residuals where nothing is missing; theirs as they are if None.
+    """
+    fitted, recording = base.train, data.train
+    cut = windows(base.compiled.system, len(recording), base.horizon)
+    moved, slopes = _along(data, base, found)
+    measured = np.isfinite(recording.outputs)[cut.starts[:, None] + np.arange(cut.length)]
+    moved, slopes = moved * measured[..., None], slopes * measured[..., None]
+    if recording.thinning:
+        moved, slopes = recording.thinning.apply(moved), recording.thinning.apply(slopes)
+    flat = (len(cut.starts), -1)
+    moved = moved.reshape(*flat, len(found))
+    slopes = slopes.reshape(*flat, slopes.shape[-1])
+    m = len(base.compiled.system.free)
+    residual = np.nan_to_num(fitted.residuals / fitted.scale).reshape(flat)
+    if variance is None:
+        variance = float(np.mean(residual**2))
+    return score(residual, moved, Projector(slopes[..., :m], slopes[..., m:]), variance)
+
+
+def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatArray, FloatArray]:
+    """Scaled directions of the candidates and slopes of the model, at every sample."""
+    fitted, recording = base.train, data.train
+    cut = windows(base.compiled.system, len(recording), base.horizon)
+    substeps = base.substeps if base.compiled.system.states else 1
+    at = trajectory(
+        base.compiled, recording.inputs, recording.dt, cut.starts, cut.length,
+        initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
+    )  # fmt: skip
+    run = base.compiled.simulate(
+        recording.inputs, recording.dt, cut.starts, cut.length,
+        initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
+    )  # fmt: skip
+    scale = fitted.scale[:, None]
+    return directions(at, found) / scale, run.slopes / scale
+
+
+def block_p_values(scores: Scores, count: int) -> FloatArray:
+    """p-values by Student's t over blocks, corrected for all candidates, shape (k,).
+
+    Args:
+        scores: with the parts of each sample.
+        count: windows that the samples come from.
+    """
+    windowed = scores.parts.reshape(count, -1, scores.parts.shape[1])
+    sums = np.array([block.sum(axis=0) for block in blocks(windowed)])
+    spread = sums.std(axis=0, ddof=1) / np.sqrt(len(sums))
+    statistic = np.abs(sums.mean(axis=0)) / np.where(spread > 0, spread, np.inf)
+    alone = 2 * student.sf(statistic, len(sums) - 1)
+    tests = max(int(np.sum(spread > 0)), 1)
+    return np.asarray(-np.expm1(tests * np.log1p(-np.minimum(alone, 1 - 1e-16))))
+
+
+def rank(study: Study, data: Data, base: Fitted, variance: float | None = None) -> list[Ranked]:
+    """All effects at all ports, the best first; those worth it fitted and judged."""
+    found = candidates(study, data.train)
+    scores = score_all(data, base, found, variance)
+    p_values = block_p_values(scores, len(base.train.residuals))
+    rows = _best_shapes(study, found, scores, p_values)
+    for row in _worth_a_fit(rows, "dynamic" if study.model.states else "static"):
+        refit(study, data, base, row)
+    return sorted(rows, key=_order)
+
+
+def rank_only(study: Study, data: Data, base: Fitted, found: Sequence[Candidate]) -> Ranked:
+    """The row of one effect at one port, whatever its score; `found` are its shapes."""
+    scores = score_all(data, base, found, None)
+    p_values = block_p_values(scores, len(base.train.residuals))
+    return _best_shapes(study, found, scores, p_values, every=True)[0]
+
+
+def _best_shapes(
+    study: Study,
+    found: Sequence[Candidate],
+    scores: Scores,
+    p_values: FloatArray,
+    *,
+    every: bool = False,
+) -> list[Ranked]:
+    """One row an effect and port, with the shape that the residual looks like most."""
+    best: dict[tuple[str, str], int] = {}
+    for index, candidate in enumerate(found):
+        if not every and not _possible(candidate, float(scores.strength[index])):
+            continue
+        key = (candidate.name, candidate.port)
+        if key not in best or scores.score[index] > scores.score[best[key]]:
+            best[key] = index
+    rows = []
+    for (name, port), index in best.items():
+        alike = [
+            f"{n}@{p}"
+            for (n, p), j in best.items()
+            if j != index and scores.cosines[index, j] > ALIKE
+        ]
+        candidate = found[index]
+        rows.append(
+            Ranked(
+                name, port, study.model.ports[port].kind, float(p_values[index]),
+                float(scores.explained[index]), _start(candidate, float(scores.strength[index])),
+                alike, placement=Placement(name, candidate.effect, port),
+            )
+        )  # fmt: skip
+    return sorted(rows, key=lambda row: -row.explained)
+
+
+def _possible(candidate: Candidate, strength: float) -> bool:
+    """Whether the strength that the score suggests lies on the right side of its bounds."""
+    p = candidate.effect.parameters[candidate.effect.strength]
+    if p.role == "switch":
+        return strength > 0
+    value = p.neutral + strength
+    return min(p.low, p.neutral) <= value <= max(p.high, p.neutral)
+
+
+def _start(candidate: Candidate, strength: float) -> dict[str, float]:
+    p = candidate.effect.parameters[candidate.effect.strength]
+    value = 1.0 if p.role == "switch" else float(np.clip(p.neutral + strength, p.low, p.high))
+    return {**candidate.shape, candidate.effect.strength: value}
+
+
+def _worth_a_fit(rows: Sequence[Ranked], kind: str) -> list[Ranked]:
+    """The best, and the best of each kind of port, that the residual looks like beyond chance."""
+    likely = [row for row in rows if row.p_value < LEVEL]
+    chosen = likely[: MOST_FITS[kind]]
+    for port_kind in ("force", "actuator", "sensor"):
+        first = next((row for row in likely if row.kind == port_kind), None)
+        if first is not None and first not in chosen:
+            chosen.append(first)
+    for row in likely:
+        row.reason = "explains less than others; not fitted"
+    return chosen
+
+
+def refit(study: Study, data: Data, base: Fitted, row: Ranked) -> None:
+    """Fit the model with the row's effect and judge it on the recordings held out."""
+    assert row.placement is not None
+    prefix = row.placement.prefix
+    start = base.train.values() | {prefix + name: value for name, value in row.start.items()}
+    try:
+        row.fitted = fit_model(
+            study, data, (*base.placements, row.placement), start, base.train.scale
+        )
+    except ModelError as error:
+        row.reason, row.trouble = "cannot be fitted", str(error)
+        return
+    row.gain, row.gain_deviation = gain(base, row.fitted)
+    count = len(block_errors(base.held_out))
+    needed = student.ppf(1 - STEP, count - 1) * row.gain_deviation
+    fall = 1 - row.held_out_error / base.held_out_error
+    row.accepted = row.gain > max(needed, 0.0) and fall > MATERIAL
+    row.reason = _said(row.gain, needed, row.accepted)
+
+
+def _said(gained: float, needed: float, accepted: bool) -> str:
+    if accepted:
+        return "held-out error falls"
+    if gained <= 0:
+        return "held-out error rises"
+    if gained <= needed:
+        return "held-out error falls no more than by chance"
+    return f"held-out error falls by less than {MATERIAL:.0%}"
+
+
+def gain(base: Fitted, other: Fitted) -> tuple[float, float]:
+    """Fall of the held-out mean squared error from `base` to `other`, and its deviation."""
+    difference = block_errors(base.held_out) - block_errors(other.held_out)
+    return float(difference.mean()), float(difference.std(ddof=1) / np.sqrt(len(difference)))
+
+
+def _order(row: Ranked) -> tuple[int, float, float]:
+    return (
+        0 if row.accepted else 1 if row.fitted else 2,
+        row.held_out_error if row.fitted else 0.0,
+        -row.explained,
+    )

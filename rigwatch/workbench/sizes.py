@@ -1,0 +1,52 @@
+"""How large the signals at each port are: starts and bounds of effects are shares of that."""
+
+import numpy as np
+
+from rigwatch.physics.engine.compiled import FloatArray
+from rigwatch.physics.engine.expression import parse
+from rigwatch.physics.engine.fit import Recording, initial_states
+from rigwatch.physics.engine.model import Model, Port
+from rigwatch.physics.engine.numeric import numpy_function
+from rigwatch.physics.engine.scope import symbol
+from rigwatch.physics.engine.system import compose
+
+Sizes = dict[str, float]
+
+
+def port_sizes(model: Model, recording: Recording) -> dict[str, Sizes]:
+    """Root mean squares of what effects at each port see, as the recording shows it.
+
+    Beside the port's own variables there are `dt`, the time between samples [s], and at a signal
+    `u` and `rate`, the size of its rate of change.
+    """
+    signals = _measured(model, recording)
+    return {name: _sizes(port, model, signals, recording) for name, port in model.ports.items()}
+
+
+def _measured(model: Model, recording: Recording) -> dict[str, FloatArray]:
+    states = initial_states(compose(model), recording)
+    found = dict(zip(model.states, states.T, strict=True))
+    found |= dict(zip(model.inputs, recording.inputs.T, strict=True))
+    found |= dict(zip(model.outputs, recording.outputs.T, strict=True))
+    for name, port in model.ports.items():
+        found[name] = found[port.signal] if port.signal else np.zeros(len(recording))
+    return found
+
+
+def _sizes(port: Port, model: Model, signals: dict[str, FloatArray], recording: Recording) -> Sizes:
+    values = {name: p.value for name, p in model.parameters.items()}
+    names = {name: symbol(name) for name in (*signals, *values, "t")}
+    sizes = {"dt": recording.dt}
+    for name, variable in port.variables.items():
+        expression = parse(variable.expression, names, f"port variable {name}")
+        function = numpy_function([*signals, *values], expression)
+        sizes[name] = _rms(function(*signals.values(), *values.values()))
+    if port.signal:
+        sizes["u"] = _rms(signals[port.signal])
+        sizes["rate"] = _rms(np.gradient(signals[port.signal], recording.dt))
+    return sizes
+
+
+def _rms(signal: FloatArray) -> float:
+    size = float(np.sqrt(np.nanmean(np.square(signal))))
+    return size if size > 0 else 1.0

@@ -1,0 +1,132 @@
+"""The verdict: what the ranking means, in one of four words.
+
+`nothing_missing`, `missing_effect`, `undetermined` (rivals of different physics that this recording
+cannot tell apart) or `unknown_effect` (the error stays above the noise floor, and no known effect
+brings it down). All four are results.
+
+Of effects that do equally well on the recordings held out, the one with the fewest parameters is
+named first; the others of its kind form its class.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rigwatch.physics.engine.effect import Effect
+from rigwatch.workbench.fitted import Fitted, block_errors
+from rigwatch.workbench.noise_floor import NoiseFloor
+from rigwatch.workbench.rank import Ranked
+
+Word = Literal["nothing_missing", "missing_effect", "undetermined", "unknown_effect"]
+ALLOWED = {"periods": 1.1, "healthy": 1.1, "quiet band": 1.25}
+"""Error over noise floor up to which nothing is missing, by how the floor is known."""
+EQUAL = 2.0
+"""Standard deviations of a paired difference below which two effects do equally well."""
+MOST_OF_IT = 0.75
+"""Share of a gain that an effect of lower order must have to go first."""
+EXPLAINED = 0.6
+"""Share of the energy above the floor that known effects must explain, or it is unknown."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is missing.
+
+    Attributes:
+        word: one of four.
+        best: what is named, None where nothing is.
+        members: labels that the best cannot be told from, itself first.
+        rivals: labels of other physics that this recording cannot tell from it.
+        text: a sentence for people.
+    """
+
+    word: Word
+    best: Ranked | None
+    members: tuple[str, ...]
+    rivals: tuple[str, ...]
+    text: str
+
+
+def judge(
+    base: Fitted, rows: Sequence[Ranked], effects: Mapping[str, Effect], floor: NoiseFloor
+) -> Verdict:
+    """The verdict on a ranking; `floor` is of the held-out recordings."""
+    accepted = [row for row in rows if row.accepted]
+    if not accepted:
+        return _nothing_found(base, floor)
+    best = _named(accepted, effects)
+    equals = [row for row in accepted if row is not best and _equal(best, row)]
+    kind = family(best, effects)
+    members = [best.label, *(row.label for row in equals if family(row, effects) == kind)]
+    members += [
+        row.label
+        for row in rows
+        if row.label in best.alike and row.label not in members and family(row, effects) == kind
+    ]
+    rivals = [
+        row.label for row in equals if family(row, effects) != kind and _free(row) <= _free(best)
+    ]
+    if floor.method != "quiet band" and _left(base, best, floor) > 1 - EXPLAINED:
+        text = (
+            f"the best known effect, {best.label}, leaves much of the error above the noise floor"
+        )
+        return Verdict("unknown_effect", best, tuple(members), tuple(rivals), text)
+    if rivals:
+        text = f"{best.label} and {', '.join(rivals)} explain this recording equally well"
+        return Verdict("undetermined", best, tuple(members), tuple(rivals), text)
+    text = f"{best.label} is missing: the held-out error falls from {base.held_out_error:.3g} to"
+    return Verdict("missing_effect", best, tuple(members), (), f"{text} {best.held_out_error:.3g}")
+
+
+def family(row: Ranked, effects: Mapping[str, Effect]) -> str:
+    """Effects of one family say the same in other words."""
+    return effects[row.effect].family or row.label
+
+
+def _nothing_found(base: Fitted, floor: NoiseFloor) -> Verdict:
+    ratio = above_floor(base, floor)
+    if ratio <= ALLOWED[floor.method]:
+        text = f"the held-out error is {ratio:.2f} times the noise floor, and no effect lowers it"
+        return Verdict("nothing_missing", None, (), (), text)
+    text = f"the held-out error is {ratio:.2f} times the noise floor, and no known effect lowers it"
+    return Verdict("unknown_effect", None, (), (), text)
+
+
+def above_floor(fitted: Fitted, floor: NoiseFloor) -> float:
+    """Held-out error over the noise floor, over all channels."""
+    return float(np.sqrt(np.mean((fitted.held_out.rms / floor.rms) ** 2)))
+
+
+def _left(base: Fitted, best: Ranked, floor: NoiseFloor) -> float:
+    """Share of the energy above the floor that is left with the best effect."""
+    assert best.fitted is not None
+    allowed = ALLOWED[floor.method] ** 2
+    before, after = above_floor(base, floor) ** 2 - 1, above_floor(best.fitted, floor) ** 2
+    return max(after - allowed, 0.0) / max(before, 1e-12)
+
+
+def _named(accepted: Sequence[Ranked], effects: Mapping[str, Effect]) -> Ranked:
+    top = min(accepted, key=lambda row: row.held_out_error)
+    equals = [row for row in accepted if row is top or _equal(top, row)]
+    best = min(equals, key=lambda row: (_free(row), row.held_out_error))
+    lower = effects[best.effect].refines
+    for row in accepted:
+        if row.effect == lower and row.gain and best.gain and row.gain > MOST_OF_IT * best.gain:
+            return row
+    return best
+
+
+def _equal(one: Ranked, other: Ranked) -> bool:
+    assert one.fitted is not None
+    assert other.fitted is not None
+    difference = block_errors(other.fitted.held_out) - block_errors(one.fitted.held_out)
+    spread = difference.std(ddof=1) / np.sqrt(len(difference))
+    same = abs(other.held_out_error / one.held_out_error - 1) < 0.005
+    return bool(same or abs(difference.mean()) < EQUAL * spread)
+
+
+def _free(row: Ranked) -> int:
+    assert row.fitted is not None
+    return len(row.fitted.compiled.system.free)
