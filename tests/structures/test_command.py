@@ -1,0 +1,71 @@
+import json
+
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.structures.record import read_record
+from rigwatch.wire.errors import ImportDataError
+from tests.structures.antenna import FILE, FOLDER, TRUTH
+
+
+@pytest.fixture(scope="module")
+def csv(tmp_path_factory):
+    path = tmp_path_factory.mktemp("records") / "antenna.csv"
+    assert main(["structure", "simulate", str(FILE), str(path)]) == 0
+    return path
+
+
+def test_identify_prints_json(csv, capsys):
+    assert main(["structure", "identify", str(FILE), str(csv), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    for name, value in TRUTH.items():
+        assert printed["parameters"][name]["value"] == pytest.approx(value, rel=1e-4)
+
+
+def test_compare_runs_every_method(csv, capsys):
+    assert main(["structure", "compare", str(FILE), str(csv)]) == 0
+    printed = capsys.readouterr().out
+    for method in ("quasilinearization", "direct", "gauss-newton", "kalman", "shooting"):
+        assert f"{method}: " in printed
+
+
+def test_modes_are_ranked_and_drawn(tmp_path, capsys):
+    svg = tmp_path / "shares.svg"
+    assert main(["structure", "modes", str(FILE), "--families", "--svg", str(svg)]) == 0
+    assert "most to suspect: k1, k3" in capsys.readouterr().out
+    assert svg.read_text().startswith("<svg")
+
+
+@pytest.mark.parametrize(
+    ("extra", "expected"),
+    [(["--unknown", "k1_6=x"], "found 'x', expected a number"),
+     (["--unknown", "k1_66"], "found the unknown 'k1_66'"),
+     (["--method", "magic"], "method: found 'magic'")],
+)  # fmt: skip
+def test_errors_are_one_plain_line(csv, extra, expected, capsys):
+    assert main(["structure", "identify", str(FILE), str(csv), *extra]) == 2
+    assert expected in capsys.readouterr().err
+
+
+def test_a_frame_with_an_earthquake_goes_through(tmp_path, capsys):
+    path, file = tmp_path / "frame.npz", FOLDER / "shear_frame.toml"
+    arguments = [
+        "structure",
+        "simulate",
+        str(file),
+        str(path),
+        "--duration",
+        "15",
+        "--noise",
+        "0.01",
+    ]
+    assert main(arguments) == 0
+    assert set(read_record(path).columns) == {"x_roof", "v_roof", "a_roof", "ground"}
+    assert main(["structure", "identify", str(file), str(path)]) == 0
+
+
+def test_a_record_with_uneven_time_is_refused(tmp_path):
+    path = tmp_path / "uneven.csv"
+    path.write_text("t,x6\n0,0\n0.01,1\n0.05,2\n")
+    with pytest.raises(ImportDataError, match=r"found steps of 0\.01 to 0\.04 s"):
+        read_record(path)

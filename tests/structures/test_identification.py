@@ -1,0 +1,132 @@
+import numpy as np
+import pytest
+
+from rigwatch.structures.identification import METHODS, identify
+from rigwatch.structures.problem import problem_of
+from rigwatch.structures.record import Record
+from rigwatch.wire.errors import ModelError
+from sim_plant.structure import simulate, with_noise
+from tests.structures.antenna import FILE, NAMES, TRUTH, antenna, positions, record
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return record()
+
+
+def off(found, truth=TRUTH):
+    return max(abs(found.parameters[name] / value - 1) for name, value in truth.items())
+
+
+def same_steps(structure, truth, h=0.01, duration=10.0):
+    """A record by the recursion's own integrator and step, as in theory 4.1."""
+    count = round(duration / h) + 1
+    empty = Record(h, {f"x{n}": np.zeros(count) for n in range(1, 9)})
+    problem = problem_of(structure, empty, NAMES, truth, substeps=1)
+    outputs, _ = problem.simulate(np.array(list(truth.values())), 1)
+    return Record(h, {f"x{n}": outputs[:, n - 1] for n in range(1, 9)})
+
+
+def test_quasilinearization_gives_the_iterations_of_the_document():
+    found = identify("quasilinearization", antenna(), same_steps(antenna(), TRUTH))
+    np.testing.assert_allclose(found.iterations[0], [100.46, 997.18, 98.5], rtol=2e-4)
+    np.testing.assert_allclose(found.iterations[1], [100.00, 1000.0, 100.1], rtol=5e-4)
+    assert found.converged
+
+
+@pytest.mark.parametrize("method", ["direct", "kalman", "shooting"])
+def test_a_clean_record_gives_the_truth(method, clean):
+    found = identify(method, antenna(), clean)
+    assert found.converged
+    assert off(found) < {"direct": 2e-4, "kalman": 2e-5, "shooting": 5e-5}[method]
+
+
+def test_gauss_newton_needs_a_near_guess(clean):
+    near = {"k4_46": 98.0, "k1_6": 1005.0, "k1_6_cubic": 110.0}
+    assert off(identify("gauss-newton", antenna(), clean, NAMES, near)) < 5e-5
+    far = identify("gauss-newton", antenna(), clean)
+    assert off(far) > 0.1
+    assert far.remarks
+
+
+@pytest.mark.parametrize(
+    ("load", "alpha", "guess", "h"),
+    [
+        ({"node": "6", "step": 1000.0}, 10.0, (150.0, 750.0, 7500.0), 0.01),
+        ({"node": "6", "step": 1000.0}, 0.1, (50.0, 1300.0, 145.0), 0.04),
+        ({"node": "6", "step": 4000.0}, 0.1, (50.0, 750.0, 7500.0), 0.005),
+    ],
+)
+def test_shooting_converges_where_the_thesis_fails(load, alpha, guess, h):
+    truth = TRUTH | {"k1_6_cubic": 1000.0 * alpha}
+    values = {"springs.k1_6.cubic": truth["k1_6_cubic"]}
+    made = simulate(FILE, h, 10.0, loads={"push": load}, values=values)
+    start = dict(zip(NAMES, guess, strict=True))
+    found = identify("shooting", antenna(**load), positions(made, h), NAMES, start)
+    assert found.converged
+    assert off(found, truth) < 5e-5
+
+
+def test_half_the_peak_as_noise_on_three_signals():
+    made = with_noise(simulate(FILE, 0.01, 10.0), dict.fromkeys(("x3", "x6", "x8"), 0.5), 7)
+    found = identify("shooting", antenna(), positions(made, 0.01))
+    assert off(found) < 0.03
+    for name, (low, high) in found.intervals.items():
+        assert low < TRUTH[name] < high
+
+
+@pytest.mark.parametrize("method", ["quasilinearization", "shooting"])
+def test_some_of_the_signals_will_do(method):
+    found = identify(method, antenna(), record(nodes=(4, 6)))
+    assert off(found) < (0.05 if method == "quasilinearization" else 5e-5)
+
+
+def test_an_unknown_start_is_found():
+    structure = antenna()
+    truth = TRUTH | {"v6(0)": 0.0}
+    guess = {"v6(0)": 3.0}
+    for method in ("quasilinearization", "shooting"):
+        found = identify(method, structure, record(), [*NAMES, "v6(0)"], guess)
+        assert abs(found.parameters["v6(0)"]) < 0.2, truth
+
+
+def test_a_weighted_record_counts_where_the_weight_is(clean):
+    spoilt = {name: column.copy() for name, column in clean.columns.items()}
+    spoilt["x6"][700:] += 0.05
+    bent = Record(0.01, spoilt)
+    even = identify("quasilinearization", antenna(), bent)
+    early = identify("quasilinearization", antenna(), bent, weighting="exponential:0.5")
+    middle = identify("quasilinearization", antenna(), bent, weighting="jacobi:6,0")
+    assert off(early) < off(even)
+    assert off(middle) < off(even)
+    with pytest.raises(ModelError, match="weighting: found 'late'"):
+        identify("quasilinearization", antenna(), clean, weighting="late")
+
+
+def test_a_step_too_coarse_says_which_would_do():
+    with pytest.raises(ModelError, match=r"found a time step of 0.1 s, expected at most 0.075 s"):
+        identify("shooting", antenna(), record(h=0.1))
+    with pytest.raises(ModelError, match="Runge-Kutta step is stable"):
+        identify("quasilinearization", antenna(), record(h=0.07))
+
+
+def test_more_unknowns_than_the_record_determines_are_named(clean):
+    still = {name: np.zeros_like(column) for name, column in clean.columns.items()}
+    quiet = antenna(node="5", step=0.0)
+    with pytest.raises(ModelError, match="does not determine k4_46, k1_6, k1_6_cubic"):
+        identify("quasilinearization", quiet, Record(0.01, still))
+    few = Record(0.01, {"x6": clean.columns["x6"][:2]})
+    with pytest.raises(ModelError, match="3 unknowns and 2 samples"):
+        identify("shooting", antenna(), few)
+
+
+def test_missing_samples_are_left_out(clean):
+    gaps = {name: column.copy() for name, column in clean.columns.items()}
+    gaps["x6"][100:140] = np.nan
+    assert off(identify("shooting", antenna(), Record(0.01, gaps))) < 5e-5
+
+
+def test_all_methods_are_there(clean):
+    assert set(METHODS) == {"quasilinearization", "direct", "gauss-newton", "kalman", "shooting"}
+    with pytest.raises(ModelError, match="method: found 'guesswork'"):
+        identify("guesswork", antenna(), clean)
