@@ -8,6 +8,7 @@ EXAMPLE = """\
   rigwatch structure simulate configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure identify configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv
+  rigwatch structure damage configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure modes configs/structures/kabe_antenna.toml --svg antenna.svg"""
 
 ACTIONS: dict[str, str] = {
@@ -15,6 +16,7 @@ ACTIONS: dict[str, str] = {
     "simulate": "structure_simulate",
     "identify": "structure_identify",
     "compare": "structure_compare",
+    "damage": "structure_damage",
     "modes": "structure_modes",
 }
 

@@ -1,0 +1,88 @@
+"""`rigwatch structure damage`: whether, when and where a structure was damaged, and how much."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rigwatch.commands._sessions import print_json, say
+
+if TYPE_CHECKING:
+    from rigwatch.structures.damage import Damage
+
+HELP = "find damage in a record: its instant, its place among all springs, and its size"
+EXAMPLE = """\
+  rigwatch structure simulate configs/structures/kabe_antenna.toml damaged.csv \\
+      --damage 5 springs.k4_46.stiffness=50
+  rigwatch structure damage configs/structures/kabe_antenna.toml damaged.csv"""
+SHOWN = 5
+"""Places that are printed."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    parser.add_argument("structure", type=Path, help="structure file of the undamaged structure")
+    parser.add_argument("record", type=Path, help="record with columns t, x6, ... (.csv or .npz)")
+    parser.add_argument(
+        "--undamaged", type=float, metavar="SECONDS", help="start that is sure to be undamaged"
+    )
+    parser.add_argument("--limit", type=float, help="fixed limit of the residual instead of a test")
+    parser.add_argument(
+        "--known", action="store_true", help="take the file's values as true, even unknown ones"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the record was examined, damaged or not."""
+    from rigwatch.structures.damage import Settings, examine
+    from rigwatch.structures.description import load_structure
+    from rigwatch.structures.record import read_record
+
+    settings = Settings(undamaged=arguments.undamaged, limit=arguments.limit, known=arguments.known)
+    found = examine(
+        load_structure(arguments.structure), read_record(arguments.record), settings, say
+    )
+    if arguments.json:
+        print_json({"damages": [_plain(damage) for damage in found.damages]})
+    elif not found.damages:
+        print("no damage")
+    else:
+        for damage in found.damages:
+            _print(damage)
+    return 0
+
+
+def _plain(damage: "Damage") -> dict[str, Any]:
+    return {
+        "alarm": damage.alarm,
+        "instant": damage.instant.time,
+        "interval": [damage.instant.low, damage.instant.high],
+        "explained": damage.explained,
+        "ranking": [
+            {
+                "coefficient": place.name,
+                "spring": place.spring,
+                "kind": place.kind,
+                "p_value": place.p_value,
+                "before": place.before,
+                "after": place.after,
+                "class": list(place.alike),
+            }
+            for place in damage.ranking.candidates
+        ],
+        "parameters": {
+            name: {"value": figure.value, "interval": [figure.low, figure.high]}
+            for name, figure in damage.figures.items()
+        },
+    }
+
+
+def _print(damage: "Damage") -> None:
+    at = damage.instant
+    vague = "" if damage.explained else ", not explained by one change"
+    print(f"damage noticed at {damage.alarm:.3f} s{vague}")
+    print(f"  happened at {at.time:.3f} s [{at.low:.3f}, {at.high:.3f}]")
+    for place in damage.ranking.candidates[:SHOWN]:
+        alike = f"  (cannot be told from {', '.join(place.alike)})" if place.alike else ""
+        print(f"  {place.name:<16} {place.before:>11.5g} -> {place.after:<11.5g}{alike}")
+    for name, figure in damage.figures.items():
+        print(f"  {name} = {figure.value:.6g} [{figure.low:.6g}, {figure.high:.6g}]")
