@@ -248,7 +248,7 @@ def _speed(turns: int) -> list[Row]:
             f"{1e3 * best:.1f} ms",
             "< 10 ms",
             "2.5 s (1999)",
-            f"best of {turns}, everything of a whole run shared among its iterations",
+            f"best of {turns}, a whole run shared among its iterations; record prepared before",
             best < 0.010,
         ),
         Row(

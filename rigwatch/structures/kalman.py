@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.fit import initial_states
 from rigwatch.structures.identification import Outcome, settled
 from rigwatch.structures.problem import Problem
 
@@ -71,8 +70,7 @@ class _Filter:
         self.variance = (
             self.noise * np.ones_like(size) * (size if np.isscalar(self.noise) else 1)
         ) ** 2
-        shown = initial_states(problem.sweeper.compiled.system, problem.recording)
-        self.size = np.sqrt(np.mean(shown[problem.first :] ** 2, axis=0))
+        self.size = np.sqrt(np.mean(problem.shown[problem.first :] ** 2, axis=0))
 
     def prior(self, guess: FloatArray, spread: float) -> FloatArray:
         """Covariance of the unknowns before the first pass."""

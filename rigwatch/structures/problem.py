@@ -6,6 +6,7 @@ Unknowns are parameters of the model, by name, and initial states, called x6(0) 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import msgspec
@@ -101,6 +102,11 @@ class Problem:
         """Inputs from `first` on, shape (samples, inputs)."""
         return self.recording.inputs[self.first :]
 
+    @cached_property
+    def shown(self) -> FloatArray:
+        """States as the record shows them, whole, shape (all samples, n)."""
+        return initial_states(self.sweeper.compiled.system, self.recording)
+
     def split(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """All parameters and initial states with the unknowns in their places."""
         parameters, initial = self.start.copy(), self.initial.copy()
@@ -178,7 +184,7 @@ def problem_of(
 
 def _fastest(problem: Problem) -> Speed:
     """The fastest motion at the guess, about some of the states that the record shows."""
-    nominal = initial_states(problem.sweeper.compiled.system, problem.recording)[problem.first :]
+    nominal = problem.shown[problem.first :]
     some = np.unique(np.linspace(0, len(nominal) - 1, 25).astype(int))
     _, slopes = problem.sweeper.rates(
         problem.inputs[some], problem.recording.dt, problem.first, nominal[some], problem.start

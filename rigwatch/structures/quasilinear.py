@@ -16,7 +16,6 @@ positions does not show is filled in thus:
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.fit import initial_states
 from rigwatch.structures.identification import Outcome, settled
 from rigwatch.structures.least_squares import Step, require_determined
 from rigwatch.structures.least_squares import solve as least_squares
@@ -78,7 +77,7 @@ class _Nominal:
         self._problem = problem
         system = problem.sweeper.compiled.system
         channels = {output.channel or name for name, output in system.model.outputs.items()}
-        shown = initial_states(system, problem.recording)[problem.first :]
+        shown = problem.shown[problem.first :]
         seen = [s.measured in channels or s.rate_of in channels for s in system.states.values()]
         self._hidden = ~np.array(seen, bool)
         self._states = shown.copy()

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.fit import initial_states
 from rigwatch.structures.least_squares import FOUR_DIGITS, Step
 from rigwatch.structures.least_squares import solve as least_squares
 from rigwatch.structures.problem import Problem
@@ -77,8 +76,7 @@ class Windows:
         self._starts = np.arange(problem.first, last, length - 1, dtype=np.int64)
         rows = self._starts[:, None] + np.arange(length)
         self._measured = problem.recording.outputs[rows]
-        states = initial_states(problem.sweeper.compiled.system, problem.recording)
-        self._initial = states[self._starts]
+        self._initial = problem.shown[self._starts]
         self._scale = spreads(problem.observed)
         weight = problem.weight[rows - problem.first]
         self._factor = np.where(np.isfinite(self._measured), np.sqrt(weight)[..., None], 0.0)
