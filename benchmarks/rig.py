@@ -47,12 +47,17 @@ def blocks(case: Scenario, seed: int, size: int = 16384) -> Iterator[SampleBlock
 
 
 def record(name: str, role: Role, seed: int) -> Recording:
-    """A commissioning recording made from a scenario."""
-    parts = list(blocks(scenario(name), seed))
+    """A commissioning recording made from a scenario of configs/scenarios."""
+    return record_of(scenario(name), role, seed)
+
+
+def record_of(case: Scenario, role: Role, seed: int) -> Recording:
+    """A commissioning recording of a whole scenario."""
+    parts = list(blocks(case, seed))
     channels = {
         key: np.concatenate([block.channel(key).values for block in parts]) for key in _UNITS
     }
-    return recording_of(role, name, RATE, channels)
+    return recording_of(role, case.name, RATE, channels)
 
 
 @cache

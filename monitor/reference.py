@@ -30,10 +30,10 @@ from rigwatch.physics.transfer_function import FloatArray
 SETTLING, LEARNING, ARMED, RESUMING = 0, 1, 2, 3
 NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC, FIXED = 0, 1, 2, 3, 4
 
-MODE, SOURCE, SINCE, PERIOD, ANCHOR, LEARNT, RING_FILL, RING_HEAD, DEPTH = range(9)
+MODE, SOURCE, SINCE, PERIOD, ANCHOR, LEARNT, RING_FILL, RING_HEAD, DEPTH, CYCLE = range(10)
 """Integers of the state: mode, where the reference is from, samples since the last restart, period
 [samples], sample number of its first place, samples learnt, fill and head of the voltage ring,
-periods averaged.
+periods averaged, one to and fro of the mass [samples].
 """
 SCALE, NOISE, POSITION_NOISE, VOLTAGE_NOISE, SWING, POSITION_SWING, ACCELERATION_SWING = range(7)
 """Floats: amplitude scale; noise of y, x, V; rms of the periodic part of V, x, a."""
@@ -77,7 +77,7 @@ def new_reference(rules: ReferenceRules, known: list[tuple[FloatArray, float, in
     stored = np.zeros((len(known), 4, longest))
     for place, (signals, _, _) in enumerate(known):
         stored[place, :, : signals.shape[1]] = signals
-    number, value = np.zeros(9, np.int64), np.zeros(7)
+    number, value = np.zeros(10, np.int64), np.zeros(7)
     value[SCALE] = 1.0
     return Reference(
         number,
@@ -333,6 +333,27 @@ def _measure_swings(ref: Reference) -> None:
         for k in range(period):
             square += (ref.template[i, k] - mean) ** 2 / period
         ref.value[place] = np.sqrt(square)
+    ref.number[CYCLE] = period // _turns(ref)
+
+
+@njit(cache=True)
+def _turns(ref: Reference) -> int:
+    """How often the mass goes to and fro within one period of the samples, at least once: an
+    excitation of 5 Hz repeats after 256 samples and has five cycles in them.
+    """
+    period, swing = ref.number[PERIOD], ref.value[POSITION_SWING]
+    mean = 0.0
+    for k in range(period):
+        mean += ref.template[1, k] / period
+    turns, side = 0, 0
+    for k in range(2 * period):
+        off = ref.template[1, k % period] - mean
+        if abs(off) > 0.3 * swing:
+            now = 1 if off > 0.0 else -1
+            if k >= period and side < 0 < now:
+                turns += 1
+            side = now
+    return max(turns, 1)
 
 
 @njit(cache=True, inline="always")

@@ -25,6 +25,7 @@ from monitor.reference import (
     ACCELERATION_SWING,
     APERIODIC,
     ARMED,
+    CYCLE,
     DEPTH,
     FIXED,
     MODE,
@@ -333,7 +334,7 @@ def _decide(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     moved_v = _moved(energies, _V, count)
     moved_x = _moved(energies, _X, count) > _position_limit(rules, ref)
     moved_a = _moved(energies, _A, count) > max(3.0 * spread, 0.002 * ref.value[ACCELERATION_SWING])
-    span = max(32, min(ref.number[PERIOD], 256))
+    span = max(32, min(ref.number[CYCLE], 256))
     evidence = weigh(state.history, ref, seq, min(since, HISTORY), min(since, 2 * span))
     held[EXPLAINED], held[SHARE] = evidence.explained, evidence.share
     held[RHO], held[REST] = evidence.rho, evidence.rest
@@ -354,23 +355,26 @@ def _verdict(before, since, span, moved_v, moved_x, moved_a, rules, ref, state, 
         return NEW_EXCITATION
     jump_seen = evidence.share > 0.003 and evidence.jump > 30.0 * spread**2 and evidence.dry > 0.2
     certain = jump_seen and evidence.rho > 0.9 and evidence.explained > 0.95
-    jumps = jump_seen and evidence.rho > 0.35 and evidence.explained > 0.6 and since >= span
+    settled = since >= 3 * span
+    jumps = jump_seen and evidence.rho > 0.35 and evidence.explained > 0.6 and settled
     follows = (
         evidence.explained > 0.93
         and evidence.dry > 0.3
         and evidence.share > 0.001
         and evidence.rho > 0.2
-        and since >= span
+        and settled
     )
-    thin = evidence.share > 0.3 and evidence.rho > 0.6 and since >= span
-    slips = evidence.rest > 0.03 and evidence.together > 0.7 and since >= span and before != OTHER
+    thin = evidence.share > 0.3 and evidence.rho > 0.6 and settled
+    slips = evidence.rest > 0.04 and evidence.together > 0.7 and evidence.rho > -0.5
+    slips = slips and since >= span and before != OTHER
     sure = moved_x or evidence.share > 0.1
     spike = evidence.peak > 0.5
     friction = moved_a and sure and not spike and (certain or jumps or follows or thin or slips)
     state.number[_AGREED] = state.number[_AGREED] + 1 if friction else 0
     if before in (FRICTION, STICKING) or state.number[_AGREED] >= 3:
         return STICKING if evidence.rest >= 0.5 and moved_a else FRICTION
-    if since >= 2 * span + 64:
+    alone = moved_x and not moved_a
+    if since >= 4 * span + 64 or (settled and alone) or (since >= span and spike):
         return OTHER
     return before
 
