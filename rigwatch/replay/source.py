@@ -23,13 +23,18 @@ def items(
     device: str | None = None,
 ) -> Iterator[Item]:
     """Samples in blocks of at most `size`, and the commands of the same span of time [ns]."""
-    recorded = (item.message for item in session.messages(["commands"], start, end))
-    commands = [message for message in recorded if isinstance(message, AlarmCommand)]
-    waiting = sorted(commands, key=lambda command: command.t_ns)
+    waiting = _commands(session, start, end) if session.may_hold("commands") else []
     for whole in session.samples(device, start, end):
         for block in pieces(whole, size):
             yield from _interleaved(block, waiting)
     yield from waiting
+
+
+def _commands(session: Session, start: int | None, end: int | None) -> list[AlarmCommand]:
+    """The session's commands in order of time; takes a pass through all of it."""
+    recorded = (item.message for item in session.messages(["commands"], start, end))
+    commands = [message for message in recorded if isinstance(message, AlarmCommand)]
+    return sorted(commands, key=lambda command: command.t_ns)
 
 
 def _interleaved(block: SampleBlock, waiting: list[AlarmCommand]) -> Iterator[Item]:

@@ -24,6 +24,7 @@ from rigwatch.wire.errors import MessageError, SessionError
 from rigwatch.wire.messages import EstimateBlock, Message, RunInfo, SampleBlock
 from rigwatch.wire.session.chunks import Damage, ends_closed, scan
 from rigwatch.wire.session.packed import decode_block
+from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY, message_time
 from rigwatch.wire.topics import ESTIMATES, SAMPLES, TOPICS, Topic, topic
 
@@ -124,6 +125,13 @@ class Session:
             if isinstance(recorded.message, RunInfo):
                 return recorded.message
         raise SessionError(f"{self.path}: the description of the run (RunInfo) is lost")
+
+    def may_hold(self, name: str) -> bool:
+        """False only where every segment is closed and says that it has no message of the topic
+        `name`; costs no pass through the session.
+        """
+        said = [topic_counts(path) for path in self.segments]
+        return any(counts is None or counts.get(name, 0) > 0 for counts in said)
 
     def check_content(self) -> None:
         """Raise where the session holds no message of rigwatch at all."""
