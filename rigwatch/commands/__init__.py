@@ -44,6 +44,7 @@ COMMANDS: dict[str, str] = {
     "verify": "verify",
     "study": "study",
     "compare": "compare",
+    "locate": "locate",
     "explain": "explain",
     "add": "add",
     "undo": "undo",

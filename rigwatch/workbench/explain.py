@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
 from rigwatch.workbench.intervals import Value, values
+from rigwatch.workbench.next_experiment import Experiment, propose
 from rigwatch.workbench.rank import Ranked, rank
 from rigwatch.workbench.study import Study
 from rigwatch.workbench.verdict import Verdict, judge
@@ -52,7 +53,7 @@ class Explanation:
     comparison: Comparison
     ranking: list[Row]
     rivals: list[str] = field(default_factory=list)
-    next_experiment: dict[str, object] | None = None
+    next_experiment: Experiment | None = None
 
 
 def explain(study: Study) -> Explanation:
@@ -78,8 +79,11 @@ def ranking(bench: Bench) -> tuple[list[Ranked], Verdict]:
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
     """The same for people and programs."""
     members, rivals = list(verdict.members), list(verdict.rivals)
+    experiment = None
+    if verdict.best is not None and rivals:
+        experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
     told = [_row(row, members if row is verdict.best else row.alike) for row in rows]
-    return Explanation(verdict.word, verdict.text, comparison(bench), told, rivals)
+    return Explanation(verdict.word, verdict.text, comparison(bench), told, rivals, experiment)
 
 
 def _row(row: Ranked, alike: list[str]) -> Row:

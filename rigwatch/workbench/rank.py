@@ -1,8 +1,8 @@
 """Ranks every effect at every port: scored along the fitted model, the best fitted and judged.
 
 The score test asks all candidates at once which of them the residual looks like, with what has been
-fitted already taken out. Its p-value stands on whole blocks, as residuals of a wrong model hang
-together, and is corrected for the number of candidates. The best are then fitted in full, and the
+fitted already taken out. Its p-value allows for residuals that hang together, as those of a wrong
+model do, and is corrected for the number of candidates. The best are then fitted in full, and the
 recordings held out decide: an effect counts only if their error falls, block by block, by more
 than chance would do.
 """
@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import chi2
 from scipy.stats import t as student
 
 from rigwatch.physics.engine.compiled import FloatArray
@@ -22,7 +23,7 @@ from rigwatch.physics.engine.model import Model, Port
 from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
 from rigwatch.physics.engine.system import Placement
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.fitted import Fitted, block_errors, blocks, fit_model
+from rigwatch.workbench.fitted import Fitted, block_errors, fit_model
 from rigwatch.workbench.signals import Data
 from rigwatch.workbench.sizes import port_sizes
 from rigwatch.workbench.study import Study
@@ -47,6 +48,7 @@ class Ranked:
         explained: share of the residual's energy in training that it explains to first order.
         start: values that its fit starts from.
         alike: effects whose effect on this recording is nearly parallel, as "effect@port".
+        cosines: with every other effect, by its label.
         fitted: with it in the model; None where it was not worth a fit or the fit failed.
         gain: fall of the held-out mean squared error, None without a fit.
         gain_deviation: standard deviation of `gain`.
@@ -62,6 +64,7 @@ class Ranked:
     explained: float
     start: dict[str, float]
     alike: list[str]
+    cosines: dict[str, float]
     fitted: Fitted | None = None
     gain: float | None = None
     gain_deviation: float | None = None
@@ -156,27 +159,49 @@ def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatA
     return directions(at, found) / scale, run.slopes / scale
 
 
-def block_p_values(scores: Scores, count: int) -> FloatArray:
-    """p-values by Student's t over blocks, corrected for all candidates, shape (k,).
+def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> FloatArray:
+    """p-values of the scores where residuals hang together, corrected for all candidates.
+
+    The variance of a sum of products of two series is larger than that of white noise by
+    Σ_k ρr(k)·ρd(k) (M. S. Bartlett, 1946), with the autocorrelations ρ of the direction and of
+    the residual that is left without the candidate.
 
     Args:
-        scores: with the parts of each sample.
-        count: windows that the samples come from.
+        scores: of the candidates.
+        residual: scaled, what the scores are of, shape (samples,).
+        windows_: windows that the samples come from.
     """
-    windowed = scores.parts.reshape(count, -1, scores.parts.shape[1])
-    sums = np.array([block.sum(axis=0) for block in blocks(windowed)])
-    spread = sums.std(axis=0, ddof=1) / np.sqrt(len(sums))
-    statistic = np.abs(sums.mean(axis=0)) / np.where(spread > 0, spread, np.inf)
-    alone = 2 * student.sf(statistic, len(sums) - 1)
-    tests = max(int(np.sum(spread > 0)), 1)
+    shape = (windows_, -1, scores.units.shape[1])
+    along = scores.units.T @ residual
+    left = residual[:, None] - scores.units * along
+    own, other = (
+        _autocorrelation(left.reshape(shape)),
+        _autocorrelation(scores.units.reshape(shape)),
+    )
+    swollen = np.maximum(1.0, own[0] * other[0] + 2 * np.sum(own[1:] * other[1:], axis=0))
+    spread = np.maximum(np.sum(left**2, axis=0), 1e-300) / max(len(residual) - 1, 1)
+    alone = chi2.sf(along**2 / (spread * swollen), 1)
+    tests = max(int(np.sum(scores.score > 0)), 1)
     return np.asarray(-np.expm1(tests * np.log1p(-np.minimum(alone, 1 - 1e-16))))
+
+
+def _autocorrelation(signals: FloatArray) -> FloatArray:
+    """Over the windows of (windows, samples, k), tapered, up to a quarter of a window."""
+    count = signals.shape[1]
+    spectrum = np.fft.rfft(signals, 2 * count, axis=1)
+    power = np.mean(np.abs(spectrum) ** 2, axis=0)
+    together = np.fft.irfft(power, axis=0)[: max(min(count // 4, 200), 1)]
+    taper = 1 - np.arange(len(together)) / len(together)
+    start = np.where(together[0] > 0, together[0], 1.0)
+    return np.asarray(together / start * taper[:, None])
 
 
 def rank(study: Study, data: Data, base: Fitted, variance: float | None = None) -> list[Ranked]:
     """All effects at all ports, the best first; those worth it fitted and judged."""
     found = candidates(study, data.train)
     scores = score_all(data, base, found, variance)
-    p_values = block_p_values(scores, len(base.train.residuals))
+    residual = np.nan_to_num(base.train.residuals / base.train.scale).ravel()
+    p_values = corrected_p_values(scores, residual, len(base.train.residuals))
     rows = _best_shapes(study, found, scores, p_values)
     for row in _worth_a_fit(rows, "dynamic" if study.model.states else "static"):
         refit(study, data, base, row)
@@ -186,7 +211,8 @@ def rank(study: Study, data: Data, base: Fitted, variance: float | None = None) 
 def rank_only(study: Study, data: Data, base: Fitted, found: Sequence[Candidate]) -> Ranked:
     """The row of one effect at one port, whatever its score; `found` are its shapes."""
     scores = score_all(data, base, found, None)
-    p_values = block_p_values(scores, len(base.train.residuals))
+    residual = np.nan_to_num(base.train.residuals / base.train.scale).ravel()
+    p_values = corrected_p_values(scores, residual, len(base.train.residuals))
     return _best_shapes(study, found, scores, p_values, every=True)[0]
 
 
@@ -208,17 +234,16 @@ def _best_shapes(
             best[key] = index
     rows = []
     for (name, port), index in best.items():
-        alike = [
-            f"{n}@{p}"
-            for (n, p), j in best.items()
-            if j != index and scores.cosines[index, j] > ALIKE
-        ]
+        cosines = {
+            f"{n}@{p}": float(scores.cosines[index, j]) for (n, p), j in best.items() if j != index
+        }
+        alike = [label for label, cosine in cosines.items() if cosine > ALIKE]
         candidate = found[index]
         rows.append(
             Ranked(
                 name, port, study.model.ports[port].kind, float(p_values[index]),
                 float(scores.explained[index]), _start(candidate, float(scores.strength[index])),
-                alike, placement=Placement(name, candidate.effect, port),
+                alike, cosines, placement=Placement(name, candidate.effect, port),
             )
         )  # fmt: skip
     return sorted(rows, key=lambda row: -row.explained)
@@ -242,14 +267,34 @@ def _start(candidate: Candidate, strength: float) -> dict[str, float]:
 def _worth_a_fit(rows: Sequence[Ranked], kind: str) -> list[Ranked]:
     """The best, and the best of each kind of port, that the residual looks like beyond chance."""
     likely = [row for row in rows if row.p_value < LEVEL]
-    chosen = likely[: MOST_FITS[kind]]
+    told: dict[str, Ranked] = {}
+    for row in likely:
+        double = _told_by(row, told, likely)
+        if double is None:
+            told[row.label] = row
+            row.reason = "explains less than others; not fitted"
+        else:
+            row.reason = f"looks like {double}; not fitted"
+    chosen = list(told.values())[: MOST_FITS[kind]]
     for port_kind in ("force", "actuator", "sensor"):
-        first = next((row for row in likely if row.kind == port_kind), None)
+        first = next((row for row in told.values() if row.kind == port_kind), None)
         if first is not None and first not in chosen:
             chosen.append(first)
-    for row in likely:
-        row.reason = "explains less than others; not fitted"
     return chosen
+
+
+def _told_by(row: Ranked, told: dict[str, Ranked], likely: Sequence[Ranked]) -> str | None:
+    """What is fitted in the row's place: a double that is no more complicated, or of lower order."""
+    assert row.placement is not None
+    lower = f"{row.placement.effect.refines}@{row.port}"
+    if lower in row.alike and any(other.label == lower for other in likely):
+        return lower
+    return next((c for c in row.alike if c in told and _free(told[c]) <= _free(row)), None)
+
+
+def _free(row: Ranked) -> int:
+    assert row.placement is not None
+    return row.placement.effect.free
 
 
 def refit(study: Study, data: Data, base: Fitted, row: Ranked) -> None:

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from rigwatch.physics.engine.effect import Effect
+from rigwatch.physics.engine.score import ALIKE
 from rigwatch.workbench.fitted import Fitted, block_errors
 from rigwatch.workbench.noise_floor import NoiseFloor
 from rigwatch.workbench.rank import Ranked
@@ -24,6 +25,8 @@ ALLOWED = {"periods": 1.1, "healthy": 1.1, "quiet band": 1.25}
 """Error over noise floor up to which nothing is missing, by how the floor is known."""
 EQUAL = 2.0
 """Standard deviations of a paired difference below which two effects do equally well."""
+SIMILAR = 0.8
+"""Cosine below which two effects that do equally well explain different parts of the error."""
 MOST_OF_IT = 0.75
 """Share of a gain that an effect of lower order must have to go first."""
 EXPLAINED = 0.6
@@ -66,7 +69,12 @@ def judge(
         if row.label in best.alike and row.label not in members and family(row, effects) == kind
     ]
     rivals = [
-        row.label for row in equals if family(row, effects) != kind and _free(row) <= _free(best)
+        row.label
+        for row in rows
+        if (row in equals or row.fitted is None)
+        and best.cosines.get(row.label, 0.0) > (SIMILAR if row in equals else ALIKE)
+        and family(row, effects) != kind
+        and effects[row.effect].free <= effects[best.effect].free
     ]
     if floor.method != "quiet band" and _left(base, best, floor) > 1 - EXPLAINED:
         text = (
@@ -110,7 +118,7 @@ def _left(base: Fitted, best: Ranked, floor: NoiseFloor) -> float:
 def _named(accepted: Sequence[Ranked], effects: Mapping[str, Effect]) -> Ranked:
     top = min(accepted, key=lambda row: row.held_out_error)
     equals = [row for row in accepted if row is top or _equal(top, row)]
-    best = min(equals, key=lambda row: (_free(row), row.held_out_error))
+    best = min(equals, key=lambda row: (effects[row.effect].free, row.held_out_error))
     lower = effects[best.effect].refines
     for row in accepted:
         if row.effect == lower and row.gain and best.gain and row.gain > MOST_OF_IT * best.gain:
@@ -125,8 +133,3 @@ def _equal(one: Ranked, other: Ranked) -> bool:
     spread = difference.std(ddof=1) / np.sqrt(len(difference))
     same = abs(other.held_out_error / one.held_out_error - 1) < 0.005
     return bool(same or abs(difference.mean()) < EQUAL * spread)
-
-
-def _free(row: Ranked) -> int:
-    assert row.fitted is not None
-    return len(row.fitted.compiled.system.free)

@@ -6,6 +6,7 @@ from rigwatch.workbench.change import Change
 from rigwatch.workbench.compare import Comparison
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.intervals import Value
+from rigwatch.workbench.locate import Region
 
 VERDICTS = {
     "nothing_missing": "nothing is missing",
@@ -82,7 +83,7 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
     head = ["effect@port", "training", "held out", "p", "", "cannot be told from"]
     lines += table(head, [_ranked(row) for row in found.ranking[:most]])
     if found.next_experiment:
-        lines += ["", f"next experiment: {found.next_experiment['text']}"]
+        lines += ["", f"next experiment: {found.next_experiment.text}"]
     return lines
 
 
@@ -109,3 +110,28 @@ def change_lines(found: Change) -> list[str]:
             ["name", "value", "interval", "unit", ""], _parameters(found.after.parameters)
         )
     return lines
+
+
+def region_lines(found: Sequence[Region], most: int) -> list[str]:
+    """What `rigwatch locate` prints: of each view the regions with most of the energy."""
+    lines = []
+    for channel, view in dict.fromkeys((r.channel, r.view) for r in found):
+        regions = [r for r in found if (r.channel, r.view) == (channel, view)][:most]
+        rows = [
+            [r.name, number(r.rms), number(r.mean), f"{r.share:.0%}", _span(r)] for r in regions
+        ]
+        lines += [f"{channel}, by {view}"]
+        lines += [*table(["where", "rms", "mean", "share of energy", "samples"], rows), ""]
+    return lines[:-1]
+
+
+def _span(region: Region) -> str:
+    if not len(region.samples):
+        return ""
+    return f"{len(region.samples)}, first {region.samples[0]}, last {region.samples[-1]}"
+
+
+def region_data(found: Sequence[Region]) -> list[dict[str, object]]:
+    """What `rigwatch locate --json` prints."""
+    whole = [{name: getattr(r, name) for name in r.__dataclass_fields__} for r in found]
+    return [row | {"samples": r.samples.tolist()} for row, r in zip(whole, found, strict=True)]

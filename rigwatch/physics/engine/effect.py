@@ -89,6 +89,11 @@ class Effect(Section, frozen=True, kw_only=True):
         roles = ("strength", "switch")
         return next(name for name, p in self.parameters.items() if p.role in roles)
 
+    @property
+    def free(self) -> int:
+        """Parameters that a fit moves."""
+        return sum(p.role in ("strength", "shape") for p in self.parameters.values())
+
     def scaled(self, sizes: Mapping[str, float]) -> "Effect":
         """The effect with its shares turned into numbers for signals of these sizes.
 

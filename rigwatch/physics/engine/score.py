@@ -32,7 +32,7 @@ class Scores:
         strength: first-order estimate, shape (k,).
         explained: share of the residual's energy, shape (k,).
         cosines: between projected directions, absolute, shape (k, k).
-        parts: of each sample in the unit direction times residual, shape (windows·samples, k).
+        units: the projected directions, of unit length, shape (windows·samples, k).
     """
 
     score: FloatArray
@@ -41,7 +41,7 @@ class Scores:
     strength: FloatArray
     explained: FloatArray
     cosines: FloatArray
-    parts: FloatArray
+    units: FloatArray
 
     def classes(self, alike: float = ALIKE) -> list[list[int]]:
         """For each candidate the candidates that it cannot be told from, itself first."""
@@ -99,5 +99,5 @@ def score(
         along / size,
         along**2 / max(float(r @ r), 1e-300),
         np.abs(unit.T @ unit),
-        unit * r[:, None],
+        unit,
     )
