@@ -67,7 +67,9 @@ def add(study: Study, effect: str, port: str | None = None, *, anyway: bool = Fa
     )
     if not row.accepted and not anyway:
         text = f"{words}: {row.reason}; not added"
-        append(study, "refused", effect=effect, port=where, reason=row.reason, **_numbers(before))
+        tried = {"tried_train_error": errors[0], "tried_held_out_error": errors[1]}
+        numbers = _numbers(before) | tried
+        append(study, "refused", effect=effect, port=where, reason=row.reason, **numbers)
         return Change("refused", effect, where, before, before, errors, text)
     accepted = _accepted(row)
     changed = append_effect(study, accepted)

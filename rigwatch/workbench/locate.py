@@ -57,10 +57,10 @@ def locate(bench: Bench) -> list[Region]:
 def _channel(bench: Bench, channel: str, residual: FloatArray, floor: float) -> list[Region]:
     recording = bench.data.train
     rows = sample_numbers(recording, len(residual))
-    motion = _motion(bench, rows)
+    moved = motion(bench, rows)
     found = _cut(channel, residual, floor, rows, "time", _by_time(residual, rows, recording.dt))
-    if motion is not None:
-        x, v = motion
+    if moved is not None:
+        x, v = moved
         views = {
             "motion": _by_motion(x, v),
             "direction": _by_direction(v),
@@ -90,7 +90,7 @@ def sample_numbers(recording: Recording, count: int) -> IntArray:
     return np.concatenate(parts).astype(np.int64)[:count]
 
 
-def _motion(bench: Bench, rows: IntArray) -> tuple[FloatArray, FloatArray] | None:
+def motion(bench: Bench, rows: IntArray) -> tuple[FloatArray, FloatArray] | None:
     """Position and velocity at a force port, as measured."""
     recording, model = bench.data.train, bench.study.model
     names = list(model.inputs)
