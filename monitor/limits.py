@@ -15,10 +15,14 @@ import numpy as np
 from scipy.special import chdtri
 
 from monitor.model_file import RigModel
-from monitor.watch import Rules
+from monitor.watch_state import Rules
 
 SECONDS_A_YEAR = 365.25 * 86400.0
 STATISTICS = 3
+POSITION_FLOOR, VOLTAGE_FLOOR = 0.02, 0.03
+"""Shares of its swing by which a channel may drift from the healthy period, root mean square: what
+temperature does to the supply and to the valve in a day.
+"""
 
 
 def chance_a_look(false_alarm: float, sample_rate: float) -> float:
@@ -39,8 +43,8 @@ def rules_for(model: RigModel) -> Rules:
         limit_64=float(chdtri(64, chance)),
         least_velocity=decision.least_velocity,
         worst_condition=decision.worst_condition,
-        position_floor=0.02,
-        voltage_floor=0.03,
+        position_floor=POSITION_FLOOR,
+        voltage_floor=VOLTAGE_FLOOR,
         low1=low[0],
         high1=high[0],
         low2=low[1],

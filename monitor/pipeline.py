@@ -13,17 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor import conditions as kinds
-from monitor import watch as w
+from monitor import watch_state as w
 from monitor.admission import Admission, Admitted
 from monitor.conditions import Condition
-from monitor.energies import new_energies
 from monitor.inertia import InertiaResidual
-from monitor.isolation import new_history
 from monitor.limits import rules_for
 from monitor.model_file import InertiaPlant, RigModel
 from monitor.reference import ReferenceRules, new_reference
 from monitor.residual import TransferResidual
-from monitor.window import new_window
+from monitor.watch import watch_block
 from rigwatch.physics.transfer_function import FloatArray
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
 
@@ -92,8 +90,8 @@ class Monitor:
         if admitted is None:
             return None
         data = self._residual.update(admitted.signals, admitted.code)
-        out = np.zeros((len(data), w.OUTPUTS))
-        w.watch_block(
+        out = np.zeros((w.OUTPUTS, len(data)))
+        watch_block(
             data,
             admitted.code,
             admitted.position_valid,
@@ -102,12 +100,12 @@ class Monitor:
             self._arming,
             self._reference,
             self._state,
-            out,
+            out.T,
         )
         return self._result(block, admitted, out)
 
     def _result(self, block: SampleBlock, admitted: Admitted, out: FloatArray) -> Result:
-        kept = np.ascontiguousarray(out[admitted.padding :].T)
+        kept = out[:, admitted.padding :]
         run = admitted.invalid_run[admitted.padding :]
         estimates = EstimateBlock(
             device=block.device,
@@ -196,13 +194,4 @@ def _known(model: RigModel) -> list[tuple[FloatArray, float, int]]:
 
 def _new_state(model: RigModel) -> w.WatchState:
     longest = max(model.decision.longest_period, model.window.length)
-    b, a = model.friction.function().padded()
-    return w.WatchState(
-        new_window(longest, 2),
-        new_energies(64, 5),
-        new_history(b, a),
-        np.zeros(8, np.int64),
-        np.zeros(w.OUTPUTS),
-        np.zeros(8),
-        np.zeros((3, 8)),
-    )
+    return w.new_watch_state(longest, *model.friction.function().padded())
