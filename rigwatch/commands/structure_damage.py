@@ -1,19 +1,23 @@
 """`rigwatch structure damage`: whether, when and where a structure was damaged, and how much."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands._sessions import print_json, say
+from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:
-    from rigwatch.structures.damage import Damage
+    from rigwatch.structures.damage import Damage, Examination
+    from rigwatch.structures.damage_reference import Figure
 
 HELP = "find damage in a record: its instant, its place among all springs, and its size"
 EXAMPLE = """\
   rigwatch structure simulate configs/structures/kabe_antenna.toml damaged.csv \\
       --damage 5 springs.k4_46.stiffness=50
-  rigwatch structure damage configs/structures/kabe_antenna.toml damaged.csv"""
+  rigwatch structure damage configs/structures/kabe_antenna.toml damaged.csv --report damage.html
+  rigwatch structure damage antenna.toml sessions/antenna.mcap --undamaged 4 --false-alarms 0.001"""
 SHOWN = 5
 """Places that are printed."""
 
@@ -21,11 +25,24 @@ SHOWN = 5
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
     parser.add_argument("structure", type=Path, help="structure file of the undamaged structure")
-    parser.add_argument("record", type=Path, help="record with columns t, x6, ... (.csv or .npz)")
+    parser.add_argument(
+        "record",
+        type=Path,
+        help="record with columns t, x6, ... (.csv or .npz), or a session (.mcap or its folder)",
+    )
     parser.add_argument(
         "--undamaged", type=float, metavar="SECONDS", help="start that is sure to be undamaged"
     )
     parser.add_argument("--limit", type=float, help="fixed limit of the residual instead of a test")
+    parser.add_argument(
+        "--false-alarms", type=float, default=0.01, metavar="P",
+        help="probability of any false alarm in a whole record, default 0.01",
+    )  # fmt: skip
+    parser.add_argument(
+        "--settle", type=float, default=2.0, metavar="SECONDS",
+        help="data from which a damage is identified at first; at least this lies between damages",
+    )  # fmt: skip
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a web page")
     parser.add_argument(
         "--known", action="store_true", help="take the file's values as true, even unknown ones"
     )
@@ -35,20 +52,56 @@ def run(arguments: argparse.Namespace) -> int:
     """0 when the record was examined, damaged or not."""
     from rigwatch.structures.damage import Settings, examine
     from rigwatch.structures.description import load_structure
-    from rigwatch.structures.record import read_record
+    from rigwatch.structures.session_record import read_any
 
-    settings = Settings(undamaged=arguments.undamaged, limit=arguments.limit, known=arguments.known)
-    found = examine(
-        load_structure(arguments.structure), read_record(arguments.record), settings, say
+    settings = Settings(
+        undamaged=arguments.undamaged,
+        rate=arguments.false_alarms,
+        limit=arguments.limit,
+        settle=arguments.settle,
+        known=arguments.known,
     )
+    found = examine(load_structure(arguments.structure), read_any(arguments.record), settings, say)
+    if arguments.report:
+        _write_report(arguments.report, found, arguments.record.name)
     if arguments.json:
-        print_json({"damages": [_plain(damage) for damage in found.damages]})
+        print_json(_whole(found))
     elif not found.damages:
         print("no damage")
     else:
         for damage in found.damages:
             _print(damage)
     return 0
+
+
+def _write_report(path: Path, found: "Examination", record: str) -> None:
+    from rigwatch.structures.damage_report import page
+
+    try:
+        path.write_text(page(found, record), encoding="utf-8")
+    except OSError as error:
+        raise ModelError(f"{path}: {error.strerror or error}, cannot be written") from error
+    say(f"report: {path}")
+
+
+def _whole(found: "Examination") -> dict[str, Any]:
+    base = found.reference
+    return {
+        "undamaged": {
+            "seconds": base.samples * base.model.dt,
+            "parameters": _intervals(base.figures),
+            "noise": dict(zip(base.model.signals, base.sigma.tolist(), strict=True)),
+        },
+        "threshold": found.watches[0].threshold,
+        "damages": [_plain(damage) for damage in found.damages],
+    }
+
+
+def _intervals(figures: "Mapping[str, Figure]") -> dict[str, Any]:
+    return {
+        name: {"value": figure.value, "interval": [figure.low, figure.high]}
+        for name, figure in figures.items()
+    }
 
 
 def _plain(damage: "Damage") -> dict[str, Any]:
@@ -69,10 +122,9 @@ def _plain(damage: "Damage") -> dict[str, Any]:
             }
             for place in damage.ranking.candidates
         ],
-        "parameters": {
-            name: {"value": figure.value, "interval": [figure.low, figure.high]}
-            for name, figure in damage.figures.items()
-        },
+        "before": _intervals(damage.before),
+        "parameters": _intervals(damage.figures),
+        "unseen": list(damage.ranking.unseen),
     }
 
 

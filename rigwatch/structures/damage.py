@@ -18,8 +18,10 @@ from rigwatch.structures.damage_refit import Refit, Stretch
 from rigwatch.structures.damage_watch import RATE, Alarm, Judge, Watch
 from rigwatch.structures.description import Structure
 from rigwatch.structures.identification import CONFIDENCE
-from rigwatch.structures.locate import Ranking, best_score, locate
+from rigwatch.structures.locate import Ranking, locate, unexplained
 from rigwatch.structures.record import Record
+from rigwatch.structures.spring_model import SpringModel
+from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
 
@@ -98,6 +100,7 @@ def examine(
     record: Record,
     settings: Settings | None = None,
     progress: Callable[[str], None] = lambda _: None,
+    model: SpringModel | None = None,
 ) -> Examination:
     """Look for damages in a record.
 
@@ -106,18 +109,31 @@ def examine(
         record: what was measured, undamaged at first.
         settings: how.
         progress: is told what is being done.
+        model: of an earlier examination of the same structure, whose kernel may serve again.
 
     Raises:
-        ModelError: structure and record do not fit, or its undamaged start does not suffice.
+        ModelError: structure and record do not fit, its undamaged start does not suffice, or a
+            setting is out of range.
     """
     chosen = settings or Settings()
+    _check(chosen)
     undamaged = chosen.undamaged or 0.2 * len(record) * record.dt
     progress(f"undamaged structure from the first {undamaged:g} s")
-    base = reference(structure, record, undamaged, known=chosen.known)
+    base = reference(structure, record, undamaged, known=chosen.known, model=model)
     judge = Judge(base.sigma, base.samples, chosen.rate, chosen.limit)
     work = _Work(base, judge, chosen, progress)
     work.through()
     return Examination(base, chosen, tuple(work.watches), tuple(work.damages))
+
+
+def _check(settings: Settings) -> None:
+    for name, value, good, expected in (
+        ("false alarms", settings.rate, 0 < settings.rate < 1, "a probability between 0 and 1"),
+        ("limit", settings.limit, settings.limit is None or settings.limit > 0, "one above 0"),
+        ("settle", settings.settle, settings.settle > 0, "seconds above 0"),
+    ):
+        if not good:
+            raise ModelError(f"{name}: found {value:g}, expected {expected}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +177,7 @@ class _Work:
         model, dt = self.base.model, self.base.model.dt
         self.progress(f"residual beyond its threshold at {alarm.sample * dt:g} s")
         path = np.concatenate([np.tile(now.state, (now.first, 1)), watch.states])
-        begin = self._begin(now, path, alarm)
+        begin = self._begin(now, path, watch, alarm)
         ranking, explained = self._located(now, path, begin)
         best = ranking.best
         self.progress(f"most likely {best.name}: {best.before:g} -> {best.after:g}")
@@ -178,19 +194,25 @@ class _Work:
             {**now.figures, **figures},
         )  # fmt: skip
 
-    def _begin(self, now: _Now, path: FloatArray, alarm: Alarm) -> int:
+    def _begin(self, now: _Now, path: FloatArray, watch: Watch, alarm: Alarm) -> int:
         """First sample of the data to identify from.
 
-        Where the alarm came late the change is small, and the onset is only known to lie before:
-        the start at which the best candidate explains most is taken.
+        Where the alarm came late the change is small, and the onset is only known to lie before.
+        Taken is the start from which a changed spring explains more of the undamaged model's
+        residual than from any other: too early mixes two structures, too late leaves some of it.
         """
         end = len(self.base.model)
         if alarm.sample - alarm.onset <= LATE * (end - alarm.sample):
             return alarm.sample
         earliest = min(alarm.onset, max(now.first, self.base.samples))
         starts = np.unique(np.linspace(earliest, alarm.onset, STARTS).astype(int)).tolist()
-        scores = [best_score(self._stretch(now, first, end), path) for first in starts]
-        return int(starts[int(np.argmax(scores))])
+        squares = np.nansum((watch.residual / self.base.sigma) ** 2, axis=1)
+        gains = [
+            float(squares[first - watch.first :].sum())
+            - unexplained(self._stretch(now, first, end), path)
+            for first in starts
+        ]
+        return int(starts[int(np.argmax(gains))])
 
     def _stretch(self, now: _Now, first: int, last: int) -> Stretch:
         return Stretch(self.base.model, now.parameters, first, last, self.base.sigma)

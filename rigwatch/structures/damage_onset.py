@@ -1,8 +1,8 @@
 """The instant of a damage whose place is known: positions and velocities do not jump there.
 
 For each instant τ that comes into question the undamaged model runs until τ and the damaged one
-from its state there; the sum of squared residuals over the noise is smallest at the likeliest τ, and
-within 3.84 of that at 95 % of all τ.
+from its state there. The likeliest τ has the smallest sum of squared residuals over the noise, and
+the 95 % interval holds those whose sum is at most 3.84 above that.
 """
 
 from dataclasses import dataclass
@@ -61,7 +61,8 @@ def instant(
     while True:
         for at in np.unique(np.linspace(*span, TRIED).round().astype(int)).tolist():
             if at not in costs:
-                costs[at] = _cost(model, damaged, watch, at, end, sigma)
+                run = model.run(damaged, watch.states[at - watch.first], at, end)
+                costs[at] = _cost((model.observed[at:end] - run.outputs) / sigma)
                 costs[at] += float(quiet[at - watch.first])
         centre = min(costs, key=lambda at: costs[at])
         step = (span[1] - span[0]) / (TRIED - 1)
@@ -73,11 +74,7 @@ def instant(
     return Instant(centre, centre * dt, (min(near) - 1) * dt, (max(near) + 1) * dt)
 
 
-def _cost(
-    model: SpringModel, damaged: FloatArray, watch: Watch, at: int, end: int, sigma: FloatArray
-) -> float:
-    """Squared residuals after sample `at`, from the state that the undamaged model has there."""
-    run = model.run(damaged, watch.states[at - watch.first], at, end)
-    errors = ((model.observed[at:end] - run.outputs) / sigma)[1:]
-    found = float(np.nansum(errors**2))
+def _cost(errors: FloatArray) -> float:
+    """Sum of squares after the first sample; infinite where the simulation ran away."""
+    found = float(np.nansum(errors[1:] ** 2))
     return found if np.isfinite(found) else float("inf")

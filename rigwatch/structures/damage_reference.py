@@ -15,7 +15,7 @@ from rigwatch.structures.description import Structure, coefficients
 from rigwatch.structures.identification import CONFIDENCE, solver
 from rigwatch.structures.problem import problem_of
 from rigwatch.structures.record import Record
-from rigwatch.structures.spring_model import SpringModel, spring_model
+from rigwatch.structures.spring_model import SpringModel, beside, spring_model
 from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
@@ -55,7 +55,12 @@ class Reference:
 
 
 def reference(
-    structure: Structure, record: Record, undamaged: float, *, known: bool = False
+    structure: Structure,
+    record: Record,
+    undamaged: float,
+    *,
+    known: bool = False,
+    model: SpringModel | None = None,
 ) -> Reference:
     """The structure as the first `undamaged` seconds of the record show it.
 
@@ -64,6 +69,7 @@ def reference(
         record: the whole record.
         undamaged: length of its start that is taken as undamaged [s].
         known: take the file's values as true instead of identifying.
+        model: the structure with another record, whose kernel may serve where `known` is set.
 
     Raises:
         ModelError: the undamaged start is too short, or does not determine what is unknown.
@@ -75,7 +81,10 @@ def reference(
             f" {LEAST * record.dt:g} and {len(record) * record.dt:g} s"
         )
     names, values, covariance = _identified(structure, record, samples, known=known)
-    model = spring_model(structure, record, dict(zip(names, values.tolist(), strict=True)))
+    if known and model is not None:
+        model = beside(model, record)
+    else:
+        model = spring_model(structure, record, dict(zip(names, values.tolist(), strict=True)))
     parameters = model.problem.start
     run = model.run(parameters, model.start(), 0, samples)
     observed = model.observed[:samples]

@@ -3,10 +3,12 @@
 First pass: one linear sweep along the observed trajectory gives the residual and its derivative by
 every candidate and every unknown first state at once (thesis 4.13, 4.14); the engine's score test
 ranks the candidates. Second pass: the best few are refitted with unknown first states and ranked by
-what they leave unexplained. Candidates whose directions, freed of the first states, have a cosine
-above 0.95 cannot be told apart by the record and stand in one class.
+what they leave unexplained. Candidates form a class that the record cannot tell apart where their
+directions, freed of the first states, have a cosine above 0.95 and the data do not prefer the best
+of them: what it explains beyond another is no more than chance would give.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,15 +16,19 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
-from rigwatch.structures.damage_refit import Refit, Stretch
+from rigwatch.structures.damage_refit import STEPS, Refit, Stretch
 from rigwatch.structures.spring_model import SpringModel, split
 
 FloatArray = NDArray[np.float64]
 
-REFITTED = 5
+REFITTED = 4
 """Candidates of the first pass that are refitted."""
-WORTH = 0.3
+WORTH = 0.4
 """Share of the best candidate's score that one must reach to be refitted."""
+CHANCE = float(chi2.isf(0.01, 1))
+"""χ² by which the best may be better than another of its class."""
+SCREENING = 6
+"""Gauss-Newton steps that candidates get; the best goes on from there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,16 +108,21 @@ def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Rank
     listed = [_first_pass(stretch, scores, i) for i in np.argsort(-scores.score).tolist()]
     chosen = [c for c in listed[:refitted] if c.score >= WORTH * listed[0].score]
     places = {name: i for i, name in enumerate(model.candidates)}
-    done = [_refitted(stretch, c, state + shifts[places[c.name]]) for c in chosen]
+    done = [_refitted(stretch, c, state + shifts[places[c.name]], SCREENING) for c in chosen]
     done.sort(key=lambda c: c.chi2)
-    best = _with_classes(done[0], model, count)
+    if done[0].refit is not None:
+        done[0] = _refitted(stretch, done[0], done[0].refit.state)
+    left = {c.name: c.refit.chi2 for c in done if c.refit is not None}
+    best = _with_class(done[0], model, left)
     weak = _unseen(model, stretch, rows, fitted, count)
     return Ranking((best, *done[1:], *listed[len(chosen) :]), stretch.first, stretch.last, weak)
 
 
-def best_score(stretch: Stretch, path: FloatArray) -> float:
-    """Score of the best candidate over the stretch; arguments as of `locate`."""
-    return float(_scored(stretch, path)[3].score.max())
+def unexplained(stretch: Stretch, path: FloatArray) -> float:
+    """χ² that the best candidate leaves to first order; arguments as of `locate`."""
+    scores = _scored(stretch, path)[3]
+    best = int(np.argmax(scores.score))
+    return float(scores.score[best] * (1.0 / max(scores.explained[best], 1e-12) - 1.0))
 
 
 def _scored(stretch: Stretch, path: FloatArray) -> tuple[FloatArray, FloatArray, Projector, Scores]:
@@ -145,9 +156,11 @@ def _first_pass(stretch: Stretch, scores: Scores, index: int) -> Candidate:
     return Candidate(name, spring, kind, *numbers, before, after, nan, nan, (), None)
 
 
-def _refitted(stretch: Stretch, candidate: Candidate, state: FloatArray) -> Candidate:
+def _refitted(
+    stretch: Stretch, candidate: Candidate, state: FloatArray, steps: int = STEPS
+) -> Candidate:
     begin = max(candidate.after, 0.0) if candidate.kind == "stiffness" else candidate.after
-    found = stretch.refit({candidate.name: begin}, state)
+    found = stretch.refit({candidate.name: begin}, state, steps)
     return replace(
         candidate,
         after=found.values[candidate.name],
@@ -157,15 +170,29 @@ def _refitted(stretch: Stretch, candidate: Candidate, state: FloatArray) -> Cand
     )
 
 
-def _with_classes(best: Candidate, model: SpringModel, count: int) -> Candidate:
-    """The best with what looks like it along its own refitted trajectory."""
-    if best.refit is None:
+def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) -> Candidate:
+    """The best with what looks like it along its own refitted trajectory.
+
+    Args:
+        best: refitted.
+        model: structure and record.
+        left: χ² after their refits, by name.
+    """
+    if best.refit is None or not len(best.refit.slopes):
         return best
-    unit = _freed(best.refit.slopes[:, :count], best.refit.slopes[:, count:])
-    place = model.candidates.index(best.name)
-    cosines = np.abs(unit.T @ unit[:, place])
-    others = [i for i in np.argsort(-cosines).tolist() if i != place and cosines[i] > ALIKE]
-    return replace(best, alike=tuple(model.candidates[i] for i in others))
+    count, place = len(model.candidates), model.candidates.index(best.name)
+    slopes = best.refit.slopes
+    unit = _freed(slopes[:, :count], slopes[:, count:])
+    cosines = np.minimum(np.abs(unit.T @ unit[:, place]), 1.0)
+    # What is lost, to first order, where the best's direction is replaced by another.
+    shares = (1.0 - cosines**2) * ((best.after - best.before) / max(best.deviation, 1e-300)) ** 2
+    alike = []
+    for i in np.argsort(-cosines).tolist():
+        name = model.candidates[i]
+        worse = left[name] - best.refit.chi2 if name in left else shares[i]
+        if i != place and cosines[i] > ALIKE and worse < CHANCE:
+            alike.append(name)
+    return replace(best, alike=tuple(alike))
 
 
 def _freed(candidates: FloatArray, states: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ positions and velocities of all nodes that are not among them, so that states ca
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -168,6 +168,15 @@ def spring_model(
     kept = {name: column for name, column in record.columns.items() if name not in hidden}
     problem = problem_of(whole, Record(record.dt, kept), names, guess)
     return SpringModel(whole, problem, signals)
+
+
+def beside(model: SpringModel, record: Record) -> SpringModel:
+    """The same kernel beside another record of the same signals and time step."""
+    equations = model.problem.sweeper.compiled.system.model
+    wanted = {*model.signals, *(i.channel or name for name, i in equations.inputs.items())}
+    kept = {name: column for name, column in record.columns.items() if name in wanted}
+    recording = Record(record.dt, kept).recording(equations)
+    return replace(model, problem=replace(model.problem, recording=recording))
 
 
 def split(name: str, structure: Structure) -> tuple[str, str]:
