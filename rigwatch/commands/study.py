@@ -9,6 +9,7 @@ HELP = "make a study of a model and recordings, show what was done in it"
 EXAMPLE = """\
   rigwatch study new emps --template configs/studies/emps.toml --sessions recordings/
   rigwatch study show emps
+  rigwatch study report emps --output emps.html
   rigwatch study replay emps"""
 
 
@@ -16,8 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument(
         "action",
-        choices=["new", "show", "replay", "accept-data"],
-        help="new: make it; show: its ledger; replay: fit every step again and compare;"
+        choices=["new", "show", "report", "replay", "accept-data"],
+        help="new: make it; show: its ledger; report: write an HTML page;"
+        " replay: fit every step again and compare;"
         " accept-data: go on with recordings that have changed",
     )
     parser.add_argument("study", type=Path, help="the study's folder")
@@ -25,11 +27,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sessions", type=Path, metavar="FOLDER", help="where the template's sessions are"
     )
+    parser.add_argument("--output", type=Path, metavar="HTML", help="the report's file")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """0 on success; 1 where a replay gives other errors than the ledger."""
-    actions = {"new": _new, "show": _show, "replay": _replay, "accept-data": _accept}
+    from rigwatch.commands._study_report import report
+
+    actions = {
+        "new": _new,
+        "show": _show,
+        "report": report,
+        "replay": _replay,
+        "accept-data": _accept,
+    }
     return actions[arguments.action](arguments)
 
 
