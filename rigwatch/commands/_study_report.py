@@ -1,8 +1,6 @@
 """What `rigwatch study report` and `rigwatch study view` do."""
 
 import argparse
-import os
-from pathlib import Path
 
 from rigwatch.commands._sessions import print_json, say
 
@@ -19,5 +17,6 @@ def report(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json({"file": path, "verdict": found.explanation.verdict, "comparison": last})
         return 0
-    print(f"{path}: {len(found.stages)} steps, held-out error {last.held_out_error:.4g} {last.unit}")
+    error = f"{last.held_out_error:.4g} {last.unit}"
+    print(f"{path}: {len(found.stages)} steps, held-out error {error}")
     return 0

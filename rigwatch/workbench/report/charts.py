@@ -82,13 +82,13 @@ def stretch(first: Signals, last: Signals, channel: int) -> slice:
 
 
 def signal_chart(
-    found: Signals, channel: int, part: slice, name: str, unit: str, ends: tuple[float, float]
+    found: Signals, channel: int, part: slice, axis: str, ends: tuple[float, float]
 ) -> str:
     """Measured against modelled over a stretch."""
     time = found.time[part]
     plot = Plot(
-        f"{name} measured and modelled", (float(time[0]), float(time[-1])), ends, "",
-        f"{name} [{unit}]", 760, 190,
+        "measured and modelled", (float(time[0]), float(time[-1])), ends, "",
+        axis, 760, 190,
     )  # fmt: skip
     plot.line(time, found.measured[part, channel], "measured", width=3.2, name="measured")
     plot.line(time, found.modelled[part, channel], "model", width=1.5, name="modelled")
@@ -150,9 +150,7 @@ def _surface(
     if good.sum() < CELLS or np.ptp(x[good]) == 0 or np.ptp(v[good]) == 0:
         return None
     counts, edges_x, edges_v = np.histogram2d(x[good], v[good], CELLS)
-    sums, _, _ = np.histogram2d(
-        x[good], v[good], (edges_x, edges_v), weights=residual[good]
-    )
+    sums, _, _ = np.histogram2d(x[good], v[good], (edges_x, edges_v), weights=residual[good])
     return edges_x, edges_v, sums / np.maximum(counts, 1), counts
 
 
@@ -175,12 +173,18 @@ def bars_chart(
         if region.name in by_name:
             rms = by_name[region.name].rms
             plot.box((k + 0.02, k + 0.36), (0, rms), "held", f"{region.name}: {rms:.3g} {unit} now")
-    plot.line(np.array([-0.6, len(names) - 0.4]), np.full(2, floor), "soft", dash="4 4", name="noise floor")
+    plot.line(
+        np.array([-0.6, len(names) - 0.4]),
+        np.full(2, floor),
+        "soft",
+        dash="4 4",
+        name="noise floor",
+    )
     return plot.drawn()
 
 
 def _short(name: str) -> str:
-    return name.split(" to ")[0].replace("|x - mean| ", "")
+    return name.partition(" to ")[0].replace("|x - mean| ", "")
 
 
 def spectrum_chart(first: Stage, last: Stage, channel: int, unit: str) -> str:
@@ -215,7 +219,7 @@ def interval_chart(value: float, interval: tuple[float, float] | None) -> str:
     low, high = ((end - value) / abs(value) for end in interval)
     a, b = (60 + 110 * float(np.clip(end, -0.5, 0.5)) for end in (low, high))
     return (
-        f'<svg viewBox="0 0 120 14" class="whisker" role="img" aria-label="{low:+.1%} to {high:+.1%}">'
+        f'<svg viewBox="0 0 120 14" class="whisker" role="img">'
         f'<title>{low:+.1%} to {high:+.1%}</title><path class="grid" d="M60 1V13"/>'
         f'<path d="M{a:.1f} 7H{max(b, a + 1):.1f}" stroke="var(--held)" stroke-width="3"/>'
         f'<circle cx="60" cy="7" r="3" fill="var(--held)"/></svg>'

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from html import escape
 
 STYLE = """
-:root{color-scheme:light dark;--paper:#f6f5f1;--card:#fff;--ink:#1d232b;--soft:#69727d;--line:#e2e0d9;
+:root{color-scheme:light dark;--paper:#f6f5f1;--card:#fff;--ink:#1d232b;--soft:#69727d;
+--line:#e2e0d9;
 --held:#1467c6;--train:#7b8794;--before:#c9862b;--floor:#cfe3d3;--measured:#b3bac2;--model:#c4302b;
 --rest:#7a4fb5;--refused:#c4302b;--plus:#c4302b;--minus:#1467c6;--good:#1f7a45;--warn:#9a5b00}
 @media(prefers-color-scheme:dark){:root{--paper:#14171b;--card:#1c2026;--ink:#e6e8ea;--soft:#98a2ad;
@@ -18,7 +19,8 @@ main{max-width:880px;margin:0 auto;padding:36px 20px 64px}
 header h1{font-size:30px;line-height:1.2;margin:4px 0 10px;letter-spacing:-.01em}
 header p.sub,.note,figcaption{color:var(--soft);font-size:14px;margin:6px 0}
 .kicker{color:var(--soft);font-size:13px;letter-spacing:.06em;text-transform:uppercase;margin:0}
-.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:12px;margin:22px 0}
+.figures{display:grid;
+grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:12px;margin:22px 0}
 .figure{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:12px 16px}
 .figure b{display:block;font-size:26px;line-height:1.25;font-variant-numeric:tabular-nums}
 .figure span{color:var(--soft);font-size:13px}
@@ -73,7 +75,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
         "<tr>" + "".join(f"<td{k}>{c}</td>" for c, k in zip(row, kinds, strict=True)) + "</tr>"
         for row in rows
     )
-    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{lines}</tbody></table></div>'
+    whole = f"<table><thead><tr>{top}</tr></thead><tbody>{lines}</tbody></table>"
+    return f'<div class="scroll">{whole}</div>'
 
 
 def key(*entries: tuple[str, str]) -> str:

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
+import numpy as np
+
+from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.locate import Region
 from rigwatch.workbench.report import charts
@@ -17,7 +20,7 @@ from rigwatch.workbench.words import VERDICTS
 VIEWS = {
     "direction": "direction of motion",
     "amplitude": "distance from the mean position",
-    "time": "time",
+    "time": "time [s]",
 }
 
 
@@ -44,7 +47,7 @@ class Material:
 
     @property
     def refused(self) -> list[charts.Refused]:
-        """Effects that the recordings held out spoke against, while what stood then stands still."""
+        """Effects that held-out data spoke against, where what stood then stands still."""
         labels = [stage.added for stage in self.stages[1:]]
         found: dict[tuple[str, int], charts.Refused] = {}
         for line in self.ledger:
@@ -65,21 +68,37 @@ def header(m: Material) -> str:
         (exact(last.train_error, "train_error"), f"training error now [{unit}]"),
         (exact(last.noise_floor, "noise_floor"), f"noise floor [{unit}]"),
     ]
+    name = m.study.folder.resolve().name
     figures = "".join(f'<div class="figure"><b>{n}</b><span>{w}</span></div>' for n, w in cards)
     return (
-        f'<p class="kicker">{escape(m.study.folder.resolve().name)} · {escape(m.study.model.name)}</p>'
+        f'<p class="kicker">{escape(name)} · {escape(m.study.model.name)}</p>'
         f'<h1 id="verdict" data-verdict="{m.explanation.verdict}">{escape(_headline(m))}</h1>'
-        f'<p>{escape(_story(m))}</p>'
+        f"<p>{escape(_story(m))}</p>"
         f'<p class="sub">{escape(m.study.model.summary)} Noise floor from'
         f' {escape(last.noise_from)}.</p><div class="figures">{figures}</div>'
     )
 
 
 def _headline(m: Material) -> str:
-    words = VERDICTS[m.explanation.verdict]
-    now = f"With {_listed(m)}: " if len(m.stages) > 1 else ""
-    text = words if now else words[0].upper() + words[1:]
-    return f"{now}{text}"
+    """What a reader takes along: how far the error fell, and what is missing still."""
+    first, last = m.stages[0].comparison, m.stages[-1].comparison
+    best = m.explanation.ranking[0] if m.explanation.ranking else None
+    name = f"{_plain(best.effect)} at {best.port}" if best else ""
+    rivals = " or ".join(_plain(rival.split("@")[0]) for rival in m.explanation.rivals)
+    words = {
+        "nothing_missing": "nothing is missing",
+        "missing_effect": f"probably missing: {name}",
+        "undetermined": f"this recording cannot tell {name} from {rivals}",
+    }.get(m.explanation.verdict, VERDICTS[m.explanation.verdict])
+    if len(m.stages) == 1:
+        return words[0].upper() + words[1:]
+    fall = f"Error {first.held_out_error:.3g} → {last.held_out_error:.3g} {last.unit}"
+    still = words.replace("probably", "probably still", 1)
+    return f"{fall} on unseen data; {still}"
+
+
+def _plain(effect: str) -> str:
+    return effect.replace("_", " ")
 
 
 def _listed(m: Material) -> str:
@@ -137,24 +156,31 @@ def measured(m: Material) -> str:
         " share their axes.</p>",
     ]
     for channel, (name, output) in enumerate(m.study.model.outputs.items()):
+        axis = f"{name} [{output.unit}]"
         part = charts.stretch(m.signals[0], m.signals[-1], channel)
         shown = [s.measured[part, channel] for s in m.signals[:1]]
         shown += [s.modelled[part, channel] for s in m.signals]
         ends = limits(*shown)
-        rest = limits(*[s.residual[part, channel] for s in m.signals])
+        rest = _without_spikes([s.residual[part, channel] for s in m.signals])
         for stage, found in zip(m.stages, m.signals, strict=True):
             error = stage.comparison.channels[name].held_out_error
             heading = f"{stage.label}: {name}, {error:.3g} {output.unit} over the whole recording"
             parts += [f"<h3>{escape(heading)}</h3>"]
-            parts += [figure(charts.signal_chart(found, channel, part, name, output.unit, ends))]
+            parts += [figure(charts.signal_chart(found, channel, part, axis, ends))]
             parts += [figure(charts.residual_chart(found, channel, part, output.unit, rest))]
     return "".join(parts)
+
+
+def _without_spikes(residuals: Sequence[FloatArray]) -> tuple[float, float]:
+    """Ends of the axis that all steps share; a few spikes may stand out of it."""
+    usual = [np.nanquantile(r, [0.01, 0.99]) for r in residuals if np.isfinite(r).any()]
+    return limits(*usual, room=0.25)
 
 
 def where(m: Material) -> str:
     """Where-maps: motion, direction, amplitude, time, frequency."""
     parts = [
-        key(("before", "model alone"), ("held", "model as it is"), ("plus", "mean residual above 0"),
+        key(("before", "model alone"), ("held", "model as it is"), ("plus", "mean above 0"),
             ("minus", "below 0")),
         '<p class="note">Residual of the training recordings, as rigwatch locate counts it.</p>',
     ]  # fmt: skip
@@ -170,7 +196,12 @@ def where(m: Material) -> str:
             scale = f"Full colour from {most:.3g} {output.unit} of mean residual in a cell on."
             parts.append(f'<p class="note">{escape(scale)}</p>')
         parts += _bars(m, name, output.unit)
-        parts.append(figure(charts.spectrum_chart(first, last, channel, output.unit), "Spectrum"))
+        parts.append(
+            figure(
+                charts.spectrum_chart(first, last, channel, output.unit),
+                "Spectral density of the residual",
+            )
+        )
     return "".join(parts)
 
 

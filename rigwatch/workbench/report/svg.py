@@ -70,7 +70,9 @@ def limits(*values: FloatArray, zero: bool = False, room: float = 0.06) -> tuple
     if zero:
         low, high = min(low, 0.0), max(high, 0.0)
     spare = room * (high - low or abs(high) or 1.0)
-    return (low if zero and low == 0 else low - spare), (high if zero and high == 0 else high + spare)
+    return (low if zero and low == 0 else low - spare), (
+        high if zero and high == 0 else high + spare
+    )
 
 
 def label(value: float) -> str:
@@ -111,8 +113,8 @@ class Plot:
 
     def line(self, x: FloatArray, y: FloatArray, colour: str, *, width: float = 1.5,
              dash: str = "", marks: bool = False, name: str = "") -> None:  # fmt: skip
-        """A line that breaks where a value is not finite."""
-        path = " ".join(_segments(*_thinned(x, y), self))
+        """A line that breaks where a value is not finite and stays within the axes."""
+        path = " ".join(_segments(*_thinned(x, np.clip(y, *self.y)), self))
         dashed = f' stroke-dasharray="{dash}"' if dash else ""
         told = f"<title>{escape(name)}</title>" if name else ""
         self._parts.append(
