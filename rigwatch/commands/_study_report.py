@@ -1,4 +1,4 @@
-"""What `rigwatch study report` and `rigwatch study view` do."""
+"""What `rigwatch study report` does."""
 
 import argparse
 

@@ -10,6 +10,7 @@ EXAMPLE = """\
   rigwatch study new emps --template configs/studies/emps.toml --sessions recordings/
   rigwatch study show emps
   rigwatch study report emps --output emps.html
+  rigwatch study view emps --save emps.rrd
   rigwatch study replay emps"""
 
 
@@ -17,8 +18,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument(
         "action",
-        choices=["new", "show", "report", "replay", "accept-data"],
+        choices=["new", "show", "report", "view", "replay", "accept-data"],
         help="new: make it; show: its ledger; report: write an HTML page;"
+        " view: measured and modelled signals of every step;"
         " replay: fit every step again and compare;"
         " accept-data: go on with recordings that have changed",
     )
@@ -28,16 +30,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sessions", type=Path, metavar="FOLDER", help="where the template's sessions are"
     )
     parser.add_argument("--output", type=Path, metavar="HTML", help="the report's file")
+    parser.add_argument("--save", type=Path, metavar="FILE", help="view: write a file for Rerun")
+    parser.add_argument("--picture", type=Path, metavar="PNG", help="view: write a picture")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """0 on success; 1 where a replay gives other errors than the ledger."""
     from rigwatch.commands._study_report import report
+    from rigwatch.commands._study_view import view
 
     actions = {
         "new": _new,
         "show": _show,
         "report": report,
+        "view": view,
         "replay": _replay,
         "accept-data": _accept,
     }

@@ -86,4 +86,5 @@ def signals(stage: Stage, *, held_out: bool = True) -> Signals:
     residual = evaluate(base.train, recording, horizon, base.substeps).residuals
     flat = residual.reshape(-1, residual.shape[-1])
     measured = recording.outputs[: len(flat)]
-    return Signals(np.arange(len(flat)) * recording.dt, measured, measured - flat)
+    time = np.arange(len(flat), dtype=np.float64) * recording.dt
+    return Signals(time, measured, measured - flat)

@@ -207,7 +207,7 @@ def where(m: Material) -> str:
 
 def _bars(m: Material, channel: str, unit: str) -> list[str]:
     floor = m.stages[-1].comparison.channels[channel].noise_floor
-    pair, wide = [], []
+    pair, wide = list[str](), list[str]()
     for view, words in VIEWS.items():
         old, new = ([r for r in found if (r.channel, r.view) == (channel, view)]
                     for found in (m.before, m.now))  # fmt: skip

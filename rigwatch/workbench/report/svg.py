@@ -164,7 +164,7 @@ class Plot:
         left, right = self.across.start, self.across.end
         low, high = self.up.start, self.up.end
         parts = []
-        for value in self.up.ticks(max(2, round(self.height / 50))):
+        for value in self.up.ticks(max(4, round(self.height / 50))):
             y = self.up.at(value)
             parts.append(f'<path class="grid" d="M{left:.1f} {y:.1f}H{right:.1f}"/>')
             parts.append(

@@ -1,0 +1,110 @@
+"""What `rigwatch study view` does: the steps of a study in the viewer, a file or a picture."""
+
+import argparse
+import os
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from rigwatch.commands._sessions import print_json, say
+
+if TYPE_CHECKING:
+    from rigwatch.dashboard.study_view import Output
+    from rigwatch.workbench.stages import Signals, Stage
+    from rigwatch.workbench.study import Study
+
+_LOOK_AGAIN = 0.3
+
+
+def view(arguments: argparse.Namespace) -> int:
+    """0 when it was drawn, and when a window was shown, once that is closed."""
+    from rigwatch.dashboard import require_rerun
+
+    require_rerun()
+    os.environ.setdefault("RUST_LOG", "off")
+    from rigwatch.workbench.stages import signals, stages
+    from rigwatch.workbench.study import open_study
+
+    study = open_study(arguments.study)
+    say("fitting every step")
+    found = stages(study)
+    shown = [signals(stage) for stage in found]
+    _show(arguments, study, found, shown)
+    if arguments.json:
+        steps = [stage.label for stage in found]
+        print_json({"samples": len(shown[0].time), "steps": steps})
+    return 0
+
+
+def _show(
+    arguments: argparse.Namespace, study: "Study", found: "list[Stage]", shown: "list[Signals]"
+) -> None:
+    from rigwatch.dashboard import recording, study_view
+
+    def draw(url: str, *, bare: bool = False) -> None:
+        stream = study_view.new_stream(study.folder.resolve().name)
+        if url:
+            stream.connect_grpc(url)
+        else:
+            stream.save(arguments.save)
+        outputs = _outputs(study, found, shown)
+        study_view.draw_study(stream, shown[0].time, outputs, _story(found), bare=bare)
+
+    if arguments.picture:
+        viewer = recording.headless_viewer()
+        try:
+            draw(viewer.url, bare=True)
+            study_view.take_picture(viewer, float(shown[0].time[-1]), arguments.picture)
+        finally:
+            viewer.stop()
+    elif arguments.save:
+        draw("")
+    else:
+        _in_a_viewer(draw)
+
+
+def _in_a_viewer(draw: Callable[[str], None]) -> None:
+    """Show it until the window is closed or the command is interrupted."""
+    from rigwatch.dashboard.opening import open_viewer
+    from rigwatch.dashboard.viewer import RECORDING_MEMORY
+    from rigwatch.wire.rig_config import DashboardSection
+
+    stop = threading.Event()
+    viewer = open_viewer(
+        "auto", DashboardSection(), stop, say, lambda: None, memory=RECORDING_MEMORY
+    )
+    assert viewer is not None  # only a wait for a foreign viewer can be given up
+    try:
+        draw(viewer.url)
+        say("shown; Ctrl-C ends")
+        while viewer.exit_code() is None:
+            stop.wait(_LOOK_AGAIN)
+    except KeyboardInterrupt:
+        say("")
+    finally:
+        viewer.stop()
+
+
+def _outputs(study: "Study", found: "list[Stage]", shown: "list[Signals]") -> "list[Output]":
+    from rigwatch.dashboard.study_view import Output
+
+    return [
+        Output(
+            name,
+            output.unit,
+            shown[0].measured[:, k],
+            {stage.label: s.modelled[:, k] for stage, s in zip(found, shown, strict=True)},
+        )
+        for k, (name, output) in enumerate(study.model.outputs.items())
+    ]
+
+
+def _story(found: "list[Stage]") -> str:
+    rows = [
+        f"| {s.label} | {s.comparison.train_error:.4g} | {s.comparison.held_out_error:.4g} |"
+        for s in found
+    ]
+    last = found[-1].comparison
+    head = [f"# Error [{last.unit}]", "", "| step | training | held out |", "|---|---|---|"]
+    floor = f"Noise floor {last.noise_floor:.4g}, from {last.noise_from}."
+    return "\n".join([*head, *rows, "", floor, "", "Signals are of the recordings held out."])
