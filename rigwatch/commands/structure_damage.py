@@ -51,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when the record was examined, damaged or not."""
     from rigwatch.structures.damage import Settings, examine
+    from rigwatch.structures.damage_report import remark
     from rigwatch.structures.description import load_structure
     from rigwatch.structures.session_record import read_any
 
@@ -62,6 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
         known=arguments.known,
     )
     found = examine(load_structure(arguments.structure), read_any(arguments.record), settings, say)
+    if sensors := remark(found).strip():
+        say(sensors)
     if arguments.report:
         _write_report(arguments.report, found, arguments.record.name)
     if arguments.json:

@@ -166,6 +166,9 @@ class _Work:
             if watch.alarm is None or len(base.model) - watch.alarm.sample < SHORTEST:
                 return
             now = self._identified(now, watch, watch.alarm)
+            if not self.damages[-1].explained:
+                # Beside a model that is known to be wrong, every sample would be an alarm.
+                return
 
     def _watched(self, now: _Now) -> Watch:
         model = self.base.model
@@ -218,9 +221,10 @@ class _Work:
         return Stretch(self.base.model, now.parameters, first, last, self.base.sigma)
 
     def _located(self, now: _Now, path: FloatArray, begin: int) -> tuple[Ranking, bool]:
-        """Rank with ever more data, as long as one change explains them."""
+        """Rank with ever more data as long as one change explains them, with less where not."""
         end = len(self.base.model)
         length = max(SHORTEST, round(self.settings.settle / self.base.model.dt))
+        shortest = min(length, end - begin) // 4
         kept: Ranking | None = None
         while True:
             # A rest too short to stand for itself goes with the data before it.
@@ -229,7 +233,7 @@ class _Work:
             if not self._holds(now, ranking):
                 if kept is not None:
                     return self._extended(now, path, kept), True
-                if length // 2 < SHORTEST:
+                if length // 2 < max(SHORTEST, shortest):
                     return ranking, False
                 length //= 2
                 continue

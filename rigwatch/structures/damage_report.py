@@ -9,6 +9,7 @@ import numpy as np
 from rigwatch.structures.damage import Damage, Examination
 from rigwatch.structures.damage_drawing import ranking_svg, residual_svg, statistic_svg
 from rigwatch.structures.damage_reference import Figure
+from rigwatch.structures.description import label
 from rigwatch.structures.locate import Candidate
 
 SHOWN = 8
@@ -50,7 +51,8 @@ def _body(found: Examination, record: str) -> Iterator[str]:
     yield (
         f"<p>Record {escape(record)}: {len(base.model) * base.model.dt:g} s of"
         f" {escape(', '.join(base.model.signals))} every {base.model.dt:g} s. Its first"
-        f" {base.samples * base.model.dt:g} s are taken as undamaged. {escape(_rule(found))}</p>"
+        f" {base.samples * base.model.dt:g} s are taken as undamaged."
+        f" {escape(_rule(found))}{escape(remark(found))}</p>"
     )
     yield "<h2>Residual</h2>"
     yield statistic_svg(found)
@@ -68,9 +70,24 @@ def verdict(found: Examination) -> str:
         return "no damage"
     places = [
         f"{d.ranking.best.spring} {d.ranking.best.words} at {d.instant.time:.3f} s"
+        if d.explained
+        else f"a damage at {d.alarm:.3f} s that no change of one spring explains"
         for d in found.damages
     ]
     return "; ".join(places)
+
+
+def remark(found: Examination) -> str:
+    """What a reader has to know of the sensors, empty where every position was measured."""
+    model = found.reference.model
+    nodes = [label("x", node) for node in model.structure.nodes]
+    hidden = [name for name in nodes if name not in model.signals]
+    if not hidden:
+        return ""
+    return (
+        f" The positions {', '.join(hidden)} were not measured: large changes that move them are"
+        " noticed, but located less surely."
+    )
 
 
 def _rule(found: Examination) -> str:
@@ -126,7 +143,7 @@ def _places(damage: Damage) -> str:
     rows = "".join(
         f"<tr><td>{escape(c.name)}</td><td class=words>{escape(c.words)}</td>"
         f"<td>{c.before:.5g}</td><td>{c.after:.5g}</td><td>{_number(c.deviation)}</td><td>{c.score:.4g}</td>"
-        f"<td>{c.p_value:.2g}</td><td>{_number(c.chi2)}</td></tr>"
+        f"<td>{_chance(c.p_value)}</td><td>{_number(c.chi2)}</td></tr>"
         for c in damage.ranking.candidates[:SHOWN]
     )
     return (
@@ -152,6 +169,10 @@ def _with_interval(figure: Figure) -> str:
     if isnan(figure.low):
         return f"{figure.value:.6g} (known)"
     return f"{figure.value:.6g} [{figure.low:.6g}, {figure.high:.6g}]"
+
+
+def _chance(value: float) -> str:
+    return f"{value:.2g}" if value > 1e-300 else "< 1e-300"
 
 
 def _number(value: float) -> str:
