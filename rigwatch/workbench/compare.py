@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigwatch.workbench.fitted import Fitted, fit_base
+from rigwatch.workbench.free_run import free_run
 from rigwatch.workbench.intervals import Value, values
 from rigwatch.workbench.ledger import check_data
 from rigwatch.workbench.noise_floor import METHODS, NoiseFloor, from_residual, quiet_scale
@@ -14,12 +15,13 @@ from rigwatch.workbench.study import Study
 
 @dataclass(frozen=True)
 class Channel:
-    """Errors of one output, in its unit."""
+    """Errors of one output, in its unit; the free run is one long simulation held out."""
 
     train_error: float
     held_out_error: float
     noise_floor: float
     unit: str
+    free_run_error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -89,9 +91,9 @@ def comparison(bench: Bench) -> Comparison:
     base, floor = bench.base, bench.floor
     outputs = bench.study.model.outputs
     channels = {
-        name: Channel(float(a), float(b), float(c), output.unit)
-        for (name, output), a, b, c in zip(
-            outputs.items(), base.train.rms, base.held_out.rms, floor.rms, strict=True
+        name: Channel(float(a), float(b), float(c), output.unit, free)
+        for (name, output), a, b, c, free in zip(
+            outputs.items(), base.train.rms, base.held_out.rms, floor.rms, _free(bench), strict=True
         )
     }
     alone = len(channels) == 1
@@ -109,3 +111,11 @@ def comparison(bench: Bench) -> Comparison:
         [f"{a.effect}@{a.port}" for a in bench.study.file.effects],
         [*bench.data.remarks, *weak],
     )
+
+
+def _free(bench: Bench) -> list[float | None]:
+    """Errors of a free run; none for a model without states or a recording in several parts."""
+    model, file = bench.study.model, bench.study.file
+    if not model.states or len(file.held_out) > 1:
+        return [None] * len(model.outputs)
+    return [float(error) for error in free_run(bench.base, bench.data.held_out)]

@@ -13,6 +13,8 @@ from rigwatch.workbench.signals import Data, parameters_of
 from rigwatch.workbench.sizes import port_sizes
 from rigwatch.workbench.study import Study
 
+LONG = 2000
+"""Samples of a horizon from which a fit goes by way of a tenth of it."""
 BLOCKS = 40
 """Blocks that a recording of a model without states is cut into for statistics."""
 
@@ -108,6 +110,10 @@ def fit_model(
     horizon = data.horizon if study.model.states else len(data.train)
     begin = compiled.vector(start)
     substeps = max(study.file.substeps, _needed(compiled.system, data.train, begin))
+    if study.model.states and horizon >= LONG:
+        # Over long horizons there are many local minima: start from where short ones lead.
+        near = fit(compiled, data.train, horizon // 10, start=begin, scale=scale, substeps=substeps)
+        begin = near.parameters
     found = fit(compiled, data.train, horizon, start=begin, scale=scale, substeps=substeps)
     beside = data.horizon if study.model.states else len(data.held_out)
     judged = evaluate(found, data.held_out, beside, substeps=substeps)

@@ -6,6 +6,7 @@ regions carry the numbers of their samples, so that one can look at them.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import t as student
@@ -72,7 +73,7 @@ def _channel(bench: Bench, channel: str, residual: FloatArray, floor: float) -> 
     found += _spectrum(channel, residual, floor, recording.dt * factor)
     period = find_period(recording)
     if period and factor == 1 and len(residual) >= 2 * period:
-        found += _lines(channel, residual, floor, period)
+        found += _lines(channel, residual, period)
     return found
 
 
@@ -108,7 +109,7 @@ def _by_time(residual: FloatArray, rows: IntArray, dt: float) -> list[str]:
     edges = np.linspace(0, len(residual), PIECES["time"] + 1).astype(int)
     names = [
         f"{rows[a] * dt:.3g} to {rows[min(b, len(rows) - 1)] * dt:.3g} s"
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        for a, b in pairwise(edges)
     ]
     return [names[i] for i in np.searchsorted(edges, np.arange(len(residual)), side="right") - 1]
 
@@ -137,7 +138,7 @@ def _by_amplitude(x: FloatArray) -> list[str]:
     return [f"|x - mean| {edges[a]:.3g} to {edges[a + 1]:.3g}" for a in i]
 
 
-def _cut(
+def _cut(  # noqa: PLR0917 -- one residual and how it is cut
     channel: str, residual: FloatArray, floor: float, rows: IntArray, view: str, labels: list[str]
 ) -> list[Region]:
     names = np.array(labels)
@@ -178,7 +179,7 @@ def _spectrum(channel: str, residual: FloatArray, floor: float, dt: float) -> li
     white = floor**2 / len(energy)
     total = max(float(np.sum(energy - white)), 1e-300)
     found = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         inside = (rate > low) & (rate <= high)
         if inside.any():
             size = float(np.sum(energy[inside]))
@@ -192,8 +193,8 @@ def _spectrum(channel: str, residual: FloatArray, floor: float, dt: float) -> li
     return found
 
 
-def _lines(channel: str, residual: FloatArray, floor: float, period: int) -> list[Region]:
-    """Energy on even and odd multiples of the excitation's rate: which nonlinearity it smells of."""
+def _lines(channel: str, residual: FloatArray, period: int) -> list[Region]:
+    """Energy on even and odd multiples of the excitation's rate: even or odd nonlinearities."""
     periods = np.nan_to_num(residual)[: len(residual) // period * period].reshape(-1, period)
     energy = np.abs(np.fft.rfft(periods.mean(axis=0))) ** 2 * 2 / period**2
     total = max(float(energy.sum()), 1e-300)

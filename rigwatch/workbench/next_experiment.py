@@ -104,7 +104,7 @@ def _excitations(bench: Bench) -> Iterator[tuple[str, float, FloatArray]]:
     dt = bench.data.train.dt
     count = int(min(DURATION / dt, MOST_SAMPLES))
     count = count // bench.data.horizon * bench.data.horizon or count
-    time = np.arange(count) * dt
+    time: FloatArray = np.arange(count, dtype=np.float64) * dt
     for share in (1.0, 0.3):
         for name, shape in _shapes(time[-1], dt).items():
             inputs = _inputs(bench, shape(time), share)

@@ -5,6 +5,7 @@ is a recording with nothing wrong, which counts the model's own faults as well. 
 band of the residual, taken for white noise, gives a lower limit.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,8 +82,7 @@ def find_period(recording: Recording) -> int:
 def _between(series: FloatArray, samples: int, count: int) -> FloatArray:
     periods = series[: count * samples].reshape(count, samples, -1)
     variance = np.nanvar(periods, axis=0, ddof=1)
-    found: FloatArray = np.sqrt(np.nanmean(variance, axis=0))
-    return found
+    return np.array([float(np.sqrt(np.nanmean(column))) for column in variance.T])
 
 
 def _quiet(series: FloatArray, rate: float, top: float) -> float:
@@ -90,11 +90,12 @@ def _quiet(series: FloatArray, rate: float, top: float) -> float:
     frequencies, density = welch(clean, rate, nperseg=min(256, max(len(clean) // 4, 8)))
     inside = density[(frequencies > 0) & (frequencies <= top * rate)]
     levels = [float(np.mean(band)) for band in np.array_split(inside, BANDS) if band.size]
-    return float(np.sqrt(min(levels) * rate / 2))
+    return math.sqrt(min(levels) * rate / 2)
 
 
 def quiet_scale(recording: Recording) -> FloatArray:
     """Noise of each channel as its own quietest band shows it: how channels are weighed."""
     sizes = np.nanstd(recording.outputs, axis=0)
     quiet = np.array([_quiet(c, 1 / recording.dt, 0.5) for c in recording.outputs.T])
-    return np.maximum(quiet, 1e-6 * np.where(sizes > 0, sizes, 1.0))
+    least: FloatArray = 1e-6 * np.where(sizes > 0, sizes, 1.0)
+    return np.asarray(np.maximum(quiet, least), np.float64)

@@ -284,7 +284,7 @@ def _worth_a_fit(rows: Sequence[Ranked], kind: str) -> list[Ranked]:
 
 
 def _told_by(row: Ranked, told: dict[str, Ranked], likely: Sequence[Ranked]) -> str | None:
-    """What is fitted in the row's place: a double that is no more complicated, or of lower order."""
+    """What is fitted in the row's place: a double of no more parameters, or of lower order."""
     assert row.placement is not None
     lower = f"{row.placement.effect.refines}@{row.port}"
     if lower in row.alike and any(other.label == lower for other in likely):
@@ -313,7 +313,7 @@ def refit(study: Study, data: Data, base: Fitted, row: Ranked) -> None:
     count = len(block_errors(base.held_out))
     needed = student.ppf(1 - STEP, count - 1) * row.gain_deviation
     fall = 1 - row.held_out_error / base.held_out_error
-    row.accepted = row.gain > max(needed, 0.0) and fall > MATERIAL
+    row.accepted = bool(row.gain > max(needed, 0.0) and fall > MATERIAL)
     row.reason = _said(row.gain, needed, row.accepted)
 
 

@@ -25,6 +25,8 @@ ALLOWED = {"periods": 1.1, "healthy": 1.1, "quiet band": 1.25}
 """Error over noise floor up to which nothing is missing, by how the floor is known."""
 EQUAL = 2.0
 """Standard deviations of a paired difference below which two effects do equally well."""
+SAME = 0.9995
+"""Cosine above which two effects are one, whatever they are called."""
 SIMILAR = 0.8
 """Cosine below which two effects that do equally well explain different parts of the error."""
 MOST_OF_IT = 0.75
@@ -61,19 +63,15 @@ def judge(
         return _nothing_found(base, floor)
     best = _named(accepted, effects)
     equals = [row for row in accepted if row is not best and _equal(best, row)]
-    kind = family(best, effects)
-    members = [best.label, *(row.label for row in equals if family(row, effects) == kind)]
-    members += [
-        row.label
-        for row in rows
-        if row.label in best.alike and row.label not in members and family(row, effects) == kind
-    ]
+    same = {row.label for row in rows if _same_words(best, row, effects)}
+    members = [best.label, *(row.label for row in equals if row.label in same)]
+    members += [name for name in best.alike if name in same and name not in members]
     rivals = [
         row.label
         for row in rows
         if (row in equals or row.fitted is None)
         and best.cosines.get(row.label, 0.0) > (SIMILAR if row in equals else ALIKE)
-        and family(row, effects) != kind
+        and row.label not in same
         and effects[row.effect].free <= effects[best.effect].free
     ]
     if floor.method != "quiet band" and _left(base, best, floor) > 1 - EXPLAINED:
@@ -88,9 +86,13 @@ def judge(
     return Verdict("missing_effect", best, tuple(members), (), f"{text} {best.held_out_error:.3g}")
 
 
-def family(row: Ranked, effects: Mapping[str, Effect]) -> str:
-    """Effects of one family say the same in other words."""
-    return effects[row.effect].family or row.label
+def _same_words(best: Ranked, row: Ranked, effects: Mapping[str, Effect]) -> bool:
+    """Whether two effects say the same: of one family, or without any difference to be seen."""
+    if row is best or best.cosines.get(row.label, 0.0) > SAME:
+        return True
+    return bool(effects[best.effect].family) and (
+        effects[row.effect].family == effects[best.effect].family
+    )
 
 
 def _nothing_found(base: Fitted, floor: NoiseFloor) -> Verdict:

@@ -52,6 +52,11 @@ def comparison_lines(found: Comparison) -> list[str]:
         rows.append(["all", found.unit, *map(number, total)])
     lines = [heading, "", "error (root mean square)"]
     lines += table(["channel", "unit", "training", "held out", "noise floor"], rows)
+    lines += [
+        f"  one free run over all that is held out: {name} {number(c.free_run_error)} {c.unit}"
+        for name, c in found.channels.items()
+        if c.free_run_error is not None
+    ]
     lines += [f"  noise floor from {found.noise_from}", "", "parameters, 95 % interval"]
     lines += table(["name", "value", "interval", "unit", ""], _parameters(found.parameters))
     return lines + [f"note: {remark}" for remark in found.remarks]

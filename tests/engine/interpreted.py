@@ -1,4 +1,4 @@
-"""Kernels run by the interpreter: the same source, without seconds of compilation for each effect."""
+"""Kernels run by the interpreter: the same source, without seconds of compilation."""
 
 from types import SimpleNamespace
 

@@ -9,8 +9,10 @@ which is one linear equation for all candidates together and needs nothing compi
 At a sensor the effect moves its own output alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
 
 import numpy as np
 import sympy
@@ -107,16 +109,19 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
     system, run = at.compiled.system, at.run
     kinds = {name: port.kind for name, port in system.model.ports.items()}
     inner = [c for c in candidates if kinds[c.port] != "sensor"]
+    seen = {port: _signals(at, port) for port in {c.port for c in candidates}}
     found = np.zeros((*run.outputs.shape, len(candidates)))
     if inner:
-        pushes = np.stack([_push(at, c) for c in inner], axis=-1)
+        pushes = np.stack([_push(at, c, seen[c.port]) for c in inner], axis=-1)
         columns = np.array([_probe_column(system, c.port) for c in inner])
         places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
         found[..., places] = _propagated(run, len(system.free), pushes, columns)
     for index, candidate in enumerate(candidates):
         if kinds[candidate.port] == "sensor":
             signal = list(system.outputs).index(system.model.ports[candidate.port].signal)
-            found[..., signal, index] = _push(at, candidate)[:, :: run.substeps]
+            found[..., signal, index] = _push(at, candidate, seen[candidate.port])[
+                :, :: run.substeps
+            ]
     return found
 
 
@@ -124,27 +129,32 @@ def _probe_column(system: System, port: str) -> int:
     return len(system.free) + len(system.states) + system.probes.index(PROBE + port)
 
 
-def _push(at: Trajectory, candidate: Candidate) -> FloatArray:
+def _push(at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]) -> FloatArray:
     """e(t) of one candidate at the nodes, shape (windows, nodes)."""
-    signals = _signals(at, candidate.port)
     names = {name: symbol(name) for name in (*signals, *candidate.effect.states)}
     names |= {name: symbol(name) for name in candidate.effect.parameters}
-    expression = _at_neutral(_direction(candidate.effect, names), candidate)
-    if expression.free_symbols & {symbol(name) for name in candidate.effect.states}:
+    effect, values = candidate.effect, _neutral_values(candidate)
+    text = (effect.expression, effect.direction, effect.strength)
+    function, used = _push_function(*text, tuple(names))
+    if used & set(effect.states):
         signals = signals | _memory(at, candidate, signals, names)
-    return _evaluated(expression, signals, at.time.shape)
+    known = {**dict.fromkeys(names, 0.0), **signals, **values}
+    pushed = function(*(known[name] for name in names))
+    return np.broadcast_to(np.asarray(pushed, np.float64), at.time.shape)
 
 
-def _direction(effect: Effect, names: dict[str, sympy.Symbol]) -> sympy.Expr:
-    """∂effect/∂strength as an expression."""
-    if effect.direction:
-        return parse(effect.direction, names, "direction")
-    return derivative(parse(effect.expression, names, "effect"), names[effect.strength])
-
-
-def _at_neutral(expression: sympy.Expr, candidate: Candidate) -> sympy.Expr:
-    numbers = _neutral_values(candidate)
-    return expression.subs({symbol(name): value for name, value in numbers.items()})
+@cache
+def _push_function(
+    expression: str, direction: str, strength: str, names: tuple[str, ...]
+) -> tuple[Callable[..., Any], frozenset[str]]:
+    """∂effect/∂strength as a function of everything it may name, and what it does name."""
+    symbols = {name: symbol(name) for name in names}
+    if direction:
+        found = parse(direction, symbols, "direction")
+    else:
+        found = derivative(parse(expression, symbols, "effect"), symbols[strength])
+    used = frozenset(s.name for s in found.free_symbols)
+    return numpy_function(names, found), used
 
 
 def _evaluated(
