@@ -29,7 +29,7 @@ _NOISES = 6.0
 """Root mean square over a window that a channel's own noise does not reach, in its deviations."""
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def moved(energies: Energies, signal: int, count: int) -> float:
     """Root mean square of the newest `count` samples."""
     if count >= energies.rows.shape[0]:
@@ -37,7 +37,7 @@ def moved(energies: Energies, signal: int, count: int) -> float:
     return np.sqrt(recent_energy(energies, signal, count) / max(count, 1))
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def position_limit(rules: Rules, ref: Reference) -> float:
     """How far the position may lie from its healthy period, root mean square [m]."""
     return max(
@@ -45,13 +45,13 @@ def position_limit(rules: Rules, ref: Reference) -> float:
     )
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def voltage_limit(rules: Rules, ref: Reference) -> float:
     """The same of the voltage [V]."""
     return max(_NOISES * ref.value[VOLTAGE_NOISE], rules.voltage_floor * ref.value[SWING])
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def departed(rules: Rules, ref: Reference, state: WatchState) -> bool:
     """Whether anything has left its limits; the largest of all goes into the deviation, in units
     of k.

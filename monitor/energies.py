@@ -35,7 +35,7 @@ def new_energies(length: int, signals: int) -> Energies:
     )
 
 
-@njit(cache=True)
+@njit
 def restart_energies(energies: Energies) -> None:
     """Forget every sample."""
     energies.place[:] = 0
@@ -43,7 +43,7 @@ def restart_energies(energies: Energies) -> None:
     energies.back[:] = 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def add(energies: Energies, signals: FloatArray) -> None:
     """Take the squares of one sample's signals in, the oldest out."""
     rows, front, back, place = energies
@@ -66,13 +66,13 @@ def add(energies: Energies, signals: FloatArray) -> None:
     place[HEAD] = head + 1 if head + 1 < length else 0
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def energy(energies: Energies, signal: int) -> float:
     """Sum of squares of one signal over the window."""
     return energies.front[energies.place[FRONT_LEFT], signal] + energies.back[signal]
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def recent_energy(energies: Energies, signal: int, count: int) -> float:
     """Sum of squares of the newest `count` samples."""
     length, at = energies.rows.shape[0], energies.place[HEAD]

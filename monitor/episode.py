@@ -59,7 +59,7 @@ SHORTEST_CYCLE, LONGEST_CYCLE = 32, 256
 """Samples; evidence needs some, and a slow drive must not put off the verdict for ever."""
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def follow(  # noqa: PLR0917
     out: bool,
     seq: int,
@@ -84,7 +84,7 @@ def follow(  # noqa: PLR0917
             forget(state, rules.window)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _count(out: bool, state: WatchState) -> None:
     """Begin, continue or end the episode."""
     number, held = state.number, state.held
@@ -100,7 +100,7 @@ def _count(out: bool, state: WatchState) -> None:
             held[EXPLAINED] = held[SHARE] = held[RHO] = held[REST] = 0.0
 
 
-@njit(cache=True)
+@njit
 def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     """Weigh the evidence since the departure and judge by it."""
     held, since = state.held, state.number[EPISODE]
@@ -115,7 +115,7 @@ def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     held[VERDICT] = verdict(_seen(since, cycle, rules, ref, state), evidence, state)
 
 
-@njit(cache=True)
+@njit
 def _seen(since: int, cycle: int, rules: Rules, ref: Reference, state: WatchState) -> Seen:
     """Which channels have moved since the departure."""
     energies, count = state.energies, min(since, LONG)

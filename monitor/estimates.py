@@ -38,7 +38,7 @@ _APERIODIC_VARIANCE = 9.0
 """Without a period the residual itself is judged, which swings by about three of its own sizes."""
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def spread_of_change(ref: Reference) -> float:
     """Standard deviation of the change of the residual, error of the healthy average included."""
     aperiodic = ref.number[SOURCE] == APERIODIC
@@ -46,7 +46,7 @@ def spread_of_change(ref: Reference) -> float:
     return ref.value[NOISE] * np.sqrt(1.0 + extra)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
     """θ, its limits, D and whether friction can be seen at all, into `state.held`."""
     held, s = state.held, state.sums
@@ -72,7 +72,7 @@ def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
         _judge_by_band(rules, state)
 
 
-@njit(cache=True)
+@njit
 def _judge_by_band(rules: Rules, state: WatchState) -> None:
     """Fixed limits; the deviation is k at a limit. A window that is not full yet has no say."""
     held, place = state.held, state.window.place

@@ -58,6 +58,7 @@ class Evidence(NamedTuple):
             energy in.
         rho: correlation of the jump with what the rivals leave.
         rest: share of the samples at rest.
+        rest_always: the same of the half of the samples that has less of it.
         rivals: share of y² that the rivals explain.
         jump: energy explained by the jump beyond the rivals [(m/s^2)^2].
         together: share of y² that rivals and jump explain together.
@@ -69,6 +70,7 @@ class Evidence(NamedTuple):
     share: float
     rho: float
     rest: float
+    rest_always: float
     rivals: float
     jump: float
     together: float
@@ -81,7 +83,7 @@ def new_history(b: FloatArray, a: FloatArray) -> History:
     return History(np.zeros((HISTORY, 6)), np.zeros(1, np.int64), b, a)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def remember(  # noqa: PLR0917
     history: History, y: float, g1: float, g2: float, speed: float, rest: float, volts: float
 ) -> None:
@@ -93,7 +95,7 @@ def remember(  # noqa: PLR0917
     history.head[0] = head if head < HISTORY else 0
 
 
-@njit(cache=True)
+@njit
 def weigh(history: History, ref: Reference, seq: int, since: int, count: int) -> Evidence:
     """Evidence of the newest `count` samples.
 
@@ -108,17 +110,21 @@ def weigh(history: History, ref: Reference, seq: int, since: int, count: int) ->
     data = np.zeros((n, _RIVALS + 3))
     _fill_rivals(data, ref, seq, n)
     _fill_friction(data, history, since, n)
-    rest = peak = 0.0
+    first = second = peak = 0.0
     for k in range(n):
         at = (history.head[0] - n + k) % HISTORY
         data[k, _RIVALS + 2] = history.rows[at, Y]
-        rest += history.rows[at, AT_REST] / n
+        at_rest = history.rows[at, AT_REST]
+        if 2 * k < n:
+            first += at_rest
+        else:
+            second += at_rest
         peak = max(peak, history.rows[at, Y] ** 2)
     gram = data.T @ data
-    return _compare(gram, rest, peak)
+    return _compare(gram, (first + second) / n, 2.0 * min(first, second) / n, peak)
 
 
-@njit(cache=True)
+@njit
 def swing_of_voltage_change(history: History, count: int) -> float:
     """Standard deviation of the voltage's change over the newest `count` samples [V]; a shifted
     mean is none.
@@ -131,7 +137,7 @@ def swing_of_voltage_change(history: History, count: int) -> float:
     return np.sqrt(max(square - mean * mean, 0.0))
 
 
-@njit(cache=True)
+@njit
 def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
     period = ref.number[PERIOD]
     mean = 0.0
@@ -152,7 +158,7 @@ def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
         data[k, 7], data[k, 8], data[k, 9], data[k, 10] = x * x, x * dx, x * x * x, x * x * dx
 
 
-@njit(cache=True)
+@njit
 def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> None:
     rows, head = history.rows, history.head[0]
     if since >= HISTORY:
@@ -173,8 +179,8 @@ def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> No
             data[place, _RIVALS], data[place, _RIVALS + 1] = g1, g2
 
 
-@njit(cache=True)
-def _compare(gram: FloatArray, rest: float, peak: float) -> Evidence:
+@njit
+def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> Evidence:
     size = gram.shape[0]
     y, g1, g2 = size - 1, _RIVALS, _RIVALS + 1
     yy = max(gram[y, y], 1e-30)
@@ -196,10 +202,12 @@ def _compare(gram: FloatArray, rest: float, peak: float) -> Evidence:
     rho = sign * np.sqrt(min(jump / remains, 1.0)) if remains > 0.0 else 0.0
     together = 1.0 - (remains - jump) / yy
     rivals, share = 1.0 - remains / yy, sign * jump / yy
-    return Evidence(explained, share, rho, rest, rivals, jump, together, dry, peak / yy)
+    return Evidence(
+        explained, share, rho, rest, rest_always, rivals, jump, together, dry, peak / yy
+    )
 
 
-@njit(cache=True)
+@njit
 def _eliminate(gram: FloatArray, pivot: int, least: float) -> None:
     """Take out of every column what column `pivot` explains; a column that others explained
     already is skipped.

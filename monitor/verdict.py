@@ -46,8 +46,9 @@ FOLLOW_FIT, FOLLOW_DRY, FOLLOW_SHARE, FOLLOW_RHO = 0.93, 0.3, 0.001, 0.2
 THIN_SHARE, THIN_RHO = 0.3, 0.6
 """The jump alone is a third of all that is seen."""
 STILL, STILL_TOGETHER, STILL_RHO = 0.04, 0.7, -0.5
-"""Slip and stick: at rest for longer than a smooth motion is at its turning points, in a change
-that is not chaos, and with no jump that plainly feeds energy in as a fading drive does.
+"""Slip and stick: at rest for longer than a smooth motion is at its turning points and not in one
+cycle only, in a change that is not chaos, and with no jump that plainly feeds energy in, as that of
+a fading drive does.
 """
 STUCK = 0.5
 """At rest for half the time: stiction rather than friction."""
@@ -81,7 +82,7 @@ class Seen(NamedTuple):
     spread: float
 
 
-@njit(cache=True)
+@njit
 def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
     """The verdict after one more look."""
     if seen.moved_voltage and not seen.moved_acceleration:
@@ -96,7 +97,7 @@ def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
     return OTHER if _other(seen, evidence) else seen.before
 
 
-@njit(cache=True)
+@njit
 def _friction(seen: Seen, evidence: Evidence) -> bool:
     """Whether this look finds dry friction."""
     if not seen.moved_acceleration or evidence.peak > SPIKE:
@@ -109,49 +110,50 @@ def _friction(seen: Seen, evidence: Evidence) -> bool:
     return settled and (_jumps(seen, evidence) or _follows(evidence) or _thin(evidence))
 
 
-@njit(cache=True)
+@njit
 def _jump_seen(seen: Seen, evidence: Evidence) -> bool:
     large = evidence.jump > LEAST_JUMP * seen.spread**2
     return large and evidence.share > LEAST_SHARE and evidence.dry > LEAST_DRY
 
 
-@njit(cache=True)
+@njit
 def _certain(seen: Seen, evidence: Evidence) -> bool:
     """Nothing but friction is left over."""
     plain = evidence.rho > CERTAIN_RHO and evidence.explained > CERTAIN_FIT
     return plain and _jump_seen(seen, evidence)
 
 
-@njit(cache=True)
+@njit
 def _jumps(seen: Seen, evidence: Evidence) -> bool:
     """A jump that no rival has, in a change that friction explains more than half of."""
     plain = evidence.rho > JUMP_RHO and evidence.explained > JUMP_FIT
     return plain and _jump_seen(seen, evidence)
 
 
-@njit(cache=True)
+@njit
 def _follows(evidence: Evidence) -> bool:
     """A change that follows the friction filter closely."""
     fits = evidence.explained > FOLLOW_FIT and evidence.dry > FOLLOW_DRY
     return fits and evidence.share > FOLLOW_SHARE and evidence.rho > FOLLOW_RHO
 
 
-@njit(cache=True)
+@njit
 def _thin(evidence: Evidence) -> bool:
     """Hardly anything but the jump."""
     return evidence.share > THIN_SHARE and evidence.rho > THIN_RHO
 
 
-@njit(cache=True)
+@njit
 def _slips(seen: Seen, evidence: Evidence) -> bool:
     """The mass stands still where the healthy one moves."""
     if seen.since < seen.cycle or seen.before == OTHER:
         return False
     orderly = evidence.together > STILL_TOGETHER and evidence.rho > STILL_RHO
-    return evidence.rest > STILL and orderly
+    again = evidence.rest > STILL and evidence.rest_always > 0.0
+    return again and orderly
 
 
-@njit(cache=True)
+@njit
 def _other(seen: Seen, evidence: Evidence) -> bool:
     """Whether it is time to call it another fault."""
     if seen.since >= GIVE_UP * seen.cycle + LONG:

@@ -4,6 +4,9 @@
     change ─▶ sums and history ─▶ estimates ─▶ departure ─▶ episode ─▶ verdict
 
 Before that, the healthy reference takes the samples until it is armed.
+
+Only `watch_block` is kept compiled. numba compiles it anew where this file has changed and knows
+nothing of the files that it calls, so their fingerprint stands here; a test says what to put in.
 """
 
 # Compiled functions are untyped to mypy.
@@ -57,6 +60,9 @@ from monitor.watch_state import (
 from monitor.window import FILL, Window, push
 from rigwatch.physics.transfer_function import FloatArray
 
+FINGERPRINT = "0b28c467d4ae"
+"""Of every source file whose code is compiled into `watch_block`."""
+
 
 @njit(cache=True)
 def watch_block(  # noqa: PLR0917
@@ -90,7 +96,7 @@ def watch_block(  # noqa: PLR0917
         _write(data[k], code[k], ref, state, out[k])
 
 
-@njit(cache=True)
+@njit
 def _window_length(wanted: int, ref: Reference, window: Window) -> int:
     """Whole periods of the excitation, at least what was wanted, at most what there is room for."""
     period = ref.number[PERIOD]
@@ -98,7 +104,7 @@ def _window_length(wanted: int, ref: Reference, window: Window) -> int:
     return min(((wanted + period - 1) // period) * period, (room // period) * period)
 
 
-@njit(cache=True)
+@njit
 def _skip(state: WatchState) -> None:
     """A sample that counts in nothing, so that the windows stay stretches of time."""
     push(state.window, np.zeros(3))
@@ -108,7 +114,7 @@ def _skip(state: WatchState) -> None:
         state.number[EPISODE] += 1
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _judge(  # noqa: PLR0917
     data: FloatArray,
     seq: int,
@@ -127,7 +133,7 @@ def _judge(  # noqa: PLR0917
     follow(departed(rules, ref, state), seq, place, data, rules, ref, state)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _take(
     data: FloatArray, place: int, position_valid: int, ref: Reference, state: WatchState
 ) -> None:
@@ -147,7 +153,7 @@ def _take(
     state.held[CHANGE] = y
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
     """1.0 where position and acceleration have stood still over four samples.
 
@@ -167,7 +173,7 @@ def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
     return 1.0 if still else 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _write(data: FloatArray, code: int, ref: Reference, state: WatchState, out: FloatArray) -> None:
     for i in range(out.size):
         out[i] = state.held[i]
