@@ -69,6 +69,10 @@ class InertiaResidual:
         self._ring = np.zeros((2, self._kernels.shape[1]))
         self._place = np.zeros(2, np.int64)
 
+    def adopt(self, plant: InertiaPlant) -> None:
+        """Go on with another mass and offset; what has been smoothed stays."""
+        self._mass, self._offset = plant.mass, plant.offset
+
     def update(self, signals: FloatArray, code: Codes) -> FloatArray:
         """The next samples, shape (n, 2) of force and position, to the stage's columns, shape (n,
         7).

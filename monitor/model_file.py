@@ -11,7 +11,7 @@ from typing import Annotated
 from msgspec import Meta, field, structs
 
 from rigwatch.physics.transfer_function import TransferFunction
-from rigwatch.wire.config import Section, load
+from rigwatch.wire.config import Section, load, parse
 from rigwatch.wire.errors import ConfigError
 
 Floats = tuple[float, ...]
@@ -121,6 +121,21 @@ class ReferenceSection(Section, frozen=True, kw_only=True):
     modelled: Annotated[Floats, Meta(description="modelled, before the scale [m/s^2]")]
 
 
+class PromotedSection(Section, frozen=True, kw_only=True):
+    """[promoted] — friction that the model has learnt: part of what is expected from now on.
+
+    Friction is (coulomb + coulomb_by_direction·sgn v)·sgn v + (viscous + viscous_by_direction·sgn
+    v)·v, in units of θ.
+    """
+
+    coulomb: Annotated[float, Meta(description="in units of theta1")] = 0.0
+    viscous: Annotated[float, Meta(description="in units of theta2")] = 0.0
+    coulomb_by_direction: Annotated[float, Meta(description="half the difference, theta1")] = 0.0
+    viscous_by_direction: Annotated[float, Meta(description="half the difference, theta2")] = 0.0
+    study: Annotated[str, Meta(description="where it was learnt")] = ""
+    sha256: Annotated[str, Meta(description="hash of the study's model and effects")] = ""
+
+
 class RecordingSection(Section, frozen=True, kw_only=True):
     """[[recording]] — what the model was made from."""
 
@@ -141,6 +156,7 @@ class RigModel(Section, frozen=True, kw_only=True):
     window: WindowSection = field(default_factory=WindowSection)
     decision: DecisionSection = field(default_factory=DecisionSection)
     band: BandSection | None = None
+    promoted: PromotedSection | None = None
     reference: tuple[ReferenceSection, ...] = ()
     recording: tuple[RecordingSection, ...] = ()
 
@@ -157,6 +173,27 @@ def load_model(path: Path | str) -> RigModel:
         ConfigError: the file cannot be read or does not fit.
     """
     model = load(path, RigModel)
+    check_model(model, path)
+    return model
+
+
+def parse_model(text: str, name: str) -> RigModel:
+    """The model in a file's text; `name` stands in errors.
+
+    Raises:
+        ConfigError: it does not fit.
+    """
+    model = parse(text, RigModel, name)
+    check_model(model, name)
+    return model
+
+
+def check_model(model: RigModel, path: Path | str) -> None:
+    """What the types alone cannot say.
+
+    Raises:
+        ConfigError: the parts of the model do not fit together.
+    """
     for index, reference in enumerate(model.reference):
         lengths = {len(getattr(reference, name)) for name in _COLUMNS}
         if len(lengths) != 1 or 0 in lengths:
@@ -171,7 +208,11 @@ def load_model(path: Path | str) -> RigModel:
         raise ConfigError(path, "plant.a", "poles outside the unit circle", "a stable model")
     if not model.friction.function().is_stable:
         raise ConfigError(path, "friction.a", "poles outside the unit circle", "a stable filter")
-    return model
+    if model.promoted and isinstance(model.plant, TransferPlant):
+        by_direction = model.promoted.coulomb_by_direction, model.promoted.viscous_by_direction
+        if any(by_direction):
+            found = "friction that differs by direction"
+            raise ConfigError(path, "promoted", found, "it with an inertia only")
 
 
 _COLUMNS = ("voltage", "position", "acceleration", "modelled")

@@ -19,6 +19,7 @@ from monitor.conditions import Condition
 from monitor.inertia import InertiaResidual
 from monitor.limits import rules_for
 from monitor.model_file import InertiaPlant, RigModel
+from monitor.promoted import add_promoted, check_can_follow
 from monitor.reference import ReferenceRules, new_reference
 from monitor.residual import TransferResidual
 from monitor.watch import watch_block
@@ -84,12 +85,27 @@ class Monitor:
         self._reference = new_reference(self._arming, _known(model))
         self._state = _new_state(model)
 
+    def adopt(self, model: RigModel) -> None:
+        """Go on with another model from the next sample: filters run on, estimates start anew.
+
+        Raises:
+            ModelError: the filters of the new model are others.
+        """
+        check_can_follow(self.model, model)
+        if isinstance(self._residual, InertiaResidual) and isinstance(model.plant, InertiaPlant):
+            self._residual.adopt(model.plant)
+        self.model, self.rules = model, rules_for(model)
+        self._arming = _arming_rules(model)
+        self._reference = new_reference(self._arming, _known(model))
+        self._state = _new_state(model)
+
     def update(self, block: SampleBlock) -> Result | None:
         """Take the next block; None where it holds nothing new."""
         admitted = self._admission.admit(block)
         if admitted is None:
             return None
         data = self._residual.update(admitted.signals, admitted.code)
+        add_promoted(data, self.model.promoted)
         out = np.zeros((w.OUTPUTS, len(data)))
         watch_block(
             data,
@@ -186,6 +202,9 @@ def _arming_rules(model: RigModel) -> ReferenceRules:
 
 
 def _known(model: RigModel) -> list[tuple[FloatArray, float, int]]:
+    if model.promoted:
+        # Kept periods were modelled without what has been learnt since.
+        return []
     return [
         (np.array([r.voltage, r.position, r.acceleration, r.modelled]), r.scale, r.periods)
         for r in model.reference

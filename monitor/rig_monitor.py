@@ -14,13 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from monitor.alarms import AlarmManager, Announcement, quality_conditions
-from monitor.conditions import Condition
+from monitor.conditions import GAP, SENSOR_INVALID, Condition
 from monitor.detectors.detector import Detector
 from monitor.model_file import RigModel
 from monitor.pipeline import Monitor
 from rigwatch.wire.blocks import cut
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.rig_config import AlarmSection
+
+OF_SAMPLES = frozenset({GAP, SENSOR_INVALID})
+"""Conditions of the samples themselves, judged whether the friction scheme is wanted or not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +43,7 @@ class RigMonitor:
         settings: sections of [monitor.alarms].
         detectors: what runs beside the friction scheme.
         file: the configuration's name, for errors.
+        friction: whether the friction scheme raises alarms; its estimates are made in any case.
 
     Raises:
         ConfigError: a section names no alarm.
@@ -51,8 +55,10 @@ class RigMonitor:
         settings: Mapping[str, AlarmSection] | None = None,
         detectors: Sequence[Detector] = (),
         file: str = "configuration",
+        friction: bool = True,
     ) -> None:
         self.alarms = AlarmManager(settings, file)
+        self._friction = friction
         self._pipeline = Monitor(model)
         self._detectors = tuple(detectors)
 
@@ -80,11 +86,27 @@ class RigMonitor:
         columns = at.columns + tuple(column for columns, _ in found for column in columns)
         more = tuple(condition for _, conditions in found for condition in conditions)
         quality = tuple(quality_conditions(fresh))
-        return replace(at, columns=columns), (*result.conditions, *more, *quality)
+        own = result.conditions
+        if not self._friction:
+            own = tuple(condition for condition in own if condition.name in OF_SAMPLES)
+        return replace(at, columns=columns), (*own, *more, *quality)
 
     def announce(self, at: EstimateBlock, conditions: tuple[Condition, ...]) -> list[Announcement]:
         """What the alarms say to conditions, in the order in which they were judged."""
         return self.alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
+
+    @property
+    def model(self) -> RigModel:
+        """The model in force."""
+        return self._pipeline.model
+
+    def adopt(self, model: RigModel) -> None:
+        """Judge with another model from the next sample on.
+
+        Raises:
+            ModelError: it asks for other channels or filters.
+        """
+        self._pipeline.adopt(model)
 
     def learn(self, block: SampleBlock) -> None:
         """Take a block that an earlier run has judged already: state moves on, nothing is said."""
@@ -93,10 +115,15 @@ class RigMonitor:
             detector.update(block)
 
 
-def compile_kernels(model: RigModel) -> None:
-    """Run every kernel once on a monitor of its own, so that the first sample does not wait."""
+def compile_kernels(model: RigModel, detectors: Sequence[Detector] = ()) -> None:
+    """Run every kernel once on a monitor of its own, so that the first sample does not wait.
+
+    Args:
+        model: of the rig.
+        detectors: the configured ones, made for this: they are fed with zeros.
+    """
     n = 4
     zeros = np.zeros(n)
     channels = tuple(Column(name, "", zeros, np.zeros(n, np.uint8)) for name in model.channels)
     times = np.arange(n, dtype=np.int64)
-    RigMonitor(model).update(SampleBlock("", 0, 0, times, times, channels))
+    RigMonitor(model, detectors=detectors).update(SampleBlock("", 0, 0, times, times, channels))

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Self
 
 from monitor.alarms import Announcement
-from monitor.model_file import RigModel
+from monitor.model_file import RigModel, parse_model
 from monitor.rig_monitor import RigMonitor, Watched
 from rigwatch.replay.source import Item, items
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import Alarm, AlarmCommand, Event, SampleBlock
+from rigwatch.wire.messages import Alarm, AlarmCommand, Event, ModelChange, SampleBlock
 from rigwatch.wire.session.reader import MERGED_SAMPLES, LostSpan, Session
 from rigwatch.wire.session.writer import SessionWriter
 
@@ -96,6 +96,10 @@ def judge(session: Session, monitor: RigMonitor, found: Iterable[Item]) -> Itera
     for item in found:
         if isinstance(item, AlarmCommand):
             yield Judged(item, None, monitor.alarms.command(item))
+            continue
+        if isinstance(item, ModelChange):
+            monitor.adopt(parse_model(item.model, f"{session.path}: the model promoted"))
+            yield Judged(item, None, [])
             continue
         try:
             watched = monitor.update(item)

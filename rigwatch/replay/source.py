@@ -9,10 +9,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from rigwatch.wire.blocks import cut, pieces
-from rigwatch.wire.messages import AlarmCommand, SampleBlock
+from rigwatch.wire.messages import AlarmCommand, ModelChange, SampleBlock
 from rigwatch.wire.session.reader import MERGED_SAMPLES, Session
 
-Item = SampleBlock | AlarmCommand
+Order = AlarmCommand | ModelChange
+Item = SampleBlock | Order
 
 
 def items(
@@ -22,22 +23,25 @@ def items(
     size: int = MERGED_SAMPLES,
     device: str | None = None,
 ) -> Iterator[Item]:
-    """Samples in blocks of at most `size`, and the commands of the same span of time [ns]."""
-    waiting = _commands(session, start, end) if session.may_hold("commands") else []
+    """Samples in blocks of at most `size`, and commands and changes of the model between them."""
+    waiting = _orders(session, start, end)
     for whole in session.samples(device, start, end):
         for block in pieces(whole, size):
             yield from _interleaved(block, waiting)
     yield from waiting
 
 
-def _commands(session: Session, start: int | None, end: int | None) -> list[AlarmCommand]:
-    """The session's commands in order of time; takes a pass through all of it."""
-    recorded = (item.message for item in session.messages(["commands"], start, end))
-    commands = [message for message in recorded if isinstance(message, AlarmCommand)]
-    return sorted(commands, key=lambda command: command.t_ns)
+def _orders(session: Session, start: int | None, end: int | None) -> list[Order]:
+    """The session's commands and changes of the model in order of time."""
+    topics = [name for name in ("commands", "models") if session.may_hold(name)]
+    if not topics:
+        return []
+    recorded = (item.message for item in session.messages(topics, start, end))
+    found = [message for message in recorded if isinstance(message, Order)]
+    return sorted(found, key=lambda message: message.t_ns)
 
 
-def _interleaved(block: SampleBlock, waiting: list[AlarmCommand]) -> Iterator[Item]:
+def _interleaved(block: SampleBlock, waiting: list[Order]) -> Iterator[Item]:
     """The block, cut where commands fall, which are taken off `waiting`."""
     done = 0
     while waiting and waiting[0].t_ns <= int(block.t_ns[-1]):

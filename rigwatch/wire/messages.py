@@ -218,7 +218,40 @@ class RunInfo:
     notes: str
 
 
-Message = SampleBlock | EstimateBlock | Gap | Health | Event | Alarm | AlarmCommand | RunInfo
+@dataclass(frozen=True, slots=True)
+class ModelChange:
+    """The monitor goes on with another model.
+
+    Attributes:
+        device, boot, seq: the first sample that is judged with it; seq 0 before any sample.
+        t_ns: later than the last sample before, not later than that one [ns].
+        user: who wanted it.
+        text: why, in words.
+        model: the model file's text.
+        previous: the text of the one before.
+    """
+
+    device: str
+    boot: int
+    seq: int
+    t_ns: int
+    user: str
+    text: str
+    model: str
+    previous: str
+
+
+Message = (
+    SampleBlock
+    | EstimateBlock
+    | Gap
+    | Health
+    | Event
+    | Alarm
+    | AlarmCommand
+    | RunInfo
+    | ModelChange
+)
 MESSAGE_TYPES: tuple[type[Message], ...] = (
     SampleBlock,
     EstimateBlock,
@@ -228,4 +261,5 @@ MESSAGE_TYPES: tuple[type[Message], ...] = (
     Alarm,
     AlarmCommand,
     RunInfo,
+    ModelChange,
 )

@@ -10,6 +10,7 @@ from rigwatch.wire.messages import (
     Gap,
     Health,
     Message,
+    ModelChange,
     RunInfo,
     SampleBlock,
 )
@@ -44,8 +45,19 @@ GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True)
 HEALTH = Topic("health", "health", Health, "any", 1.0, recorded=True)
 EVENTS = Topic("events", "events", Event, "any", 0.0, recorded=True)
 RUN = Topic("run", "run", RunInfo, "recorder", 0.0, recorded=True)
+MODELS = Topic("models", "monitor/models", ModelChange, "monitor", 0.0, recorded=True)
 
-TOPICS: tuple[Topic, ...] = (SAMPLES, ESTIMATES, ALARMS, COMMANDS, GAPS, HEALTH, EVENTS, RUN)
+TOPICS: tuple[Topic, ...] = (
+    SAMPLES,
+    ESTIMATES,
+    ALARMS,
+    COMMANDS,
+    GAPS,
+    HEALTH,
+    EVENTS,
+    RUN,
+    MODELS,
+)
 
 RING_KEY = "daq/ring"
 """Key of the adapter's ring of recent samples, asked by readers that miss some."""

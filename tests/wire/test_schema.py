@@ -20,6 +20,7 @@ from rigwatch.wire.messages import (
     Gap,
     Health,
     Message,
+    ModelChange,
     RunInfo,
     SampleBlock,
 )
@@ -55,6 +56,7 @@ EXAMPLES: dict[type[Message], Message] = {
         ),
         AlarmCommand("*", "acknowledge", "ann", 5, "seen"),
         RunInfo("bench", 1, 256.0, "[rig]", "ab", "rigwatch 0", "π"),
+        ModelChange("rig", 1, 2, 3, "ann", "friction is known", "a = 1", "a = 0"),
     )
 }
 
