@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from monitor.alarms import Occasion
+from rigwatch.wire.messages import Health
 
 LOSS_SHOWN_NS = 1_000_000_000
 """A loss stands for this long after its last gap [ns]."""
@@ -72,6 +73,15 @@ class LinkWatch:
         self._clock_offset_ns = offset
         step = 0 if before is None else offset - before
         return step if abs(step) > CLOCK_STEP_NS else 0
+
+
+def disk_report(seen: Seen, troubled: Health | None) -> tuple[str, Occasion, bool]:
+    """The same of the alarm `disk`: the recorder's last word, where that was trouble."""
+    if troubled is None:
+        return "disk", _occasion(seen), False
+    free = troubled.counters.get("free_share", float("nan"))
+    text = troubled.text or f"{free:.1%} of the disk is free"
+    return "disk", _occasion(seen, text=text), True
 
 
 def _occasion(

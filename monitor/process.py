@@ -12,9 +12,10 @@ from pathlib import Path
 
 from monitor.alarms import AlarmJournal, Announcement, last_records, read_journal
 from monitor.cursor import Cursor
-from monitor.detectors.selection import detectors_of
+from monitor.detectors.selection import FRICTION, detectors_of
 from monitor.health import HealthBook
-from monitor.links import LinkWatch, Seen
+from monitor.links import LinkWatch, Seen, disk_report
+from monitor.model_desk import ModelDesk, Place
 from monitor.model_file import RigModel, load_model
 from monitor.rig_monitor import RigMonitor, compile_kernels
 from rigwatch.wire.alarm_list import serve_alarm_list
@@ -22,11 +23,11 @@ from rigwatch.wire.blocks import cut, pieces
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.heartbeat import Heartbeat
-from rigwatch.wire.messages import Alarm, Event, Gap, SampleBlock
+from rigwatch.wire.messages import Alarm, Event, Gap, Health, SampleBlock
 from rigwatch.wire.realtime import MONITOR, prepare_for_real_time, raise_priority
 from rigwatch.wire.rig_config import MonitorSection, RigConfig, load_rig, section_or_error
 from rigwatch.wire.sample_reader import SampleReader
-from rigwatch.wire.topics import ALARMS, ALIVE_KEY, COMMANDS, ESTIMATES, EVENTS, HEALTH
+from rigwatch.wire.topics import ALARMS, ALIVE_KEY, COMMANDS, ESTIMATES, EVENTS, HEALTH, MODELS
 
 TURN = 0.02
 """Longest wait for samples before commands and silence are looked at [s]."""
@@ -53,7 +54,8 @@ class MonitorProcess:
     def __init__(self, config: RigConfig, path: Path | str, model: RigModel, bus: Bus) -> None:
         section = monitor_section(config, path)
         detectors = detectors_of(section.detectors, model, path)
-        self.rig = RigMonitor(model, section.alarms, detectors, str(path))
+        friction = FRICTION in section.detectors
+        self.rig = RigMonitor(model, section.alarms, detectors, str(path), friction)
         self.bus = bus
         self._journal = AlarmJournal(section.journal) if section.journal else None
         self._cursor = Cursor(f"{section.journal}.position") if section.journal else None
@@ -63,6 +65,7 @@ class MonitorProcess:
         self._device = config.daq.name
         self._daq_alive = False
         self._daq_trouble = ""
+        self._disk_trouble: Health | None = None
         self._unsuitable = ""
         self._standing = self.rig.alarms.standing()
         self._commands = bus.subscribe(COMMANDS)
@@ -71,6 +74,8 @@ class MonitorProcess:
         serve_alarm_list(bus, lambda: self._standing)
         if section.journal:
             self.say(self.rig.alarms.restore(last_records(read_journal(section.journal)[0])))
+        self._models = ModelDesk(bus, self.rig, Path(section.model))
+        self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
 
     def take(self, item: SampleBlock | Gap | Event) -> None:
@@ -87,9 +92,12 @@ class MonitorProcess:
             self._cursor.write(*position)
         for command in self._commands.drain():
             self.say(self.rig.alarms.command(command))
+        self._change_models()
         seen = self._seen()
         for name, occasion, holds in self._links.reports(seen):
             self.say(self.rig.alarms.report(name, occasion, active=holds))
+        name, occasion, holds = disk_report(seen, self._disk_trouble)
+        self.say(self.rig.alarms.report(name, occasion, active=holds))
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen)
 
@@ -105,11 +113,22 @@ class MonitorProcess:
     def close(self) -> None:
         """Leave everything in order."""
         self.reader.close()
+        self._models.close()
         for kept in (self._journal, self._cursor):
             if kept:
                 kept.close()
 
+    def _change_models(self) -> None:
+        """Between two samples: all that the reader has given so far has been judged."""
+        boot, last = self.reader.position or (0, -1)
+        at = self._judged_ns + 1 if last >= 0 else time.time_ns()
+        for change in self._models.changes(Place(self._device, boot, last + 1, at)):
+            self.bus.publish(MODELS, change)
+            text = f"{change.text} ({change.user}), from sample {change.seq} on"
+            self.bus.publish(EVENTS, Event("monitor", at, "info", "MODEL", text))
+
     def _judge(self, block: SampleBlock) -> None:
+        self._judged_ns = int(block.t_ns[-1])
         known = self._known_of(block)
         try:
             if known:
@@ -135,13 +154,16 @@ class MonitorProcess:
     def _daq_changed(self, _key: str, alive: bool) -> None:
         self._daq_alive = alive
 
-    def _hear_of_daq(self) -> None:
+    def _hear_of_others(self) -> None:
         for health in self._healths.drain():
             if health.source.startswith("daq"):
                 self._daq_trouble = health.text if health.state == "reconnecting" else ""
+            elif health.source.startswith("recorder"):
+                troubled = health.counters.get("disk_trouble", 0.0) > 0.0
+                self._disk_trouble = health if troubled else None
 
     def _seen(self) -> Seen:
-        self._hear_of_daq()
+        self._hear_of_others()
         silent = self.reader.silent_for()
         return Seen(
             time.time_ns(),
@@ -226,7 +248,8 @@ def run(path: Path | str) -> int:
     config = load_rig(path)
     model = suitable_model(config, path)
     # Before the bus is joined, so that one who is seen there is ready to judge.
-    compile_kernels(model)
+    names = monitor_section(config, path).detectors
+    compile_kernels(model, detectors_of(names, model, path))
     raise_priority(MONITOR)
     bus = connect(config, "monitor")
     try:

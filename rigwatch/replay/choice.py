@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from monitor.detectors.selection import detectors_of
+from monitor.detectors.selection import FRICTION, detectors_of
 from monitor.model_file import load_model
 from monitor.rig_monitor import RigMonitor
 from rigwatch.replay.run import check_suits
@@ -33,7 +33,8 @@ def monitor_for(session: Session, model: Path | None, config: Path | None) -> Ri
     if section is None:
         return RigMonitor(loaded)
     detectors = detectors_of(section.detectors, loaded, file)
-    return RigMonitor(loaded, section.alarms, detectors, file)
+    watches_friction = FRICTION in section.detectors
+    return RigMonitor(loaded, section.alarms, detectors, file, watches_friction)
 
 
 def _section(session: Session, config: Path | None) -> tuple[MonitorSection | None, str]:

@@ -286,3 +286,16 @@ def test_a_clock_that_was_set_is_noticed_and_one_that_runs_is_not() -> None:
     assert [watch.clock_step(seen(t, t)) for t in (0, 1, 2)] == [0, 0, 0]
     assert watch.clock_step(seen(3 - 30, 3)) == pytest.approx(-30e9)
     assert watch.clock_step(seen(4 - 30, 4)) == 0
+
+
+def test_the_recorders_trouble_with_its_disk_is_an_alarm_and_clears(bench: Bench) -> None:
+    def say(trouble: float) -> None:
+        counters = {"disk_trouble": trouble, "free_share": 0.004}
+        bench.daq.publish(HEALTH, Health("recorder", 1, "recording", "", counters))
+        bench.turn()
+
+    said = []
+    for trouble in (0.0, 1.0, 1.0, 0.0):
+        say(trouble)
+        said.append([state for name, state in bench.alarm_states() if name == "disk"])
+    assert said == [[], ["unacknowledged"], [], ["cleared_unacknowledged"]]

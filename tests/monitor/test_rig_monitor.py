@@ -1,0 +1,48 @@
+"""Which alarms a rig's monitor raises, with and without the friction scheme."""
+
+import numpy as np
+from monitor_rig import SINE, block, friction, model, run
+
+from monitor.rig_monitor import RigMonitor, compile_kernels
+from rigwatch.wire.messages import Alarm
+
+
+def raised(watching: RigMonitor) -> set[str]:
+    """Names of the alarms over a run with friction and three missing readings."""
+    channels = run(SINE, 8.0, friction(5.0))
+    channels["acceleration"][1000:1003] = np.nan
+    watched = watching.update(block(channels))
+    assert watched is not None
+    return {said.name for said in watched.announcements if isinstance(said, Alarm)}
+
+
+def test_without_the_friction_scheme_its_alarms_stay_away_and_others_do_not() -> None:
+    with_it = raised(RigMonitor(model()))
+    without = raised(RigMonitor(model(), friction=False))
+    assert {"departure", "dry_friction"} <= with_it
+    assert "sensor_invalid" in without
+    assert with_it - without >= {"departure", "dry_friction"}
+    assert without <= {"gap", "sensor_invalid"}
+
+
+def test_estimates_are_made_with_and_without_the_friction_scheme() -> None:
+    samples = block(run(SINE, 6.0))
+    both = [RigMonitor(model(), friction=wanted).update(samples) for wanted in (True, False)]
+    first, second = (np.array([c.values for c in w.estimates.columns]) for w in both if w)
+    np.testing.assert_array_equal(first, second)
+
+
+def test_compiling_takes_what_is_configured() -> None:
+    class Counting:
+        """A detector that counts its blocks."""
+
+        name = "counting"
+        blocks = 0
+
+        def update(self, _block: object) -> tuple[tuple[()], tuple[()]]:
+            self.blocks += 1
+            return (), ()
+
+    counting = Counting()
+    compile_kernels(model(), [counting])
+    assert counting.blocks == 1
