@@ -11,6 +11,7 @@ EXAMPLE = """\
   rigwatch study show emps
   rigwatch study report emps --output emps.html
   rigwatch study view emps --save emps.rrd
+  rigwatch study promote emps --rig emps-rig.toml
   rigwatch study replay emps"""
 
 
@@ -18,9 +19,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument(
         "action",
-        choices=["new", "show", "report", "view", "replay", "accept-data"],
+        choices=["new", "show", "report", "view", "promote", "replay", "accept-data"],
         help="new: make it; show: its ledger; report: write an HTML page;"
         " view: measured and modelled signals of every step;"
+        " promote: hand the model to the rig's monitor;"
         " replay: fit every step again and compare;"
         " accept-data: go on with recordings that have changed",
     )
@@ -32,10 +34,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", type=Path, metavar="HTML", help="the report's file")
     parser.add_argument("--save", type=Path, metavar="FILE", help="view: write a file for Rerun")
     parser.add_argument("--picture", type=Path, metavar="PNG", help="view: write a picture")
+    parser.add_argument(
+        "--rig", type=Path, metavar="CONFIG", help="promote: the rig's configuration"
+    )
+    parser.add_argument("--rollback", action="store_true", help="promote: the model before again")
+    parser.add_argument("--user", default="", help="promote: who acts; else the user logged in")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """0 on success; 1 where a replay gives other errors than the ledger."""
+    from rigwatch.commands._study_promote import promote
     from rigwatch.commands._study_report import report
     from rigwatch.commands._study_view import view
 
@@ -44,6 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         "show": _show,
         "report": report,
         "view": view,
+        "promote": promote,
         "replay": _replay,
         "accept-data": _accept,
     }

@@ -1,0 +1,93 @@
+"""The model file with its history: every version that was in force stays beside it.
+
+model.toml                what a start of the monitor reads
+model.v1.toml, .v2.toml   what stood before, the newest with the highest number
+model.undone-….toml       what was rolled back, named by the beginning of its SHA-256
+model.history.jsonl       who did what, when and why, one line each
+"""
+
+import hashlib
+import json
+import os
+from pathlib import Path
+
+from rigwatch.wire.errors import ConfigError
+
+
+def install(path: Path, text: str, t_ns: int, user: str, why: str) -> None:
+    """Put a new version in force and keep the one before.
+
+    Raises:
+        ConfigError: a file cannot be written.
+    """
+    try:
+        before = path.read_text(encoding="utf-8")
+        number = max(_numbers(path), default=0) + 1
+        _write(_version(path, number), before)
+        _write(path, text)
+        _note(path, "promote", text, t_ns=t_ns, user=user, why=why)
+    except OSError as error:
+        raise ConfigError(path, "", error.strerror or str(error), "a file to write") from error
+
+
+def version_before(path: Path) -> str:
+    """Text of the version that a rollback brings back.
+
+    Raises:
+        ConfigError: there is none, or it cannot be read.
+    """
+    if not (numbers := _numbers(path)):
+        raise ConfigError(path, "", "no version before this one", "one to roll back to")
+    try:
+        return _version(path, max(numbers)).read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(path, "", error.strerror or str(error), "a readable file") from error
+
+
+def roll_back(path: Path, t_ns: int, user: str, why: str) -> str:
+    """Put the version before in force again; its text.
+
+    Raises:
+        ConfigError: there is none, or a file cannot be written.
+    """
+    text = version_before(path)
+    try:
+        undone = path.read_text(encoding="utf-8")
+        _write(path.with_name(f"{path.stem}.undone-{_sha256(undone)[:8]}.toml"), undone)
+        _write(path, text)
+        _version(path, max(_numbers(path))).unlink()
+        _note(path, "rollback", text, t_ns=t_ns, user=user, why=why)
+    except OSError as error:
+        raise ConfigError(path, "", error.strerror or str(error), "a file to write") from error
+    return text
+
+
+def _numbers(path: Path) -> list[int]:
+    found = (
+        file.name[len(path.stem) + 2 : -5] for file in path.parent.glob(f"{path.stem}.v*.toml")
+    )
+    return [int(number) for number in found if number.isdigit()]
+
+
+def _version(path: Path, number: int) -> Path:
+    return path.with_name(f"{path.stem}.v{number}.toml")
+
+
+def _write(path: Path, text: str) -> None:
+    """Whole or not at all."""
+    beside = path.with_suffix(".new")
+    with beside.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    beside.replace(path)
+
+
+def _note(path: Path, step: str, text: str, *, t_ns: int, user: str, why: str) -> None:
+    line = {"t_ns": t_ns, "step": step, "user": user, "why": why, "sha256": _sha256(text)}
+    with path.with_name(f"{path.stem}.history.jsonl").open("a", encoding="utf-8") as file:
+        file.write(json.dumps(line, ensure_ascii=False) + "\n")
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
