@@ -95,6 +95,19 @@ class RigMonitor:
         """What the alarms say to conditions, in the order in which they were judged."""
         return self.alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
 
+    @property
+    def model(self) -> RigModel:
+        """The model in force."""
+        return self._pipeline.model
+
+    def adopt(self, model: RigModel) -> None:
+        """Judge with another model from the next sample on.
+
+        Raises:
+            ModelError: it asks for other channels or filters.
+        """
+        self._pipeline.adopt(model)
+
     def learn(self, block: SampleBlock) -> None:
         """Take a block that an earlier run has judged already: state moves on, nothing is said."""
         self._pipeline.update(block)
