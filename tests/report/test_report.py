@@ -1,0 +1,131 @@
+"""The report is one page with everything in it, and its numbers are those of `compare`."""
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.workbench.report.svg import Plot, Scale, limits
+from rigwatch.workbench.study import Study
+
+SECTIONS = ("errors", "signals", "where", "ranking", "parameters", "ledger")
+VOID = ("meta", "path", "rect", "circle", "i")
+
+
+class Page(HTMLParser):
+    """What a program finds in the page: numbers by name, text and pictures by section."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.numbers: dict[str, float] = {}
+        self.verdict, self.section = "", "header"
+        self.text: dict[str, str] = {}
+        self.pictures: dict[str, int] = {}
+        self.open: list[str] = []
+        self.attributes: list[tuple[str, str]] = []
+
+    def handle_starttag(self, tag, attrs):
+        found = dict(attrs)
+        self.attributes += [(k, v or "") for k, v in found.items()]
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "section":
+            self.section = found["id"]
+        if tag == "svg":
+            self.pictures[self.section] = self.pictures.get(self.section, 0) + 1
+        if "data-name" in found:
+            self.numbers[found["data-name"]] = float(found["value"])
+        self.verdict = found.get("data-verdict", self.verdict)
+
+    def handle_endtag(self, tag):
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text[self.section] = self.text.get(self.section, "") + data
+
+
+@pytest.fixture(scope="module")
+def page(study: Study, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Page]:
+    target = Path(tmp_path_factory.mktemp("page")) / "drive.html"
+    assert main(["study", "report", str(study.folder), "--output", str(target)]) == 0
+    text, parsed = target.read_text(), Page()
+    parsed.feed(text)
+    return text, parsed
+
+
+def test_it_asks_the_network_for_nothing(page: tuple[str, Page]) -> None:
+    text, parsed = page
+    assert not re.search(r"https?://|//[a-z]|@import|url\(|<script|<link|<img|<iframe", text)
+    assert not {k for k, _ in parsed.attributes} & {"src", "href", "srcset", "onload"}
+
+
+def test_it_is_whole_and_every_section_has_content(page: tuple[str, Page]) -> None:
+    _, parsed = page
+    assert parsed.open == ["html"] or parsed.open == []
+    for name in SECTIONS:
+        assert len(parsed.text[name]) > 100, name
+    # Signal and residual of three steps; two maps, three cuts and a spectrum.
+    assert parsed.pictures["signals"] == 6
+    assert parsed.pictures["where"] >= 5
+    assert parsed.pictures["errors"] == 1
+
+
+def test_its_numbers_are_those_of_compare(
+    page: tuple[str, Page], study: Study, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, parsed = page
+    assert main(["compare", str(study.folder), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    for name in ("train_error", "held_out_error", "noise_floor"):
+        assert parsed.numbers[name] == found[name]
+        for channel, values in found["channels"].items():
+            assert parsed.numbers[f"{channel}.{name}"] == values[name]
+    for name, value in found["parameters"].items():
+        assert parsed.numbers[name] == value["value"]
+
+
+def test_it_tells_the_story(page: tuple[str, Page]) -> None:
+    _, parsed = page
+    assert parsed.verdict in ("nothing_missing", "missing_effect", "undetermined", "unknown_effect")
+    assert "+ coulomb" in parsed.text["errors"]
+    assert "+ constant force" in parsed.text["errors"]
+    assert "stribeck@load refused" in parsed.text["errors"]
+    assert "stribeck@load" in parsed.text["ranking"]
+    assert "constant_force@load" in parsed.text["ledger"]
+
+
+def test_an_output_that_cannot_be_written(
+    study: Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "no" / "such" / "folder.html"
+    assert main(["study", "report", str(study.folder), "--output", str(target)]) == 2
+    assert str(target) in capsys.readouterr().err
+
+
+def test_ticks_are_round_and_inside() -> None:
+    for low, high in ((0.0, 1.0), (-3.7, 12.1), (1e-7, 5e-7), (-1e4, 3e5)):
+        ticks = Scale(low, high, 0, 100).ticks()
+        assert 3 <= len(ticks) <= 8
+        assert min(ticks) >= low - 1e-9 * (high - low)
+        assert max(ticks) <= high + 1e-9 * (high - low)
+    assert Scale(0.1, 1000.0, 0, 100, log=True).ticks() == pytest.approx([0.1, 1, 10, 100, 1000])
+
+
+def test_a_line_breaks_where_nothing_was_measured_and_keeps_its_peaks() -> None:
+    x = np.linspace(0, 1, 5000)
+    y = np.sin(50 * x)
+    y[2000:2600] = np.nan
+    y[4321] = 7.0
+    plot = Plot("test", (0, 1), limits(y))
+    plot.line(x, y, "held")
+    path = re.search(r'<path d="(M[^"]+)" fill="none"', plot.drawn())
+    assert path is not None
+    assert path[1].count("M") == 2
+    assert len(path[1]) < 20_000
+    highest = min(float(pair.split()[1]) for pair in re.findall(r"[\d.]+ [\d.]+", path[1]))
+    assert highest == pytest.approx(plot.up.at(7.0), abs=0.06)
