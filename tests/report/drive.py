@@ -1,4 +1,4 @@
-"""A drive with friction, written as two sessions, and a study of it: small, quick, deterministic."""
+"""A drive with friction, written as two sessions, and a study of it: small and deterministic."""
 
 from pathlib import Path
 
@@ -46,7 +46,7 @@ MODEL = RigModel(
     decision=DecisionSection(settle=21, least_velocity=0.001),
     band=BandSection(low=(4.0, 20.0), high=(20.0, 100.0)),
 )
-"""What commissioning may have left: a mass that is somewhat wrong, friction that is not modelled."""
+"""What commissioning may have left: a mass that is somewhat wrong, friction not modelled."""
 
 
 def block(seed: int, count: int = SAMPLES) -> SampleBlock:

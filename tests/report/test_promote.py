@@ -1,0 +1,221 @@
+"""An accepted model goes to a running monitor: its residual falls, nothing is lost, and back."""
+
+import json
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from monitor.model_file import PromotedSection, load_model, model_text, parse_model
+from monitor.process import MonitorProcess, suitable_model
+from monitor.rig_monitor import RigMonitor
+from rigwatch.commands import main
+from rigwatch.replay.run import judge
+from rigwatch.replay.source import items
+from rigwatch.wire.blocks import concatenate, cut, pieces
+from rigwatch.wire.bus_memory import MemoryNetwork
+from rigwatch.wire.errors import ConfigError, ModelError
+from rigwatch.wire.messages import EstimateBlock, ModelChange, SampleBlock
+from rigwatch.wire.model_wish import Granted, Wish, ask_for_model
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.schema import encode
+from rigwatch.wire.session import SessionWriter, open_session, run_info
+from rigwatch.wire.topics import ESTIMATES, MODELS, SAMPLES
+from rigwatch.workbench.promote import promotion
+from rigwatch.workbench.study import Study
+from tests.report.drive import COULOMB, MASS, MODEL, PUSH, RATE, VISCOUS, block, make_study
+
+RIG = """
+[rig]
+id = "drive"
+sample_rate = 500.0
+[bus]
+router = "tcp/127.0.0.1:9"
+listen = "tcp/127.0.0.1:9"
+[[channels]]
+name = "force"
+unit = "N"
+gain = 0.001
+[[channels]]
+name = "position"
+unit = "m"
+gain = 0.001
+[daq.device]
+adapter = "serial"
+port = "/dev/null"
+[monitor]
+model = "{model}"
+"""
+SETTLED = 600
+"""Samples after which the estimates stand again."""
+
+
+class Bench:
+    """A monitor whose loop is turned by hand."""
+
+    def __init__(self, folder: Path) -> None:
+        self.model = folder / "model.toml"
+        self.model.write_text(model_text(MODEL))
+        self.path = folder / "rig.toml"
+        self.path.write_text(RIG.format(model=self.model))
+        network = MemoryNetwork()
+        self.daq, self.observer = (network.bus("drive", name) for name in ("daq", "observer"))
+        self.estimates = self.observer.subscribe(ESTIMATES)
+        self.changes = self.observer.subscribe(MODELS)
+        config = load_rig(self.path)
+        self.monitor = MonitorProcess(
+            config, self.path, suitable_model(config, self.path), network.bus("drive", "monitor")
+        )
+
+    def send(self, samples: SampleBlock) -> None:
+        for piece in pieces(samples, 7):
+            self.daq.publish(SAMPLES, piece)
+            self.turn()
+
+    def turn(self) -> None:
+        for item in self.monitor.reader.read(0.0):
+            self.monitor.take(item)
+        self.monitor.look_around()
+
+    def ask(self, wish: Wish) -> Granted:
+        """Ask from a thread of its own, as an operator does, while the loop turns."""
+        answers: list[Granted] = []
+        asking = threading.Thread(target=lambda: answers.append(ask_for_model(self.observer, wish)))
+        asking.start()
+        while asking.is_alive():
+            self.turn()
+        return answers[0]
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    made = Bench(tmp_path)
+    yield made
+    made.monitor.close()
+
+
+def wish_of(study: Study) -> Wish:
+    return Wish("promote", promotion(study, MODEL).text, "ann", "friction is known")
+
+
+def rms(estimates: EstimateBlock, first: int, last: int) -> float:
+    residual = estimates.column("residual").values[first:last]
+    return float(np.sqrt(np.nanmean(residual**2)))
+
+
+def test_the_monitor_gets_what_the_study_has_learnt(study: Study) -> None:
+    found = promotion(study, MODEL)
+    assert found.learnt["mass"] == pytest.approx(MASS, rel=0.02)
+    assert found.learnt["coulomb"] == pytest.approx(COULOMB, rel=0.02)
+    assert found.learnt["viscous"] == pytest.approx(VISCOUS, rel=0.02)
+    assert found.learnt["offset"] == pytest.approx(PUSH, rel=0.02)
+    assert found.after < 0.1 * found.before
+    assert parse_model(found.text, "promoted") == found.model
+    assert MODEL.band is not None
+    assert found.model.band is not None
+    assert found.model.band.low[0] == pytest.approx(MODEL.band.low[0] - found.learnt["coulomb"])
+
+
+def test_the_residual_of_a_running_monitor_falls_and_rises_again(
+    study: Study, bench: Bench
+) -> None:
+    samples = block(3)
+    bench.send(cut(samples, 0, 2000))
+    granted = bench.ask(wish_of(study))
+    assert granted.done, granted.text
+    assert granted.seq == 2000
+    bench.send(cut(samples, 2000, 4000))
+    assert load_model(bench.model).promoted is not None
+    assert bench.ask(Wish("rollback", "", "ann", "")).done
+    bench.send(cut(samples, 4000, 6000))
+    whole = concatenate(bench.estimates.drain())
+    assert len(whole) == 6000
+    before, during = rms(whole, SETTLED, 2000), rms(whole, 2000, 4000)
+    assert during < 0.1 * before
+    assert rms(whole, 4000, 6000) == pytest.approx(before, rel=0.3)
+    # Estimated is friction beyond what is known: all of it, none, all of it.
+    theta = whole.column("theta1").values
+    assert np.nanmedian(theta[1500:2000]) == pytest.approx(COULOMB, rel=0.1)
+    assert abs(np.nanmedian(theta[3500:4000])) < 0.1 * COULOMB
+    assert load_model(bench.model) == MODEL
+    assert [c.seq for c in bench.changes.drain()] == [2000, 4000]
+
+
+def test_a_replay_gives_the_same_to_the_last_bit(
+    study: Study, bench: Bench, tmp_path: Path
+) -> None:
+    samples = block(3, 3000)
+    bench.send(cut(samples, 0, 1501))
+    assert bench.ask(wish_of(study)).done
+    bench.send(cut(samples, 1501, 3000))
+    live = concatenate(bench.estimates.drain())
+    path = tmp_path / "session.mcap"
+    with SessionWriter(path, run_info("drive", RATE), sync=False) as writer:
+        for message in (samples, *bench.changes.drain()):
+            writer.write(message)
+    session = open_session(path)
+    judged = list(judge(session, RigMonitor(MODEL), items(session)))
+    assert sum(isinstance(j.item, ModelChange) for j in judged) == 1
+    replayed = concatenate([j.watched.estimates for j in judged if j.watched])
+    assert encode(replayed) == encode(live)
+
+
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        (Wish("rollback", "", "ann", ""), "no version before"),
+        (Wish("promote", "mass = 1", "ann", ""), "the new model"),
+        (Wish("promote", model_text(structs.replace(MODEL, sample_rate=256.0)), "a", ""), "rate"),
+    ],
+)
+def test_what_does_not_suit_is_refused_and_nothing_changes(
+    bench: Bench, wish: Wish, words: str
+) -> None:
+    granted = bench.ask(wish)
+    assert not granted.done
+    assert words in granted.text
+    assert load_model(bench.model) == MODEL == bench.monitor.rig.model
+    assert not bench.changes.drain()
+
+
+def test_without_a_monitor_the_file_is_changed_and_rolled_back(
+    study: Study, bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["study", "promote", str(study.folder), "--rig", str(bench.path), "--json"]
+    assert main(arguments) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["live"] is False
+    assert said["residual"]["after"] < 0.1 * said["residual"]["before"]
+    assert load_model(bench.model).promoted is not None
+    assert load_model(bench.model.with_name("model.v1.toml")) == MODEL
+    assert main([*arguments, "--rollback"]) == 0
+    assert load_model(bench.model) == MODEL
+    history = bench.model.with_name("model.history.jsonl").read_text().splitlines()
+    assert [json.loads(line)["step"] for line in history] == ["promote", "rollback"]
+    assert main([*arguments, "--rollback"]) == 2
+
+
+def test_a_study_without_effects_has_nothing_to_promote(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="no accepted effect"):
+        promotion(make_study(tmp_path), MODEL)
+
+
+def test_friction_by_direction_needs_an_inertia() -> None:
+    transfer = Path(__file__).parents[1] / "verify" / "model.toml"
+    section = PromotedSection(viscous_by_direction=1.0)
+    with pytest.raises(ConfigError, match="direction"):
+        parse_model(model_text(structs.replace(load_model(transfer), promoted=section)), "model")
+
+
+def test_blocks_do_not_matter_where_friction_is_promoted() -> None:
+    section = PromotedSection(coulomb=12.0, viscous=60.0, viscous_by_direction=3.0)
+    model, samples = structs.replace(MODEL, promoted=section), block(4, 2000)
+    whole = RigMonitor(model).update(samples)
+    one = RigMonitor(model)
+    parts = [one.update(piece) for piece in pieces(replace(samples), 13)]
+    assert whole is not None
+    assert encode(concatenate([p.estimates for p in parts if p])) == encode(whole.estimates)
