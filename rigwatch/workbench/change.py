@@ -12,9 +12,8 @@ from rigwatch.physics.engine.system import Placement, compose
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
 from rigwatch.workbench.ledger import append
-from rigwatch.workbench.rank import Ranked, candidates, rank_only, refit, suits
+from rigwatch.workbench.rank import Ranked, accepted_from, candidates, rank_only, refit, suits
 from rigwatch.workbench.study import (
-    Accepted,
     Study,
     append_effect,
     drop_effect,
@@ -71,7 +70,7 @@ def add(study: Study, effect: str, port: str | None = None, *, anyway: bool = Fa
         numbers = _numbers(before) | tried
         append(study, "refused", effect=effect, port=where, reason=row.reason, **numbers)
         return Change("refused", effect, where, before, before, errors, text)
-    accepted = _accepted(row)
+    accepted = accepted_from(row)
     changed = append_effect(study, accepted)
     after = comparison(open_bench(changed))
     numbers = _numbers(after)
@@ -156,15 +155,3 @@ def _tried(bench: Bench, effect: str, port: str) -> Ranked:
     if row.fitted is None:
         raise ModelError(f"{row.label}: cannot be fitted: {row.trouble}")
     return row
-
-
-def _accepted(row: Ranked) -> Accepted:
-    assert row.fitted is not None
-    assert row.placement is not None
-    prefix = row.placement.prefix
-    values = {
-        name[len(prefix) :]: value
-        for name, value in row.fitted.train.values().items()
-        if name.startswith(prefix)
-    }
-    return Accepted(effect=row.effect, port=row.port, parameters=values)

@@ -1,13 +1,16 @@
 """Explains the gap: ranks what may be missing, gives a verdict and says what to do next."""
 
+import dataclasses
 from dataclasses import dataclass, field
+
+from msgspec.structs import replace
 
 from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
 from rigwatch.workbench.intervals import Value, values
 from rigwatch.workbench.next_experiment import Experiment, propose
-from rigwatch.workbench.rank import Ranked, rank
+from rigwatch.workbench.rank import Ranked, accepted_from, rank
 from rigwatch.workbench.study import Study
-from rigwatch.workbench.verdict import Verdict, judge
+from rigwatch.workbench.verdict import EXPLAINED, Verdict, judge, left_over
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,7 @@ class Explanation:
         text: the verdict in a sentence.
         comparison: the model as it is.
         ranking: best first.
+        also: what is missing as well, where two effects hide at once.
         rivals: of different physics that the recording cannot tell from the best.
         next_experiment: what would tell them apart, None where nothing needs to be told.
     """
@@ -53,6 +57,7 @@ class Explanation:
     comparison: Comparison
     ranking: list[Row]
     rivals: list[str] = field(default_factory=list)
+    also: list[str] = field(default_factory=list)
     next_experiment: Experiment | None = None
 
 
@@ -71,9 +76,28 @@ def ranking(bench: Bench) -> tuple[list[Ranked], Verdict]:
     """The ranking, what the verdict names in front, and the verdict."""
     rows = rank(bench.study, bench.data, bench.base)
     verdict = judge(bench.base, rows, bench.study.effects, bench.floor)
+    if verdict.word == "unknown_effect" and verdict.best is not None:
+        verdict = _with_second(bench, verdict)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
+
+
+def _with_second(bench: Bench, verdict: Verdict) -> Verdict:
+    """The verdict once a second effect has been tried beside the best: two may hide at once."""
+    best = verdict.best
+    assert best is not None
+    assert best.fitted is not None
+    effects = (*bench.study.file.effects, accepted_from(best))
+    study = dataclasses.replace(bench.study, file=replace(bench.study.file, effects=effects))
+    beside = dataclasses.replace(bench, study=study, base=best.fitted)
+    second = judge(beside.base, rank(study, beside.data, beside.base), study.effects, bench.floor)
+    if second.best is None or second.best.fitted is None:
+        return verdict
+    if left_over(bench.base, second.best.fitted, bench.floor) > 1 - EXPLAINED:
+        return verdict
+    text = f"{best.label} is missing, and {second.best.label} as well"
+    return dataclasses.replace(verdict, word="missing_effect", text=text, second=second.members)
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
@@ -83,7 +107,15 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     if verdict.best is not None and rivals:
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
     told = [_row(row, members if row is verdict.best else row.alike) for row in rows]
-    return Explanation(verdict.word, verdict.text, comparison(bench), told, rivals, experiment)
+    return Explanation(
+        verdict.word,
+        verdict.text,
+        comparison(bench),
+        told,
+        rivals,
+        list(verdict.second),
+        experiment,
+    )
 
 
 def _row(row: Ranked, alike: list[str]) -> Row:

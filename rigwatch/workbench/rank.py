@@ -26,7 +26,7 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.fitted import Fitted, block_errors, fit_model
 from rigwatch.workbench.signals import Data
 from rigwatch.workbench.sizes import port_sizes
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.study import Accepted, Study
 
 LEVEL = 0.01
 """Corrected p-value below which an effect is worth a fit."""
@@ -331,6 +331,19 @@ def gain(base: Fitted, other: Fitted) -> tuple[float, float]:
     """Fall of the held-out mean squared error from `base` to `other`, and its deviation."""
     difference = block_errors(base.held_out) - block_errors(other.held_out)
     return float(difference.mean()), float(difference.std(ddof=1) / np.sqrt(len(difference)))
+
+
+def accepted_from(row: Ranked) -> Accepted:
+    """The row as a study's file lists it, its fit's values to start from."""
+    assert row.fitted is not None
+    assert row.placement is not None
+    prefix = row.placement.prefix
+    values = {
+        name[len(prefix) :]: value
+        for name, value in row.fitted.train.values().items()
+        if name.startswith(prefix)
+    }
+    return Accepted(effect=row.effect, port=row.port, parameters=values)
 
 
 def _order(row: Ranked) -> tuple[int, float, float]:

@@ -31,7 +31,7 @@ SIMILAR = 0.8
 """Cosine below which two effects that do equally well explain different parts of the error."""
 MOST_OF_IT = 0.75
 """Share of a gain that an effect of lower order must have to go first."""
-EXPLAINED = 0.6
+EXPLAINED = 0.9
 """Share of the energy above the floor that known effects must explain, or it is unknown."""
 
 
@@ -45,6 +45,7 @@ class Verdict:
         members: labels that the best cannot be told from, itself first.
         rivals: labels of other physics that this recording cannot tell from it.
         text: a sentence for people.
+        second: labels of what is missing as well, where two effects hide at once.
     """
 
     word: Word
@@ -52,6 +53,7 @@ class Verdict:
     members: tuple[str, ...]
     rivals: tuple[str, ...]
     text: str
+    second: tuple[str, ...] = ()
 
 
 def judge(
@@ -74,7 +76,8 @@ def judge(
         and row.label not in same
         and effects[row.effect].free <= effects[best.effect].free
     ]
-    if floor.method != "quiet band" and _left(base, best, floor) > 1 - EXPLAINED:
+    assert best.fitted is not None
+    if floor.method != "quiet band" and left_over(base, best.fitted, floor) > 1 - EXPLAINED:
         text = (
             f"the best known effect, {best.label}, leaves much of the error above the noise floor"
         )
@@ -109,11 +112,10 @@ def above_floor(fitted: Fitted, floor: NoiseFloor) -> float:
     return float(np.sqrt(np.mean((fitted.held_out.rms / floor.rms) ** 2)))
 
 
-def _left(base: Fitted, best: Ranked, floor: NoiseFloor) -> float:
-    """Share of the energy above the floor that is left with the best effect."""
-    assert best.fitted is not None
+def left_over(base: Fitted, best: Fitted, floor: NoiseFloor) -> float:
+    """Share of the energy above the floor that is left with better effects."""
     allowed = ALLOWED[floor.method] ** 2
-    before, after = above_floor(base, floor) ** 2 - 1, above_floor(best.fitted, floor) ** 2
+    before, after = above_floor(base, floor) ** 2 - 1, above_floor(best, floor) ** 2
     return max(after - allowed, 0.0) / max(before, 1e-12)
 
 

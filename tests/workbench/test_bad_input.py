@@ -1,0 +1,124 @@
+"""Recordings that do not suit a model: one plain line, and nothing is lost."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.physics.engine.compiled import compile_system
+from rigwatch.physics.engine.fit import Recording, fit
+from rigwatch.physics.engine.model import Model
+from rigwatch.physics.engine.system import compose
+from rigwatch.wire.config import parse
+from rigwatch.wire.errors import ConfigError, ModelError
+from rigwatch.wire.exchange.importing import import_file
+from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option
+from rigwatch.workbench.compare import compare
+from rigwatch.workbench.intervals import identifiability
+from rigwatch.workbench.study import Study, create
+
+MODEL = """
+name = "line"
+summary = "A force that grows with position."
+inputs.position = { unit = "m" }
+parameters.k = { value = 1.0, unit = "N/m" }
+outputs.force = { unit = "N", expression = "k*position + load" }
+ports.load = { kind = "force", unit = "N", variables.x = { expression = "position", unit = "m" } }
+"""
+Table = dict[str, np.ndarray]
+Made = Callable[..., Study]
+
+
+def good(samples: int = 400) -> Table:
+    position = np.sin(np.arange(samples) / 9)
+    noise = np.random.default_rng(1).normal(size=samples)
+    return {"position": position, "force": 3 * position + 0.01 * noise}
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Made:
+    """A study of two recordings."""
+
+    def make(train: Table, held_out: Table, rates: tuple[float, float] = (100.0, 100.0)) -> Study:
+        for name, table, rate in zip(("a", "b"), (train, held_out), rates, strict=True):
+            session(tmp_path / name, table, rate)
+        (tmp_path / "line.toml").write_text(MODEL)
+        template = tmp_path / "template.toml"
+        template.write_text(
+            'model = "line.toml"\n[[train]]\nsession = "a.mcap"\n[[held_out]]\nsession = "b.mcap"\n'
+        )
+        return create(tmp_path / "study", template)
+
+    return make
+
+
+def session(path: Path, table: Table, rate: float) -> None:
+    lines = [",".join(table)]
+    lines += [",".join(f"{v:.9g}" for v in row) for row in zip(*table.values(), strict=True)]
+    path.with_suffix(".csv").write_text("\n".join(lines) + "\n")
+    units = {"position": "m", "force": "N"}
+    channels = dict(parse_map_option(f"{name}={name}[{units[name]}]") for name in table)
+    mapping = ImportMapping(channels=channels, rate=rate, flag_missing=True)
+    import_file(path.with_suffix(".csv"), path.with_suffix(".mcap"), mapping)
+
+
+def test_a_good_recording_is_fitted(made: Made) -> None:
+    found = compare(made(good(), good()))
+    k = found.parameters["k"]
+    assert k.interval is not None
+    assert k.interval[0] < 3.0 < k.interval[1]
+    assert found.held_out_error == pytest.approx(0.01, rel=0.2)
+
+
+def test_samples_that_are_missing_are_told_and_left_out(made: Made) -> None:
+    broken = good()
+    broken["position"][50:60] = np.nan
+    broken["force"][200:210] = np.nan
+    found = compare(made(broken, good()))
+    assert "train: 10 samples without a valid input are not counted" in found.remarks
+    assert found.parameters["k"].value == pytest.approx(3.0, rel=0.01)
+
+
+def test_an_input_that_is_mostly_missing_is_refused(made: Made) -> None:
+    broken = good()
+    broken["position"][:200] = np.nan
+    with pytest.raises(ModelError, match="50% of input 'position' missing"):
+        compare(made(broken, good()))
+
+
+def test_a_recording_without_excitation_is_refused(made: Made) -> None:
+    still = good() | {"position": np.full(400, 0.3)}
+    with pytest.raises(ModelError, match="never change, expected a recording with excitation"):
+        compare(made(still, good()))
+
+
+def test_rates_that_differ_are_refused(made: Made) -> None:
+    with pytest.raises(ModelError, match=r"b.mcap: found 50 Hz, expected 100 Hz"):
+        compare(made(good(), good(), (100.0, 50.0)))
+
+
+def test_a_channel_that_is_not_there_is_named(made: Made) -> None:
+    nameless = {"position": good()["position"]}
+    with pytest.raises(ModelError, match="found no channel 'force'"):
+        compare(made(nameless, good()))
+
+
+def test_a_study_is_not_written_over(made: Made, tmp_path: Path) -> None:
+    study = made(good(), good())
+    before = (study.folder / "study.toml").read_bytes()
+    with pytest.raises(ConfigError, match="expected a folder without one"):
+        create(study.folder, tmp_path / "template.toml")
+    assert (study.folder / "study.toml").read_bytes() == before
+
+
+def test_parameters_that_cannot_be_told_apart_are_named() -> None:
+    text = MODEL.replace("k*position", "(k + k2)*position").replace(
+        "parameters.k =", 'parameters.k2 = { value = 1.0, unit = "N/m" }\nparameters.k ='
+    )
+    system = compose(parse(text, Model, "line"))
+    table = good()
+    recording = Recording(0.01, table["position"][:, None], table["force"][:, None])
+    notes = identifiability(fit(compile_system(system), recording, 100))
+    assert set(notes) == {"k", "k2"}
+    assert "tied to" in notes["k"]
