@@ -6,12 +6,17 @@ from pathlib import Path
 from rigwatch.commands._sessions import print_json
 
 HELP = "fit a model and show its errors on training and held-out recordings"
-EXAMPLE = "  rigwatch compare emps"
+EXAMPLE = """\
+  rigwatch compare emps
+  rigwatch compare emps --profile"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("study", type=Path, help="the study's folder")
+    parser.add_argument(
+        "--profile", action="store_true", help="intervals from the profile likelihood: many fits"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -20,7 +25,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.study import open_study
     from rigwatch.workbench.words import comparison_lines
 
-    found = compare(open_study(arguments.study))
+    found = compare(open_study(arguments.study), profiled=arguments.profile)
     if arguments.json:
         print_json(found)
         return 0

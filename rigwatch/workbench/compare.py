@@ -1,6 +1,6 @@
 """Compares the model of a study with its recordings: errors, noise floor, parameters."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from rigwatch.workbench.free_run import free_run
 from rigwatch.workbench.intervals import Value, values
 from rigwatch.workbench.ledger import check_data
 from rigwatch.workbench.noise_floor import METHODS, NoiseFloor, from_residual, quiet_scale
+from rigwatch.workbench.profile import profile
 from rigwatch.workbench.signals import Data, prepare
 from rigwatch.workbench.study import Study
 
@@ -81,9 +82,16 @@ def noise_floor(study: Study, data: Data, base: Fitted) -> NoiseFloor:
     return from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
 
 
-def compare(study: Study) -> Comparison:
-    """Errors, noise floor and parameters of the study's model as it is."""
-    return comparison(open_bench(study))
+def compare(study: Study, *, profiled: bool = False) -> Comparison:
+    """Errors, noise floor and parameters of the study's model as it is.
+
+    Args:
+        study: the study.
+        profiled: intervals from the profile likelihood, which takes many fits.
+    """
+    bench = open_bench(study)
+    found = comparison(bench)
+    return replace(found, parameters=profile(bench.base, bench.data.train)) if profiled else found
 
 
 def comparison(bench: Bench) -> Comparison:

@@ -71,6 +71,14 @@ def test_a_good_recording_is_fitted(made: Made) -> None:
     assert found.held_out_error == pytest.approx(0.01, rel=0.2)
 
 
+def test_a_profile_agrees_with_the_interval_of_a_straight_line(made: Made) -> None:
+    study = made(good(), good())
+    plain, profiled = (compare(study, profiled=p).parameters["k"].interval for p in (False, True))
+    assert plain is not None
+    assert profiled is not None
+    assert profiled == pytest.approx(plain, rel=1e-3)
+
+
 def test_samples_that_are_missing_are_told_and_left_out(made: Made) -> None:
     broken = good()
     broken["position"][50:60] = np.nan

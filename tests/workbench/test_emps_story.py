@@ -171,3 +171,23 @@ def test_data_that_changed_are_refused_until_accepted(
     assert "has changed since the last step" in capsys.readouterr().err
     assert told("study", "accept-data", folder)[0] == 0
     assert told("compare", folder)[0] == 0
+
+
+def test_an_installed_package_offers_effects(
+    study: str, tmp_path: Path, told: Told, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    info = tmp_path / "site" / "offers-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: offers\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[rigwatch.effects]\nmine = offered_effects:effects\n")
+    (tmp_path / "site" / "offered_effects.py").write_text(
+        "from rigwatch.physics.engine.effect import Effect, EffectParameter\n"
+        "def effects():\n"
+        "    strength = EffectParameter(unit='{F}', role='strength')\n"
+        "    return {'offered': Effect(port='force', expression='-F*sign(v)', physics='Mine.',\n"
+        "                              source='me', parameters={'F': strength})}\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path / "site"))
+    code, change = told("add", study, "offered")
+    assert code == 0
+    assert change["after"]["held_out_error"] == pytest.approx(4.08, abs=0.02)
