@@ -26,7 +26,7 @@ from rigwatch.wire.schema import encode
 from rigwatch.wire.session import SessionWriter, open_session, run_info
 from rigwatch.wire.topics import ESTIMATES, MODELS, SAMPLES
 from rigwatch.workbench.promote import promotion
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.study import Study, open_study
 from tests.report.drive import COULOMB, MASS, MODEL, PUSH, RATE, VISCOUS, block, make_study
 
 RIG = """
@@ -219,3 +219,28 @@ def test_blocks_do_not_matter_where_friction_is_promoted() -> None:
     parts = [one.update(piece) for piece in pieces(replace(samples), 13)]
     assert whole is not None
     assert encode(concatenate([p.estimates for p in parts if p])) == encode(whole.estimates)
+
+
+def test_on_a_rig_with_a_transfer_function_friction_goes_through_its_filter(tmp_path: Path) -> None:
+    recordings = Path(__file__).parents[1] / "verify"
+    (tmp_path / "study.toml").write_text(
+        f"""
+        model = "mass-spring-damper"
+        channels = {{ force = "voltage" }}
+        [[train]]
+        session = "{recordings / "friction.mcap"}"
+        start = 4.0
+        end = 6.0
+        [[held_out]]
+        session = "{recordings / "friction.mcap"}"
+        start = 6.0
+        [[effects]]
+        effect = "coulomb"
+        port = "load"
+        parameters = {{}}
+        """
+    )
+    found = promotion(open_study(tmp_path), load_model(recordings / "model.toml"))
+    assert found.model.promoted is not None
+    assert found.model.promoted.coulomb == pytest.approx(0.8, abs=0.1)
+    assert found.after < 0.2 * found.before
