@@ -27,8 +27,10 @@ FloatArray = NDArray[np.float64]
 
 LATE = 0.1
 """Share of the data after an alarm that the way from onset to alarm may cost."""
-STARTS = 6
-"""Earlier starts that are tried where an alarm came late."""
+STARTS = 5
+"""Starts before the onset, and from onset to alarm, that are tried where an alarm came late."""
+CLEAR = 0.01
+"""Probability below which a candidate's score is taken for more than chance."""
 SHORTEST = 50
 """Samples without which nothing is identified."""
 MOST = 20
@@ -191,7 +193,7 @@ class _Work:
         self.damages.append(
             Damage(alarm.sample * dt, when, ranking, figures, before, explained, ranking.last * dt)
         )
-        follow = max(ranking.first, when.sample)
+        follow = max(ranking.first, min(when.sample, ranking.last - SHORTEST))
         return _Now(
             self._changed(now, refit), refit.state, follow, self._spread(refit),
             {**now.figures, **figures},
@@ -208,7 +210,9 @@ class _Work:
         if alarm.sample - alarm.onset <= LATE * (end - alarm.sample):
             return alarm.sample
         earliest = min(alarm.onset, max(now.first, self.base.samples))
-        starts = np.unique(np.linspace(earliest, alarm.onset, STARTS).astype(int)).tolist()
+        before = np.linspace(earliest, alarm.onset, STARTS)
+        within = np.linspace(alarm.onset, alarm.sample, STARTS)
+        starts = np.unique(np.concatenate([before, within]).astype(int)).tolist()
         squares = np.nansum((watch.residual / self.base.sigma) ** 2, axis=1)
         gains = [
             float(squares[first - watch.first :].sum())
@@ -257,9 +261,9 @@ class _Work:
         return ranking if self._holds(now, ranking) else kept
 
     def _holds(self, now: _Now, ranking: Ranking) -> bool:
-        """Whether the best candidate's residual is nothing but noise."""
+        """Whether the best candidate says something, and leaves nothing but noise."""
         refit = ranking.best.refit
-        if refit is None or not np.isfinite(refit.chi2):
+        if refit is None or not np.isfinite(refit.chi2) or ranking.best.p_value > CLEAR:
             return False
         parameters = self._changed(now, refit)
         watch = self.judge.watch(
@@ -270,7 +274,7 @@ class _Work:
     def _refitted(self, now: _Now, path: FloatArray, ranking: Ranking, onset: int) -> Refit:
         """The changed coefficient with those that the file marks, from the instant on."""
         best, known = ranking.best, self.base.model.candidates
-        first = max(ranking.first, onset)
+        first = max(ranking.first, min(onset, ranking.last - SHORTEST))
         marked = {n: f.value for n, f in now.figures.items() if n in known}
         state = path[first] if best.refit is None or first != ranking.first else best.refit.state
         stretch = self._stretch(now, first, ranking.last)

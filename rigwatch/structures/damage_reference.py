@@ -4,7 +4,7 @@ Also how large its residual is there (noise), and how well the identified figure
 say which residual is to be expected later.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,8 @@ from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
 
+NEAR = 0.1
+"""Change of an iteration, in standard deviations, that will do."""
 LEAST = 20
 """Undamaged samples without which nothing is said about noise."""
 
@@ -107,13 +109,21 @@ def _identified(
     start = Record(record.dt, {name: column[:samples] for name, column in record.columns.items()})
     problem = problem_of(structure, start)
     outcome = solver("shooting")(problem)
-    covariance = outcome.covariance
-    if covariance is None or not outcome.converged:
+    covariance, turns = outcome.covariance, outcome.iterations
+    if covariance is None or not (outcome.converged or _settled(turns, covariance)):
         raise ModelError(
             f"{structure.name}: found no figures that explain the undamaged"
             f" {samples * record.dt:g} s, expected other guesses or a longer undamaged start"
         )
-    return problem.names, outcome.iterations[-1], covariance
+    return problem.names, turns[-1], covariance
+
+
+def _settled(turns: Sequence[FloatArray], covariance: FloatArray) -> bool:
+    """Whether the last iteration changed less than the figures are known to."""
+    if len(turns) < 2:
+        return False
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return bool(np.all(np.abs(turns[-1] - turns[-2]) <= NEAR * deviations))
 
 
 def _spread(model: SpringModel, names: tuple[str, ...], covariance: FloatArray) -> FloatArray:

@@ -89,22 +89,24 @@ class Judge:
             parameters: that it has now, shape (n_p,).
             state: at sample `first`, shape (n,).
             first, last: the stretch [samples].
-            spread: covariance of the springs' coefficients and the state, shape (c + n, c + n); it
-                widens what is expected of the residual.
+            spread: covariance of the springs' coefficients and the state, shape (c + n, c + n);
+                None where they are known.
         """
         run = model.run(parameters, state, first, last)
         residual = run.outputs - model.observed[first:last]
-        scale = np.broadcast_to(self.sigma, residual.shape)
-        if spread is not None:
-            own = np.einsum("kmi,ij,kmj->km", run.slopes, spread, run.slopes)
-            scale = np.sqrt(scale**2 + np.maximum(own, 0.0))
-        statistic, threshold, alarm = self.judge(residual, scale, first)
+        scaled = residual / self.sigma
+        if spread is not None and np.any(spread) and self.limit is None:
+            scaled = innovations(scaled, run.slopes / self.sigma[:, None], spread)
+        statistic, threshold, alarm = self.judge(residual, scaled, first)
         return Watch(first, residual, run.states, statistic, threshold, alarm)
 
     def judge(
-        self, residual: FloatArray, scale: FloatArray, first: int = 0
+        self, residual: FloatArray, scaled: FloatArray, first: int = 0
     ) -> tuple[FloatArray, float, Alarm | None]:
-        """Statistic (samples,), threshold and the first alarm of residuals (samples, m)."""
+        """Statistic (samples,), threshold and first alarm of residuals (samples, m).
+
+        `scaled` are those of standard deviation 1 where only noise is there, same shape.
+        """
         if self.limit is not None:
             return _by_limit(residual, self.limit, first)
         samples, signals = residual.shape
@@ -112,10 +114,46 @@ class Judge:
         adding = CumulativeSum(signals, threshold)
         statistic, alarm = np.zeros(samples), None
         for k in range(samples):
-            if adding.update(residual[k] / scale[k]) and alarm is None:
+            if adding.update(scaled[k]) and alarm is None:
                 alarm = Alarm(first + k, first + k + 1 - adding.zero)
             statistic[k] = adding.value
         return statistic, threshold, alarm
+
+
+def innovations(scaled: FloatArray, slopes: FloatArray, spread: FloatArray) -> FloatArray:
+    """What of the residuals the past and the uncertainty of the figures do not explain.
+
+    An error θ of the figures moves all residuals together, slopes·θ, so that they are no
+    independent noise. Updating what is known of θ sample by sample leaves innovations that are
+    (R. E. Kalman, 1960); each is divided by the root of its covariance.
+
+    Args:
+        scaled: residuals over the noise's deviation, NaN where missing, shape (samples, m).
+        slopes: scaled alike, by θ, shape (samples, m, p).
+        spread: covariance of θ, shape (p, p).
+
+    Returns:
+        Shape (samples, m), standard deviation 1 and independent where only noise is there.
+    """
+    used = np.flatnonzero(np.diag(spread) > 0)
+    # In units of their own deviations: stiffnesses and positions differ by many orders.
+    size = np.sqrt(np.diag(spread)[used])
+    covariance = spread[np.ix_(used, used)] / np.outer(size, size)
+    theta, found = np.zeros(len(used)), np.full(scaled.shape, np.nan)
+    for k, row in enumerate(scaled):
+        seen = np.isfinite(row)
+        if not seen.any():
+            continue
+        along = slopes[k][np.ix_(seen, used)] * size
+        across = covariance @ along.T
+        root = np.linalg.cholesky(along @ across + np.eye(int(seen.sum())))
+        new = np.linalg.solve(root, row[seen] - along @ theta)
+        gain = np.linalg.solve(root, across.T)
+        theta = theta + gain.T @ new
+        covariance = covariance - gain.T @ gain
+        covariance = 0.5 * (covariance + covariance.T)
+        found[k, seen] = new
+    return found
 
 
 def _by_limit(

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigwatch.structures.damage import Examination, Settings, examine
+from rigwatch.structures.damage_watch import innovations
 from rigwatch.structures.description import Structure, load_structure
 from rigwatch.structures.record import FloatArray, Record
 from rigwatch.wire.errors import ModelError
@@ -86,6 +87,29 @@ def test_undamaged_records_alarm_nobody(kabe: Structure, noise: float) -> None:
         assert found.watches[0].alarm is None
 
 
+def test_identified_figures_do_not_raise_false_alarms(kabe: Structure) -> None:
+    made, alarms = simulate(KABE, 0.01, 10.0), 0
+    for seed in range(8):
+        noisy = with_noise(made, dict.fromkeys(SIGNALS, 0.05), seed, normal=True)
+        found = examine(kabe, positions(noisy.columns, SIGNALS), Settings(rate=0.05))
+        alarms += found.watches[0].alarm is not None
+    # With 5 % a record, more than two of eight have a chance of 0.6 %.
+    assert alarms <= 2
+
+
+def test_innovations_of_a_wrong_figure_are_white() -> None:
+    random = np.random.default_rng(2)
+    slopes = np.sin(np.arange(200.0)[:, None, None] * np.array([0.1, 0.17])) * np.ones((1, 3, 1))
+    spread = np.array([[4.0, 1.0], [1.0, 9.0]])
+    energies = []
+    for _ in range(200):
+        theta = random.multivariate_normal(np.zeros(2), spread)
+        residual = slopes @ theta + random.standard_normal((200, 3))
+        energies.append(np.sum(innovations(residual, slopes, spread) ** 2))
+    assert np.mean(energies) == pytest.approx(600.0, rel=0.02)
+    assert np.var(energies) == pytest.approx(1200.0, rel=0.4)
+
+
 def test_damages_in_sequence_are_found_one_after_the_other(kabe: Structure) -> None:
     both = [
         Damage(3.0, {"springs.k4_46.stiffness": 50.0}),
@@ -115,7 +139,7 @@ def frame_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     spring=st.sampled_from(["lower", "top"]),
     share=st.floats(0.3, 0.9),
