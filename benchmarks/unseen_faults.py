@@ -20,14 +20,15 @@ from monitor.commission import commission
 from monitor.conditions import DEPARTURE, DRY_FRICTION, EXCITATION_CHANGED, OTHER_FAULT, STICTION
 from monitor.model_file import RigModel
 from monitor.pipeline import Monitor
+from monitor.recordings import Role
 from rigwatch.physics.transfer_function import FloatArray
 from sim_plant.effects import EFFECTS, Effect
-from sim_plant.excitation import Excitation, Sine, Square, Triangle
+from sim_plant.excitation import Sine, Square, Triangle
 from sim_plant.parameters import RigParameters
 from sim_plant.scenario import Event, Scenario
 
 LENGTH = 20.0
-DRIVES: tuple[Excitation, ...] = (
+DRIVES: tuple[Sine | Triangle | Square, ...] = (
     Sine(frequency=6.0, amplitude=1.3),
     Sine(frequency=10.0, amplitude=1.0),
     Sine(frequency=3.2, amplitude=1.6),
@@ -72,10 +73,14 @@ def rig(number: int) -> tuple[RigParameters, RigModel]:
         accelerometer_noise=noise * nominal.accelerometer_noise,
         voltage_noise=noise * nominal.voltage_noise,
     )
-    names = ("commissioning_chirp", "chirp"), ("healthy_sine_8hz_1v4", "healthy")
+    names: tuple[tuple[str, Role], ...] = (
+        ("commissioning_chirp", "chirp"),
+        ("healthy_sine_8hz_1v4", "healthy"),
+        ("known_friction", "friction"),
+    )
     recordings = [
         record_of(structs.replace(scenario(name), plant=plant), role, SEED + 10 * number + k)
-        for k, (name, role) in enumerate((*names, ("known_friction", "friction")))
+        for k, (name, role) in enumerate(names)
     ]
     return plant, commission(recordings)
 
