@@ -116,9 +116,10 @@ def surface_chart(stage: Stage, channel: int, most: float, unit: str) -> str | N
     if grid is None:
         return None
     x, v, means, counts = grid
+    words = _motion_units(stage)
     plot = Plot(
         "mean residual by position and velocity", (x[0], x[-1]), (v[0], v[-1]),
-        "position [m]", "velocity [m/s]", 372, 290,
+        f"position [{words[0]}]", f"velocity [{words[1]}]", 372, 290,
     )  # fmt: skip
     for i, j in np.argwhere(counts > 0):
         mean = float(means[i, j])
@@ -127,6 +128,14 @@ def surface_chart(stage: Stage, channel: int, most: float, unit: str) -> str | N
         colour = "plus" if mean > 0 else "minus"
         plot.box((x[i], x[i + 1]), (v[j], v[j + 1]), colour, told, 0.06 + 0.94 * strength)
     return plot.drawn()
+
+
+def _motion_units(stage: Stage) -> tuple[str, str]:
+    """Units of what `locate.motion` gives: of two inputs, else of two states."""
+    model = stage.bench.study.model
+    if "position" in model.inputs and "velocity" in model.inputs:
+        return model.inputs["position"].unit, model.inputs["velocity"].unit
+    return model.states["x"].unit, model.states["v"].unit
 
 
 def surface_peak(stage: Stage, channel: int) -> float:
