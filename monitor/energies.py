@@ -35,7 +35,7 @@ def new_energies(length: int, signals: int) -> Energies:
     )
 
 
-@njit
+@njit()
 def restart_energies(energies: Energies) -> None:
     """Forget every sample."""
     energies.place[:] = 0

@@ -100,7 +100,7 @@ def _count(out: bool, state: WatchState) -> None:
             held[EXPLAINED] = held[SHARE] = held[RHO] = held[REST] = 0.0
 
 
-@njit
+@njit()
 def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     """Weigh the evidence since the departure and judge by it."""
     held, since = state.held, state.number[EPISODE]
@@ -115,7 +115,7 @@ def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     held[VERDICT] = verdict(_seen(since, cycle, rules, ref, state), evidence, state)
 
 
-@njit
+@njit()
 def _seen(since: int, cycle: int, rules: Rules, ref: Reference, state: WatchState) -> Seen:
     """Which channels have moved since the departure."""
     energies, count = state.energies, min(since, LONG)

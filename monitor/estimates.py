@@ -72,7 +72,7 @@ def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
         _judge_by_band(rules, state)
 
 
-@njit
+@njit()
 def _judge_by_band(rules: Rules, state: WatchState) -> None:
     """Fixed limits; the deviation is k at a limit. A window that is not full yet has no say."""
     held, place = state.held, state.window.place

@@ -95,7 +95,7 @@ def remember(  # noqa: PLR0917
     history.head[0] = head if head < HISTORY else 0
 
 
-@njit
+@njit()
 def weigh(history: History, ref: Reference, seq: int, since: int, count: int) -> Evidence:
     """Evidence of the newest `count` samples.
 
@@ -124,7 +124,7 @@ def weigh(history: History, ref: Reference, seq: int, since: int, count: int) ->
     return _compare(gram, (first + second) / n, 2.0 * min(first, second) / n, peak)
 
 
-@njit
+@njit()
 def swing_of_voltage_change(history: History, count: int) -> float:
     """Standard deviation of the voltage's change over the newest `count` samples [V]; a shifted
     mean is none.
@@ -137,7 +137,7 @@ def swing_of_voltage_change(history: History, count: int) -> float:
     return np.sqrt(max(square - mean * mean, 0.0))
 
 
-@njit
+@njit()
 def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
     period = ref.number[PERIOD]
     mean = 0.0
@@ -158,7 +158,7 @@ def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
         data[k, 7], data[k, 8], data[k, 9], data[k, 10] = x * x, x * dx, x * x * x, x * x * dx
 
 
-@njit
+@njit()
 def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> None:
     rows, head = history.rows, history.head[0]
     if since >= HISTORY:
@@ -179,7 +179,7 @@ def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> No
             data[place, _RIVALS], data[place, _RIVALS + 1] = g1, g2
 
 
-@njit
+@njit()
 def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> Evidence:
     size = gram.shape[0]
     y, g1, g2 = size - 1, _RIVALS, _RIVALS + 1
@@ -207,7 +207,7 @@ def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> 
     )
 
 
-@njit
+@njit()
 def _eliminate(gram: FloatArray, pivot: int, least: float) -> None:
     """Take out of every column what column `pivot` explains; a column that others explained
     already is skipped.

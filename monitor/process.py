@@ -17,6 +17,7 @@ from monitor.health import HealthBook
 from monitor.links import LinkWatch, Seen, disk_report
 from monitor.model_desk import ModelDesk, Place
 from monitor.model_file import RigModel, load_model
+from monitor.probable import Explainer
 from monitor.rig_monitor import RigMonitor, compile_kernels
 from rigwatch.wire.alarm_list import serve_alarm_list
 from rigwatch.wire.blocks import cut, pieces
@@ -75,6 +76,7 @@ class MonitorProcess:
         if section.journal:
             self.say(self.rig.alarms.restore(last_records(read_journal(section.journal)[0])))
         self._models = ModelDesk(bus, self.rig, Path(section.model))
+        self._explainer = Explainer(lambda: self.rig.model)
         self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
 
@@ -93,6 +95,8 @@ class MonitorProcess:
         for command in self._commands.drain():
             self.say(self.rig.alarms.command(command))
         self._change_models()
+        for event in self._explainer.results():
+            self.bus.publish(EVENTS, event)
         seen = self._seen()
         for name, occasion, holds in self._links.reports(seen):
             self.say(self.rig.alarms.report(name, occasion, active=holds))
@@ -108,6 +112,8 @@ class MonitorProcess:
             if self._journal:
                 self._journal.write(changes)
         for said in announcements:
+            if isinstance(said, Alarm):
+                self._explainer.hear(said)
             self.bus.publish(ALARMS if isinstance(said, Alarm) else EVENTS, said)
 
     def close(self) -> None:
@@ -142,6 +148,7 @@ class MonitorProcess:
             return
         self._unsuitable = ""
         self.bus.publish(ESTIMATES, judged[0])
+        self._explainer.take(judged[0])
         self._health.judged(int(block.t_ns[-1]), time.time_ns())
         self.say(self.rig.announce(*judged))
 

@@ -93,7 +93,7 @@ def new_reference(rules: ReferenceRules, known: list[tuple[FloatArray, float, in
     )
 
 
-@njit
+@njit()
 def restart(ref: Reference, new_boot: bool) -> None:
     """Filters have been reset: settle again, and forget the reference where its phase is lost."""
     ref.number[SINCE] = 0
@@ -112,7 +112,7 @@ def place_in_period(ref: Reference, seq: int) -> int:
     return (seq - ref.number[ANCHOR]) % ref.number[PERIOD]
 
 
-@njit
+@njit()
 def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
     """Take one good sample (V, x, a, am) before the reference is armed; may arm it."""
     number = ref.number
@@ -131,7 +131,7 @@ def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) ->
         _learn(ref, rules, seq, row)
 
 
-@njit
+@njit()
 def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
     """No healthy average: the residual is friction itself, its limits stand in the model file."""
     ref.template[:, :] = 0.0
@@ -140,7 +140,7 @@ def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
     ref.value[SCALE], ref.value[NOISE] = 1.0, rules.residual_noise
 
 
-@njit
+@njit()
 def _remember(ref: Reference, voltage: float) -> None:
     size = ref.ring.size
     ref.ring[ref.number[RING_HEAD]] = voltage
@@ -148,13 +148,13 @@ def _remember(ref: Reference, voltage: float) -> None:
     ref.number[RING_FILL] = min(ref.number[RING_FILL] + 1, size)
 
 
-@njit
+@njit()
 def _past(ref: Reference, ago: int) -> float:
     """Voltage `ago` samples before the newest."""
     return ref.ring[(ref.number[RING_HEAD] - 1 - ago) % ref.ring.size]
 
 
-@njit
+@njit()
 def _swing(ref: Reference, count: int) -> float:
     mean = 0.0
     for n in range(count):
@@ -166,7 +166,7 @@ def _swing(ref: Reference, count: int) -> float:
     return np.sqrt(square / count)
 
 
-@njit
+@njit()
 def _look_for_period(ref: Reference, rules: ReferenceRules, seq: int) -> None:
     count = ref.number[RING_FILL]
     swing = _swing(ref, count)
@@ -182,7 +182,7 @@ def _look_for_period(ref: Reference, rules: ReferenceRules, seq: int) -> None:
         ref.number[SOURCE] = APERIODIC
 
 
-@njit
+@njit()
 def _repeats(ref: Reference, period: int, count: int, tolerance: float) -> bool:
     """Whether the voltage repeats after `period`; gives up as soon as it cannot."""
     total = 0.0
@@ -193,7 +193,7 @@ def _repeats(ref: Reference, period: int, count: int, tolerance: float) -> bool:
     return True
 
 
-@njit
+@njit()
 def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: float) -> None:
     number, value = ref.number, ref.value
     number[PERIOD], number[ANCHOR] = period, seq + 1
@@ -214,7 +214,7 @@ def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: 
                 return
 
 
-@njit
+@njit()
 def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
     """Place in the known period that the newest voltage belongs to, -1 where it is another
     excitation.
@@ -231,7 +231,7 @@ def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
     return best_turn
 
 
-@njit
+@njit()
 def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) -> None:
     """The model file's reference holds for this run: no learning, and a fault from the start
     shows.
@@ -247,7 +247,7 @@ def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) ->
     ref.number[MODE] = ARMED
 
 
-@njit
+@njit()
 def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
     number, period = ref.number, ref.number[PERIOD]
     place = place_in_period(ref, seq)
@@ -264,7 +264,7 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
         _finish_learning(ref, rules, wanted // period)
 
 
-@njit
+@njit()
 def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     """Averages, amplitude scale and scatter; start over where the scatter says that the rig has
     not settled.
@@ -306,7 +306,7 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
         ref.products[:] = 0.0
 
 
-@njit
+@njit()
 def _arm_aperiodic(ref: Reference) -> None:
     """Nothing repeats: the residual itself is judged, against its own size while learning."""
     p, learnt = ref.products, ref.number[LEARNT]
@@ -322,7 +322,7 @@ def _arm_aperiodic(ref: Reference) -> None:
     ref.number[MODE] = ARMED
 
 
-@njit
+@njit()
 def _measure_swings(ref: Reference) -> None:
     period = ref.number[PERIOD]
     for i, place in ((0, SWING), (1, POSITION_SWING), (2, ACCELERATION_SWING)):
@@ -336,7 +336,7 @@ def _measure_swings(ref: Reference) -> None:
     ref.number[CYCLE] = period // _turns(ref)
 
 
-@njit
+@njit()
 def _turns(ref: Reference) -> int:
     """How often the mass goes to and fro within one period of the samples, at least once: an
     excitation of 5 Hz repeats after 256 samples and has five cycles in them.

@@ -82,7 +82,7 @@ class Seen(NamedTuple):
     spread: float
 
 
-@njit
+@njit()
 def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
     """The verdict after one more look."""
     if seen.moved_voltage and not seen.moved_acceleration:
@@ -97,7 +97,7 @@ def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
     return OTHER if _other(seen, evidence) else seen.before
 
 
-@njit
+@njit()
 def _friction(seen: Seen, evidence: Evidence) -> bool:
     """Whether this look finds dry friction."""
     if not seen.moved_acceleration or evidence.peak > SPIKE:
@@ -110,40 +110,40 @@ def _friction(seen: Seen, evidence: Evidence) -> bool:
     return settled and (_jumps(seen, evidence) or _follows(evidence) or _thin(evidence))
 
 
-@njit
+@njit()
 def _jump_seen(seen: Seen, evidence: Evidence) -> bool:
     large = evidence.jump > LEAST_JUMP * seen.spread**2
     return large and evidence.share > LEAST_SHARE and evidence.dry > LEAST_DRY
 
 
-@njit
+@njit()
 def _certain(seen: Seen, evidence: Evidence) -> bool:
     """Nothing but friction is left over."""
     plain = evidence.rho > CERTAIN_RHO and evidence.explained > CERTAIN_FIT
     return plain and _jump_seen(seen, evidence)
 
 
-@njit
+@njit()
 def _jumps(seen: Seen, evidence: Evidence) -> bool:
     """A jump that no rival has, in a change that friction explains more than half of."""
     plain = evidence.rho > JUMP_RHO and evidence.explained > JUMP_FIT
     return plain and _jump_seen(seen, evidence)
 
 
-@njit
+@njit()
 def _follows(evidence: Evidence) -> bool:
     """A change that follows the friction filter closely."""
     fits = evidence.explained > FOLLOW_FIT and evidence.dry > FOLLOW_DRY
     return fits and evidence.share > FOLLOW_SHARE and evidence.rho > FOLLOW_RHO
 
 
-@njit
+@njit()
 def _thin(evidence: Evidence) -> bool:
     """Hardly anything but the jump."""
     return evidence.share > THIN_SHARE and evidence.rho > THIN_RHO
 
 
-@njit
+@njit()
 def _slips(seen: Seen, evidence: Evidence) -> bool:
     """The mass stands still where the healthy one moves."""
     if seen.since < seen.cycle or seen.before == OTHER:
@@ -153,7 +153,7 @@ def _slips(seen: Seen, evidence: Evidence) -> bool:
     return again and orderly
 
 
-@njit
+@njit()
 def _other(seen: Seen, evidence: Evidence) -> bool:
     """Whether it is time to call it another fault."""
     if seen.since >= GIVE_UP * seen.cycle + LONG:

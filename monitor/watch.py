@@ -60,7 +60,7 @@ from monitor.watch_state import (
 from monitor.window import FILL, Window, push
 from rigwatch.physics.transfer_function import FloatArray
 
-FINGERPRINT = "0b28c467d4ae"
+FINGERPRINT = "b44f32c5b9ac"
 """Of every source file whose code is compiled into `watch_block`."""
 
 
@@ -96,7 +96,7 @@ def watch_block(  # noqa: PLR0917
         _write(data[k], code[k], ref, state, out[k])
 
 
-@njit
+@njit()
 def _window_length(wanted: int, ref: Reference, window: Window) -> int:
     """Whole periods of the excitation, at least what was wanted, at most what there is room for."""
     period = ref.number[PERIOD]
@@ -104,7 +104,7 @@ def _window_length(wanted: int, ref: Reference, window: Window) -> int:
     return min(((wanted + period - 1) // period) * period, (room // period) * period)
 
 
-@njit
+@njit()
 def _skip(state: WatchState) -> None:
     """A sample that counts in nothing, so that the windows stay stretches of time."""
     push(state.window, np.zeros(3))

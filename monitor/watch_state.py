@@ -93,7 +93,7 @@ def new_watch_state(
     )
 
 
-@njit
+@njit()
 def forget(state: WatchState, window: int) -> None:
     """Back to nothing seen; from now on the least squares spans `window` samples."""
     restart_window(state.window, window)

@@ -53,7 +53,7 @@ def new_window(length: int, parameters: int) -> Window:
     )
 
 
-@njit
+@njit()
 def restart_window(window: Window, length: int) -> None:
     """Forget every sample; from now on the window spans `length` samples, at most what it was made
     for.
@@ -87,7 +87,7 @@ def push(window: Window, row: FloatArray) -> None:
     place[HEAD] = head + 1 if head + 1 < length else 0
 
 
-@njit
+@njit()
 def _refill(window: Window) -> None:
     """Move everything from `back` to `front`: suffix sums from the newest sample to the oldest."""
     rows, front, back, place = window
@@ -115,7 +115,7 @@ def sums(window: Window, out: FloatArray) -> None:
         out[k] = front[place[FRONT_LEFT], k] + back[k]
 
 
-@njit
+@njit()
 def solve_two(s: FloatArray) -> tuple[float, float, float]:
     """(θ1, θ2, condition number of the normal matrix scaled to unit diagonal) from six sums.
 
