@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 RATE = 256.0
 """Samples a second."""
+LARGEST = 16.0
+"""Force that the drive gives before it saturates, divided by 1 + the strength [N]."""
 STEPS = 64
 """Integration steps between two samples."""
 MASS, DAMPING, STIFFNESS = 0.8, 1.5, 60.0
@@ -104,7 +106,6 @@ def _run(force: FloatArray, s: FloatArray, out: FloatArray) -> None:  # noqa: C9
     x, v, played, bent, yielded, branch = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     slow_x, slow_a = 0.0, 0.0
     late = round(s[15] / h) if s[15] > 0 else 0
-    peak = np.abs(force).max()
     for k in range(len(force)):
         read_x, read_a = x, 0.0
         for step in range(STEPS):
@@ -116,7 +117,7 @@ def _run(force: FloatArray, s: FloatArray, out: FloatArray) -> None:  # noqa: C9
             if s[12] > 0:
                 u = u - _clipped(u, s[12])
             if s[13] > 0:
-                u = _clipped(u, peak / (1.0 + s[13]))
+                u = _clipped(u, LARGEST / (1.0 + s[13]))
             if s[14] > 0:
                 played = min(max(played, u - s[14]), u + s[14])
                 u = played
