@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def add_problem(parser: argparse.ArgumentParser) -> None:
     """Arguments that say what is identified from what."""
     parser.add_argument("structure", type=Path, help="structure or model file (.toml)")
-    parser.add_argument("record", type=Path, help="record with columns t, x6, ... (.csv or .npz)")
+    add_record(parser)
     parser.add_argument(
         "--unknown",
         action="append",
@@ -27,6 +27,15 @@ def add_problem(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--first", type=int, default=0, metavar="SAMPLE", help="first sample that counts"
+    )
+
+
+def add_record(parser: argparse.ArgumentParser) -> None:
+    """The record: a table or a session."""
+    parser.add_argument(
+        "record",
+        type=Path,
+        help="record with columns t, x6, ... (.csv or .npz), or a session (.mcap or its folder)",
     )
 
 

@@ -18,12 +18,12 @@ def run(arguments: argparse.Namespace) -> int:
     """0 when at least one method converged, 1 when none did."""
     from rigwatch.structures.identification import METHODS, Identification, solved
     from rigwatch.structures.problem import problem_of
-    from rigwatch.structures.record import read_record
+    from rigwatch.structures.session_record import read_any
     from rigwatch.wire.errors import ModelError
 
     names, guesses = unknowns_of(arguments)
     problem = problem_of(
-        subject_of(arguments.structure), read_record(arguments.record), names, guesses,
+        subject_of(arguments.structure), read_any(arguments.record), names, guesses,
         weighting=arguments.weighting, first=arguments.first,
     )  # fmt: skip
     results: dict[str, Identification | str] = {}

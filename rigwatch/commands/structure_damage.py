@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands._sessions import print_json, say
+from rigwatch.commands._structures import add_record
 from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:
@@ -25,11 +26,7 @@ SHOWN = 5
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
     parser.add_argument("structure", type=Path, help="structure file of the undamaged structure")
-    parser.add_argument(
-        "record",
-        type=Path,
-        help="record with columns t, x6, ... (.csv or .npz), or a session (.mcap or its folder)",
-    )
+    add_record(parser)
     parser.add_argument(
         "--undamaged", type=float, metavar="SECONDS", help="start that is sure to be undamaged"
     )

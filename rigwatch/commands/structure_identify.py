@@ -25,13 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when the method converged, 1 when it did not."""
     from rigwatch.structures.identification import identify
-    from rigwatch.structures.record import read_record
+    from rigwatch.structures.session_record import read_any
 
     names, guesses = unknowns_of(arguments)
     found = identify(
         arguments.method,
         subject_of(arguments.structure),
-        read_record(arguments.record),
+        read_any(arguments.record),
         names,
         guesses,
         weighting=arguments.weighting,

@@ -22,6 +22,17 @@ def test_identify_prints_json(csv, capsys):
         assert printed["parameters"][name]["value"] == pytest.approx(value, rel=1e-4)
 
 
+def test_a_session_is_identified_like_a_table(csv, tmp_path, capsys):
+    session = tmp_path / "antenna.mcap"
+    maps = [part for node in range(1, 9) for part in ("--map", f"x{node}=x{node}[m]")]
+    assert main(["import", str(csv), str(session), "--time", "t[s]", *maps]) == 0
+    capsys.readouterr()
+    assert main(["structure", "identify", str(FILE), str(session), "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    for name, value in TRUTH.items():
+        assert printed["parameters"][name]["value"] == pytest.approx(value, rel=1e-4)
+
+
 def test_compare_runs_every_method(csv, capsys):
     assert main(["structure", "compare", str(FILE), str(csv)]) == 0
     printed = capsys.readouterr().out
