@@ -73,10 +73,10 @@ class MonitorProcess:
         self._healths = bus.subscribe(HEALTH)
         bus.watch_tokens(f"{ALIVE_KEY}/daq", self._daq_changed)
         serve_alarm_list(bus, lambda: self._standing)
+        self._explainer = Explainer(lambda: self.rig.model)
         if section.journal:
             self.say(self.rig.alarms.restore(last_records(read_journal(section.journal)[0])))
         self._models = ModelDesk(bus, self.rig, Path(section.model))
-        self._explainer = Explainer(lambda: self.rig.model)
         self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
 
