@@ -155,6 +155,8 @@ def _run(force: FloatArray, s: FloatArray, out: FloatArray) -> None:  # noqa: C9
                 crosses = dry > 0 and v != 0.0 and np.sign(following_v) != np.sign(v)
                 v = 0.0 if crosses and abs(other) <= dry else following_v
             if step == 0:
+                if k == 0:
+                    slow_a, slow_x = a, x
                 read_a = slow_a if s[16] > 0 else a
                 read_x = slow_x if s[17] > 0 else x
             x += h * v

@@ -187,3 +187,18 @@ def test_an_unknown_unit_is_named():
     with pytest.raises(ModelError, match="'furlong'"):
         dimension("furlong")
     assert describe(dimension("m/s^2")) == "m s^-2"
+
+
+def test_a_simulation_that_blows_up_does_not_count_as_missing_samples():
+    text = """
+name = "runaway"
+summary = "a state that grows beyond all numbers"
+inputs.u = { unit = "1" }
+states.x = { unit = "1", derivative = "k*x**3 + u", start = 1.0 }
+parameters.k = { value = 1.0, unit = "1/s", fixed = true }
+outputs.y = { unit = "1", expression = "x" }
+""".replace('derivative = "k*x**3 + u"', 'derivative = "k*(x**3 + u)"')
+    compiled = interpret(compose(parse(text, Model, "runaway")))
+    recording = Recording(0.1, np.ones((80, 1)), np.ones((80, 1)))
+    with pytest.raises(ModelError, match="leaves the finite numbers"):
+        fit(compiled, recording, 80)

@@ -205,7 +205,7 @@ class _Problem:
         )  # fmt: skip
         error = (self._measured - run.outputs) / self.scale
         slopes = run.slopes / self.scale[:, None]
-        missing = np.isnan(error)
+        missing = np.isnan(self._measured)
         if missing.any():
             error, slopes = np.where(missing, 0.0, error), np.where(missing[..., None], 0.0, slopes)
         if r.thinning:
@@ -220,7 +220,7 @@ class _Problem:
             return
         for _ in range(steps):
             error, slopes = self._simulated(parameters)
-            if not np.all(np.isfinite(slopes)):
+            if not (np.isfinite(slopes).all() and np.isfinite(error).all()):
                 raise ModelError(
                     f"{self._compiled.system.model.name}: the simulation leaves the finite numbers;"
                     " try other starting values or more substeps"
@@ -273,6 +273,11 @@ class _Problem:
         """The fit at these parameters."""
         residual, jacobian = self.projected(parameters)
         error, _ = self._simulated(parameters)
+        if not np.isfinite(error).all():
+            raise ModelError(
+                f"{self._compiled.system.model.name}: the simulation leaves the finite numbers;"
+                " try other starting values or more substeps"
+            )
         used = residual.size - self._initial.size - len(self.free)
         variance = float(residual @ residual) / max(used, 1)
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * variance, np.float64)
