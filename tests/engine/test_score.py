@@ -18,7 +18,7 @@ MODEL = shipped_models()["mass-spring-damper"]
 DT = 1 / 256
 SAMPLES = 1280
 TRUE = {"m": 0.8, "c": 1.5, "k": 60.0}
-SIZES = {"x": 0.03, "v": 0.5, "L": 6.0, "u": 0.1, "rate": 1.0, "dt": DT, "p": 1.0}
+SIZES = {"x": 0.03, "v": 0.5, "L": 6.0, "u": 0.01, "rate": 1.0, "dt": DT, "p": 1.0}
 GENTLE = {"vs": 0.05, "td": 0.001}
 
 
