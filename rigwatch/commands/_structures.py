@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from rigwatch.physics.engine.model import Model
     from rigwatch.structures.description import Structure
     from rigwatch.structures.identification import Identification
+    from rigwatch.structures.problem import Problem
 
 
 def add_problem(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +37,26 @@ def add_record(parser: argparse.ArgumentParser) -> None:
         "record",
         type=Path,
         help="record with columns t, x6, ... (.csv or .npz), or a session (.mcap or its folder)",
+    )
+
+
+def problem_asked(arguments: argparse.Namespace) -> "Problem":
+    """The identification that the arguments of `add_problem` ask for.
+
+    Raises:
+        ModelError: of `problem_of`, or a guess is no number.
+    """
+    from rigwatch.structures.problem import problem_of
+    from rigwatch.structures.session_record import read_any
+
+    names, guesses = unknowns_of(arguments)
+    return problem_of(
+        subject_of(arguments.structure),
+        read_any(arguments.record),
+        names,
+        guesses,
+        weighting=arguments.weighting,
+        first=arguments.first,
     )
 
 

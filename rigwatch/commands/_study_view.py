@@ -4,6 +4,7 @@ import argparse
 import os
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands._sessions import print_json, say
@@ -36,10 +37,31 @@ def view(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def write_views(draw: Callable[..., None], end: float, picture: Path | None) -> None:
+    """Draw into a headless viewer for a picture, or else into a file.
+
+    Args:
+        draw: takes the viewer's address, "" for the file.
+        end: of the data [s].
+        picture: file to write.
+    """
+    from rigwatch.dashboard import recording, study_view
+
+    if picture is None:
+        draw("")
+        return
+    viewer = recording.headless_viewer()
+    try:
+        draw(viewer.url, bare=True)
+        study_view.take_picture(viewer, end, picture)
+    finally:
+        viewer.stop()
+
+
 def _show(
     arguments: argparse.Namespace, study: "Study", found: "list[Stage]", shown: "list[Signals]"
 ) -> None:
-    from rigwatch.dashboard import recording, study_view
+    from rigwatch.dashboard import study_view
 
     def draw(url: str, *, bare: bool = False) -> None:
         stream = study_view.new_stream(study.folder.resolve().name)
@@ -50,15 +72,8 @@ def _show(
         outputs = _outputs(study, found, shown)
         study_view.draw_study(stream, shown[0].time, outputs, _story(found), bare=bare)
 
-    if arguments.picture:
-        viewer = recording.headless_viewer()
-        try:
-            draw(viewer.url, bare=True)
-            study_view.take_picture(viewer, float(shown[0].time[-1]), arguments.picture)
-        finally:
-            viewer.stop()
-    elif arguments.save:
-        draw("")
+    if arguments.picture or arguments.save:
+        write_views(draw, float(shown[0].time[-1]), arguments.picture)
     else:
         _in_a_viewer(draw)
 

@@ -3,7 +3,7 @@
 import argparse
 
 from rigwatch.commands._sessions import print_json
-from rigwatch.commands._structures import add_problem, figures, plain, subject_of, unknowns_of
+from rigwatch.commands._structures import add_problem, figures, plain, problem_asked
 
 HELP = "run every method of identification on the same record"
 EXAMPLE = "  rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv"
@@ -17,15 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when at least one method converged, 1 when none did."""
     from rigwatch.structures.identification import METHODS, Identification, solved
-    from rigwatch.structures.problem import problem_of
-    from rigwatch.structures.session_record import read_any
     from rigwatch.wire.errors import ModelError
 
-    names, guesses = unknowns_of(arguments)
-    problem = problem_of(
-        subject_of(arguments.structure), read_any(arguments.record), names, guesses,
-        weighting=arguments.weighting, first=arguments.first,
-    )  # fmt: skip
+    problem = problem_asked(arguments)
     results: dict[str, Identification | str] = {}
     for method in METHODS:
         try:

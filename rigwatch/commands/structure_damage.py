@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands._sessions import print_json, say
+from rigwatch.commands._structure_view import add_views, draw_damage, told, wanted
 from rigwatch.commands._structures import add_record
 from rigwatch.wire.errors import ModelError
 
@@ -18,9 +19,8 @@ EXAMPLE = """\
   rigwatch structure simulate configs/structures/kabe_antenna.toml damaged.csv \\
       --damage 5 springs.k4_46.stiffness=50
   rigwatch structure damage configs/structures/kabe_antenna.toml damaged.csv --report damage.html
+  rigwatch structure damage configs/structures/kabe_antenna.toml damaged.csv --save damage.rrd
   rigwatch structure damage antenna.toml sessions/antenna.mcap --undamaged 4 --false-alarms 0.001"""
-SHOWN = 5
-"""Places that are printed."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="data from which a damage is identified at first; at least this lies between damages",
     )  # fmt: skip
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a web page")
+    add_views(parser)
     parser.add_argument(
         "--known", action="store_true", help="take the file's values as true, even unknown ones"
     )
@@ -59,18 +60,21 @@ def run(arguments: argparse.Namespace) -> int:
         settle=arguments.settle,
         known=arguments.known,
     )
+    drawn = wanted(arguments)
     found = examine(load_structure(arguments.structure), read_any(arguments.record), settings, say)
     if sensors := remark(found).strip():
         say(sensors)
     if arguments.report:
         _write_report(arguments.report, found, arguments.record.name)
+    if drawn:
+        draw_damage(arguments, found)
     if arguments.json:
         print_json(_whole(found))
     elif not found.damages:
         print("no damage")
     else:
         for damage in found.damages:
-            _print(damage)
+            print("\n".join(told(damage)))
     return 0
 
 
@@ -126,15 +130,3 @@ def _plain(damage: "Damage") -> dict[str, Any]:
         "parameters": _intervals(damage.figures),
         "unseen": list(damage.ranking.unseen),
     }
-
-
-def _print(damage: "Damage") -> None:
-    at = damage.instant
-    vague = "" if damage.explained else ", not explained by one change"
-    print(f"damage noticed at {damage.alarm:.3f} s{vague}")
-    print(f"  happened at {at.time:.3f} s [{at.low:.3f}, {at.high:.3f}]")
-    for place in damage.ranking.candidates[:SHOWN]:
-        alike = f"  (cannot be told from {', '.join(place.alike)})" if place.alike else ""
-        print(f"  {place.name:<16} {place.before:>11.5g} -> {place.after:<11.5g}{alike}")
-    for name, figure in damage.figures.items():
-        print(f"  {name} = {figure.value:.6g} [{figure.low:.6g}, {figure.high:.6g}]")

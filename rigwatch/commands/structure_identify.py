@@ -3,7 +3,8 @@
 import argparse
 
 from rigwatch.commands._sessions import print_json
-from rigwatch.commands._structures import add_problem, figures, plain, subject_of, unknowns_of
+from rigwatch.commands._structure_view import add_views, draw_identification, wanted
+from rigwatch.commands._structures import add_problem, figures, plain, problem_asked
 
 HELP = "identify what is unknown of a structure from a record"
 EXAMPLE = """\
@@ -20,23 +21,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="shooting",
         help="shooting (default), quasilinearization, gauss-newton, kalman or direct",
     )
+    add_views(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when the method converged, 1 when it did not."""
-    from rigwatch.structures.identification import identify
-    from rigwatch.structures.session_record import read_any
+    from rigwatch.structures.identification import solved
 
-    names, guesses = unknowns_of(arguments)
-    found = identify(
-        arguments.method,
-        subject_of(arguments.structure),
-        read_any(arguments.record),
-        names,
-        guesses,
-        weighting=arguments.weighting,
-        first=arguments.first,
-    )
+    drawn = wanted(arguments)
+    problem = problem_asked(arguments)
+    found = solved(arguments.method, problem)
+    if drawn:
+        draw_identification(arguments, problem, found)
     if arguments.json:
         print_json(plain(found))
     else:

@@ -1,10 +1,11 @@
 """A study in the viewer: measured and modelled signals of every step and what is left, on one
-timeline.
+timeline; for a structure that is watched for damage also the test that judges what is left.
 
-Nothing of the workbench is known here: what is drawn comes as plain columns.
+Nothing of workbench and structures is known here: what is drawn comes as plain columns.
 
     <output>/signals/measured, <output>/signals/<step>      [unit of the output]
-    <output>/residual/<step>                                [unit of the output]
+    <output>/residual/<step>, <output>/residual/<bound>     [unit of the output]
+    test/statistic, test/threshold, test/<instant>          [share of the threshold]
 """
 
 import io
@@ -25,7 +26,11 @@ from rigwatch.dashboard.viewer import Viewer, ViewerError
 from rigwatch.wire.messages import FloatArray
 
 TIMELINE = "recording"
-_STORY = "story"
+_STORY, _TEST = "story", "test"
+_SHOWN = 3
+"""Outputs that are seen first; the others stand on a second tab."""
+_TALL = 3.0
+"""Upper end of the test's axis, in thresholds."""
 _FLUSH_TIMEOUT = 60.0
 _ARRIVAL_TIMEOUT = 30.0
 _SETTLING = 6.0
@@ -41,12 +46,27 @@ class Output:
         name, unit: of the channel.
         measured: shape (n,); NaN where nothing valid was measured.
         modelled: by step, the first one the model alone, each of shape (n,).
+        bound: name and size of the residual that is remarkable, None where nothing is.
     """
 
     name: str
     unit: str
     measured: FloatArray
     modelled: dict[str, FloatArray]
+    bound: tuple[str, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """The test that what is left was put to.
+
+    Attributes:
+        statistic: over its threshold, shape (n,); NaN where nothing was tested.
+        instants: what happened then [s], by name.
+    """
+
+    statistic: FloatArray
+    instants: dict[str, float]
 
 
 def draw_study(
@@ -55,6 +75,7 @@ def draw_study(
     outputs: Sequence[Output],
     story: str,
     *,
+    judged: Judged | None = None,
     bare: bool = False,
 ) -> int:
     """Draw a whole study; the number of samples.
@@ -62,22 +83,45 @@ def draw_study(
     Args:
         stream: connected to a viewer or a file; is disconnected afterwards.
         seconds: time of the samples [s], shape (n,).
-        outputs: what was measured and modelled then.
+        outputs: what was measured and modelled then, the most telling first.
         story: the steps in words, as Markdown.
+        judged: the test for damage, where there was one.
         bare: leave out what serves to operate the viewer, for pictures.
     """
-    stream.send_blueprint(_blueprint(outputs, bare=bare))
+    stream.send_blueprint(_blueprint(outputs, judged, bare=bare))
     stream.log(_STORY, rr.TextDocument(story, media_type=rr.MediaType.MARKDOWN), static=True)
     for output in outputs:
-        root = _path(output.name)
-        _send(stream, f"{root}/signals/measured", seconds, output.measured, _look(0, "measured"))
-        for k, (step, modelled) in enumerate(output.modelled.items(), 1):
-            look, left = _look(k, step), output.measured - modelled
-            _send(stream, f"{root}/signals/{_path(step)}", seconds, modelled, look)
-            _send(stream, f"{root}/residual/{_path(step)}", seconds, left, look)
+        _draw_output(stream, seconds, output)
+    if judged:
+        _draw_test(stream, seconds, judged)
     stream.flush(timeout_sec=_FLUSH_TIMEOUT)
     stream.disconnect()
     return len(seconds)
+
+
+def _draw_output(stream: rr.RecordingStream, seconds: FloatArray, output: Output) -> None:
+    root = _path(output.name)
+    _send(stream, f"{root}/signals/measured", seconds, output.measured, _look(0, "measured"))
+    for k, (step, modelled) in enumerate(output.modelled.items(), 1):
+        look, left = _look(k, step), output.measured - modelled
+        _send(stream, f"{root}/signals/{_path(step)}", seconds, modelled, look)
+        _send(stream, f"{root}/residual/{_path(step)}", seconds, left, look)
+    if output.bound:
+        name, size = output.bound
+        ends, sides = seconds[[0, -1]], (("", size), (" below", -size))
+        for side, level in sides:
+            entity = f"{root}/residual/{_path(name + side)}"
+            _send(stream, entity, ends, np.full(2, level), _limit(name))
+
+
+def _draw_test(stream: rr.RecordingStream, seconds: FloatArray, judged: Judged) -> None:
+    # Averaged over pixels, as the viewer does unless told, an alarm would stay below its threshold.
+    statistic = _look(1, "statistic", rr.components.AggregationPolicy.Max)
+    _send(stream, f"{_TEST}/statistic", seconds, judged.statistic, statistic)
+    _send(stream, f"{_TEST}/threshold", seconds[[0, -1]], np.ones(2), _limit("threshold"))
+    for k, (name, at) in enumerate(judged.instants.items(), 2):
+        upright, look = np.array([0.0, _TALL]), _look(k, name, rr.components.AggregationPolicy.Off)
+        _send(stream, f"{_TEST}/{_path(name)}", np.full(2, at), upright, look)
 
 
 def new_stream(name: str) -> rr.RecordingStream:
@@ -114,12 +158,19 @@ def _end_of(client: ViewerClient) -> float:
     return max(ends, default=0) * 1e-9
 
 
-def _look(place: int, name: str) -> rr.SeriesLines:
+def _look(
+    place: int,
+    name: str,
+    policy: rr.components.AggregationPolicy = rr.components.AggregationPolicy.Average,
+) -> rr.SeriesLines:
     """Measured stands out behind everything; the steps have a colour each."""
-    if place == 0:
-        return rr.SeriesLines(colors=[palette.SIGNATURE], names=[name], widths=[3.0])
-    colour = palette.OTHERS[(place - 1) % len(palette.OTHERS)]
-    return rr.SeriesLines(colors=[colour], names=[name], widths=[1.3])
+    colour = palette.OTHERS[(place - 1) % len(palette.OTHERS)] if place else palette.SIGNATURE
+    width = 1.3 if place else 3.0
+    return rr.SeriesLines(colors=[colour], names=[name], widths=[width], aggregation_policy=policy)
+
+
+def _limit(name: str) -> rr.SeriesLines:
+    return rr.SeriesLines(colors=[palette.LIMIT], names=[name], widths=[1.3])
 
 
 def _send(
@@ -142,8 +193,26 @@ def _path(name: str) -> str:
     return "_".join(name.replace("+", " ").split())
 
 
-def _blueprint(outputs: Sequence[Output], *, bare: bool) -> rrb.Blueprint:
-    views = [
+def _blueprint(outputs: Sequence[Output], judged: Judged | None, *, bare: bool) -> rrb.Blueprint:
+    test = [_test_view()] if judged else []
+    first, others = _views(outputs[:_SHOWN]), _views(outputs[_SHOWN:])
+    plots: rrb.Vertical | rrb.Tabs = rrb.Vertical(*test, *first, name="Signals")
+    if others:
+        plots = rrb.Tabs(plots, rrb.Vertical(*others, name="Other signals"))
+    story = rrb.TextDocumentView(origin=_STORY, name="In words")
+    return rrb.Blueprint(
+        rrb.Horizontal(plots, story, column_shares=[7, 2]),
+        rrb.TopPanel(state="hidden" if bare else "expanded"),
+        rrb.TimePanel(state="hidden" if bare else "collapsed", timeline=TIMELINE),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _views(outputs: Sequence[Output]) -> list[rrb.TimeSeriesView]:
+    return [
         rrb.TimeSeriesView(
             origin=f"{_path(output.name)}/{kind}",
             name=f"{output.name}, {words} [{output.unit}]",
@@ -152,13 +221,12 @@ def _blueprint(outputs: Sequence[Output], *, bare: bool) -> rrb.Blueprint:
         for output in outputs
         for kind, words in (("signals", "measured and modelled"), ("residual", "what is left"))
     ]
-    story = rrb.TextDocumentView(origin=_STORY, name="Steps")
-    return rrb.Blueprint(
-        rrb.Horizontal(rrb.Vertical(*views), story, column_shares=[7, 2]),
-        rrb.TopPanel(state="hidden" if bare else "expanded"),
-        rrb.TimePanel(state="hidden" if bare else "collapsed", timeline=TIMELINE),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        auto_views=False,
-        auto_layout=False,
+
+
+def _test_view() -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=_TEST,
+        name="Test of what is left, over its threshold",
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+        axis_y=rrb.ScalarAxis(range=(0.0, _TALL)),
     )

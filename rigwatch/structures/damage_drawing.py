@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.structures.damage import Examination
+from rigwatch.structures.damage_signals import band, pieces
 from rigwatch.structures.locate import Candidate, Ranking
 
 FloatArray = NDArray[np.float64]
@@ -25,16 +26,11 @@ SHOWN = 8
 
 def statistic_svg(found: Examination) -> str:
     """Every watch's statistic over its threshold, with alarms and instants."""
-    pieces, dt, end = [], found.reference.model.dt, len(found.reference.model)
-    stops = [d.alarm for d in found.damages]
-    for index, watch in enumerate(found.watches):
-        last = round(stops[index] / dt) + 1 if index < len(stops) else end
-        begin = watch.first if index == 0 else round(stops[index - 1] / dt)
-        part = watch.statistic[max(begin - watch.first, 0) : last - watch.first]
-        pieces.append((max(begin, watch.first) * dt, part / watch.threshold))
-    axis = _Axis(0.0, end * dt, 1e-3, max(10.0, *(_peak(p) for _, p in pieces)))
+    dt, end = found.reference.model.dt, len(found.reference.model)
+    drawn = [(first * dt, part) for first, part in pieces(found)]
+    axis = _Axis(0.0, end * dt, 1e-3, max(10.0, *(_peak(p) for _, p in drawn)))
     lines = [*axis.frame("statistic / threshold"), axis.level(1.0, "threshold")]
-    lines += [axis.curve(t0, dt, p, "--line") for t0, p in pieces if len(p)]
+    lines += [axis.curve(t0, dt, p, "--line") for t0, p in drawn if len(p)]
     lines += _marks(found, axis)
     return _document(HEIGHT, lines, "test statistic over its threshold against time")
 
@@ -46,9 +42,8 @@ def residual_svg(found: Examination, signal: int) -> str:
     sigma = float(found.reference.sigma[signal])
     axis = _Axis(0.0, len(values) * dt, sigma / 10, max(_peak(values), 10 * sigma))
     name = found.reference.model.signals[signal]
-    limit = found.settings.limit
-    mark = axis.level(limit, "limit") if limit else axis.level(3 * sigma, "3 sigma")
-    lines = [*axis.frame(f"|residual| of {name}"), mark]
+    words, sizes = band(found)
+    lines = [*axis.frame(f"|residual| of {name}"), axis.level(float(sizes[signal]), words)]
     lines += [axis.curve(0.0, dt, values, "--line"), *_marks(found, axis)]
     return _document(HEIGHT, lines, f"residual of {name} against time")
 

@@ -4,11 +4,10 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from math import isnan
 
-import numpy as np
-
 from rigwatch.structures.damage import Damage, Examination
 from rigwatch.structures.damage_drawing import ranking_svg, residual_svg, statistic_svg
 from rigwatch.structures.damage_reference import Figure
+from rigwatch.structures.damage_signals import loudest
 from rigwatch.structures.description import label
 from rigwatch.structures.locate import Candidate
 
@@ -98,12 +97,6 @@ def _rule(found: Examination) -> str:
         "An alarm is a cumulative sum of squared residuals beyond a threshold that noise alone"
         f" reaches in {share:g} % of such records."
     )
-
-
-def loudest(found: Examination) -> int:
-    """The signal whose residual stands out most over its noise."""
-    first = found.watches[0].residual / found.reference.sigma
-    return int(np.argmax(np.nanmax(np.abs(np.nan_to_num(first)), axis=0)))
 
 
 def _damage(number: int, damage: Damage, found: Examination) -> Iterator[str]:

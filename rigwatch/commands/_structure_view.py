@@ -1,0 +1,146 @@
+"""`--save` and `--picture` of `rigwatch structure`: what was measured, modelled and concluded."""
+
+import argparse
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.commands._sessions import say
+from rigwatch.commands._structures import figures
+from rigwatch.wire.errors import ModelError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rigwatch.dashboard.study_view import Judged, Output
+    from rigwatch.structures.damage import Damage, Examination
+    from rigwatch.structures.identification import Identification
+    from rigwatch.structures.problem import Problem
+
+SHOWN = 5
+"""Places of a damage that are told."""
+
+
+def add_views(parser: argparse.ArgumentParser) -> None:
+    """Arguments that draw into files."""
+    parser.add_argument("--save", type=Path, metavar="FILE.rrd", help="write a file for Rerun")
+    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="write a picture of it")
+
+
+def wanted(arguments: argparse.Namespace) -> bool:
+    """Whether something is to be drawn; says early what would hinder it.
+
+    Raises:
+        MissingExtraError: Rerun is not installed.
+        ModelError: a file's folder does not exist.
+    """
+    files = [file for file in (arguments.save, arguments.picture) if file]
+    for file in files:
+        if not file.parent.is_dir():
+            raise ModelError(f"{file}: found no folder {file.parent}, expected one to write to")
+    if not files:
+        return False
+    from rigwatch.dashboard import require_rerun
+
+    require_rerun()
+    os.environ.setdefault("RUST_LOG", "off")
+    return True
+
+
+def draw_damage(arguments: argparse.Namespace, found: "Examination") -> None:
+    """The examined record: signals, residuals, the test, instants and verdict."""
+    import numpy as np
+
+    from rigwatch.dashboard.study_view import Judged, Output
+    from rigwatch.structures import damage_signals
+    from rigwatch.structures.damage_report import verdict
+
+    model = found.reference.model
+    series = damage_signals.modelled(found)
+    words, sizes = damage_signals.band(found)
+    units = model.problem.sweeper.compiled.system.model.outputs
+    outputs = [
+        Output(
+            name, units[name].unit, model.observed[:, k],
+            {step: values[:, k] for step, values in series.items()}, (words, float(sizes[k])),
+        )
+        for k, name in enumerate(model.signals)
+    ]  # fmt: skip
+    loudest = np.argsort(-damage_signals.loudness(found), kind="stable")
+    instants = {f"{d.ranking.best.name} {d.instant.time:.3f} s": d.instant.time
+                for d in found.damages}  # fmt: skip
+    judged = Judged(damage_signals.statistic(found), instants)
+    lines = [line for damage in found.damages for line in told(damage)]
+    story = _story(f"{model.structure.name}: {verdict(found)}", lines)
+    seconds = np.arange(len(model)) * np.float64(model.dt)
+    _draw(arguments, seconds, [outputs[k] for k in loudest], story, judged)
+
+
+def told(damage: "Damage") -> list[str]:
+    """A damage in lines for people."""
+    at = damage.instant
+    vague = "" if damage.explained else ", not explained by one change"
+    lines = [
+        f"damage noticed at {damage.alarm:.3f} s{vague}",
+        f"  happened at {at.time:.3f} s [{at.low:.3f}, {at.high:.3f}]",
+    ]
+    for place in damage.ranking.candidates[:SHOWN]:
+        alike = f"  (cannot be told from {', '.join(place.alike)})" if place.alike else ""
+        lines.append(f"  {place.name:<16} {place.before:>11.5g} -> {place.after:<11.5g}{alike}")
+    for name, figure in damage.figures.items():
+        lines.append(f"  {name} = {figure.value:.6g} [{figure.low:.6g}, {figure.high:.6g}]")
+    return lines
+
+
+def draw_identification(
+    arguments: argparse.Namespace, problem: "Problem", found: "Identification"
+) -> None:
+    """What was identified: signals, what the model leaves of them, unknowns."""
+    import numpy as np
+
+    from rigwatch.dashboard.study_view import Output
+    from rigwatch.structures.identified import modelled, seconds_of
+
+    model = problem.sweeper.compiled.system.model
+    values, observed = modelled(problem, found), problem.observed
+    outputs = [
+        Output(name, output.unit, observed[:, k], {found.method: values[:, k]})
+        for k, (name, output) in enumerate(model.outputs.items())
+        if np.isfinite(observed[:, k]).any()
+    ]
+    state = "converged" if found.converged else "did not converge"
+    title = f"{model.name}: {found.method} {state} in {len(found.iterations)} iterations"
+    story = _story(title, [*figures(found), *found.remarks])
+    _draw(arguments, seconds_of(problem), outputs, story)
+
+
+def _story(title: str, lines: Sequence[str]) -> str:
+    """Markdown: a title, and lines that stand as they are."""
+    stripped = [line.rstrip() for line in lines]
+    return "\n".join([f"# {title}", "", *(["```", *stripped, "```"] if lines else [])])
+
+
+def _draw(
+    arguments: argparse.Namespace,
+    seconds: "NDArray[np.float64]",
+    outputs: "list[Output]",
+    story: str,
+    judged: "Judged | None" = None,
+) -> None:
+    from rigwatch.commands._study_view import write_views
+    from rigwatch.dashboard import study_view
+
+    def draw(url: str, *, bare: bool = False) -> None:
+        stream = study_view.new_stream(arguments.record.stem)
+        if url:
+            stream.connect_grpc(url)
+        else:
+            stream.save(arguments.save)
+        study_view.draw_study(stream, seconds, outputs, story, judged=judged, bare=bare)
+
+    for file in (arguments.save, arguments.picture):
+        if file:
+            write_views(draw, float(seconds[-1]), file if file is arguments.picture else None)
+            say(f"drawn: {file}")
