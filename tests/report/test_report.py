@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.workbench.report.svg import Plot, Scale, limits
+from rigwatch.page.svg import Plot, Scale, limits
 from rigwatch.workbench.study import Study
 
 SECTIONS = ("errors", "signals", "where", "ranking", "parameters", "ledger")

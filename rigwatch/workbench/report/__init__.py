@@ -10,12 +10,12 @@ prints.
 from collections.abc import Callable
 from pathlib import Path
 
+from rigwatch.page.html import page
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench import ledger as book
 from rigwatch.workbench.explain import explanation, ranking
 from rigwatch.workbench.locate import locate
 from rigwatch.workbench.report import sections
-from rigwatch.workbench.report.page import page
 from rigwatch.workbench.stages import signals, stages
 from rigwatch.workbench.study import Study
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import welch
 
+from rigwatch.page.svg import Plot, limits
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.workbench.locate import Region, motion, sample_numbers
-from rigwatch.workbench.report.svg import Plot, limits
 from rigwatch.workbench.stages import Signals, Stage
 
 CELLS = 22

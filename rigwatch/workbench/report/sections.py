@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from rigwatch.page.html import exact, figure, key, table
+from rigwatch.page.svg import limits
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.locate import Region
 from rigwatch.workbench.report import charts
-from rigwatch.workbench.report.page import exact, figure, key, table
-from rigwatch.workbench.report.svg import limits
 from rigwatch.workbench.stages import Signals, Stage
 from rigwatch.workbench.study import Study
 from rigwatch.workbench.words import VERDICTS

@@ -10,8 +10,9 @@ from html import escape
 from math import ceil, floor, isfinite, log10
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rigwatch.physics.engine.compiled import FloatArray
+FloatArray = NDArray[np.float64]
 
 MOST_POINTS = 900
 """Points of a line; longer ones show the highest and lowest sample of each pixel."""

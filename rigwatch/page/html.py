@@ -1,4 +1,4 @@
-"""The page around the report's sections: one HTML file that asks the network for nothing."""
+"""The page around a report's sections: one HTML file that asks the network for nothing."""
 
 from collections.abc import Sequence
 from html import escape
