@@ -1,9 +1,11 @@
 """What the actions of `rigwatch structure` share: files, unknowns, figures for people."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rigwatch.commands._sessions import say
 from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:
@@ -29,6 +31,24 @@ def add_problem(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--first", type=int, default=0, metavar="SAMPLE", help="first sample that counts"
     )
+
+
+def add_report(parser: argparse.ArgumentParser) -> None:
+    """Where a web page is written."""
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a web page")
+
+
+def write_page(path: Path, text: str) -> None:
+    """Write a web page and say so.
+
+    Raises:
+        ModelError: it cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ModelError(f"{path}: {error.strerror or error}, cannot be written") from error
+    say(f"report: {path}")
 
 
 def add_record(parser: argparse.ArgumentParser) -> None:
@@ -127,3 +147,20 @@ def plain(found: "Identification") -> dict[str, object]:
         "undetermined": list(found.undetermined),
         "remarks": list(found.remarks),
     }
+
+
+def write_report(
+    arguments: argparse.Namespace, problem: "Problem", results: "Mapping[str, Identification | str]"
+) -> None:
+    """The page of `--report`; a result is a method's, or the message of why there is none.
+
+    Raises:
+        ModelError: it cannot be written.
+    """
+    from rigwatch.structures.identification_report import Findings, report_html
+
+    found = {method: result for method, result in results.items() if not isinstance(result, str)}
+    failed = {method: result for method, result in results.items() if isinstance(result, str)}
+    write_page(
+        arguments.report, report_html(Findings(problem, arguments.record.name, found, failed))
+    )

@@ -7,8 +7,8 @@ HELP = "identify structures from their motion, and find damage in them"
 EXAMPLE = """\
   rigwatch structure simulate configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure identify configs/structures/kabe_antenna.toml antenna.csv
-  rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv
-  rigwatch structure damage configs/structures/kabe_antenna.toml antenna.csv
+  rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv --report antenna.html
+  rigwatch structure damage configs/structures/kabe_antenna.toml antenna.csv --save antenna.rrd
   rigwatch structure modes configs/structures/kabe_antenna.toml --svg antenna.svg"""
 
 ACTIONS: dict[str, str] = {

@@ -3,15 +3,25 @@
 import argparse
 
 from rigwatch.commands._sessions import print_json
-from rigwatch.commands._structures import add_problem, figures, plain, problem_asked
+from rigwatch.commands._structures import (
+    add_problem,
+    add_report,
+    figures,
+    plain,
+    problem_asked,
+    write_report,
+)
 
 HELP = "run every method of identification on the same record"
-EXAMPLE = "  rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv"
+EXAMPLE = """\
+  rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv
+  rigwatch structure compare antenna.toml antenna.csv --report methods.html"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
     add_problem(parser)
+    add_report(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -26,6 +36,8 @@ def run(arguments: argparse.Namespace) -> int:
             results[method] = solved(method, problem)
         except ModelError as error:
             results[method] = str(error)
+    if arguments.report:
+        write_report(arguments, problem, results)
     if arguments.json:
         print_json(
             {m: {"error": r} if isinstance(r, str) else plain(r) for m, r in results.items()}

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands._sessions import print_json, say
 from rigwatch.commands._structure_view import add_views, draw_damage, told, wanted
-from rigwatch.commands._structures import add_record
-from rigwatch.wire.errors import ModelError
+from rigwatch.commands._structures import add_record, add_report, write_page
 
 if TYPE_CHECKING:
     from rigwatch.structures.damage import Damage, Examination
@@ -39,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--settle", type=float, default=2.0, metavar="SECONDS",
         help="data from which a damage is identified at first; at least this lies between damages",
     )  # fmt: skip
-    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a web page")
+    add_report(parser)
     add_views(parser)
     parser.add_argument(
         "--known", action="store_true", help="take the file's values as true, even unknown ones"
@@ -49,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when the record was examined, damaged or not."""
     from rigwatch.structures.damage import Settings, examine
-    from rigwatch.structures.damage_report import remark
+    from rigwatch.structures.damage_report import page, remark
     from rigwatch.structures.description import load_structure
     from rigwatch.structures.session_record import read_any
 
@@ -65,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     if sensors := remark(found).strip():
         say(sensors)
     if arguments.report:
-        _write_report(arguments.report, found, arguments.record.name)
+        write_page(arguments.report, page(found, arguments.record.name))
     if drawn:
         draw_damage(arguments, found)
     if arguments.json:
@@ -76,16 +75,6 @@ def run(arguments: argparse.Namespace) -> int:
         for damage in found.damages:
             print("\n".join(told(damage)))
     return 0
-
-
-def _write_report(path: Path, found: "Examination", record: str) -> None:
-    from rigwatch.structures.damage_report import page
-
-    try:
-        path.write_text(page(found, record), encoding="utf-8")
-    except OSError as error:
-        raise ModelError(f"{path}: {error.strerror or error}, cannot be written") from error
-    say(f"report: {path}")
 
 
 def _whole(found: "Examination") -> dict[str, Any]:

@@ -4,12 +4,19 @@ import argparse
 
 from rigwatch.commands._sessions import print_json
 from rigwatch.commands._structure_view import add_views, draw_identification, wanted
-from rigwatch.commands._structures import add_problem, figures, plain, problem_asked
+from rigwatch.commands._structures import (
+    add_problem,
+    add_report,
+    figures,
+    plain,
+    problem_asked,
+    write_report,
+)
 
 HELP = "identify what is unknown of a structure from a record"
 EXAMPLE = """\
   rigwatch structure identify configs/structures/kabe_antenna.toml antenna.csv
-  rigwatch structure identify antenna.toml antenna.csv --method quasilinearization
+  rigwatch structure identify antenna.toml antenna.csv --method direct --report antenna.html
   rigwatch structure identify antenna.toml antenna.csv --unknown k1_6=1300 --unknown m4=0.8"""
 
 
@@ -21,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="shooting",
         help="shooting (default), quasilinearization, gauss-newton, kalman or direct",
     )
+    add_report(parser)
     add_views(parser)
 
 
@@ -31,6 +39,8 @@ def run(arguments: argparse.Namespace) -> int:
     drawn = wanted(arguments)
     problem = problem_asked(arguments)
     found = solved(arguments.method, problem)
+    if arguments.report:
+        write_report(arguments, problem, {found.method: found})
     if drawn:
         draw_identification(arguments, problem, found)
     if arguments.json:

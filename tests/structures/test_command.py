@@ -1,11 +1,16 @@
 import json
+import re
+from xml.etree import ElementTree
 
 import pytest
 
 from rigwatch.commands import main
+from rigwatch.structures.identification import METHODS
+from rigwatch.structures.identification_report import Findings, report_html
+from rigwatch.structures.problem import problem_of
 from rigwatch.structures.record import read_record
 from rigwatch.wire.errors import ImportDataError
-from tests.structures.antenna import FILE, FOLDER, TRUTH
+from tests.structures.antenna import FILE, FOLDER, TRUTH, antenna, record
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +85,38 @@ def test_a_record_with_uneven_time_is_refused(tmp_path):
     path.write_text("t,x6\n0,0\n0.01,1\n0.05,2\n")
     with pytest.raises(ImportDataError, match=r"found steps of 0\.01 to 0\.04 s"):
         read_record(path)
+
+
+def test_compare_writes_a_page_of_every_method(csv, tmp_path, capsys):
+    page = tmp_path / "antenna.html"
+    assert main(["structure", "compare", str(FILE), str(csv), "--report", str(page), "--json"]) == 0
+    told, text = json.loads(capsys.readouterr().out), page.read_text(encoding="utf-8")
+    for method, result in told.items():
+        for name, parameter in result["parameters"].items():
+            value = re.escape(repr(parameter["value"]))
+            assert re.search(rf'<data value="{value}" data-name="{method}:{name}">', text)
+        assert f"{method}: unknowns after each iteration" in text
+    shares = re.findall(r"</td><td class=\"num\">([\d.e-]+) %</td>", text)
+    left = dict(zip(METHODS, map(float, shares), strict=True))
+    assert left["shooting"] < 0.1
+    assert left["gauss-newton"] > 50.0  # from this guess it settles elsewhere
+    assert not re.search(r"https?://|<script|<link|<img|@import|url\(", text)
+    drawings = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
+    assert len(drawings) == 1 + 2 * 8  # iterations; every position and what is left of it
+    for drawing in drawings:
+        assert "nan" not in drawing
+        ElementTree.fromstring(drawing)
+
+
+def test_a_method_that_gave_nothing_says_why_on_the_page():
+    problem = problem_of(antenna(), record(duration=2.0))
+    text = report_html(Findings(problem, "antenna", {}, {"direct": "found <nothing>"}))
+    assert "no method converged" in text
+    assert "found &lt;nothing&gt;" in text
+    ElementTree.fromstring(re.findall(r"<svg.*?</svg>", text, re.DOTALL)[0])
+
+
+def test_a_page_that_cannot_be_written_is_one_plain_line(csv, tmp_path, capsys):
+    target = tmp_path / "no" / "page.html"
+    assert main(["structure", "identify", str(FILE), str(csv), "--report", str(target)]) == 2
+    assert "cannot be written" in capsys.readouterr().err
