@@ -23,6 +23,8 @@ COLOURS = ("held", "before", "model", "rest", "good")
 SMALLEST = 1e-8
 """Relative change that is drawn for all that are smaller."""
 MOST = 1e6
+FOLLOWS = 0.5
+"""Share of the signals up to which a trajectory follows them."""
 MARKED = 60
 """Iterations up to which each has its mark."""
 
@@ -73,14 +75,21 @@ def _header(f: Findings, name: str) -> str:
     problem, dt = f.problem, f.problem.recording.dt
     good = [method for method, one in f.found.items() if one.converged]
     shares = {method: np.nan_to_num(_share(f, method), nan=np.inf) for method in good}
-    best = min(shares, key=lambda method: shares[method]) if shares else ""
-    words = f"{best} leaves {_left(f, best)} of the signals" if best else "no method converged"
+    words = _best(f, shares) if shares else "no method converged"
     settled = f" Converged: {', '.join(good)}." if good else ""
     span = f"{len(problem.observed) * dt:g} s every {dt:g} s, {len(problem.names)} unknowns"
     return (
         f'<p class="kicker">{escape(name)}</p><h1>{escape(words)}</h1>'
         f'<p class="sub">Record {escape(f.record)}: {escape(span)}.{escape(settled)}</p>'
     )
+
+
+def _best(f: Findings, shares: Mapping[str, float]) -> str:
+    """The method that explains most, where one explains anything."""
+    best = min(shares, key=lambda method: shares[method])
+    if shares[best] > FOLLOWS:
+        return "converged, but no trajectory follows the whole record"
+    return f"{best} leaves {_left(f, best)} of the signals"
 
 
 def _parameters(f: Findings) -> str:
@@ -118,7 +127,10 @@ def _methods(f: Findings) -> str:
         for method, why in f.failed.items()
     ]
     head = ["method", "", "iterations", "time [s]", "left of the signals", "remarks"]
-    words = "Left: rms of the residual over rms of the signals, all signals of the record together."
+    words = (
+        "Left: rms of the residual over rms of the signals, along one trajectory from the first"
+        " sample on. Where motion is chaotic or runs away, right figures part from the record too."
+    )
     return f'<p class="note">{words}</p>{table(head, rows, (2, 3, 4))}'
 
 

@@ -108,6 +108,12 @@ def test_compare_writes_a_page_of_every_method(csv, tmp_path, capsys):
         ElementTree.fromstring(drawing)
 
 
+def test_the_page_of_a_wrong_minimum_does_not_praise_it(csv, tmp_path):
+    page, arguments = tmp_path / "antenna.html", ["structure", "identify", str(FILE), str(csv)]
+    assert main([*arguments, "--method", "gauss-newton", "--report", str(page)]) == 0
+    assert "converged, but no trajectory follows" in page.read_text(encoding="utf-8")
+
+
 def test_a_method_that_gave_nothing_says_why_on_the_page():
     problem = problem_of(antenna(), record(duration=2.0))
     text = report_html(Findings(problem, "antenna", {}, {"direct": "found <nothing>"}))
