@@ -70,16 +70,23 @@ def decode_block(kind: type[K], data: bytes) -> K:
     Raises:
         MessageError: the bytes are no such message, or its columns differ in length.
     """
-    layout = _layouts.get((kind, len(data)))
-    if layout is None or not _fits(layout, data):
-        try:
-            layout = _layout(kind, data)
-        except (_UnfamiliarError, IndexError, ValueError):
-            return schema.decode(kind, data)
-        if len(_layouts) >= _MOST_LAYOUTS:
-            _layouts.clear()
-        _layouts[kind, len(data)] = layout
+    try:
+        layout = _layout_of(kind, data)
+    except (_UnfamiliarError, IndexError, ValueError):
+        return schema.decode(kind, data)
     return _read(kind, layout, data)
+
+
+def _layout_of(kind: type[Any], data: bytes) -> _Layout:
+    """The layout of `data`, worked out where no earlier block had the same."""
+    known = _layouts.get((kind, len(data)))
+    if known is not None and _fits(known, data):
+        return known
+    layout = _layout(kind, data)
+    if len(_layouts) >= _MOST_LAYOUTS:
+        _layouts.clear()
+    _layouts[kind, len(data)] = layout
+    return layout
 
 
 def _fits(layout: _Layout, data: bytes) -> bool:
