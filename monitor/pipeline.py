@@ -116,7 +116,7 @@ class Monitor:
             self._arming,
             self._reference,
             self._state,
-            out.T,
+            out,
         )
         return self._result(block, admitted, out)
 

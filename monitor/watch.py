@@ -77,7 +77,7 @@ def watch_block(  # noqa: PLR0917
     out: FloatArray,
 ) -> None:
     """Take the residual stage's columns for samples `first`, `first` + 1, … and fill `out`, shape
-    (n, OUTPUTS).
+    (OUTPUTS, n).
     """
     for k in range(code.size):
         seq = first + k
@@ -93,7 +93,7 @@ def watch_block(  # noqa: PLR0917
             _judge(data[k], seq, position_valid[k], rules, ref, state)
         elif code[k] == HELD and ref.number[MODE] == ARMED:
             _skip(state)
-        _write(data[k], code[k], ref, state, out[k])
+        _write(data[k], code[k], ref, state, out[:, k])
 
 
 @njit()

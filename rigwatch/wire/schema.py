@@ -139,7 +139,8 @@ def _from_wire(hint: Any) -> Callable[[Any], Any]:
     if _is_columns(hint):
         return lambda value: tuple(_read(Column, part) for part in value)
     if hint == ByteArray:
-        return lambda value: np.frombuffer(value, np.uint8)
+        # A read-only view is another type to compiled kernels: they would compile anew for it.
+        return lambda value: np.frombuffer(value, np.uint8).copy()
     if hint == FloatArray:
         return lambda value: np.array(value, np.float64)
     if hint == IntArray:

@@ -4,7 +4,9 @@ import numpy as np
 from monitor_rig import SINE, block, friction, model, run
 
 from monitor.rig_monitor import RigMonitor, compile_kernels
-from rigwatch.wire.messages import Alarm
+from monitor.watch import watch_block
+from rigwatch.wire.messages import Alarm, Column, SampleBlock
+from rigwatch.wire.schema import decode, encode
 
 
 def raised(watching: RigMonitor) -> set[str]:
@@ -46,3 +48,17 @@ def test_compiling_takes_what_is_configured() -> None:
     counting = Counting()
     compile_kernels(model(), [counting])
     assert counting.blocks == 1
+
+
+def test_a_sample_from_the_bus_finds_its_kernel_compiled() -> None:
+    """A kernel that compiles anew for it would hold the first estimate up for many seconds."""
+    compile_kernels(model())
+    known = len(watch_block.signatures)
+    watching, seq = RigMonitor(model()), 0
+    for n in (1, 3, 1):
+        times, zeros = np.arange(seq, seq + n, dtype=np.int64), np.zeros(n)
+        channels = tuple(Column(c, "", zeros, np.zeros(n, np.uint8)) for c in model().channels)
+        samples = SampleBlock("rig", 1, seq, times, times, channels)
+        watching.update(decode(SampleBlock, encode(samples)))
+        seq += n
+    assert len(watch_block.signatures) == known
