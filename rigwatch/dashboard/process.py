@@ -25,6 +25,7 @@ from rigwatch.wire.topics import HEALTH
 _TURN = 0.2
 _HEALTH_PERIOD = 1.0
 _HELD_TOO_LONG = 10.0
+_LAST_MOMENT = 1.0
 _RESTARTS, _WITHIN = 5, 60.0
 
 
@@ -90,13 +91,18 @@ class LiveDashboard:
             self.facts = drawer.facts
             self._tell_supervisor()
             self._tell_rig()
-            if drawer.failure is not None:
-                return f"drawing failed and begins again: {drawer.failure}"
-            if (code := viewer.exit_code()) == 0:
+            code = viewer.exit_code()
+            if code is None and drawer.failure is not None:
+                # A viewer that dies cuts the line first: then its end is the reason to give.
+                self.stop.wait(_LAST_MOMENT)
+                code = viewer.exit_code()
+            if code == 0:
                 self._say("the viewer was closed: the dashboard ends")
                 return ""
             if code is not None:
                 return "the viewer has died and is opened again"
+            if drawer.failure is not None:
+                return f"drawing failed and begins again: {drawer.failure}"
             if drawer.held_for > _HELD_TOO_LONG:
                 return "the viewer takes no data and is opened again"
         return ""
