@@ -1,3 +1,27 @@
-"""Watches a test rig against a model of it and tells its people what the model is missing."""
+"""Watches a test rig against a model of it and tells its people what the model is missing.
 
-__version__ = "0.1.0"
+The workbench from Python, and on a notebook's cell, where results show themselves:
+
+    import rigwatch
+    rigwatch.explain("emps")
+    rigwatch.add("emps", "coulomb")
+
+Names are loaded when they are first used, so that no command waits for what it does not need.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from rigwatch.version import __version__
+
+if TYPE_CHECKING:
+    from rigwatch.workbench.api import add, compare, explain, locate, new, report, undo
+
+__all__ = ["__version__", "add", "compare", "explain", "locate", "new", "report", "undo"]
+
+
+def __getattr__(name: str) -> object:
+    """A public name, from the workbench."""
+    if name not in __all__:
+        raise AttributeError(f"rigwatch has no {name!r}; it has {', '.join(__all__)}")
+    return getattr(import_module("rigwatch.workbench.api"), name)

@@ -2,8 +2,9 @@
 
     m·dv/dt = F(u) − k·x − c·v + hidden(x, v, memory, t),    dx/dt = v
 
-Its equations and its integrator are its own: velocity first, then position (semi-implicit Euler)
-with 64 steps a sample, and dry friction that truly sticks (D. Karnopp, 1985: below a speed that the
+Its equations and its integrator are its own: velocity first, then position (leapfrog: velocity is
+half a step behind, and forces that depend on it take it forward by that), with 64 steps a sample,
+and dry friction that truly sticks (D. Karnopp, 1985: below a speed that the
 friction could stop within a step, the mass is held as long as the other forces are too weak).
 
 Symbols: x position [m], v velocity [m/s], u commanded force [N], F force that acts [N].
@@ -14,12 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 FloatArray = NDArray[np.float64]
 RATE = 256.0
 """Samples a second."""
-LARGEST = 16.0
+LARGEST = 40.0
 """Force that the drive gives before it saturates, divided by 1 + the strength [N]."""
+LIMIT = 1e6
+"""Share that stands for a plant that leaves the finite numbers."""
 STEPS = 64
 """Integration steps between two samples."""
 MASS, DAMPING, STIFFNESS = 0.8, 1.5, 60.0
@@ -84,15 +88,19 @@ def strength_for(name: str, force: FloatArray, share: float) -> float:
 
     def caused(strength: float) -> float:
         moved = oscillate(force, (Hidden(name, strength),), silent, 0) - healthy
-        return float(np.max(np.sqrt(np.mean(moved**2, axis=0)) / size))
+        found = float(np.max(np.sqrt(np.mean(moved**2, axis=0)) / size))
+        return found if np.isfinite(found) else LIMIT
 
     low, high = 1e-6, 1e-6
     while caused(high) < share and high < 1e9:
         low, high = high, high * 4
-    for _ in range(18):
-        middle = np.sqrt(low * high)
-        low, high = (middle, high) if caused(middle) < share else (low, middle)
-    return float(np.sqrt(low * high))
+    if low == high or caused(high) < share:
+        return high
+
+    def surplus(logarithm: float) -> float:
+        return float(np.log(max(caused(np.exp(logarithm)), 1e-12) / share))
+
+    return float(np.exp(brentq(surplus, np.log(low), np.log(high), xtol=1e-3)))
 
 
 @njit(cache=True)
@@ -103,7 +111,7 @@ def _clipped(value: float, limit: float) -> float:
 @njit(cache=True)
 def _run(force: FloatArray, s: FloatArray, out: FloatArray) -> None:  # noqa: C901, PLR0912, PLR0915 -- a kernel
     h = 1.0 / (RATE * STEPS)
-    x, v, played, bent, yielded, branch = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    x, v, a, played, bent, yielded, branch = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     slow_x, slow_a = 0.0, 0.0
     late = round(s[15] / h) if s[15] > 0 else 0
     for k in range(len(force)):
@@ -121,8 +129,9 @@ def _run(force: FloatArray, s: FloatArray, out: FloatArray) -> None:  # noqa: C9
             if s[14] > 0:
                 played = min(max(played, u - s[14]), u + s[14])
                 u = played
-            other = u - STIFFNESS * x - DAMPING * v
-            other -= s[3] * v * abs(v) + s[5] * x**3 + s[6] * x * x + s[11] * abs(v)
+            now = v + 0.5 * h * a
+            other = u - STIFFNESS * x - DAMPING * now
+            other -= s[3] * now * abs(now) + s[5] * x**3 + s[6] * x * x + s[11] * abs(now)
             other += s[4]
             stop = 0.12
             if abs(x) > stop:
@@ -138,14 +147,14 @@ def _run(force: FloatArray, s: FloatArray, out: FloatArray) -> None:  # noqa: C9
             if s[2] > 0:
                 bent += h * 50.0 * v * (1.0 - bent * np.sign(v))
                 other -= s[2] * bent
-            other -= s[21] * x * x * v
+            other -= s[21] * x * x * now
             if s[22] > 0:
                 branch += h * (v - 2.0 * branch)
                 other -= s[22] * branch
             other -= s[23] * np.sin(2 * np.pi * 0.7 * t) * x
             if s[24] > 0 and (t % 1.7) < 0.02:
                 other += s[24]
-            dry = s[0] + s[1] * np.exp(-((v / 0.08) ** 2)) + s[10] * (x / 0.1) ** 4
+            dry = s[0] + s[1] * np.exp(-((now / 0.08) ** 2)) + s[10] * (x / 0.1) ** 4
             if dry > 0 and abs(v) * MASS < dry * h and abs(other) <= dry:
                 a, v = 0.0, 0.0
             else:

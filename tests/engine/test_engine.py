@@ -10,11 +10,10 @@ from rigwatch.physics.engine.dimension import describe, dimension
 from rigwatch.physics.engine.effect import library
 from rigwatch.physics.engine.fit import Recording, evaluate, fit
 from rigwatch.physics.engine.model import Model, shipped_models
+from rigwatch.physics.engine.suitable import suits
 from rigwatch.physics.engine.system import Placement, compose
 from rigwatch.wire.config import parse
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.rank import suits
-from tests.engine.interpreted import interpret
 
 MASS_SPRING_DAMPER = shipped_models()["mass-spring-damper"]
 DT = 1 / 256
@@ -74,7 +73,7 @@ JUMPING = {"quantisation"}
 def test_sensitivities_agree_with_finite_differences(name):
     effect = ready(name)
     port = home(effect)
-    compiled = interpret(compose(MASS_SPRING_DAMPER, [Placement(name, effect, port)]))
+    compiled = compile_system(compose(MASS_SPRING_DAMPER, [Placement(name, effect, port)]))
     system, u = compiled.system, excitation(samples=80)
     strength = f"{port}_{name}_{effect.strength}"
     given = {strength: 0.4} if effect.parameters[effect.strength].role == "strength" else {}
@@ -198,7 +197,7 @@ states.x = { unit = "1", derivative = "k*x**3 + u", start = 1.0 }
 parameters.k = { value = 1.0, unit = "1/s", fixed = true }
 outputs.y = { unit = "1", expression = "x" }
 """.replace('derivative = "k*x**3 + u"', 'derivative = "k*(x**3 + u)"')
-    compiled = interpret(compose(parse(text, Model, "runaway")))
+    compiled = compile_system(compose(parse(text, Model, "runaway")))
     recording = Recording(0.1, np.ones((80, 1)), np.ones((80, 1)))
     with pytest.raises(ModelError, match="leaves the finite numbers"):
         fit(compiled, recording, 80)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from rigwatch.physics.engine.compiled import compile_system
 from rigwatch.physics.engine.effect import library
 from rigwatch.physics.engine.model import shipped_models
+from rigwatch.physics.engine.suitable import suits
 from rigwatch.physics.engine.system import Placement, compose
-from rigwatch.workbench.rank import suits
-from tests.engine.interpreted import interpret
 
 
 @pytest.mark.parametrize("name", sorted(shipped_models()))
@@ -32,11 +32,11 @@ def test_every_effect_suits_some_model():
 
 def test_the_pneumatic_rig_oscillates_as_its_air_spring_says_and_a_leak_shows():
     model = shipped_models()["servo-pneumatic"]
-    whole = interpret(compose(model, [Placement("leakage", library()["leakage"], "between")]))
+    whole = compile_system(compose(model, [Placement("leakage", library()["leakage"], "between")]))
     time = np.arange(200) / 256
     voltage = 0.3 * np.sin(2 * np.pi * 3 * time)[:, None]
     balance = 3e5 * 6.788e-5 - 1.01e5 * (6.788e-5 - 5.996e-5)
-    first = np.array([[0.0, 0.0, 3e5, balance / 5.996e-5, 0.0, 0.0]])
+    first = np.array([[0.0, 0.0, 3e5, balance / 5.996e-5, 0.0, 0.0, 0.0]])
     values = whole.vector({"s0": 0.0})
     run = whole.simulate(
         voltage, 1 / 256, np.array([0]), 200, initial=first, parameters=values, substeps=8

@@ -10,9 +10,8 @@ from rigwatch.physics.engine.effect import library
 from rigwatch.physics.engine.fit import Recording, fit, windows
 from rigwatch.physics.engine.model import shipped_models
 from rigwatch.physics.engine.score import Projector, score
+from rigwatch.physics.engine.suitable import suits
 from rigwatch.physics.engine.system import Placement, compose
-from rigwatch.workbench.rank import suits
-from tests.engine.interpreted import interpret
 
 MODEL = shipped_models()["mass-spring-damper"]
 DT = 1 / 256
@@ -58,7 +57,7 @@ def exact():
 @pytest.mark.parametrize(("name", "port"), exact(), ids=lambda value: value)
 def test_a_direction_is_the_derivative_of_the_composed_model(name, port):
     effect, u = ready(name), excitation()[:120]
-    whole = interpret(compose(MODEL, [Placement(name, effect, port)]))
+    whole = compile_system(compose(MODEL, [Placement(name, effect, port)]))
     prefix = f"{port}_{name}_"
     strength = effect.parameters[effect.strength].neutral
     base = whole.vector({**TRUE, prefix + effect.strength: strength})

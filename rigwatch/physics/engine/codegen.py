@@ -1,15 +1,16 @@
-"""Prints a system as the source of a numba kernel that simulates it with exact sensitivities.
+"""Differentiates the equations of a system, and prints them as numba source for other kernels.
 
 With states x (n), inputs u, parameters p of which m_p are free, and the sensitivities S =
-∂x/∂(p_free, x(0)) of shape (n, m_p + n), the kernel integrates
+∂x/∂(p_free, x(0)) of shape (n, m_p + n), the functions printed are
 
     dx/dt = f(t, x, u, p),   dS/dt = (∂f/∂x)·S + ∂f/∂p,   y = g,   ∂y = (∂g/∂x)·S + ∂g/∂p
 
-by the classical fourth-order Runge-Kutta method with fixed steps. Derivatives are SymPy's; a jump
-counts as having none. Zero entries of the Jacobians are not printed.
+and a step of the classical fourth-order Runge-Kutta method. Derivatives are SymPy's; a jump counts
+as having none. Zero entries of the Jacobians are not printed.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
@@ -50,55 +51,7 @@ def advance(u, row, step, substeps, hold, dt, p, x, xs, dx, acc, s, ss, ds, sacc
         x[i] += acc[i]
         for j in range(m):
             s[i, j] += sacc[i, j]
-
-
-@njit(cache=True, error_model="numpy")
-def simulate(u, dt, substeps, hold, starts, x0, p, y, dy):
-    n, m = {n}, {m}
-    x, xs, dx, acc = np.empty(n), np.empty(n), np.zeros(n), np.empty(n)
-    s, ss = np.empty((n, m)), np.empty((n, m))
-    ds, sacc = np.zeros((n, m)), np.empty((n, m))
-    us = np.empty(u.shape[1])
-    for w in range(starts.size):
-        for i in range(n):
-            x[i] = x0[w, i]
-            for j in range(m):
-                s[i, j] = 1.0 if j == m - n + i else 0.0
-        for k in range(y.shape[1]):
-            row = starts[w] + k
-            read(row * dt, x, u[row], p, s, y[w, k], dy[w, k])
-            if k + 1 < y.shape[1]:
-                for step in range(substeps):
-                    advance(u, row, step, substeps, hold, dt, p, x, xs, dx, acc, s, ss, ds, sacc, us)
-
-
-@njit(cache=True, error_model="numpy")
-def linearise(u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy):
-    n, m, q = {n}, {m}, {q}
-    x, xs, dx, acc = np.empty(n), np.empty(n), np.zeros(n), np.empty(n)
-    s, ss, unit = np.zeros((n, m)), np.empty((n, m)), np.zeros((n, m + q))
-    ds, sacc = np.zeros((n, m)), np.empty((n, m))
-    us = np.empty(u.shape[1])
-    for i in range(n):
-        unit[i, m - n + i] = 1.0
-    for w in range(starts.size):
-        for i in range(n):
-            x[i] = x0[w, i]
-        for k in range(y.shape[1]):
-            row, last = starts[w] + k, k + 1 == y.shape[1]
-            read(row * dt, x, u[row], p, unit, y[w, k], dy[w, k])
-            for step in range(1 if last else substeps):
-                place = step / substeps
-                for j in range(us.size):
-                    ahead = 0.0 if last else u[row + 1, j] - u[row, j]
-                    us[j] = u[row, j] + hold * place * ahead
-                node = k * substeps + step
-                for i in range(n):
-                    nodes[w, node, i] = x[i]
-                rates((row + place) * dt, x, us, p, unit, acc, slopes[w, node])
-                if not last:
-                    advance(u, row, step, substeps, hold, dt, p, x, xs, dx, acc, s, ss, ds, sacc, us)
-"""  # noqa: E501
+"""
 
 
 class _Printer(PythonCodePrinter):  # type: ignore[misc]
@@ -129,19 +82,55 @@ class _Printer(PythonCodePrinter):  # type: ignore[misc]
     def _print_Pow(self, expr: sympy.Expr, **_: object) -> str:  # noqa: N802 -- SymPy's name
         if expr.exp == sympy.Rational(1, 2):
             return f"math.sqrt({self._print(expr.base)})"
+        if expr.exp == sympy.Rational(-1, 2):
+            return f"(1/math.sqrt({self._print(expr.base)}))"
         return str(super()._print_Pow(expr))
 
 
+@dataclass(frozen=True)
+class Differentiated:
+    """Expressions with their derivatives: each row belongs to one expression.
+
+    Attributes:
+        values: the expressions, k of them.
+        by_state, by_parameter, by_probe: k rows of derivatives; parameters are the free ones.
+    """
+
+    values: list[sympy.Expr]
+    by_state: list[list[sympy.Expr]]
+    by_parameter: list[list[sympy.Expr]]
+    by_probe: list[list[sympy.Expr]]
+
+
+def differentiated(
+    expressions: Sequence[sympy.Expr],
+    states: Iterable[str],
+    free: Iterable[str],
+    probes: Iterable[str],
+) -> Differentiated:
+    """The expressions with their derivatives by states, free parameters and probes, by name."""
+
+    named = [e.free_symbols for e in expressions]
+
+    def rows(names: Iterable[str]) -> list[list[sympy.Expr]]:
+        symbols = [symbol(name) for name in names]
+        return [
+            [derivative(e, s) if s in among else sympy.Integer(0) for s in symbols]
+            for e, among in zip(expressions, named, strict=True)
+        ]
+
+    return Differentiated(list(expressions), rows(states), rows(free), rows(probes))
+
+
 def source(system: System) -> str:
-    """The text of the kernel module of `system`: `rates`, `read` and `simulate`."""
-    n, m = len(system.states), len(system.free) + len(system.states)
+    """The text of a module of numba functions of `system`: `rates`, `read` and `advance`."""
     title = ", ".join([system.model.name, *(str(p) for p in system.placements)])
     return "".join(
         [
             _HEAD.format(title=title),
             _function(system, "rates", "dx", "ds", list(system.derivatives.values())),
             _function(system, "read", "y", "dy", list(system.outputs.values())),
-            _DRIVER.format(n=n, m=m, q=len(system.probes)),
+            _DRIVER,
         ]
     )
 
@@ -176,11 +165,8 @@ def _unpacked(system: System) -> Iterator[str]:
 def _body(
     system: System, value: str, slope: str, expressions: Sequence[sympy.Expr]
 ) -> Iterator[str]:
-    states = [symbol(name) for name in system.states]
-    free = [symbol(name) for name in system.free]
-    by_state = [[derivative(e, s) for s in states] for e in expressions]
-    by_parameter = [[derivative(e, p) for p in free] for e in expressions]
-    by_probe = [[derivative(e, symbol(name)) for name in system.probes] for e in expressions]
+    found = differentiated(expressions, system.states, system.free, system.probes)
+    by_state, by_parameter, by_probe = found.by_state, found.by_parameter, found.by_probe
     flat = [
         e for rows in ([expressions], by_state, by_parameter, by_probe) for r in rows for e in r
     ]
@@ -194,7 +180,7 @@ def _body(
     for i, row in enumerate(by_state):
         yield from _chained(slope, i, row, rest)
     yield from _added(slope, by_parameter, rest, 0)
-    first = len(free) + len(states)
+    first = len(system.free) + len(system.states)
     yield f"if {slope}.shape[1] > {first}:"
     yield "    pass"
     yield from (f"    {line}" for line in _added(slope, by_probe, rest, first))
@@ -226,5 +212,7 @@ def derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
     steps = {step: sympy.Dummy(real=True) for step in expression.atoms(sympy.floor)}
     back = {dummy: step for step, dummy in steps.items()}
     slope = sympy.diff(expression.xreplace(steps), by).xreplace(back)
+    if not slope.has(sympy.DiracDelta, sympy.Heaviside):
+        return slope
     slope = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
     return slope.replace(sympy.Heaviside, lambda at, *_: sympy.Piecewise((1, at > 0), (0, True)))

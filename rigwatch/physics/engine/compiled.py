@@ -1,7 +1,8 @@
-"""A system as a compiled kernel, kept on disk so that it is compiled once.
+"""A system that can be simulated, and sources of numba kernels that are kept on disk.
 
-The kernel's source is written to the cache folder under a name made from its own hash; numba keeps
-the machine code beside it.
+The source of a numba kernel is written to the cache folder under a name made from its own hash;
+numba keeps the machine code beside it. A system's own kernel is not kept: it is made anew in
+milliseconds.
 """
 
 import hashlib
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.physics.engine.codegen import source
+from rigwatch.physics.engine.native import native_kernel
 from rigwatch.physics.engine.numeric import StaticKernel
 from rigwatch.physics.engine.system import System
 from rigwatch.wire.errors import ModelError
@@ -176,13 +178,14 @@ class CompiledSystem:
 
 
 def compile_system(system: System) -> CompiledSystem:
-    """The kernel of `system`, from the cache where it has been compiled before.
+    """`system` with its kernel; one without states is evaluated by NumPy."""
+    kernel = native_kernel(system) if system.states else StaticKernel(system)
+    return CompiledSystem(system, kernel)
 
-    A system without states needs none: it is evaluated by NumPy.
-    """
-    if not system.states:
-        return CompiledSystem(system, StaticKernel(system))
-    return CompiledSystem(system, load_source(source(system)))
+
+def numba_module(system: System) -> ModuleType:
+    """`rates`, `read` and `advance` of `system` as numba functions, for kernels of one's own."""
+    return load_source(source(system))
 
 
 def cache_folder() -> Path:

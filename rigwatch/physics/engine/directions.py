@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import sympy
 from numba import njit
+from numpy.typing import NDArray
 
 from rigwatch.physics.engine.codegen import derivative
 from rigwatch.physics.engine.compiled import (
@@ -24,18 +25,15 @@ from rigwatch.physics.engine.compiled import (
     FloatArray,
     IntArray,
     Linearisation,
-    compile_system,
 )
 from rigwatch.physics.engine.effect import Effect
 from rigwatch.physics.engine.expression import parse
-from rigwatch.physics.engine.model import Input, Model, Output, Parameter, State
+from rigwatch.physics.engine.memory import Memory
 from rigwatch.physics.engine.numeric import numpy_function
 from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.stability import stable_substeps
-from rigwatch.physics.engine.system import PROBE, TIME, System
+from rigwatch.physics.engine.system import PROBE, RATE, TIME, System
 
-RATE = "rate"
-"""What an effect at a signal may call the signal's own rate of change."""
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -115,7 +113,9 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
         pushes = np.stack([_push(at, c, seen[c.port]) for c in inner], axis=-1)
         columns = np.array([_probe_column(system, c.port) for c in inner])
         places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
-        found[..., places] = _propagated(run, len(system.free), pushes, columns)
+        kept = system.model.hold == "zero"
+        held = np.array([kept and kinds[c.port] == "actuator" for c in inner])
+        found[..., places] = _propagated(run, len(system.free), pushes, columns, held)
     for index, candidate in enumerate(candidates):
         if kinds[candidate.port] == "sensor":
             signal = list(system.outputs).index(system.model.ports[candidate.port].signal)
@@ -137,7 +137,7 @@ def _push(at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]) 
     text = (effect.expression, effect.direction, effect.strength)
     function, used = _push_function(*text, tuple(names))
     if used & set(effect.states):
-        signals = signals | _memory(at, candidate, signals, names)
+        signals = signals | _memory(at, candidate, signals)
     known = {**dict.fromkeys(names, 0.0), **signals, **values}
     pushed = function(*(known[name] for name in names))
     return np.broadcast_to(np.asarray(pushed, np.float64), at.time.shape)
@@ -203,42 +203,15 @@ def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
 
 
 def _memory(
-    at: Trajectory,
-    candidate: Candidate,
-    signals: dict[str, FloatArray],
-    names: dict[str, sympy.Symbol],
+    at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]
 ) -> dict[str, FloatArray]:
     """The effect's own states at strength zero, driven by what it sees.
 
-    Shapes stay parameters of the kernel, so that it is compiled once for all of them.
+    It runs through all windows in one go: what one window left is what the next begins with.
     """
-    effect, count = candidate.effect, at.time.shape[1]
-    values = _neutral_values(candidate)
-    rates = {
-        name: parse(state.derivative, names, f"state {name}")
-        for name, state in effect.states.items()
-    }
-    model = Model(
-        name="memory of an effect",
-        summary="the states of one effect",
-        inputs={name: Input(unit="1") for name in signals if name != TIME},
-        parameters={name: Parameter(value=0.0, unit="1", fixed=True) for name in values},
-        outputs={name: Output(unit="1", expression=name) for name in effect.states},
-    )
-    states = {n: State(unit="1", derivative=s.derivative) for n, s in effect.states.items()}
-    read = {name: symbol(name) for name in effect.states}
-    system = System(model, (), states, model.parameters, rates, read, {}, ())
-    compiled = compile_system(system)
-    driving = np.stack([signals[name].ravel() for name in model.inputs], axis=-1)
-    starts = np.arange(0, len(driving), count, dtype=np.int64)
-    first = np.tile([state.start for state in effect.states.values()], (len(starts), 1))
-    parameters = compiled.vector(values)
-    spacing = at.run.spacing
-    run = compiled.simulate(
-        driving, spacing, starts, count, initial=first, parameters=parameters,
-        substeps=stable_substeps(system, list(states), driving, None, parameters, spacing),
-    )  # fmt: skip
-    return dict(zip(effect.states, np.moveaxis(run.outputs, -1, 0), strict=True))
+    along = {name: signal.ravel() for name, signal in signals.items()}
+    found = Memory(candidate.effect, along, at.run.spacing).run(_neutral_values(candidate))
+    return {name: state.reshape(at.time.shape) for name, state in found.items()}
 
 
 def _neutral_values(candidate: Candidate) -> dict[str, float]:
@@ -247,8 +220,13 @@ def _neutral_values(candidate: Candidate) -> dict[str, float]:
     return {**candidate.shape, strength: neutral}
 
 
-def _propagated(run: Linearisation, free: int, pushes: FloatArray, columns: IntArray) -> FloatArray:
-    """Outputs moved by pushes at probes, shape (windows, samples, outputs, candidates)."""
+def _propagated(
+    run: Linearisation, free: int, pushes: FloatArray, columns: IntArray, held: BoolArray
+) -> FloatArray:
+    """Outputs moved by pushes at probes, shape (windows, samples, outputs, candidates).
+
+    A push that is `held` jumps at samples alone: up to there it is what it was a step before.
+    """
     n = run.states.shape[2]
     if n == 0:
         direct = run.read_slopes[..., columns]
@@ -258,7 +236,10 @@ def _propagated(run: Linearisation, free: int, pushes: FloatArray, columns: IntA
     reads = np.ascontiguousarray(run.read_slopes[..., free : free + n])
     direct = np.ascontiguousarray(run.read_slopes[..., columns])
     moved = np.empty((*run.outputs.shape, len(columns)))
-    _propagate(along, across, reads, direct, pushes, run.spacing, run.substeps, moved)
+    ending = pushes.copy()
+    at = np.arange(run.substeps, pushes.shape[1], run.substeps)
+    ending[:, at] = np.where(held, pushes[:, at - 1], pushes[:, at])
+    _propagate(along, across, reads, direct, pushes, ending, run.spacing, run.substeps, moved)
     return moved
 
 
@@ -269,6 +250,7 @@ def _propagate(  # noqa: C901, PLR0917 -- a kernel
     reads: FloatArray,
     direct: FloatArray,
     pushes: FloatArray,
+    ending: FloatArray,
     h: float,
     substeps: int,
     moved: FloatArray,
@@ -295,7 +277,7 @@ def _propagate(  # noqa: C901, PLR0917 -- a kernel
                         ahead[i, c] = response[i, c] + h * slope[i, c]
                 following = node + 1
                 _slopes(
-                    along[w, following], across[w, following], pushes[w, following], ahead,
+                    along[w, following], across[w, following], ending[w, following], ahead,
                     next_slope,
                 )  # fmt: skip
                 for i in range(n):

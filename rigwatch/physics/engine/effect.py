@@ -57,6 +57,8 @@ class EffectState(Section, frozen=True, kw_only=True):
     unit: Annotated[str, Meta(description="its unit")]
     derivative: Annotated[Text, Meta(description="its rate of change")]
     start: Annotated[float, Meta(description="value to start from")] = 0.0
+    low: Annotated[float, Meta(description="least that it can hold")] = float("-inf")
+    high: Annotated[float, Meta(description="most that it can hold")] = float("inf")
 
 
 class Effect(Section, frozen=True, kw_only=True):

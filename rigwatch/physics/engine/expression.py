@@ -8,6 +8,7 @@ import ast
 import difflib
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import sympy
@@ -57,13 +58,19 @@ def parse(text: str, names: Mapping[str, sympy.Expr], where: str) -> sympy.Expr:
     Raises:
         ModelError: it does not parse, or names something unknown.
     """
+    return _parsed(text, tuple(names.items()), where)
+
+
+@lru_cache(maxsize=4096)
+def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) -> sympy.Expr:
+    """The same, kept: SymPy takes milliseconds to simplify choices and extremes."""
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except SyntaxError as error:
         raise ModelError(
             f"{where}: found {text!r}, which breaks off at character {error.offset}"
         ) from None
-    return sympy.sympify(_Reader(names, where).value(tree.body))
+    return sympy.sympify(_Reader(dict(names), where).value(tree.body))
 
 
 class _Reader:

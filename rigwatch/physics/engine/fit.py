@@ -14,12 +14,16 @@ from scipy.optimize import least_squares
 from scipy.signal import savgol_filter
 
 from rigwatch.physics.engine.compiled import CompiledSystem, FloatArray, IntArray
+from rigwatch.physics.engine.memory import Recall
 from rigwatch.physics.engine.system import System
 from rigwatch.physics.engine.thinning import Thinning
 from rigwatch.wire.errors import ModelError
 
 START_STEPS = 2
-"""Gauss-Newton steps for the initial states at each evaluation; they start from the last ones."""
+"""Simulations for the initial states at each evaluation; they start from the last ones."""
+
+SETTLED = 1e-10
+"""Share of a window's squared error below which a better initial state is not looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +141,7 @@ def fit(
     low, high = _bounds(compiled.system)
     free = problem.free
     inside = np.clip(begin[free], low, high)
+    problem.recall(problem.whole(begin, inside))
     problem.settle(problem.whole(begin, inside))
     if not np.isfinite(problem.tried(problem.whole(begin, inside))).all():
         raise ModelError(
@@ -157,6 +162,7 @@ def fit(
 def evaluate(fitted: Fit, recording: Recording, horizon: int, substeps: int = 4) -> Fit:
     """The same parameters on another recording: only its windows' initial states are fitted."""
     problem = _Problem(fitted.compiled, recording, horizon, scale=fitted.scale, substeps=substeps)
+    problem.recall(fitted.parameters)
     problem.settle(fitted.parameters)
     return replace(problem.result(fitted.parameters), covariance=fitted.covariance)
 
@@ -187,7 +193,17 @@ class _Problem:
         self._measured = recording.outputs[rows]
         self.scale = np.nanstd(recording.outputs, axis=0) if scale is None else scale
         self.scale = np.where(self.scale > 0, self.scale, 1.0)
-        self._initial = initial_states(system, recording)[self._cut.starts]
+        shown = initial_states(system, recording)
+        self._initial = shown[self._cut.starts]
+        self._memory = Recall(system, recording.inputs, shown, recording.dt, compiled.parameters)
+        known = self._memory.exact
+        self._unknown = np.array([i for i in range(len(system.states)) if i not in known], np.int64)
+        self._low, self._high = (
+            np.array([getattr(state, end) for state in system.states.values()])
+            for end in ("low", "high")
+        )
+        self._best = (math.inf, compiled.parameters, self._initial)
+        """Smallest error that the solver has met, its parameters and initial states."""
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
 
     def whole(self, begin: FloatArray, theta: FloatArray) -> FloatArray:
@@ -195,6 +211,17 @@ class _Problem:
         parameters = begin.copy()
         parameters[self.free] = theta
         return parameters
+
+    def recall(self, parameters: FloatArray) -> None:
+        """Let the memory of effects begin where the measured signals have led it."""
+        self._remember(parameters, self._memory.columns)
+
+    def _remember(self, parameters: FloatArray, columns: list[int]) -> None:
+        if columns:
+            led = self._memory.at(parameters)
+            self._initial = self._initial.copy()
+            for column in columns:
+                self._initial[:, column] = led[column][self._cut.starts]
 
     def _simulated(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Scaled residuals (windows, k), slopes (windows, k, free + states); 0 if unmeasured."""
@@ -213,23 +240,55 @@ class _Problem:
         flat = error.reshape(len(error), -1)
         return flat, slopes.reshape(*flat.shape, slopes.shape[-1])
 
-    def settle(self, parameters: FloatArray, steps: int = 4) -> None:
-        """Move the initial states to where they fit best."""
-        m = len(self.free)
+    def settle(self, parameters: FloatArray, steps: int = 6) -> tuple[FloatArray, FloatArray]:
+        """Move the initial states to where they fit best; scaled residuals and slopes there.
+
+        Each window takes Gauss-Newton steps of its own. A step that makes its error larger, as one
+        that leaves the play of a valve does, is tried again at a quarter of its length.
+        """
+        self._remember(parameters, self._memory.exact)
+        error, slopes = self._simulated(parameters)
+        if not (np.isfinite(slopes).all() and np.isfinite(error).all()):
+            raise ModelError(
+                f"{self._compiled.system.model.name}: the simulation leaves the finite numbers;"
+                " try other starting values or more substeps"
+            )
         if not self._compiled.system.states:
-            return
-        for _ in range(steps):
-            error, slopes = self._simulated(parameters)
-            if not (np.isfinite(slopes).all() and np.isfinite(error).all()):
-                raise ModelError(
-                    f"{self._compiled.system.model.name}: the simulation leaves the finite numbers;"
-                    " try other starting values or more substeps"
-                )
-            step = [
-                np.linalg.lstsq(j, e, rcond=1e-10)[0]
-                for j, e in zip(slopes[..., m:], error, strict=True)
-            ]
-            self._initial = self._initial + np.array(step)
+            return error, slopes
+        step, best = self._steps(error, slopes), self._initial
+        for further in reversed(range(steps - 1)):
+            if self._promise(step, slopes, error) < SETTLED:
+                break
+            self._initial = np.clip(best + step, self._low, self._high)
+            tried, tried_slopes = self._simulated(parameters)
+            with np.errstate(over="ignore", invalid="ignore"):
+                better = np.sum(tried**2, axis=1) < np.sum(error**2, axis=1)
+            best = np.where(better[:, None], self._initial, best)
+            error = np.where(better[:, None], tried, error)
+            slopes = np.where(better[:, None, None], tried_slopes, slopes)
+            if further:
+                step = np.where(better[:, None], self._steps(error, slopes), step / 4)
+        self._initial = best
+        return error, slopes
+
+    def _promise(self, step: FloatArray, slopes: FloatArray, error: FloatArray) -> float:
+        """Largest share of a window's squared error that a step takes away to first order."""
+        moved = np.einsum("wkn,wn->wk", slopes[..., len(self.free) :], step)
+        size = np.maximum(np.sum(error**2, axis=1), 1e-300)
+        return float(np.max(np.sum(moved**2, axis=1) / size))
+
+    def _steps(self, error: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Gauss-Newton step of each window's initial state, shape (windows, states)."""
+        found = np.zeros_like(self._initial)
+        for w, (by_start, left) in enumerate(zip(slopes, error, strict=True)):
+            columns = self._fitted_starts(w)
+            by_columns = by_start[:, len(self.free) + columns]
+            found[w, columns] = np.linalg.lstsq(by_columns, left, rcond=1e-10)[0]
+        return found
+
+    def _fitted_starts(self, window: int) -> IntArray:
+        """States whose initial values are fitted: what an input led to is known but at first."""
+        return self._unknown if window else np.arange(len(self._compiled.system.states))
 
     def projected(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals and Jacobian by the free parameters, initial states projected out."""
@@ -245,8 +304,11 @@ class _Problem:
             residual = self.projected(parameters)[0]
         except ModelError:
             residual = np.full(self.count, np.nan)
-        if not np.isfinite(residual).all():
+        size = float(residual @ residual)
+        if not np.isfinite(size):
             self._initial = before
+        elif size < self._best[0]:
+            self._best = (size, parameters.copy(), self._initial.copy())
         return residual
 
     @property
@@ -259,19 +321,22 @@ class _Problem:
 
     def _project(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         m = len(self.free)
-        self.settle(parameters, START_STEPS)
-        error, slopes = self._simulated(parameters)
-        by_parameter, by_start = slopes[..., :m], slopes[..., m:]
-        if by_start.shape[-1]:
-            q = np.linalg.qr(by_start).Q
-            error = error - np.einsum("wki,wi->wk", q, np.einsum("wki,wk->wi", q, error))
-            along = np.einsum("wki,wkj->wij", q, by_parameter)
-            by_parameter = by_parameter - np.einsum("wki,wij->wkj", q, along)
-        return -error.ravel(), by_parameter.reshape(-1, m)
+        error, slopes = self.settle(parameters, START_STEPS)
+        clean = [
+            _without(by_start[:, m + self._fitted_starts(w)], error[w], by_start[:, :m])
+            for w, by_start in enumerate(slopes)
+        ]
+        error = np.array([e for e, _ in clean])
+        by_parameter = np.array([j for _, j in clean])
+        return -error.ravel(), by_parameter.reshape(error.size, m)
 
     def result(self, parameters: FloatArray) -> Fit:
         """The fit at these parameters."""
-        residual, jacobian = self.projected(parameters)
+        _, tried, initial = self._best
+        if np.array_equal(tried, parameters):
+            self._initial = initial
+        self.settle(parameters)
+        residual, jacobian = self._project(parameters)
         error, _ = self._simulated(parameters)
         if not np.isfinite(error).all():
             raise ModelError(
@@ -294,6 +359,16 @@ class _Problem:
             residual.reshape(len(error), -1),
             jacobian.reshape(len(error), -1, len(self.free)),
         )
+
+
+def _without(
+    by_start: FloatArray, error: FloatArray, by_parameter: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Error (k,) and slopes (k, m) of a window without what its initial state could have made."""
+    if by_start.shape[-1] == 0:
+        return error, by_parameter
+    q = np.linalg.qr(by_start).Q
+    return error - q @ (q.T @ error), by_parameter - q @ (q.T @ by_parameter)
 
 
 def initial_states(system: System, recording: Recording) -> FloatArray:

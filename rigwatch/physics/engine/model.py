@@ -41,6 +41,8 @@ class State(Section, frozen=True, kw_only=True):
     start: Annotated[float, Meta(description="value to start from where nothing measures it")] = 0.0
     measured: Annotated[str, Meta(description="channel that shows it")] = ""
     rate_of: Annotated[str, Meta(description="channel whose rate of change it is")] = ""
+    low: Annotated[float, Meta(description="least initial value of a fit")] = float("-inf")
+    high: Annotated[float, Meta(description="largest initial value of a fit")] = float("inf")
 
 
 class Parameter(Section, frozen=True, kw_only=True):
@@ -51,6 +53,9 @@ class Parameter(Section, frozen=True, kw_only=True):
     low: Annotated[float, Meta(description="lower bound of a fit")] = float("-inf")
     high: Annotated[float, Meta(description="upper bound of a fit")] = float("inf")
     fixed: Annotated[bool, Meta(description="whether it is known")] = False
+    kept: Annotated[
+        bool, Meta(description="fitted to a healthy recording where there is one, then fixed")
+    ] = False
     meaning: Annotated[str, Meta(description="what it is, in words")] = ""
 
 
@@ -77,6 +82,9 @@ class Port(Section, frozen=True, kw_only=True):
     signal: Annotated[str, Meta(description="input or output that an actuator or sensor is at")] = (
         ""
     )
+    passive: Annotated[
+        bool, Meta(description="nothing enters but what its variables drive, as through a leak")
+    ] = False
     variables: Annotated[
         dict[str, Variable], Meta(description="what effects here call x, v and so on")
     ] = field(default_factory=dict)
@@ -91,6 +99,9 @@ class Model(Section, frozen=True, kw_only=True):
     hold: Annotated[
         Literal["linear", "zero"], Meta(description="input between samples: a line, or kept")
     ] = "linear"
+    rough: Annotated[
+        bool, Meta(description="leaves much unexplained on a healthy rig, too; see the workbench")
+    ] = False
     inputs: dict[str, Input]
     states: dict[str, State] = field(default_factory=dict)
     parameters: dict[str, Parameter]

@@ -5,7 +5,7 @@ in milliseconds. The kernel has the functions that a compiled one has, with the 
 """
 
 from collections.abc import Callable, Sequence
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,13 @@ FloatArray = NDArray[np.float64]
 def numpy_function(names: Sequence[str], expressions: Any) -> Callable[..., Any]:
     """A function of arrays called `names` that gives the expression, or a list of them."""
     several = isinstance(expressions, list | tuple)
-    ready = list(expressions) if several else expressions
+    return _printed(tuple(names), tuple(expressions) if several else expressions)
+
+
+@lru_cache(maxsize=1024)
+def _printed(names: tuple[str, ...], expressions: Any) -> Callable[..., Any]:
+    """The same; printing takes milliseconds, and few expressions come up once only."""
+    ready = list(expressions) if isinstance(expressions, tuple) else expressions
     arguments = [symbol(name) for name in names]
     function = sympy.lambdify(arguments, ready, "numpy", printer=_Printer, cse=True)
 

@@ -17,6 +17,8 @@ from rigwatch.wire.errors import ModelError
 
 TIME = "t"
 PROBE = "probe_"
+RATE = "rate"
+"""What an effect at a signal may call the signal's own rate of change."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +210,7 @@ class _Composer:
         for name, s in placement.effect.states.items():
             unit = _resolved(s.unit, units, placement)
             self._states[placement.prefix + name] = State(
-                unit=unit, derivative=s.derivative, start=s.start
+                unit=unit, derivative=s.derivative, start=s.start, low=s.low, high=s.high
             )
 
 

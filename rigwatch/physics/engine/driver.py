@@ -1,0 +1,156 @@
+"""Integrates any system, with exact sensitivities: the loops around the equations' machine code.
+
+The state is z = [x | S], the states followed by the rows of their sensitivities, and
+
+    dz/dt = rates(t, z, u, p)
+
+is integrated by the classical fourth-order Runge-Kutta method with fixed steps. The equations come
+as addresses of functions void(double t, double* a, u, p, out, slopes), so that these loops are
+compiled once and kept, whatever the system.
+"""
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+_DOUBLE = ir.DoubleType()
+
+
+def _call(  # noqa: PLR0917 -- numba wants them by name
+    _context: Any, address: Any, t: Any, a: Any, u: Any, p: Any, out: Any, slopes: Any
+) -> Any:
+    signature = types.void(address, t, a, u, p, out, slopes)
+
+    def generate(_context: Any, builder: Any, _signature: Any, values: Any) -> None:
+        pointer = _DOUBLE.as_pointer()
+        kind = ir.FunctionType(ir.VoidType(), [_DOUBLE, *[pointer] * 5])
+        function = builder.inttoptr(values[0], kind.as_pointer())
+        builder.call(function, [values[1], *(builder.inttoptr(v, pointer) for v in values[2:])])
+
+    return signature, generate
+
+
+call: Any = intrinsic(_call)
+"""call(address, t, a, u, p, out, slopes): arrays are given by addresses of their first elements."""
+
+
+@njit(cache=True, error_model="numpy")
+def place(u: FloatArray, row: int, share: float, us: FloatArray) -> None:
+    """Inputs between one sample and the next."""
+    for j in range(us.size):
+        us[j] = u[row, j] + share * (u[row + 1, j] - u[row, j])
+
+
+@njit(cache=True, error_model="numpy")
+def advance(  # noqa: PLR0917 -- a kernel
+    rates: int, u: FloatArray, row: int, step: int, substeps: int, hold: float, dt: float, pp: int,
+    z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
+) -> None:  # fmt: skip
+    """One step of the integration; z moves on."""
+    h = dt / substeps
+    start, middle = step / substeps, (step + 0.5) / substeps
+    end = (step + 1) / substeps
+    zp, dp, up, size = zs.ctypes.data, dz.ctypes.data, us.ctypes.data, z.size
+    place(u, row, hold * start, us)
+    call(rates, (row + start) * dt, z.ctypes.data, up, pp, dp, dp)
+    for i in range(size):
+        acc[i] = h / 6.0 * dz[i]
+        zs[i] = z[i] + 0.5 * h * dz[i]
+    place(u, row, hold * middle, us)
+    call(rates, (row + middle) * dt, zp, up, pp, dp, dp)
+    for i in range(size):
+        acc[i] += h / 3.0 * dz[i]
+        zs[i] = z[i] + 0.5 * h * dz[i]
+    call(rates, (row + middle) * dt, zp, up, pp, dp, dp)
+    for i in range(size):
+        acc[i] += h / 3.0 * dz[i]
+        zs[i] = z[i] + h * dz[i]
+    place(u, row, hold * end, us)
+    call(rates, (row + end) * dt, zp, up, pp, dp, dp)
+    for i in range(size):
+        z[i] += acc[i] + h / 6.0 * dz[i]
+
+
+@njit(cache=True, error_model="numpy")
+def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
+    """States as given for window w; each moves with its own initial value alone."""
+    n = x0.shape[1]
+    # Loops, here and below: numba takes seconds to compile assignments of whole slices.
+    for i in range(z.size):
+        z[i] = 0.0
+    for i in range(n):
+        z[i] = x0[w, i]
+        z[n + i * m + m - n + i] = 1.0
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def simulate(  # noqa: PLR0917 -- a kernel
+    rates: int, read: int, m: int, u: FloatArray, dt: float, substeps: int, hold: float,
+    starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray, dy: FloatArray,
+) -> None:  # fmt: skip
+    """Fill outputs y (windows, samples, outputs) and slopes dy (…, m) of each window."""
+    size = x0.shape[1] * (1 + m)
+    z, zs, dz, acc = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    us, wanted = np.empty(u.shape[1]), y.shape[2]
+    pp, out, slopes = p.ctypes.data, np.empty(wanted), np.empty(wanted * m)
+    for w in range(starts.size):
+        restart(z, x0, w, m)
+        for k in range(y.shape[1]):
+            row = starts[w] + k
+            for j in range(us.size):
+                us[j] = u[row, j]
+            call(
+                read, row * dt, z.ctypes.data, us.ctypes.data, pp, out.ctypes.data,
+                slopes.ctypes.data,
+            )  # fmt: skip
+            for o in range(wanted):
+                y[w, k, o] = out[o]
+                for j in range(m):
+                    dy[w, k, o, j] = slopes[o * m + j]
+            if k + 1 < y.shape[1]:
+                for step in range(substeps):
+                    advance(rates, u, row, step, substeps, hold, dt, pp, z, zs, dz, acc, us)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def linearise(  # noqa: C901, PLR0917 -- a kernel
+    rates: int, read_slopes: int, rate_slopes: int, u: FloatArray, dt: float, substeps: int,
+    hold: float, starts: IntArray, x0: FloatArray, p: FloatArray, nodes: FloatArray,
+    slopes: FloatArray, y: FloatArray, dy: FloatArray,
+) -> None:  # fmt: skip
+    """The trajectory without sensitivities, and the Jacobians at its nodes."""
+    n, wide = x0.shape[1], slopes.shape[3]
+    z, zs, dz, acc = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    us, wanted, pp = np.empty(u.shape[1]), y.shape[2], p.ctypes.data
+    out, flat = np.empty(max(wanted, n)), np.empty(max(wanted, n) * wide)
+    zp, up, op, fp = z.ctypes.data, us.ctypes.data, out.ctypes.data, flat.ctypes.data
+    for w in range(starts.size):
+        for i in range(n):
+            z[i] = x0[w, i]
+        for k in range(y.shape[1]):
+            row, last = starts[w] + k, k + 1 == y.shape[1]
+            for step in range(1 if last else substeps):
+                share = step / substeps
+                for j in range(us.size):
+                    ahead = 0.0 if last else u[row + 1, j] - u[row, j]
+                    us[j] = u[row, j] + hold * share * ahead
+                if step == 0:
+                    call(read_slopes, row * dt, zp, up, pp, op, fp)
+                    for o in range(wanted):
+                        y[w, k, o] = out[o]
+                        for j in range(wide):
+                            dy[w, k, o, j] = flat[o * wide + j]
+                node = k * substeps + step
+                call(rate_slopes, (row + share) * dt, zp, up, pp, op, fp)
+                for i in range(n):
+                    nodes[w, node, i] = z[i]
+                    for j in range(wide):
+                        slopes[w, node, i, j] = flat[i * wide + j]
+                if not last:
+                    advance(rates, u, row, step, substeps, hold, dt, pp, z, zs, dz, acc, us)
