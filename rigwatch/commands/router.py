@@ -23,14 +23,14 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.wire.realtime import ROUTER, raise_priority
     from rigwatch.wire.rig_config import load_rig
 
-    endpoint = load_rig(arguments.config).bus.listen
+    bus = load_rig(arguments.config).bus
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     heartbeat = Heartbeat("router")
     raise_priority(ROUTER)
-    close = open_router(endpoint)
-    heartbeat.ready(f"listens at {endpoint}")
+    close = open_router(bus.listen, bus.lease)
+    heartbeat.ready(f"listens at {bus.listen}")
     # Samples do not go through this loop: it only says that it turns.
     while not stop.wait(TURN):
         heartbeat.advance(0)

@@ -209,7 +209,8 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
     """
     from rigwatch.wire.bus_zenoh import ZenohTransport  # slow to import, not needed in memory
 
-    return Bus(ZenohTransport.client(config.bus.router, timeout), config.rig.id, process)
+    transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease)
+    return Bus(transport, config.rig.id, process)
 
 
 def answered(answer: Answer, question: bytes) -> list[bytes]:

@@ -6,7 +6,9 @@ What the settings are for:
 * retries after 100 to 200 ms, for ever: a restarted router is found again within that time;
 * congestion control DROP: with BLOCK one frozen reader stops the publisher for seconds;
 * `express` stays off: with it, Zenoh lost a quarter of the messages at high rates;
-* a filter on payload size in the router: what is larger than any message of ours goes no further.
+* a filter on payload size in the router: what is larger than any message of ours goes no further;
+* one who connects to the router and says nothing is shown out after a second, so that a flood of
+  such connections keeps nobody waiting for long.
 """
 
 import contextlib
@@ -24,12 +26,16 @@ from rigwatch.wire.bus import MAX_PAYLOAD, Answer, Close, answered
 from rigwatch.wire.errors import BusError
 
 RETRY_MS = (100, 200)
+LEASE = 10.0
+"""Silence after which a link counts as broken [s]."""
+ACCEPT_MS, MOST_PENDING = 1000, 1000
+"""How long the router waits for one who connects to say who he is, and for how many at a time."""
 ATTEMPT_MS = 300
 """One attempt at reaching the router; short, since a signal is only seen between attempts [ms]."""
 _log = logging.getLogger(__name__)
 
 
-def _common_settings() -> dict[str, Any]:
+def _common_settings(lease: float) -> dict[str, Any]:
     first, longest = RETRY_MS
     retry = {
         "period_init_ms": first,
@@ -42,18 +48,19 @@ def _common_settings() -> dict[str, Any]:
         "connect/timeout_ms": ATTEMPT_MS,
         "connect/exit_on_failure": False,
         "connect/retry": retry,
+        "transport/link/tx/lease": round(lease * 1e3),
     }
 
 
-def _client_settings(endpoint: str) -> dict[str, Any]:
-    return _common_settings() | {
+def _client_settings(endpoint: str, lease: float) -> dict[str, Any]:
+    return _common_settings(lease) | {
         "mode": "client",
         "listen/endpoints": [],
         "connect/endpoints": [endpoint],
     }
 
 
-def _router_settings(endpoint: str) -> dict[str, Any]:
+def _router_settings(endpoint: str, lease: float) -> dict[str, Any]:
     size_filter = {
         "id": "largest-message",
         "flows": ["ingress", "egress"],
@@ -61,11 +68,13 @@ def _router_settings(endpoint: str) -> dict[str, Any]:
         "key_exprs": ["**"],
         "size_limit": MAX_PAYLOAD,
     }
-    return _common_settings() | {
+    return _common_settings(lease) | {
         "mode": "router",
         "listen/endpoints": [endpoint],
         "connect/endpoints": [],
         "low_pass_filter": [size_filter],
+        "transport/unicast/accept_timeout": ACCEPT_MS,
+        "transport/unicast/accept_pending": MOST_PENDING,
     }
 
 
@@ -80,13 +89,17 @@ def _configured(settings: dict[str, Any], endpoint: str) -> Any:
     return config
 
 
-def open_router(endpoint: str) -> Close:
+def open_router(endpoint: str, lease: float = LEASE) -> Close:
     """Run a router that listens at `endpoint`, until the returned function is called.
+
+    Args:
+        endpoint: such as tcp/127.0.0.1:7447.
+        lease: silence after which a link counts as broken [s].
 
     Raises:
         BusError: the endpoint is not well formed or already taken.
     """
-    config = _configured(_router_settings(endpoint), endpoint)
+    config = _configured(_router_settings(endpoint, lease), endpoint)
     try:
         session = zenoh.open(config)
     except zenoh.ZError:
@@ -96,12 +109,12 @@ def open_router(endpoint: str) -> Close:
     return close
 
 
-def _reach(endpoint: str, timeout: float | None) -> Any:
+def _reach(endpoint: str, timeout: float | None, lease: float) -> Any:
     """A session with the router at `endpoint`, tried again and again."""
     started, told = time.monotonic(), False
     while True:
         try:
-            return zenoh.open(_configured(_client_settings(endpoint), endpoint))
+            return zenoh.open(_configured(_client_settings(endpoint, lease), endpoint))
         except zenoh.ZError:
             waited = time.monotonic() - started
         if timeout is not None and waited >= timeout:
@@ -122,13 +135,17 @@ class ZenohTransport:
         self._kept: list[Any] = []
 
     @classmethod
-    def client(cls, endpoint: str, timeout: float | None = None) -> "ZenohTransport":
+    def client(
+        cls, endpoint: str, timeout: float | None = None, lease: float = LEASE
+    ) -> "ZenohTransport":
         """A client of the router at `endpoint`, awaited for `timeout` [s], None for ever.
+
+        A link that has been silent for `lease` [s] counts as broken.
 
         Raises:
             BusError: the endpoint is not well formed, or no router answers there.
         """
-        return cls(_reach(endpoint, timeout))
+        return cls(_reach(endpoint, timeout, lease))
 
     def put(self, key: str, payload: bytes) -> None:
         """Send without waiting; dropped where the link is full or down."""

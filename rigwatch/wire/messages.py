@@ -139,9 +139,15 @@ class Health:
     counters: Mapping[str, float]
 
 
+PROBABLY_MISSING = "PROBABLY MISSING"
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened once and is worth a line in the log."""
+    """Something that happened once and is worth a line in the log.
+
+    With the code `PROBABLY_MISSING` its text is an alarm's name, ": ", and what the ranking found.
+    """
 
     source: str
     t_ns: int

@@ -35,6 +35,9 @@ class BusSection(Section, frozen=True):
     listen: Annotated[Text, Meta(description="endpoint on which `rigwatch router` listens")] = (
         "tcp/127.0.0.1:7447"
     )
+    lease: Annotated[
+        float, Meta(gt=0, description="silence after which a link counts as broken [s]")
+    ] = 10.0
 
 
 class ChannelSection(Section, frozen=True):
@@ -161,6 +164,9 @@ class MonitorSection(Section, frozen=True):
     alarms: Annotated[dict[str, AlarmSection], Meta(description="settings by alarm")] = field(
         default_factory=dict
     )
+    effect_files: Annotated[
+        tuple[str, ...], Meta(description="own effects that an alarm's probable cause may be")
+    ] = ()
 
 
 class RecorderSection(Section, frozen=True):

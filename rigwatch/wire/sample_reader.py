@@ -66,7 +66,6 @@ class SampleReader:
         self._capacity = capacity
         self._inbox: SimpleQueue[_Incoming] = SimpleQueue()
         self._questions: SimpleQueue[Ask | None] = SimpleQueue()
-        self.heard = True
         self._heard_at = self._silence_told_at = time.monotonic()
         self._latest_ns = 0
         self._device = ""
@@ -163,6 +162,7 @@ class SampleReader:
         except MessageError:
             self.rejected += 1
             return
+        self.heard = True
         self._heard_at = self._silence_told_at = time.monotonic()
         self._handle(self._order.on_block(block))
 

@@ -24,6 +24,7 @@ id = "bench"
 [bus]
 router = "tcp/127.0.0.1:{router}"
 listen = "tcp/127.0.0.1:{listen}"
+lease = {lease}
 
 [[channels]]
 name = "voltage"
@@ -63,8 +64,9 @@ class TestRig:
 
     __test__ = False
 
-    def __init__(self, folder: Path, extra: str = "") -> None:
+    def __init__(self, folder: Path, extra: str = "", lease: float = 10.0) -> None:
         self.folder = folder
+        self.lease = lease
         self.listen = free_port()
         self.path = self.configure("rig.toml", self.listen, extra)
         self.config = load_rig(self.path)
@@ -83,7 +85,8 @@ class TestRig:
     def configure(self, name: str, router: int, extra: str = "") -> Path:
         """A configuration whose processes reach the router through the port `router`."""
         path = self.folder / name
-        path.write_text(CONFIG.format(router=router, listen=self.listen) + extra)
+        bus = {"router": router, "listen": self.listen, "lease": self.lease}
+        path.write_text(CONFIG.format(**bus) + extra)
         return path
 
     def start(self, *arguments: str) -> "subprocess.Popen[bytes]":

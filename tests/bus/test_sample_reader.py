@@ -1,5 +1,7 @@
 """Readers on a real router, while publishers, router and links are killed, frozen and restarted."""
 
+import contextlib
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -131,6 +133,50 @@ def test_a_frozen_link_delays_samples_and_loses_none(rig: TestRig) -> None:
     assert listener.ledger.lost(5) == 0
 
 
+def test_a_partition_longer_than_the_lease_is_noticed_at_once_and_costs_no_sample(
+    tmp_path: Path,
+) -> None:
+    # As 20 s of partition with the default lease of 10 s: the router gives the link up meanwhile.
+    with TestRig(tmp_path, lease=1.0) as rig:
+        rig.router()
+        proxy, port = rig.proxy()
+        far = rig.bus("reader", load_rig(rig.configure("far.toml", port)))
+        listener = Listener(far)
+        rig.publisher(5)
+        listener.reaches(5, 100)
+        with stopped(proxy):
+            eventually(lambda: listener.reader.silent_for() > 0.1, "silence is noticed")
+            eventually(lambda: not far.connected(), "the link is given up")
+            time.sleep(1.0)
+        eventually(far.connected, "the router is found again")
+        listener.goes_on(5, 200)
+        listener.close()
+        listener.ledger.assert_complete(5)
+        assert listener.ledger.lost(5) == 0
+        assert listener.reader.counters.recovered > 256
+
+
+def test_a_flood_of_connections_disturbs_nobody(rig: TestRig) -> None:
+    rig.router()
+    listener = Listener(rig.bus("reader"))
+    rig.publisher(5)
+    listener.reaches(5, 100)
+    with contextlib.ExitStack() as flood:
+        for _ in range(500):
+            address = ("127.0.0.1", rig.listen)
+            flood.enter_context(socket.create_connection(address, 5.0))
+        recovered, first = listener.reader.counters.recovered, listener.ledger.last(5)
+        started = time.monotonic()
+        late = Listener(rig.bus("late"))
+        late.goes_on(5)
+        assert time.monotonic() - started < 5.0
+        listener.reaches(5, first + 200)
+    for each in (listener, late):
+        each.close()
+    listener.ledger.assert_complete(5)
+    assert listener.reader.counters.recovered == recovered
+
+
 def test_a_killed_publisher_is_followed_by_the_head_of_its_successor(rig: TestRig) -> None:
     rig.router()
     listener = Listener(rig.bus("reader"))
@@ -146,6 +192,17 @@ def test_a_killed_publisher_is_followed_by_the_head_of_its_successor(rig: TestRi
     assert listener.ledger.unknown_ends == [5]
     assert "SOURCE RESTARTED" in listener.codes()
     assert "DUPLICATE SOURCE" not in listener.codes()
+
+
+def test_a_reader_knows_whether_it_has_ever_heard_a_sample() -> None:
+    network = MemoryNetwork()
+    reader = SampleReader(network.bus("bench", "reader"))
+    reader.read(0.0)
+    assert not reader.heard
+    network.bus("bench", "daq").publish(SAMPLES, block(0, 4))
+    reader.read(0.5)
+    assert reader.heard
+    reader.close()
 
 
 def test_late_joiners_get_the_head_from_the_ring_or_say_where_they_joined(rig: TestRig) -> None:

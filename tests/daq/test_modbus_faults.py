@@ -4,7 +4,13 @@ Each line of the table disturbs some replies of the server. The ring in the devi
 samples a moment later: none may be lost, doubled or wrong.
 """
 
+import contextlib
+import os
+import signal
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -176,6 +182,52 @@ def test_24_a_server_that_was_away_is_found_again(opened: Callable[..., ModbusBe
         heard = bench.running.more(20)
     assert heard.health.counters["reconnects"] >= 1 or bench.running.device.reconnects >= 1
     every_sample_is_there_and_right(heard)
+
+
+@pytest.mark.parametrize("frozen_s", [0.5, 4.0])
+def test_24_a_server_that_hangs_is_noticed_and_found_again(frozen_s: float) -> None:
+    port = free_port()
+    section = f'adapter = "modbus-tcp"\nhost = "127.0.0.1"\nport = {port}\ntimeout = 0.1'
+    config = config_of(section)
+    running = Running(config, adapter_for(config.daq.device, config.channels))
+    with server_process(port) as process:
+        running.more(20)
+        process.send_signal(signal.SIGSTOP)
+        frozen = time.monotonic()
+        running.until(lambda heard: "stale" in heard.events() or "link_lost" in heard.events(), 2.0)
+        while time.monotonic() < frozen + frozen_s:
+            running.turn()
+        process.send_signal(signal.SIGCONT)
+        heard = running.more(256)
+    running.device.close()
+    assert heard.health.counters["failed_polls"] >= 1
+    every_number_is_there_or_reported(heard)
+
+
+@contextlib.contextmanager
+def server_process(port: int) -> Iterator["subprocess.Popen[bytes]"]:
+    """The server of `modbus_device.py`; ended however it is left."""
+    root = Path(__file__).parents[2]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.daq.modbus_device", str(port)],
+        cwd=root,
+        env={**os.environ, "PYTHONPATH": str(root)},
+    )
+    try:
+        yield process
+    finally:
+        process.send_signal(signal.SIGCONT)
+        process.kill()
+        process.wait()
+
+
+def every_number_is_there_or_reported(heard: Heard) -> None:
+    """Each once, delivered with its own values or in a gap."""
+    delivered = [seq for _, seq in heard.numbers()]
+    told = [seq for gap in heard.gaps for seq in range(gap.first, gap.last + 1)]
+    assert sorted(delivered + told) == list(range(delivered[0], delivered[-1] + 1))
+    values = np.concatenate([block.channel("position").values for block in heard.blocks])
+    np.testing.assert_array_equal(values, codes_of(np.array(delivered))[:, 1])
 
 
 def test_24_a_restarted_device_has_a_new_boot(opened: Callable[..., ModbusBench]) -> None:

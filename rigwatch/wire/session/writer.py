@@ -21,7 +21,7 @@ from typing import Self
 
 from mcap.writer import CompressionType, Writer
 
-from rigwatch import __version__
+from rigwatch.version import __version__
 from rigwatch.wire import blocks, schema
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import (
