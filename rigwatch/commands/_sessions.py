@@ -33,6 +33,16 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
+def check_folder(target: Path | None) -> None:
+    """Refuse a file to write whose folder is missing, before long work is begun for it.
+
+    Raises:
+        SessionError: there is no such folder.
+    """
+    if target is not None and not target.absolute().parent.is_dir():
+        raise SessionError(f"{target}: found no folder {target.parent}, expected one to write to")
+
+
 def add_session_and_target(parser: argparse.ArgumentParser) -> None:
     """Arguments of commands that make one session file of another."""
     parser.add_argument("session", type=Path, help="session file or folder of segments")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands._sessions import print_json, say
+from rigwatch.commands._sessions import check_folder, print_json, say
 
 if TYPE_CHECKING:
     from rigwatch.dashboard.study_view import Output
@@ -22,6 +22,8 @@ def view(arguments: argparse.Namespace) -> int:
     from rigwatch.dashboard import require_rerun
 
     require_rerun()
+    for target in (arguments.save, arguments.picture):
+        check_folder(target)
     os.environ.setdefault("RUST_LOG", "off")
     from rigwatch.workbench.stages import signals, stages
     from rigwatch.workbench.study import open_study

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands._sessions import print_json
+from rigwatch.commands._sessions import print_json, say
 
 HELP = "rank what the model may be missing and give a verdict"
 EXAMPLE = "  rigwatch explain emps"
@@ -20,7 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.study import open_study
     from rigwatch.workbench.words import explanation_lines
 
-    found = explain(open_study(arguments.study))
+    found = explain(open_study(arguments.study), progress=say)
     if arguments.json:
         print_json(as_data(found))
         return 0

@@ -36,10 +36,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when it was drawn, and when a window was shown, once that is closed."""
-    from rigwatch.commands._sessions import print_json, say
+    from rigwatch.commands._sessions import check_folder, print_json, say
     from rigwatch.dashboard import require_rerun
 
     require_rerun()
+    for target in (arguments.save, arguments.picture):
+        check_folder(target)
     os.environ.setdefault("RUST_LOG", "off")
     drawn = _shown(arguments, _silent if arguments.json else say)
     if arguments.json:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigwatch.physics.engine.effect import load_effects
+from rigwatch.physics.engine.suitable import suits
 from rigwatch.physics.engine.system import Placement, compose
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
 from rigwatch.workbench.ledger import append
-from rigwatch.workbench.rank import Ranked, accepted_from, candidates, rank_only, refit, suits
+from rigwatch.workbench.rank import Ranked, accepted_from, candidates, rank_only, refit
 from rigwatch.workbench.study import (
     Study,
     append_effect,
@@ -71,8 +72,9 @@ def add(study: Study, effect: str, port: str | None = None, *, anyway: bool = Fa
         append(study, "refused", effect=effect, port=where, reason=row.reason, **numbers)
         return Change("refused", effect, where, before, before, errors, text)
     accepted = accepted_from(row)
+    # Before the file is touched, so that a model that fails leaves the study as it is.
+    after = comparison(open_bench(study.with_effects([*study.file.effects, accepted])))
     changed = append_effect(study, accepted)
-    after = comparison(open_bench(changed))
     numbers = _numbers(after)
     append(changed, "add", effect=effect, port=where, parameters=accepted.parameters, **numbers)
     return Change("add", effect, where, before, after, errors, words)

@@ -4,12 +4,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rigwatch.physics.engine.compiled import FloatArray
+from rigwatch.workbench.commissioned import commissioned
 from rigwatch.workbench.fitted import Fitted, fit_base
 from rigwatch.workbench.free_run import free_run
 from rigwatch.workbench.intervals import Value, values
 from rigwatch.workbench.ledger import check_data
 from rigwatch.workbench.noise_floor import METHODS, NoiseFloor, from_residual, quiet_scale
 from rigwatch.workbench.profile import profile
+from rigwatch.workbench.reference import referenced
 from rigwatch.workbench.signals import Data, prepare
 from rigwatch.workbench.study import Study
 
@@ -66,17 +69,37 @@ def open_bench(study: Study) -> Bench:
     Raises:
         ModelError: data have changed, or do not suit the model.
     """
+    return bench_of(*prepared(study))
+
+
+def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
+    """The study as its healthy recordings leave it, its data, and how channels are weighed.
+
+    Raises:
+        ModelError: data have changed, or do not suit the model.
+    """
     check_data(study)
     data = prepare(study)
     scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
+    study = commissioned(study, data, scale)
+    return study, referenced(study, data, scale), scale
+
+
+def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench:
+    """The study's model fitted to its data, with the noise floor.
+
+    Args:
+        study, data: prepared.
+        scale: divisor of each output's residuals, shape (outputs,); its spread if None.
+    """
     base = fit_base(study, data, scale)
     return Bench(study, data, base, noise_floor(study, data, base))
 
 
 def noise_floor(study: Study, data: Data, base: Fitted) -> NoiseFloor:
     """The floor of the held-out recordings' error."""
-    if data.healthy is not None:
-        healthy = Data(data.healthy, data.healthy, None, data.horizon, ())
+    healthy = data.of_healthy
+    if healthy is not None:
         bare = fit_base(study, healthy, base.train.scale)
         return NoiseFloor(bare.train.rms, "healthy")
     return from_residual(base.held_out, data.held_out, study.file.period, data.horizon)

@@ -3,14 +3,13 @@
 import dataclasses
 from dataclasses import dataclass, field
 
-from msgspec.structs import replace
-
+from rigwatch.workbench.calibration import seen
 from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
 from rigwatch.workbench.intervals import Value, values
 from rigwatch.workbench.next_experiment import Experiment, propose
-from rigwatch.workbench.rank import Ranked, accepted_from, rank
+from rigwatch.workbench.rank import Progress, Ranked, accepted_from, rank, unheard
 from rigwatch.workbench.study import Study
-from rigwatch.workbench.verdict import EXPLAINED, Verdict, judge, left_over
+from rigwatch.workbench.verdict import Verdict, judge
 
 
 @dataclass(frozen=True)
@@ -50,6 +49,8 @@ class Explanation:
         also: what is missing as well, where two effects hide at once.
         rivals: of different physics that the recording cannot tell from the best.
         next_experiment: what would tell them apart, None where nothing needs to be told.
+        wrong_probability: of the verdict, calibrated on simulated cases.
+        like_this: simulated cases with such a verdict, and how many of them were wrong.
     """
 
     verdict: str
@@ -59,42 +60,53 @@ class Explanation:
     rivals: list[str] = field(default_factory=list)
     also: list[str] = field(default_factory=list)
     next_experiment: Experiment | None = None
+    wrong_probability: float = 0.5
+    like_this: tuple[int, int] = (0, 0)
 
 
-def explain(study: Study) -> Explanation:
+def explain(study: Study, progress: Progress = unheard) -> Explanation:
     """Rank every effect at every port and judge.
+
+    Args:
+        study: the study.
+        progress: told what begins.
 
     Raises:
         ModelError: data have changed, or do not suit the model.
     """
+    progress("fitting the model as it is")
     bench = open_bench(study)
-    rows, verdict = ranking(bench)
+    rows, verdict = ranking(bench, progress)
     return explanation(bench, rows, verdict)
 
 
-def ranking(bench: Bench) -> tuple[list[Ranked], Verdict]:
+def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], Verdict]:
     """The ranking, what the verdict names in front, and the verdict."""
-    rows = rank(bench.study, bench.data, bench.base)
-    verdict = judge(bench.base, rows, bench.study.effects, bench.floor)
+    rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
+    verdict = judge(bench.base, rows, bench.floor)
     if verdict.word == "unknown_effect" and verdict.best is not None:
-        verdict = _with_second(bench, verdict)
+        verdict = _with_second(bench, verdict, progress)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
 
 
-def _with_second(bench: Bench, verdict: Verdict) -> Verdict:
-    """The verdict once a second effect has been tried beside the best: two may hide at once."""
+def _with_second(bench: Bench, verdict: Verdict, progress: Progress) -> Verdict:
+    """The verdict once a second effect has been tried beside the best: two may hide at once.
+
+    Two are named only where they leave nothing but noise: two wrong ones together explain much.
+    """
     best = verdict.best
     assert best is not None
     assert best.fitted is not None
-    effects = (*bench.study.file.effects, accepted_from(best))
-    study = dataclasses.replace(bench.study, file=replace(bench.study.file, effects=effects))
+    study = bench.study.with_effects([*bench.study.file.effects, accepted_from(best)])
     beside = dataclasses.replace(bench, study=study, base=best.fitted)
-    second = judge(beside.base, rank(study, beside.data, beside.base), study.effects, bench.floor)
+    progress(f"{best.label} leaves much: trying a second effect beside it")
+    rows = rank(study, beside.data, beside.base, bench.floor, progress)
+    second = judge(beside.base, rows, bench.floor)
     if second.best is None or second.best.fitted is None:
         return verdict
-    if left_over(bench.base, second.best.fitted, bench.floor) > 1 - EXPLAINED:
+    if not bench.floor.reached(second.best.fitted.held_out):
         return verdict
     text = f"{best.label} is missing, and {second.best.label} as well"
     return dataclasses.replace(verdict, word="missing_effect", text=text, second=second.members)
@@ -102,7 +114,7 @@ def _with_second(bench: Bench, verdict: Verdict) -> Verdict:
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
     """The same for people and programs."""
-    members, rivals = list(verdict.members), list(verdict.rivals)
+    members, rivals = [*verdict.members, *verdict.rivals], list(verdict.rivals)
     experiment = None
     if verdict.best is not None and rivals:
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
@@ -115,12 +127,14 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         rivals,
         list(verdict.second),
         experiment,
+        verdict.doubt,
+        seen(verdict.word, verdict.evidence),
     )
 
 
 def _row(row: Ranked, alike: list[str]) -> Row:
     found: dict[str, Value] = {}
-    if row.fitted is not None and row.placement is not None:
+    if row.fitted is not None:
         prefix = row.placement.prefix
         every = values(row.fitted.train)
         found = {n[len(prefix) :]: v for n, v in every.items() if n.startswith(prefix)}

@@ -2,19 +2,23 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rigwatch.physics.engine.compiled import CompiledSystem, FloatArray, compile_system
 from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
-from rigwatch.physics.engine.stability import stable_substeps
+from rigwatch.physics.engine.stability import accurate_substeps, stable_substeps
 from rigwatch.physics.engine.system import Placement, System, compose
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.signals import Data, parameters_of
 from rigwatch.workbench.sizes import port_sizes
 from rigwatch.workbench.study import Study
 
 LONG = 2000
 """Samples of a horizon from which a fit goes by way of a tenth of it."""
+WELL_ABOVE = 1.5
+"""Error over the channels' noise from which a fit may have stopped in a local minimum."""
 BLOCKS = 40
 """Blocks that a recording of a model without states is cut into for statistics."""
 
@@ -89,9 +93,24 @@ def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
 
 
 def fit_base(study: Study, data: Data, scale: FloatArray | None = None) -> Fitted:
-    """The model of a study with the effects accepted so far."""
-    placements = placements_of(study, data.train)
-    return fit_model(study, data, placements, parameters_of(study.file), scale)
+    """The model of a study with the effects accepted so far.
+
+    Where that cannot be simulated from the study's own starting values, it is fitted effect by
+    effect, as it was built.
+
+    Raises:
+        ModelError: it cannot be simulated that way either.
+    """
+    placements, start = placements_of(study, data.train), parameters_of(study.file)
+    try:
+        return fit_model(study, data, placements, start, scale)
+    except ModelError:
+        if not placements:
+            raise
+    found = fit_model(study, data, (), start, scale)
+    for count in range(1, len(placements) + 1):
+        found = fit_model(study, data, placements[:count], start | found.train.values(), scale)
+    return found
 
 
 def fit_model(
@@ -110,27 +129,42 @@ def fit_model(
     horizon = data.horizon if study.model.states else len(data.train)
     begin = compiled.vector(start)
     substeps = max(study.file.substeps, _needed(compiled.system, data.train, begin))
+    fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
     if study.model.states and horizon >= LONG:
         # Over long horizons there are many local minima: start from where short ones lead.
-        near = fit(compiled, data.train, horizon // 10, start=begin, scale=scale, substeps=substeps)
-        begin = near.parameters
-    found = fit(compiled, data.train, horizon, start=begin, scale=scale, substeps=substeps)
+        begin = fit_over(horizon // 10, start=begin).parameters
+    found = fit_over(horizon, start=begin)
+    if substeps > study.file.substeps and scale is not None and _noisy(found):
+        # What sticks and slips has many local minima too: try again by way of short horizons.
+        near = fit_over(horizon // 8, start=begin)
+        found = min(found, fit_over(horizon, start=near.parameters), key=_size)
     beside = data.horizon if study.model.states else len(data.held_out)
     judged = evaluate(found, data.held_out, beside, substeps=substeps)
     return Fitted(tuple(placements), found, judged, substeps, horizon)
 
 
+def _size(fitted: Fit) -> float:
+    return float(np.mean((fitted.rms / fitted.scale) ** 2))
+
+
+def _noisy(fitted: Fit) -> bool:
+    """Whether the residual is well above the noise that the channels are weighed by."""
+    return _size(fitted) > WELL_ABOVE**2
+
+
 def _needed(system: System, recording: Recording, parameters: FloatArray) -> int:
-    """Substeps that keep the effects' memory stable wherever its parameters may go."""
-    memory = [name for name in system.states if name not in system.model.states]
-    if not memory:
+    """Substeps that follow friction, and keep memory stable wherever its parameters may go."""
+    if not system.placements or not system.states:
         return 1
     states = initial_states(system, recording)
+    fine = accurate_substeps(system, recording.inputs, states, parameters, recording.dt)
+    memory = [name for name in system.states if name not in system.model.states]
     corners = []
     for bound in ("low", "high"):
         at = np.array([getattr(p, bound) for p in system.parameters.values()])
         corners.append(np.where(np.isfinite(at), at, parameters))
-    return max(
+    stable = (
         stable_substeps(system, memory, recording.inputs, states, corner, recording.dt)
         for corner in corners
     )
+    return max(fine, *stable)

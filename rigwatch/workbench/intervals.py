@@ -1,12 +1,14 @@
 """Intervals of parameters that stay honest where residuals are not white.
 
 A model that is wrong leaves residuals that hang together over many samples, and the textbook
-covariance, which takes each for itself, promises too much. Here whole blocks vary instead ("block
-sandwich": K.-Y. Liang, S. L. Zeger, Biometrika 73, 1986):
+covariance, which takes each for itself, promises too much. Here whole blocks are left out instead,
+one after the other (the delete-a-block jackknife: B. Efron, C. Stein, Annals of Statistics 9, 1981;
+as cluster-robust covariance "CR3": R. M. Bell, D. F. McCaffrey, Survey Methodology 28, 2002):
 
-    cov θ = (JᵀJ)⁻¹ · (Σ_b gb·gbᵀ) · (JᵀJ)⁻¹ · B/(B − m),   gb = Jbᵀ·rb
+    θ − θ₋b = (N − Nb)⁻¹·gb,   cov θ = (B − 1)/B · Σ_b (θ − θ₋b)(θ − θ₋b)ᵀ
 
-with Student's t for B − m degrees of freedom, B blocks and m parameters.
+with N = JᵀJ, Nb = JbᵀJb and gb = Jbᵀrb of B blocks, and Student's t for B − m degrees of freedom
+and m parameters.
 """
 
 from dataclasses import dataclass
@@ -19,6 +21,8 @@ from rigwatch.physics.engine.fit import Fit
 from rigwatch.workbench.fitted import blocks
 
 CONFIDENCE = 0.95
+ENOUGH = 12
+"""Windows from which they are blocks of their own."""
 TIED = 0.98
 """Correlation from which two parameters count as tied to each other."""
 
@@ -44,13 +48,25 @@ def covariance(fitted: Fit) -> tuple[FloatArray, int]:
     """Covariance of the free parameters, shape (m, m), and degrees of freedom."""
     m = fitted.jacobian.shape[-1]
     whole = fitted.jacobian.reshape(-1, m)
-    bread = np.linalg.pinv(whole.T @ whole, rcond=1e-14)
-    pairs = zip(blocks(fitted.jacobian), blocks(fitted.error), strict=True)
-    pushes = np.array([j.T @ r for j, r in pairs])
-    count = len(pushes)
-    free = max(count - m, 1)
-    meat = pushes.T @ pushes * (count / free)
-    return np.asarray(bread @ meat @ bread), free
+    # In units of the columns' sizes, so that what is tiny beside others is not taken for nothing.
+    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    normal = (whole / size).T @ (whole / size)
+    pairs = zip(_apart(fitted.jacobian / size), _apart(fitted.error), strict=True)
+    moved = np.array([_moved(normal, j, r) for j, r in pairs]) / size
+    count = len(moved)
+    return np.asarray(moved.T @ moved * ((count - 1) / count)), max(count - m, 1)
+
+
+def _apart(windowed: FloatArray) -> list[FloatArray]:
+    """Windows as blocks where there are enough: pieces of one share its initial state."""
+    return list(windowed) if len(windowed) >= ENOUGH else blocks(windowed)
+
+
+def _moved(normal: FloatArray, jacobian: FloatArray, error: FloatArray) -> FloatArray:
+    """How far the parameters move when a block is left out, shape (m,)."""
+    return np.asarray(
+        np.linalg.pinv(normal - jacobian.T @ jacobian, rcond=1e-12) @ (jacobian.T @ error)
+    )
 
 
 def values(fitted: Fit) -> dict[str, Value]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from rigwatch import __version__
+from rigwatch.version import __version__
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.study import Study
 

@@ -25,7 +25,7 @@ class Region:
     """A part of a recording.
 
     Attributes:
-        view: how it was cut: time, motion, direction, reversals, amplitude, frequency, lines.
+        view: how it was cut: time, motion, direction, amplitude, input, frequency, lines.
         name: which part, in words.
         channel: output that the residual is of.
         rms: of the residual there, in the channel's unit.
@@ -69,6 +69,8 @@ def _channel(bench: Bench, channel: str, residual: FloatArray, floor: float) -> 
         }
         for view, labels in views.items():
             found += _cut(channel, residual, floor, rows, view, labels)
+    for name, signal in _driven(bench, rows).items():
+        found += _cut(channel, residual, floor, rows, "input", _by_size(signal, f"|{name}|"))
     factor = recording.thinning.factor if recording.thinning else 1
     found += _spectrum(channel, residual, floor, recording.dt * factor)
     period = find_period(recording)
@@ -134,8 +136,19 @@ def _by_direction(v: FloatArray) -> list[str]:
 
 
 def _by_amplitude(x: FloatArray) -> list[str]:
-    i, edges = _steps(np.abs(x - np.nanmean(x)), PIECES["amplitude"])
-    return [f"|x - mean| {edges[a]:.3g} to {edges[a + 1]:.3g}" for a in i]
+    return _by_size(x - np.nanmean(x), "|x - mean|")
+
+
+def _by_size(signal: FloatArray, name: str) -> list[str]:
+    i, edges = _steps(np.abs(signal), PIECES["amplitude"])
+    return [f"{name} {edges[a]:.3g} to {edges[a + 1]:.3g}" for a in i]
+
+
+def _driven(bench: Bench, rows: IntArray) -> dict[str, FloatArray]:
+    """What drives the model, as measured: inputs at which an actuator stands."""
+    model, columns = bench.study.model, bench.data.train.inputs[rows]
+    driven = {port.signal for port in model.ports.values() if port.kind == "actuator"}
+    return {name: columns[:, i] for i, name in enumerate(model.inputs) if name in driven}
 
 
 def _cut(  # noqa: PLR0917 -- one residual and how it is cut
@@ -197,7 +210,8 @@ def _lines(channel: str, residual: FloatArray, period: int) -> list[Region]:
     """Energy on even and odd multiples of the excitation's rate: even or odd nonlinearities."""
     periods = np.nan_to_num(residual)[: len(residual) // period * period].reshape(-1, period)
     energy = np.abs(np.fft.rfft(periods.mean(axis=0))) ** 2 * 2 / period**2
-    total = max(float(energy.sum()), 1e-300)
+    # The mean is no line: an offset would hide what the others say.
+    total = max(float(energy[1:].sum()), 1e-300)
     return [
         Region(
             "lines", name, channel, float(np.sqrt(energy[first::2].sum())), 0.0,

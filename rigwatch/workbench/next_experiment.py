@@ -18,6 +18,7 @@ from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.physics.engine.directions import Candidate, directions, trajectory
 from rigwatch.physics.engine.fit import initial_states
 from rigwatch.physics.engine.score import Projector
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.rank import Ranked
 from rigwatch.workbench.study import Derived
@@ -69,6 +70,15 @@ def propose(bench: Bench, best: Ranked, rivals: Sequence[Ranked]) -> Experiment 
     if min(separation.values()) <= min(now.values()):
         return None
     return _worded(bench, name, share, separation, now)
+
+
+def excitation(bench: Bench, experiment: Experiment) -> FloatArray:
+    """The inputs of a proposed experiment at the recording's rate, shape (samples, inputs)."""
+    share = experiment.amplitude / _amplitude(bench, experiment.signal)
+    for name, size, inputs in _excitations(bench):
+        if name == experiment.shape and np.isclose(size, share):
+            return inputs
+    raise ModelError(f"found experiment {experiment.shape!r}, expected one that was proposed here")
 
 
 def _worded(
@@ -212,7 +222,6 @@ def _apart(left: FloatArray, rival: int, best: Ranked) -> float:
 
 
 def _strength(row: Ranked) -> float:
-    assert row.placement is not None
     effect = row.placement.effect
     if row.fitted is not None:
         value = row.fitted.train.values()[row.placement.prefix + effect.strength]
@@ -222,7 +231,6 @@ def _strength(row: Ranked) -> float:
 
 
 def _candidate(row: Ranked) -> Candidate:
-    assert row.placement is not None
     effect = row.placement.effect
     shape = {name: value for name, value in row.start.items() if name != effect.strength}
     return Candidate(row.effect, effect, row.port, shape)

@@ -19,6 +19,8 @@ METHODS = {
     "healthy": "the error of the model on a recording with nothing wrong",
     "quiet band": "the quietest band of the residual, taken for white noise: a lower limit",
 }
+ALLOWED = {"periods": 1.1, "healthy": 1.1, "quiet band": 1.25}
+"""Error over noise floor up to which nothing is left to explain, by how the floor is known."""
 BANDS = 8
 FEWEST_PERIODS = 3
 
@@ -34,6 +36,22 @@ class NoiseFloor:
 
     rms: FloatArray
     method: str
+
+    def ratio(self, fitted: Fit) -> float:
+        """Error over the floor, over all channels."""
+        return float(np.sqrt(np.mean((fitted.rms / self.rms) ** 2)))
+
+    def reached(self, fitted: Fit) -> bool:
+        """Whether the error is as small as noise makes it."""
+        return self.ratio(fitted) <= ALLOWED[self.method]
+
+    def left_over(self, before: Fit, after: Fit, *, tolerant: bool = False) -> float:
+        """Share of the energy above the floor that is left from one fit to a better one.
+
+        Tolerant: an error that counts as small as noise makes it leaves nothing.
+        """
+        above, least = self.ratio(before) ** 2 - 1, ALLOWED[self.method] ** 2 if tolerant else 1.0
+        return max(self.ratio(after) ** 2 - least, 0.0) / max(above, 1e-12)
 
 
 def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int) -> NoiseFloor:
@@ -73,10 +91,16 @@ def find_period(recording: Recording) -> int:
     if not falls.size:
         return 0
     for lag in falls[0] + np.argsort(-alike[falls[0] :])[:3]:
-        difference = signal[lag:] - signal[:-lag]
-        if difference @ difference < 2e-4 * (signal[lag:] @ signal[lag:]):
-            return int(lag)
+        if _repeats(signal, lag):
+            # Two periods are alike, too: the shortest counts.
+            parts = (lag // count for count in range(8, 0, -1) if lag % count == 0)
+            return int(next(part for part in parts if _repeats(signal, part)))
     return 0
+
+
+def _repeats(signal: FloatArray, lag: int) -> bool:
+    difference = signal[lag:] - signal[:-lag]
+    return bool(difference @ difference < 2e-4 * (signal[lag:] @ signal[lag:]))
 
 
 def _between(series: FloatArray, samples: int, count: int) -> FloatArray:

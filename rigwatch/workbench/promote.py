@@ -14,14 +14,24 @@ from msgspec import structs
 
 from monitor.admission import GOOD, Admission
 from monitor.model_file import BandSection, InertiaPlant, PromotedSection, RigModel, model_text
-from monitor.residual import ACCELERATION, G1, G2, MODELLED, TransferResidual
+from monitor.residual import (
+    ACCELERATION,
+    G1,
+    G2,
+    MODELLED,
+    VELOCITY,
+    VOLTAGE,
+    TransferResidual,
+)
 from monitor.rig_monitor import RigMonitor
 from rigwatch.physics.engine.compiled import FloatArray
+from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages import SampleBlock
 from rigwatch.wire.session import open_session
 from rigwatch.workbench.compare import comparison, open_bench
 from rigwatch.workbench.ledger import model_hash
+from rigwatch.workbench.noise_floor import find_period
 from rigwatch.workbench.study import Span, Study
 
 TERMS = {
@@ -32,6 +42,8 @@ TERMS = {
     "constant_force": ("F0", "offset"),
 }
 """Effects that a monitor's model has a place for: the effect's parameter and that place."""
+SMOOTH = 0.2
+"""Speed over which the promoted friction's sign turns, over the velocity's rms."""
 BASES = {"emps-force": ("M", "Fv"), "emps": ("M", "Fv")}
 """Models that are an inertia: their mass and their own viscous friction."""
 
@@ -66,8 +78,7 @@ def promotion(study: Study, model: RigModel) -> Promotion:
         learnt = _of_study(study)
         new = _inertia(study, model, model.plant, learnt)
     else:
-        learnt = _through_filter(study, bare)
-        new = structs.replace(bare, promoted=_section(study, learnt))
+        new, learnt = _transfer(study, bare)
     before, after = (_residual(study, m) for m in (model, new))
     if not after < before:
         raise ModelError(
@@ -126,7 +137,21 @@ def _section(study: Study, learnt: Mapping[str, float]) -> PromotedSection:
     return PromotedSection(study=folder, sha256=model_hash(study), **named)
 
 
-def _through_filter(study: Study, model: RigModel) -> dict[str, float]:
+def _transfer(study: Study, model: RigModel) -> tuple[RigModel, dict[str, float]]:
+    """The rig's model with the accepted friction and the noise that it leaves."""
+    whole = [_columns(study, span, model) for span in study.file.train]
+    smooth = SMOOTH * _rms([columns[:, VELOCITY] for columns in whole])
+    for columns in whole:
+        columns[:, G1] = model.friction.function().simulate(np.tanh(columns[:, VELOCITY] / smooth))
+    settled = [columns[model.decision.settle :] for columns in whole]
+    learnt = _through_filter(study, np.concatenate(settled))
+    section = structs.replace(_section(study, learnt), smooth=smooth)
+    scatter = [_scatter(columns, section, model.sample_rate) for columns in settled]
+    noise = structs.replace(model.noise, residual=max(model.noise.residual, *scatter))
+    return structs.replace(model, promoted=section, noise=noise), learnt
+
+
+def _through_filter(study: Study, columns: FloatArray) -> dict[str, float]:
     """Sizes of the accepted friction in units of θ: least squares over the training recordings."""
     places = sorted({TERMS[a.effect][1] for a in study.file.effects})
     known = {"coulomb": G1, "viscous": G2}
@@ -135,15 +160,40 @@ def _through_filter(study: Study, model: RigModel) -> dict[str, float]:
             f"{study.folder}: found {', '.join(strange)}, expected coulomb or viscous alone as the"
             " rig's model is a transfer function"
         )
-    columns = np.concatenate([_columns(study, span, model) for span in study.file.train])
     regressors = columns[:, [known[place] for place in places]]
     wanted = columns[:, ACCELERATION] - columns[:, MODELLED]
     sizes, *_ = np.linalg.lstsq(regressors, wanted, rcond=None)
     return dict(zip(places, sizes.tolist(), strict=True))
 
 
+def _scatter(columns: FloatArray, known: PromotedSection, sample_rate: float) -> float:
+    """What the friction leaves from period to period, as the estimates feel it: rms [m/s^2].
+
+    The velocity's noise is slow, so that what it does to the friction hangs together over a window
+    and weighs more than white noise of its size. A few periods show it badly, hence the margin of
+    two standard errors. 0 where nothing repeats.
+    """
+    drive = Recording(1 / sample_rate, columns[:, [VOLTAGE]], columns[:, [ACCELERATION]])
+    period = find_period(drive)
+    if not period or len(columns) < 2 * period:
+        return 0.0
+    friction = known.coulomb * columns[:, G1] + known.viscous * columns[:, G2]
+    residual = columns[:, ACCELERATION] - columns[:, MODELLED] - friction
+    change = (residual[period:] - residual[:-period]) / np.sqrt(2)
+    felt = [_felt(change, columns[period:, g], period) for g in (G1, G2)]
+    margin = 1 + 2 / np.sqrt(len(change) / period)
+    return float(margin * max(np.std(change), *felt))
+
+
+def _felt(change: FloatArray, regressor: FloatArray, window: int) -> float:
+    """Noise that would move an estimate over a window as much if it were white."""
+    along = np.convolve(change * regressor, np.ones(window), "valid")
+    size = np.convolve(regressor**2, np.ones(window), "valid")
+    return float(np.sqrt(np.mean(along**2 / size)))
+
+
 def _columns(study: Study, span: Span, model: RigModel) -> FloatArray:
-    """What the residual stage makes of a recording, settled and valid samples, shape (n, 7)."""
+    """What the residual stage makes of a recording's valid samples, shape (n, 7)."""
     needed = (model.channels[0], model.channels[2])
     admission = Admission(model.channels, needed, model.decision.longest_hold)
     stage, kept = TransferResidual(model), []
@@ -152,7 +202,7 @@ def _columns(study: Study, span: Span, model: RigModel) -> FloatArray:
         if admitted is not None:
             columns = stage.update(admitted.signals, admitted.code)
             kept.append(columns[admitted.code == GOOD])
-    return np.concatenate(kept)[model.decision.settle :]
+    return np.concatenate(kept)
 
 
 def _residual(study: Study, model: RigModel) -> float:

@@ -7,23 +7,22 @@ recordings held out decide: an effect counts only if their error falls, block by
 than chance would do.
 """
 
-import ast
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 from scipy.stats import t as student
 
 from rigwatch.physics.engine.compiled import FloatArray
-from rigwatch.physics.engine.directions import RATE, Candidate, directions, shaped, trajectory
-from rigwatch.physics.engine.effect import Effect
+from rigwatch.physics.engine.directions import Candidate, directions, shaped, trajectory
 from rigwatch.physics.engine.fit import Recording, windows
-from rigwatch.physics.engine.model import Model, Port
 from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
+from rigwatch.physics.engine.significance import corrected_p_values
+from rigwatch.physics.engine.suitable import possible, suits
 from rigwatch.physics.engine.system import Placement
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.fitted import Fitted, block_errors, fit_model
+from rigwatch.workbench.noise_floor import NoiseFloor
 from rigwatch.workbench.signals import Data
 from rigwatch.workbench.sizes import port_sizes
 from rigwatch.workbench.study import Accepted, Study
@@ -34,7 +33,18 @@ MATERIAL = 0.03
 """Share by which the held-out error must fall at least to be worth an effect."""
 STEP = 0.025
 """One-sided level at which the held-out error must fall."""
+SAME = 0.9995
+"""Cosine above which two effects are one, whatever they are called."""
+SIMILAR = 0.8
+"""Cosine below which two effects explain different parts of the error."""
+EXPLAINED = 0.95
+"""Share of the energy above the floor that an effect must explain for the error to be known."""
 MOST_FITS = {"static": 24, "dynamic": 6}
+Progress = Callable[[str], None]
+
+
+def unheard(_: str) -> None:
+    """Progress that nobody asked for."""
 
 
 @dataclass(eq=False)
@@ -42,7 +52,7 @@ class Ranked:
     """One effect at one port.
 
     Attributes:
-        effect, port: which one.
+        placement: which one, and where.
         kind: of the port: force, actuator or sensor.
         p_value: of the score, corrected for the number of candidates.
         explained: share of the residual's energy in training that it explains to first order.
@@ -57,8 +67,7 @@ class Ranked:
         trouble: why it cannot be fitted, empty where it can.
     """
 
-    effect: str
-    port: str
+    placement: Placement
     kind: str
     p_value: float
     explained: float
@@ -71,7 +80,21 @@ class Ranked:
     accepted: bool = False
     reason: str = "not like the residual"
     trouble: str = ""
-    placement: Placement | None = field(default=None, repr=False)
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect."""
+        return self.placement.name
+
+    @property
+    def port(self) -> str:
+        """Where it may be missing."""
+        return self.placement.port
+
+    @property
+    def free(self) -> int:
+        """Parameters that a fit of it moves."""
+        return self.placement.effect.free
 
     @property
     def label(self) -> str:
@@ -97,33 +120,12 @@ def candidates(study: Study, recording: Recording) -> list[Candidate]:
     ]
 
 
-def suits(effect: Effect, port: Port, model: Model) -> bool:
-    """Whether the effect can stand at the port and finds all that its equations name there."""
-    if not effect.fits(port.kind):
-        return False
-    if effect.states and port.kind != "force" and not model.states:
-        return False
-    texts = [effect.expression, *(s.derivative for s in effect.states.values())]
-    used = {n.id for text in texts for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)}
-    functions = {
-        n.func.id
-        for text in texts
-        for n in ast.walk(ast.parse(text))
-        if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
-    }
-    own = {*effect.parameters, *effect.states, "t", RATE, *({"u"} if port.kind != "force" else ())}
-    return used - functions - own <= set(port.variables)
-
-
-def score_all(
-    data: Data, base: Fitted, found: Sequence[Candidate], variance: float | None
-) -> Scores:
+def score_all(data: Data, base: Fitted, found: Sequence[Candidate]) -> Scores:
     """Scores of all candidates along the fitted base model.
 
     Args:
         data, base: the model and what it was fitted to.
         found: the candidates.
-        variance: of the scaled residuals where nothing is missing; theirs as they are if None.
     """
     fitted, recording = base.train, data.train
     cut = windows(base.compiled.system, len(recording), base.horizon)
@@ -137,9 +139,8 @@ def score_all(
     slopes = slopes.reshape(*flat, slopes.shape[-1])
     m = len(base.compiled.system.free)
     residual = np.nan_to_num(fitted.residuals / fitted.scale).reshape(flat)
-    if variance is None:
-        variance = float(np.mean(residual**2))
-    return score(residual, moved, Projector(slopes[..., :m], slopes[..., m:]), variance)
+    fixed = Projector(slopes[..., :m], slopes[..., m:])
+    return score(residual, moved, fixed, float(np.mean(residual**2)))
 
 
 def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatArray, FloatArray]:
@@ -159,61 +160,63 @@ def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatA
     return directions(at, found) / scale, run.slopes / scale
 
 
-def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> FloatArray:
-    """p-values of the scores where residuals hang together, corrected for all candidates.
-
-    The variance of a sum of products of two series is larger than that of white noise by
-    Σ_k ρr(k)·ρd(k) (M. S. Bartlett, 1946), with the autocorrelations ρ of the direction and of
-    the residual that is left without the candidate.
+def rank(
+    study: Study, data: Data, base: Fitted, floor: NoiseFloor, progress: Progress = unheard
+) -> list[Ranked]:
+    """All effects at all ports, the best first; those worth it fitted and judged.
 
     Args:
-        scores: of the candidates.
-        residual: scaled, what the scores are of, shape (samples,).
-        windows_: windows that the samples come from.
+        study, data, base: the model and what it was fitted to.
+        floor: of the held-out recordings.
+        progress: told which fit begins.
     """
-    shape = (windows_, -1, scores.units.shape[1])
-    along = scores.units.T @ residual
-    left = residual[:, None] - scores.units * along
-    own, other = (
-        _autocorrelation(left.reshape(shape)),
-        _autocorrelation(scores.units.reshape(shape)),
-    )
-    swollen = np.maximum(1.0, own[0] * other[0] + 2 * np.sum(own[1:] * other[1:], axis=0))
-    spread = np.maximum(np.sum(left**2, axis=0), 1e-300) / max(len(residual) - 1, 1)
-    alone = chi2.sf(along**2 / (spread * swollen), 1)
-    tests = max(int(np.sum(scores.score > 0)), 1)
-    return np.asarray(-np.expm1(tests * np.log1p(-np.minimum(alone, 1 - 1e-16))))
-
-
-def _autocorrelation(signals: FloatArray) -> FloatArray:
-    """Over the windows of (windows, samples, k), tapered, up to a quarter of a window."""
-    count = signals.shape[1]
-    spectrum = np.fft.rfft(signals, 2 * count, axis=1)
-    power = np.mean(np.abs(spectrum) ** 2, axis=0)
-    together = np.fft.irfft(power, axis=0)[: max(min(count // 4, 200), 1)]
-    taper = 1 - np.arange(len(together)) / len(together)
-    start = np.where(together[0] > 0, together[0], 1.0)
-    return np.asarray(together / start * taper[:, None])
-
-
-def rank(study: Study, data: Data, base: Fitted, variance: float | None = None) -> list[Ranked]:
-    """All effects at all ports, the best first; those worth it fitted and judged."""
-    found = candidates(study, data.train)
-    scores = score_all(data, base, found, variance)
-    residual = np.nan_to_num(base.train.residuals / base.train.scale).ravel()
-    p_values = corrected_p_values(scores, residual, len(base.train.residuals))
-    rows = _best_shapes(study, found, scores, p_values)
-    for row in _worth_a_fit(rows, "dynamic" if study.model.states else "static"):
+    rows = _scored(study, data, base, candidates(study, data.train))
+    chosen = _worth_a_fit(rows, "dynamic" if study.model.states else "static")
+    enough: list[Ranked] = []
+    for number, row in enumerate(chosen, start=1):
+        if any(other.cosines[row.label] < SIMILAR for other in enough):
+            row.reason = f"unlike {enough[0].label}, which leaves nothing to explain; not fitted"
+            continue
+        progress(f"fitting {row.label}, {number} of at most {len(chosen)}")
         refit(study, data, base, row)
+        if row.accepted and _leaves_nothing(row, base, floor):
+            enough.append(row)
+    while double := _unfitted_double(rows):
+        progress(f"fitting {double.label}, which looks like the best")
+        refit(study, data, base, double)
     return sorted(rows, key=_order)
+
+
+def _unfitted_double(rows: Sequence[Ranked]) -> Ranked | None:
+    """What looks like the best to first order and was not fitted: only its fit shows whether."""
+    accepted = [row for row in rows if row.accepted]
+    if not accepted:
+        return None
+    best = min(accepted, key=_order)
+    waiting = {row.label: row for row in rows if row.fitted is None and not row.trouble}
+    alike = (waiting[label] for label in best.alike if label in waiting)
+    return next((row for row in alike if best.cosines[row.label] <= SAME), None)
+
+
+def _leaves_nothing(row: Ranked, base: Fitted, floor: NoiseFloor) -> bool:
+    """Whether it explains so much of the error above the floor that only its like could as well."""
+    assert row.fitted is not None
+    return floor.left_over(base.held_out, row.fitted.held_out) < 1 - EXPLAINED
 
 
 def rank_only(study: Study, data: Data, base: Fitted, found: Sequence[Candidate]) -> Ranked:
     """The row of one effect at one port, whatever its score; `found` are its shapes."""
-    scores = score_all(data, base, found, None)
+    return _scored(study, data, base, found, every=True)[0]
+
+
+def _scored(
+    study: Study, data: Data, base: Fitted, found: Sequence[Candidate], *, every: bool = False
+) -> list[Ranked]:
+    """One row an effect and port, scored and not yet fitted, the likeliest first."""
+    scores = score_all(data, base, found)
     residual = np.nan_to_num(base.train.residuals / base.train.scale).ravel()
     p_values = corrected_p_values(scores, residual, len(base.train.residuals))
-    return _best_shapes(study, found, scores, p_values, every=True)[0]
+    return _best_shapes(study, found, scores, p_values, every=every)
 
 
 def _best_shapes(
@@ -222,12 +225,12 @@ def _best_shapes(
     scores: Scores,
     p_values: FloatArray,
     *,
-    every: bool = False,
+    every: bool,
 ) -> list[Ranked]:
     """One row an effect and port, with the shape that the residual looks like most."""
     best: dict[tuple[str, str], int] = {}
     for index, candidate in enumerate(found):
-        if not every and not _possible(candidate, float(scores.strength[index])):
+        if not every and not possible(candidate, float(scores.strength[index])):
             continue
         key = (candidate.name, candidate.port)
         if key not in best or scores.score[index] > scores.score[best[key]]:
@@ -241,21 +244,13 @@ def _best_shapes(
         candidate = found[index]
         rows.append(
             Ranked(
-                name, port, study.model.ports[port].kind, float(p_values[index]),
+                Placement(name, candidate.effect, port), study.model.ports[port].kind,
+                float(p_values[index]),
                 float(scores.explained[index]), _start(candidate, float(scores.strength[index])),
-                alike, cosines, placement=Placement(name, candidate.effect, port),
+                alike, cosines,
             )
         )  # fmt: skip
     return sorted(rows, key=lambda row: -row.explained)
-
-
-def _possible(candidate: Candidate, strength: float) -> bool:
-    """Whether the strength that the score suggests lies on the right side of its bounds."""
-    p = candidate.effect.parameters[candidate.effect.strength]
-    if p.role == "switch":
-        return strength > 0
-    value = p.neutral + strength
-    return min(p.low, p.neutral) <= value <= max(p.high, p.neutral)
 
 
 def _start(candidate: Candidate, strength: float) -> dict[str, float]:
@@ -285,21 +280,14 @@ def _worth_a_fit(rows: Sequence[Ranked], kind: str) -> list[Ranked]:
 
 def _told_by(row: Ranked, told: dict[str, Ranked], likely: Sequence[Ranked]) -> str | None:
     """What is fitted in the row's place: a double of no more parameters, or of lower order."""
-    assert row.placement is not None
     lower = f"{row.placement.effect.refines}@{row.port}"
     if lower in row.alike and any(other.label == lower for other in likely):
         return lower
-    return next((c for c in row.alike if c in told and _free(told[c]) <= _free(row)), None)
-
-
-def _free(row: Ranked) -> int:
-    assert row.placement is not None
-    return row.placement.effect.free
+    return next((c for c in row.alike if c in told and told[c].free <= row.free), None)
 
 
 def refit(study: Study, data: Data, base: Fitted, row: Ranked) -> None:
     """Fit the model with the row's effect and judge it on the recordings held out."""
-    assert row.placement is not None
     prefix = row.placement.prefix
     start = base.train.values() | {prefix + name: value for name, value in row.start.items()}
     try:
@@ -336,7 +324,6 @@ def gain(base: Fitted, other: Fitted) -> tuple[float, float]:
 def accepted_from(row: Ranked) -> Accepted:
     """The row as a study's file lists it, its fit's values to start from."""
     assert row.fitted is not None
-    assert row.placement is not None
     prefix = row.placement.prefix
     values = {
         name[len(prefix) :]: value

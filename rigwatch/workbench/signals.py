@@ -56,6 +56,13 @@ class Data:
     horizon: int
     remarks: tuple[str, ...]
 
+    @property
+    def of_healthy(self) -> "Data | None":
+        """The healthy recording to be fitted and judged by itself, None where there is none."""
+        if self.healthy is None:
+            return None
+        return Data(self.healthy, self.healthy, None, self.horizon, ())
+
 
 def read_columns(study: Study, span: Span) -> Columns:
     """The channels of a session, or of a part of it.

@@ -3,18 +3,13 @@
 Report and view show the same stages, each fitted to the same data.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from msgspec import structs
 
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.physics.engine.fit import Recording, evaluate
-from rigwatch.workbench.compare import Bench, Comparison, comparison, noise_floor
-from rigwatch.workbench.fitted import fit_base
-from rigwatch.workbench.ledger import check_data
-from rigwatch.workbench.noise_floor import quiet_scale
-from rigwatch.workbench.signals import prepare
+from rigwatch.workbench.compare import Bench, Comparison, bench_of, comparison, prepared
 from rigwatch.workbench.study import Study
 
 
@@ -63,16 +58,11 @@ def stages(study: Study) -> list[Stage]:
     Raises:
         ModelError: data have changed, or do not suit the model.
     """
-    check_data(study)
-    data = prepare(study)
-    scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
-    found = []
-    for count in range(len(study.file.effects) + 1):
-        effects = study.file.effects[:count]
-        part = replace(study, file=structs.replace(study.file, effects=effects))
-        base = fit_base(part, data, scale)
-        bench = Bench(part, data, base, noise_floor(part, data, base))
-        added = f"{effects[-1].effect}@{effects[-1].port}" if effects else ""
+    study, data, scale = prepared(study)
+    effects, found = study.file.effects, []
+    for count in range(len(effects) + 1):
+        bench = bench_of(study.with_effects(effects[:count]), data, scale)
+        added = f"{effects[count - 1].effect}@{effects[count - 1].port}" if count else ""
         found.append(Stage(added, bench, comparison(bench)))
     return found
 

@@ -9,23 +9,21 @@ import difflib
 import os
 import shutil
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
-from importlib.metadata import entry_points
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
-from msgspec import Meta, field
+from msgspec import Meta, field, structs
 
 from rigwatch.physics.engine.effect import Effect, library, load_effects
 from rigwatch.physics.engine.model import Model, load_model, shipped_models
+from rigwatch.physics.engine.offered import offered
 from rigwatch.wire.config import Section, load
 from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError
 
 FILE = "study.toml"
 LEDGER = "ledger.jsonl"
-GROUP = "rigwatch.effects"
-"""Entry points of this group give a mapping of effects by name, or a function that returns one."""
 _TABLE = "\n[[effects]]\n"
 
 
@@ -122,6 +120,10 @@ class Study:
         spans = (*self.file.train, *self.file.held_out, *self.file.healthy)
         return {span.session: self.folder / span.session for span in spans}
 
+    def with_effects(self, effects: Sequence[Accepted]) -> "Study":
+        """The same with these effects in its model, in memory alone."""
+        return replace(self, file=structs.replace(self.file, effects=tuple(effects)))
+
     def effect(self, name: str) -> Effect:
         """The effect called `name`.
 
@@ -151,7 +153,7 @@ def open_study(folder: Path | str) -> Study:
     if not path.is_file():
         raise ConfigError(path, "", "no such file", "a study; make one with `rigwatch study new`")
     file = load(path, StudyFile)
-    given = _own_effects(folder, file)
+    given = offered(folder / name for name in file.effect_files)
     effects = {**library(), **given}
     study = Study(folder, file, _model(folder, file.model), effects, frozenset(given))
     for accepted in file.effects:
@@ -166,16 +168,6 @@ def _model(folder: Path, name: str) -> Model:
     if name not in models:
         raise ModelError(f"{folder / FILE}: found model {name!r}, expected {nearest(name, models)}")
     return models[name]
-
-
-def _own_effects(folder: Path, file: StudyFile) -> dict[str, Effect]:
-    found: dict[str, Effect] = {}
-    for entry in entry_points(group=GROUP):
-        given = entry.load()
-        found |= given() if callable(given) else given
-    for name in file.effect_files:
-        found |= load_effects(folder / name)
-    return found
 
 
 def create(folder: Path | str, template: Path | str, sessions: Path | str | None = None) -> Study:

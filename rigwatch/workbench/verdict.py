@@ -8,31 +8,29 @@ Of effects that do equally well on the recordings held out, the one with the few
 named first; the others of its kind form its class.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from rigwatch.physics.engine.effect import Effect
 from rigwatch.physics.engine.score import ALIKE
+from rigwatch.workbench.calibration import CLEAR, Evidence, doubt
 from rigwatch.workbench.fitted import Fitted, block_errors
 from rigwatch.workbench.noise_floor import NoiseFloor
-from rigwatch.workbench.rank import Ranked
+from rigwatch.workbench.rank import EXPLAINED, SAME, SIMILAR, Ranked
 
 Word = Literal["nothing_missing", "missing_effect", "undetermined", "unknown_effect"]
-ALLOWED = {"periods": 1.1, "healthy": 1.1, "quiet band": 1.25}
-"""Error over noise floor up to which nothing is missing, by how the floor is known."""
 EQUAL = 2.0
 """Standard deviations of a paired difference below which two effects do equally well."""
-SAME = 0.9995
-"""Cosine above which two effects are one, whatever they are called."""
-SIMILAR = 0.8
-"""Cosine below which two effects that do equally well explain different parts of the error."""
+NO_DIFFERENCE = 1e-4
+"""Relative difference of errors that only says where two fits happened to stop."""
+PERHAPS = 1.0
+"""Standard deviations by which an effect with more parameters may be the better one."""
+MUCH_WORSE = 1.5
+"""Ratio of held-out errors that no chance favour of what else is missing explains."""
 MOST_OF_IT = 0.75
 """Share of a gain that an effect of lower order must have to go first."""
-EXPLAINED = 0.9
-"""Share of the energy above the floor that known effects must explain, or it is unknown."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +44,7 @@ class Verdict:
         rivals: labels of other physics that this recording cannot tell from it.
         text: a sentence for people.
         second: labels of what is missing as well, where two effects hide at once.
+        evidence: what the verdict rests on.
     """
 
     word: Word
@@ -54,86 +53,148 @@ class Verdict:
     rivals: tuple[str, ...]
     text: str
     second: tuple[str, ...] = ()
+    evidence: Evidence = field(default_factory=Evidence)
+
+    @property
+    def doubt(self) -> float:
+        """Probability of being wrong, calibrated on simulated cases."""
+        return doubt(self.word, self.evidence)
 
 
-def judge(
-    base: Fitted, rows: Sequence[Ranked], effects: Mapping[str, Effect], floor: NoiseFloor
-) -> Verdict:
+def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     """The verdict on a ranking; `floor` is of the held-out recordings."""
     accepted = [row for row in rows if row.accepted]
     if not accepted:
         return _nothing_found(base, floor)
-    best = _named(accepted, effects)
-    equals = [row for row in accepted if row is not best and _equal(best, row)]
-    same = {row.label for row in rows if _same_words(best, row, effects)}
-    members = [best.label, *(row.label for row in equals if row.label in same)]
-    members += [name for name in best.alike if name in same and name not in members]
-    rivals = [
-        row.label
-        for row in rows
-        if (row in equals or row.fitted is None)
-        and best.cosines.get(row.label, 0.0) > (SIMILAR if row in equals else ALIKE)
-        and row.label not in same
-        and effects[row.effect].free <= effects[best.effect].free
-    ]
+    best = _named(accepted, floor)
     assert best.fitted is not None
-    if floor.method != "quiet band" and left_over(base, best.fitted, floor) > 1 - EXPLAINED:
-        text = (
+    trusted = floor.reached(best.fitted.held_out)
+    members, rivals = _undistinguished(best, rows, trusted=trusted)
+    evidence = Evidence(
+        floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
+    )
+    word, text = _word(base, best, rivals, floor)
+    return Verdict(word, best, members, rivals, text, evidence=evidence)
+
+
+def _word(
+    base: Fitted, best: Ranked, rivals: tuple[str, ...], floor: NoiseFloor
+) -> tuple[Word, str]:
+    """The verdict where an effect lowers the error, and a sentence for people."""
+    assert best.fitted is not None
+    left = floor.left_over(base.held_out, best.fitted.held_out, tolerant=True)
+    if floor.method != "quiet band" and left > 1 - EXPLAINED:
+        return "unknown_effect", (
             f"the best known effect, {best.label}, leaves much of the error above the noise floor"
         )
-        return Verdict("unknown_effect", best, tuple(members), tuple(rivals), text)
     if rivals:
-        text = f"{best.label} and {', '.join(rivals)} explain this recording equally well"
-        return Verdict("undetermined", best, tuple(members), tuple(rivals), text)
-    text = f"{best.label} is missing: the held-out error falls from {base.held_out_error:.3g} to"
-    return Verdict("missing_effect", best, tuple(members), (), f"{text} {best.held_out_error:.3g}")
-
-
-def _same_words(best: Ranked, row: Ranked, effects: Mapping[str, Effect]) -> bool:
-    """Whether two effects say the same: of one family, or without any difference to be seen."""
-    if row is best or best.cosines.get(row.label, 0.0) > SAME:
-        return True
-    return bool(effects[best.effect].family) and (
-        effects[row.effect].family == effects[best.effect].family
+        return "undetermined", (
+            f"{best.label} and {', '.join(rivals)} explain this recording equally well"
+        )
+    return "missing_effect", (
+        f"{best.label} is missing: the held-out error falls from {base.held_out_error:.3g} to"
+        f" {best.held_out_error:.3g}"
     )
 
 
+def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> float:
+    """Standard deviations by which the best does better than all that it is not confused with."""
+    others = [row for row in rows if row.fitted is not None and row.label not in confused]
+    return min((_ahead(best, row) for row in others), default=CLEAR)
+
+
+def _undistinguished(
+    best: Ranked, rows: Sequence[Ranked], *, trusted: bool
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Labels of what this recording cannot tell from the best: its own kind, and other physics.
+
+    Args:
+        best: what is named.
+        rows: the ranking.
+        trusted: whether the best leaves nothing but noise. Where more is left, whatever causes it
+            may favour one of two effects that look alike, so that neither rules the other out, and
+            an effect with more parameters gains from it without a reason of its own.
+    """
+    members, rivals = [best.label], []
+    for row in rows:
+        if row is best:
+            continue
+        cosine = best.cosines.get(row.label, 0.0)
+        if cosine > SAME or _kin(best, row):
+            if _equal(best, row, cosine) and _earns(best, row):
+                members.append(row.label)
+        elif _rivals(best, row, cosine, trusted=trusted):
+            rivals.append(row.label)
+    return tuple(members), tuple(rivals)
+
+
+def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
+    """Whether other physics does as well: with more parameters only if it does no worse."""
+    if not row.accepted:
+        return False
+    if row.free > best.free:
+        no_worse = row.held_out_error <= best.held_out_error * (1 + NO_DIFFERENCE)
+        better = cosine > SIMILAR and _ahead(row, best) > PERHAPS
+        return trusted and ((cosine > ALIKE and no_worse) or better)
+    if cosine > ALIKE and not trusted and row.held_out_error < MUCH_WORSE * best.held_out_error:
+        return True
+    return cosine > SIMILAR and _equal(best, row, cosine)
+
+
+def _kin(best: Ranked, row: Ranked) -> bool:
+    family = best.placement.effect.family
+    return bool(family) and row.placement.effect.family == family
+
+
+def _earns(best: Ranked, row: Ranked) -> bool:
+    """Whether it is no refinement, with more parameters or of higher order, without a reason."""
+    known = {best.effect, *(name.split("@")[0] for name in best.alike)}
+    return row.free <= best.free and row.placement.effect.refines not in known
+
+
 def _nothing_found(base: Fitted, floor: NoiseFloor) -> Verdict:
-    ratio = above_floor(base, floor)
-    if ratio <= ALLOWED[floor.method]:
+    ratio = floor.ratio(base.held_out)
+    if floor.reached(base.held_out):
         text = f"the held-out error is {ratio:.2f} times the noise floor, and no effect lowers it"
         return Verdict("nothing_missing", None, (), (), text)
     text = f"the held-out error is {ratio:.2f} times the noise floor, and no known effect lowers it"
     return Verdict("unknown_effect", None, (), (), text)
 
 
-def above_floor(fitted: Fitted, floor: NoiseFloor) -> float:
-    """Held-out error over the noise floor, over all channels."""
-    return float(np.sqrt(np.mean((fitted.held_out.rms / floor.rms) ** 2)))
+def _named(accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranked:
+    """Of equals the one with the fewest parameters; what it refines first, while more is missing.
 
-
-def left_over(base: Fitted, best: Fitted, floor: NoiseFloor) -> float:
-    """Share of the energy above the floor that is left with better effects."""
-    allowed = ALLOWED[floor.method] ** 2
-    before, after = above_floor(base, floor) ** 2 - 1, above_floor(best, floor) ** 2
-    return max(after - allowed, 0.0) / max(before, 1e-12)
-
-
-def _named(accepted: Sequence[Ranked], effects: Mapping[str, Effect]) -> Ranked:
+    While more is missing an effect of higher order takes some of that, too. Where it leaves nothing
+    but noise it is what is missing.
+    """
     top = min(accepted, key=lambda row: row.held_out_error)
-    equals = [row for row in accepted if row is top or _equal(top, row)]
-    best = min(equals, key=lambda row: (effects[row.effect].free, row.held_out_error))
-    lower = effects[best.effect].refines
+    equals = [row for row in accepted if row is top or _equal(top, row, 0.0)]
+    best = min(equals, key=lambda row: (row.free, row.held_out_error))
+    assert best.fitted is not None
+    if floor.reached(best.fitted.held_out):
+        return best
+    lower = best.placement.effect.refines
     for row in accepted:
         if row.effect == lower and row.gain and best.gain and row.gain > MOST_OF_IT * best.gain:
             return row
     return best
 
 
-def _equal(one: Ranked, other: Ranked) -> bool:
+def _equal(one: Ranked, other: Ranked, cosine: float) -> bool:
+    """Whether two do equally well on the recordings held out; unfitted, whether they are one."""
+    if other.fitted is None:
+        return cosine > SAME
+    assert one.fitted is not None
+    if not other.accepted:
+        return False
+    same = abs(other.held_out_error / one.held_out_error - 1) < NO_DIFFERENCE
+    return bool(same or abs(_ahead(one, other)) < EQUAL)
+
+
+def _ahead(one: Ranked, other: Ranked) -> float:
+    """Standard deviations of the paired held-out difference by which one does better."""
     assert one.fitted is not None
     assert other.fitted is not None
     difference = block_errors(other.fitted.held_out) - block_errors(one.fitted.held_out)
     spread = difference.std(ddof=1) / np.sqrt(len(difference))
-    same = abs(other.held_out_error / one.held_out_error - 1) < 0.005
-    return bool(same or abs(difference.mean()) < EQUAL * spread)
+    return float(difference.mean() / max(spread, 1e-300))

@@ -78,6 +78,7 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
     lines = [
         f"verdict: {VERDICTS[found.verdict]}",
         f"  {found.text}",
+        f"  {doubt_of(found)}",
         "",
         f"now: training {base.train_error:.4g}, held out {base.held_out_error:.4g},"
         f" noise floor {base.noise_floor:.4g} {base.unit}",
@@ -90,6 +91,17 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
     if found.next_experiment:
         lines += ["", f"next experiment: {found.next_experiment.text}"]
     return lines
+
+
+def doubt_of(found: Explanation) -> str:
+    """How often a verdict like this one was wrong where the truth was known, in a sentence."""
+    cases, wrong = found.like_this
+    if not cases:
+        return "no simulated case looked like this one: how often that is wrong is not known"
+    return (
+        f"probability of being wrong {found.wrong_probability:.1%}: of {cases} simulated cases"
+        f" with such a verdict {wrong} were wrong"
+    )
 
 
 def _ranked(row: Row) -> list[str]:

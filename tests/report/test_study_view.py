@@ -25,3 +25,18 @@ def test_a_file_for_the_viewer_holds_every_step(
     for entity in (b"force/signals/measured", b"force/residual/model_alone",
                    b"force/signals/coulomb", b"force/residual/constant_force"):  # fmt: skip
         assert entity in content
+
+
+def test_a_missing_folder_is_named_before_the_long_work(
+    study: Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "nowhere" / "drive.rrd"
+    assert main(["study", "view", str(study.folder), "--save", str(target)]) != 0
+    said = capsys.readouterr().err
+    assert (
+        said.strip()
+        .splitlines()[-1]
+        .endswith(f"{target}: found no folder {target.parent}, expected one to write to")
+    )
+    assert "Traceback" not in said
+    assert "fitting" not in said

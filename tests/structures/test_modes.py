@@ -1,11 +1,13 @@
+import re
 import xml.etree.ElementTree as Xml
 
 import numpy as np
 import pytest
 
+from rigwatch.commands import main
 from rigwatch.structures.drawing import shares_svg
 from rigwatch.structures.strain_energy import by_family, strain_energy
-from tests.structures.antenna import antenna
+from tests.structures.antenna import FILE, antenna
 
 
 @pytest.fixture(scope="module")
@@ -37,3 +39,19 @@ def test_the_figure_has_a_bar_for_every_spring_in_every_mode(energy):
     root = Xml.fromstring(shares_svg(energy, "a & b"))
     bars = [e for e in root.iter() if e.tag.endswith("title")]
     assert len(bars) == 8 * 14
+
+
+def test_the_page_holds_both_figures_and_every_share(energy, tmp_path, capsys):
+    target = tmp_path / "modes.html"
+    assert main(["structure", "modes", str(FILE), "--report", str(target), "--json"]) == 0
+    text = target.read_text(encoding="utf-8")
+    drawings = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
+    bars = [re.findall(r"<title>mode \d, (\w+):", drawing) for drawing in drawings]
+    assert [len(names) for names in bars] == [8 * 6, 8 * 4]
+    assert set(bars[1]) == {"k1_2", "k1_3", "k1_6", "k1_7"}
+    for drawing in drawings:
+        Xml.fromstring(drawing)
+    for name, shares in zip(energy.springs, energy.shares.T.tolist(), strict=True):
+        for mode, share in enumerate(shares, start=1):
+            assert f'<data value="{share!r}" data-name="{name}:{mode}">' in text
+    assert not re.search(r"<script|<link|<img|@import|url\(", text)

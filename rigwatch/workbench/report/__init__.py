@@ -32,7 +32,7 @@ def gather(study: Study, progress: Callable[[str], None] = lambda _: None) -> se
     shown = [signals(stage) for stage in found]
     progress("ranking what may be missing")
     last = found[-1].bench
-    rows, verdict = ranking(last)
+    rows, verdict = ranking(last, progress)
     told = explanation(last, rows, verdict)
     before, now = locate(found[0].bench), locate(last)
     return sections.Material(study, found, shown, told, before, now, list(book.lines(study)))

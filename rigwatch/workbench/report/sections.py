@@ -15,7 +15,7 @@ from rigwatch.workbench.locate import Region
 from rigwatch.workbench.report import charts
 from rigwatch.workbench.stages import Signals, Stage
 from rigwatch.workbench.study import Study
-from rigwatch.workbench.words import VERDICTS
+from rigwatch.workbench.words import VERDICTS, doubt_of
 
 VIEWS = {
     "direction": "direction of motion",
@@ -73,7 +73,7 @@ def header(m: Material) -> str:
     return (
         f'<p class="kicker">{escape(name)} · {escape(m.study.model.name)}</p>'
         f'<h1 id="verdict" data-verdict="{m.explanation.verdict}">{escape(_headline(m))}</h1>'
-        f"<p>{escape(_story(m))}</p>"
+        f"<p>{escape(_story(m))}</p><p>{escape(_sentence(doubt_of(m.explanation)))}</p>"
         f'<p class="sub">{escape(m.study.model.summary)} Noise floor from'
         f' {escape(last.noise_from)}.</p><div class="figures">{figures}</div>'
     )
@@ -95,6 +95,10 @@ def _headline(m: Material) -> str:
     fall = f"Error {first.held_out_error:.3g} → {last.held_out_error:.3g} {last.unit}"
     still = words.replace("probably", "probably still", 1)
     return f"{fall} on unseen data; {still}"
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _plain(effect: str) -> str:

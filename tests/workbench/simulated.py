@@ -1,0 +1,54 @@
+"""A simulated mass on a spring with a hidden effect, as an open study in memory."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.physics.engine.effect import library
+from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.model import shipped_models
+from rigwatch.workbench.compare import Bench, noise_floor
+from rigwatch.workbench.fitted import fit_base
+from rigwatch.workbench.signals import Data
+from rigwatch.workbench.study import Span, Study, StudyFile
+from sim_plant.oscillator import DAMPING, MASS, RATE, STIFFNESS, Hidden, oscillate, strength_for
+
+HORIZON = 256
+FloatArray = NDArray[np.float64]
+
+
+def multisine(lines: FloatArray, size: float, seconds: float = 20.0, seed: int = 4) -> FloatArray:
+    """Force with these frequencies [Hz] and random phases, rms `size` [N]."""
+    time = np.arange(round(seconds * RATE)) / RATE
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
+    waves = np.cos(2 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
+    return np.asarray(size * waves / np.sqrt(len(lines) / 2))
+
+
+def opened(force: FloatArray, hidden: str = "", share: float = 0.05, noise: float = 2e-3) -> Bench:
+    """The plant driven by `force`, an effect hidden that changes its outputs by `share`."""
+    faults = (Hidden(hidden, strength_for(hidden, force, share)),) if hidden else ()
+    return fitted(force, faults, noise)
+
+
+def fitted(force: FloatArray, hidden: tuple[Hidden, ...], noise: float, seed: int = 1) -> Bench:
+    """The same with effects of given strengths; `noise` over the outputs' rms."""
+    scale = noise * oscillate(force, (), np.zeros(2), 0).std(axis=0)
+    made = [
+        Recording(1 / RATE, force[:, None], oscillate(force, effects, scale, seed + k))
+        for k, effects in enumerate((hidden, hidden, ()))
+    ]
+    data = Data(made[0], made[1], made[2], HORIZON, ())
+    of = study()
+    base = fit_base(of, data, scale)
+    return Bench(of, data, base, noise_floor(of, data, base))
+
+
+def study() -> Study:
+    """A mass-spring-damper that is to be fitted."""
+    span = (Span(session="simulated"),)
+    start = {"m": 1.2 * MASS, "c": 0.8 * DAMPING, "k": 1.1 * STIFFNESS}
+    file = StudyFile(model="mass-spring-damper", train=span, held_out=span, start=start)
+    model = shipped_models()["mass-spring-damper"]
+    return Study(Path(), file, model, library(), frozenset())

@@ -1,0 +1,63 @@
+"""The analytic model of the rig against the simulated rig, whose equations are others."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.physics.engine.effect import library
+from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.model import shipped_models
+from rigwatch.workbench.commissioned import commissioned
+from rigwatch.workbench.fitted import fit_base
+from rigwatch.workbench.signals import Data
+from rigwatch.workbench.study import Span, Study, StudyFile
+from sim_plant.excitation import Multisine, drive
+from sim_plant.parameters import RigParameters
+from sim_plant.rig import Rig
+
+RIG = RigParameters()
+SAMPLES = 2560
+NOISE = np.array(
+    [
+        np.hypot(RIG.lvdt_noise, RIG.lvdt_resolution / np.sqrt(12)),
+        np.hypot(RIG.accelerometer_noise, RIG.si_per_code[2] / np.sqrt(12)),
+    ]
+)
+
+
+def recorded(seed: int, **effects: float) -> Recording:
+    rig = Rig(RIG, seed)
+    for name, value in effects.items():
+        rig.set_effect(name, value)
+    source = drive(Multisine(amplitude=2.5, start=0.5, stop=12.0, seed=seed), RIG.sample_rate)
+    rig.advance(source(np.arange(1024)))
+    si = rig.advance(source(np.arange(1024, 1024 + SAMPLES))).codes * RIG.si_per_code
+    return Recording(1 / RIG.sample_rate, si[:, :1].copy(), si[:, 1:].copy())
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    span = (Span(session="simulated"),)
+    file = StudyFile(model="servo-pneumatic", train=span, held_out=span)
+    given = Study(Path(), file, shipped_models()["servo-pneumatic"], library(), frozenset())
+    healthy = recorded(3)
+    return commissioned(given, Data(healthy, healthy, healthy, 128, ()), NOISE)
+
+
+def test_the_analytic_model_reaches_the_noise_of_the_sensors(study):
+    fitted = fit_base(study, Data(recorded(1), recorded(2), None, 128, ()), NOISE)
+    assert (fitted.held_out.rms < 1.1 * NOISE).all()
+
+
+def test_what_a_healthy_recording_tells_is_not_fitted_away(study):
+    leaking = Data(recorded(1, chamber_leak=0.004), recorded(2, chamber_leak=0.004), None, 128, ())
+    held = fit_base(study, leaking, NOISE)
+    assert (held.held_out.rms > 1.5 * NOISE).all()
+    assert "Cs" not in held.compiled.system.free
+
+
+def test_without_a_healthy_recording_nothing_is_moved(study):
+    plain = replace(study, model=shipped_models()["servo-pneumatic"])
+    assert commissioned(plain, Data(recorded(1), recorded(2), None, 128, ()), NOISE) is plain
