@@ -2,13 +2,12 @@
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands._sessions import say
+from rigwatch.commands._sessions import check_folder, say
 from rigwatch.commands._structures import figures
-from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,6 +20,8 @@ if TYPE_CHECKING:
 
 SHOWN = 5
 """Places of a damage that are told."""
+SIGHT = 5.0
+"""Multiples of the largest measured value up to which a modelled one is drawn."""
 
 
 def add_views(parser: argparse.ArgumentParser) -> None:
@@ -34,12 +35,11 @@ def wanted(arguments: argparse.Namespace) -> bool:
 
     Raises:
         MissingExtraError: Rerun is not installed.
-        ModelError: a file's folder does not exist.
+        SessionError: a file's folder does not exist.
     """
     files = [file for file in (arguments.save, arguments.picture) if file]
     for file in files:
-        if not file.parent.is_dir():
-            raise ModelError(f"{file}: found no folder {file.parent}, expected one to write to")
+        check_folder(file)
     if not files:
         return False
     from rigwatch.dashboard import require_rerun
@@ -69,8 +69,10 @@ def draw_damage(arguments: argparse.Namespace, found: "Examination") -> None:
         for k, name in enumerate(model.signals)
     ]  # fmt: skip
     loudest = np.argsort(-damage_signals.loudness(found), kind="stable")
-    instants = {f"{d.ranking.best.name} {d.instant.time:.3f} s": d.instant.time
-                for d in found.damages}  # fmt: skip
+    instants = {
+        f"{', '.join(c.name for c in d.ranking.changed)} {d.instant.time:.3f} s": d.instant.time
+        for d in found.damages
+    }
     judged = Judged(damage_signals.statistic(found), instants)
     lines = [line for damage in found.damages for line in told(damage)]
     story = _story(f"{model.structure.name}: {verdict(found)}", lines)
@@ -81,9 +83,10 @@ def draw_damage(arguments: argparse.Namespace, found: "Examination") -> None:
 def told(damage: "Damage") -> list[str]:
     """A damage in lines for people."""
     at = damage.instant
-    vague = "" if damage.explained else ", not explained by one change"
+    vague = "" if damage.explained else ", not explained by one change or two"
+    both = ", two changes at once" if damage.ranking.second else ""
     lines = [
-        f"damage noticed at {damage.alarm:.3f} s{vague}",
+        f"damage noticed at {damage.alarm:.3f} s{vague}{both}",
         f"  happened at {at.time:.3f} s [{at.low:.3f}, {at.high:.3f}]",
     ]
     for place in damage.ranking.candidates[:SHOWN]:
@@ -94,26 +97,46 @@ def told(damage: "Damage") -> list[str]:
     return lines
 
 
-def draw_identification(
-    arguments: argparse.Namespace, problem: "Problem", found: "Identification"
+def draw_methods(
+    arguments: argparse.Namespace, problem: "Problem", results: "Mapping[str, Identification | str]"
 ) -> None:
-    """What was identified: signals, what the model leaves of them, unknowns."""
+    """What one method or several found: signals, what is left of them, unknowns.
+
+    A result is a method's, or the message of why there is none.
+    """
     import numpy as np
 
     from rigwatch.dashboard.study_view import Output
     from rigwatch.structures.identified import modelled, seconds_of
 
-    model = problem.sweeper.compiled.system.model
-    values, observed = modelled(problem, found), problem.observed
+    model, observed = problem.sweeper.compiled.system.model, problem.observed
+    made = {m: modelled(problem, r) for m, r in results.items() if not isinstance(r, str)}
     outputs = [
-        Output(name, output.unit, observed[:, k], {found.method: values[:, k]})
+        Output(
+            name, output.unit, observed[:, k],
+            {method: _kept(values[:, k], observed[:, k]) for method, values in made.items()},
+        )
         for k, (name, output) in enumerate(model.outputs.items())
         if np.isfinite(observed[:, k]).any()
-    ]
-    state = "converged" if found.converged else "did not converge"
-    title = f"{model.name}: {found.method} {state} in {len(found.iterations)} iterations"
-    story = _story(title, [*figures(found), *found.remarks])
+    ]  # fmt: skip
+    story = "\n\n".join(_method(model.name, method, r) for method, r in results.items())
     _draw(arguments, seconds_of(problem), outputs, story)
+
+
+def _method(model: str, method: str, result: "Identification | str") -> str:
+    if isinstance(result, str):
+        return _story(f"{model}: {method} failed", [result])
+    state = "converged" if result.converged else "did not converge"
+    title = f"{model}: {method} {state} in {len(result.iterations)} iterations"
+    return _story(title, [*figures(result), *result.remarks])
+
+
+def _kept(values: "NDArray[np.float64]", measured: "NDArray[np.float64]") -> "NDArray[np.float64]":
+    """A signal where it is within sight of the measured one; a method may run away."""
+    import numpy as np
+
+    near = np.abs(values) <= SIGHT * np.nanmax(np.abs(measured))
+    return np.where(near, values, np.nan)
 
 
 def _story(title: str, lines: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ EXAMPLE = """\
   rigwatch structure identify configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv --report antenna.html
   rigwatch structure damage configs/structures/kabe_antenna.toml antenna.csv --save antenna.rrd
+  rigwatch structure watch configs/structures/kabe_antenna.toml rig.toml
   rigwatch structure modes configs/structures/kabe_antenna.toml --svg antenna.svg"""
 
 ACTIONS: dict[str, str] = {
@@ -18,6 +19,7 @@ ACTIONS: dict[str, str] = {
     "compare": "structure_compare",
     "damage": "structure_damage",
     "modes": "structure_modes",
+    "watch": "structure_watch",
 }
 
 

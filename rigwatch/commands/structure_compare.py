@@ -3,6 +3,7 @@
 import argparse
 
 from rigwatch.commands._sessions import print_json
+from rigwatch.commands._structure_view import add_views, draw_methods, wanted
 from rigwatch.commands._structures import (
     add_problem,
     add_report,
@@ -15,13 +16,15 @@ from rigwatch.commands._structures import (
 HELP = "run every method of identification on the same record"
 EXAMPLE = """\
   rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv
-  rigwatch structure compare antenna.toml antenna.csv --report methods.html"""
+  rigwatch structure compare antenna.toml antenna.csv --report methods.html
+  rigwatch structure compare antenna.toml antenna.csv --save methods.rrd"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
     add_problem(parser)
     add_report(parser)
+    add_views(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -29,6 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.structures.identification import METHODS, Identification, solved
     from rigwatch.wire.errors import ModelError
 
+    drawn = wanted(arguments)
     problem = problem_asked(arguments)
     results: dict[str, Identification | str] = {}
     for method in METHODS:
@@ -38,6 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
             results[method] = str(error)
     if arguments.report:
         write_report(arguments, problem, results)
+    if drawn:
+        draw_methods(arguments, problem, results)
     if arguments.json:
         print_json(
             {m: {"error": r} if isinstance(r, str) else plain(r) for m, r in results.items()}

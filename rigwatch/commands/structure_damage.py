@@ -103,6 +103,7 @@ def _plain(damage: "Damage") -> dict[str, Any]:
         "instant": damage.instant.time,
         "interval": [damage.instant.low, damage.instant.high],
         "explained": damage.explained,
+        "changed": [place.name for place in damage.ranking.changed],
         "ranking": [
             {
                 "coefficient": place.name,

@@ -3,7 +3,7 @@
 import argparse
 
 from rigwatch.commands._sessions import print_json
-from rigwatch.commands._structure_view import add_views, draw_identification, wanted
+from rigwatch.commands._structure_view import add_views, draw_methods, wanted
 from rigwatch.commands._structures import (
     add_problem,
     add_report,
@@ -28,6 +28,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="shooting",
         help="shooting (default), quasilinearization, gauss-newton, kalman or direct",
     )
+    parser.add_argument(
+        "--integrator",
+        choices=("dormand-prince", "runge-kutta"),
+        help="of quasilinearization: dormand-prince (the thesis's) or runge-kutta",
+    )
     add_report(parser)
     add_views(parser)
 
@@ -38,11 +43,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     drawn = wanted(arguments)
     problem = problem_asked(arguments)
-    found = solved(arguments.method, problem)
+    found = solved(arguments.method, problem, **_options(arguments))
     if arguments.report:
         write_report(arguments, problem, {found.method: found})
     if drawn:
-        draw_identification(arguments, problem, found)
+        draw_methods(arguments, problem, {found.method: found})
     if arguments.json:
         print_json(plain(found))
     else:
@@ -52,3 +57,15 @@ def run(arguments: argparse.Namespace) -> int:
         )
         print("\n".join([*figures(found), *(f"  note: {remark}" for remark in found.remarks)]))
     return 0 if found.converged else 1
+
+
+def _options(arguments: argparse.Namespace) -> dict[str, str]:
+    from rigwatch.wire.errors import ModelError
+
+    if arguments.integrator is None:
+        return {}
+    if arguments.method != "quasilinearization":
+        raise ModelError(
+            f"--integrator: found the method {arguments.method}, expected quasilinearization"
+        )
+    return {"integrator": arguments.integrator}

@@ -4,12 +4,14 @@ import argparse
 from pathlib import Path
 
 from rigwatch.commands._sessions import print_json
+from rigwatch.commands._structures import add_report, write_page
 from rigwatch.wire.errors import ConfigError
 
 HELP = "natural modes of a structure and the share of each spring in their strain energy"
 EXAMPLE = """\
   rigwatch structure modes configs/structures/kabe_antenna.toml
-  rigwatch structure modes configs/structures/kabe_antenna.toml --families --svg shares.svg"""
+  rigwatch structure modes configs/structures/kabe_antenna.toml --families --svg shares.svg
+  rigwatch structure modes configs/structures/kabe_antenna.toml --report modes.html"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,16 +24,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--only", metavar="PREFIX", help="only springs whose name starts so, such as k1"
     )
     parser.add_argument("--svg", type=Path, metavar="FILE", help="also draw the shares there")
+    add_report(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when the modes were found."""
     from rigwatch.structures.description import load_structure
     from rigwatch.structures.drawing import shares_svg
+    from rigwatch.structures.modes_report import modes_html
     from rigwatch.structures.strain_energy import by_family, strain_energy
 
     structure = load_structure(arguments.structure)
     energy = strain_energy(structure)
+    if arguments.report:
+        write_page(arguments.report, modes_html(structure, energy))
     if arguments.only:
         chosen = [name for name in energy.springs if name.startswith(arguments.only)]
         if not chosen:

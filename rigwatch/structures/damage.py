@@ -19,6 +19,7 @@ from rigwatch.structures.damage_watch import RATE, Alarm, Judge, Watch
 from rigwatch.structures.description import Structure
 from rigwatch.structures.identification import CONFIDENCE
 from rigwatch.structures.locate import Ranking, locate, unexplained
+from rigwatch.structures.locate_pair import locate_pair
 from rigwatch.structures.record import Record
 from rigwatch.structures.spring_model import SpringModel
 from rigwatch.wire.errors import ModelError
@@ -67,7 +68,7 @@ class Damage:
         ranking: of its places, best first.
         figures: coefficients after it: those that the file marks and the one that changed.
         before: the same before it.
-        explained: whether the one change explains the data until the next damage.
+        explained: whether the change, or the two at once, explain the data until the next damage.
         until: end of the data that it was identified from [s].
     """
 
@@ -185,7 +186,8 @@ class _Work:
         begin = self._begin(now, path, watch, alarm)
         ranking, explained = self._located(now, path, begin)
         best = ranking.best
-        self.progress(f"most likely {best.name}: {best.before:g} -> {best.after:g}")
+        places = [f"{c.name}: {c.before:g} -> {c.after:g}" for c in ranking.changed]
+        self.progress(f"most likely {' and '.join(places)}")
         when = instant(model, self._changed(now, best.refit), watch, alarm, self.base.sigma)
         refit = self._refitted(now, path, ranking, when.sample)
         figures = _figures(refit)
@@ -225,7 +227,10 @@ class _Work:
         return Stretch(self.base.model, now.parameters, first, last, self.base.sigma)
 
     def _located(self, now: _Now, path: FloatArray, begin: int) -> tuple[Ranking, bool]:
-        """Rank with ever more data as long as one change explains them, with less where not."""
+        """Rank with ever more data as long as a change explains them, with less where not.
+
+        Two changes at once are only thought of where a single one does not do.
+        """
         end = len(self.base.model)
         length = max(SHORTEST, round(self.settings.settle / self.base.model.dt))
         shortest = min(length, end - begin) // 4
@@ -233,8 +238,8 @@ class _Work:
         while True:
             # A rest too short to stand for itself goes with the data before it.
             last = end if begin + 1.5 * length > end else begin + length
-            ranking = locate(self._stretch(now, begin, last), path)
-            if not self._holds(now, ranking):
+            ranking, holds = self._ranked(now, path, begin, last)
+            if not holds:
                 if kept is not None:
                     return self._extended(now, path, kept), True
                 if length // 2 < max(SHORTEST, shortest):
@@ -245,6 +250,15 @@ class _Work:
             if last == end:
                 return ranking, True
             length *= 2
+
+    def _ranked(self, now: _Now, path: FloatArray, begin: int, last: int) -> tuple[Ranking, bool]:
+        """One change, or else two at once; and whether they explain the data."""
+        stretch = self._stretch(now, begin, last)
+        single = locate(stretch, path)
+        if self._holds(now, single):
+            return single, True
+        pair = locate_pair(stretch, path, single)
+        return (pair, True) if pair.second and self._holds(now, pair) else (single, False)
 
     def _extended(self, now: _Now, path: FloatArray, kept: Ranking) -> Ranking:
         """The ranking from all data until the next damage, where it holds there."""
@@ -257,13 +271,14 @@ class _Work:
         )
         if watch.alarm is None or watch.alarm.onset <= kept.last:
             return kept
-        ranking = locate(self._stretch(now, kept.first, watch.alarm.onset), path)
-        return ranking if self._holds(now, ranking) else kept
+        ranking, holds = self._ranked(now, path, kept.first, watch.alarm.onset)
+        return ranking if holds else kept
 
     def _holds(self, now: _Now, ranking: Ranking) -> bool:
-        """Whether the best candidate says something, and leaves nothing but noise."""
+        """Whether what changed says something, and leaves nothing but noise."""
         refit = ranking.best.refit
-        if refit is None or not np.isfinite(refit.chi2) or ranking.best.p_value > CLEAR:
+        chance = max(candidate.p_value for candidate in ranking.changed)
+        if refit is None or not np.isfinite(refit.chi2) or chance > CLEAR:
             return False
         parameters = self._changed(now, refit)
         watch = self.judge.watch(
@@ -278,7 +293,7 @@ class _Work:
         marked = {n: f.value for n, f in now.figures.items() if n in known}
         state = path[first] if best.refit is None or first != ranking.first else best.refit.state
         stretch = self._stretch(now, first, ranking.last)
-        return stretch.refit({**marked, best.name: best.after}, state)
+        return stretch.refit({**marked, **{c.name: c.after for c in ranking.changed}}, state)
 
     def _changed(self, now: _Now, refit: Refit | None) -> FloatArray:
         parameters = now.parameters.copy()

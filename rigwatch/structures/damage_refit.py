@@ -79,9 +79,9 @@ class Stretch:
         columns = self._columns(names)
         now = np.concatenate([np.array(list(start.values())), state])
         errors, slopes = self._errors(names, now)
-        cost, weight = _cost(errors), np.ones(len(errors))
         if not _finite(errors, slopes):
             return self._lost(names, now)
+        cost, weight = _cost(errors), np.ones(len(errors))
         for _ in range(steps):
             step = solve(errors, slopes[..., columns], weight, np.ones(errors.shape[1]))
             found = self._shorter(names, now, step.change, cost)

@@ -110,7 +110,7 @@ class Judge:
         if self.limit is not None:
             return _by_limit(residual, self.limit, first)
         samples, signals = residual.shape
-        threshold = threshold_for(self.rate, signals, _rounded(samples), self.calibration)
+        threshold = threshold_for(self.rate, signals, rounded(samples), self.calibration)
         adding = CumulativeSum(signals, threshold)
         statistic, alarm = np.zeros(samples), None
         for k in range(samples):
@@ -135,25 +135,43 @@ def innovations(scaled: FloatArray, slopes: FloatArray, spread: FloatArray) -> F
     Returns:
         Shape (samples, m), standard deviation 1 and independent where only noise is there.
     """
-    used = np.flatnonzero(np.diag(spread) > 0)
-    # In units of their own deviations: stiffnesses and positions differ by many orders.
-    size = np.sqrt(np.diag(spread)[used])
-    covariance = spread[np.ix_(used, used)] / np.outer(size, size)
-    theta, found = np.zeros(len(used)), np.full(scaled.shape, np.nan)
+    filtered, found = Innovations(spread), np.empty(scaled.shape)
     for k, row in enumerate(scaled):
-        seen = np.isfinite(row)
-        if not seen.any():
-            continue
-        along = slopes[k][np.ix_(seen, used)] * size
-        across = covariance @ along.T
-        root = np.linalg.cholesky(along @ across + np.eye(int(seen.sum())))
-        new = np.linalg.solve(root, row[seen] - along @ theta)
-        gain = np.linalg.solve(root, across.T)
-        theta = theta + gain.T @ new
-        covariance = covariance - gain.T @ gain
-        covariance = 0.5 * (covariance + covariance.T)
-        found[k, seen] = new
+        found[k] = filtered.update(row, slopes[k])
     return found
+
+
+class Innovations:
+    """`innovations` one sample at a time.
+
+    Args:
+        spread: covariance of the figures' errors θ, shape (p, p).
+    """
+
+    def __init__(self, spread: FloatArray) -> None:
+        self._used = np.flatnonzero(np.diag(spread) > 0)
+        # In units of their own deviations: stiffnesses and positions differ by many orders.
+        self._size = np.sqrt(np.diag(spread)[self._used])
+        self._covariance = spread[np.ix_(self._used, self._used)] / np.outer(self._size, self._size)
+        self._theta = np.zeros(len(self._used))
+
+    def update(self, scaled: FloatArray, slopes: FloatArray) -> FloatArray:
+        """One sample's innovations (m,) from scaled residuals (m,) and slopes (m, p)."""
+        found, seen = np.full(scaled.shape, np.nan), np.isfinite(scaled)
+        if not seen.any():
+            return found
+        if not len(self._used):
+            return scaled
+        along = slopes[np.ix_(seen, self._used)] * self._size
+        across = self._covariance @ along.T
+        root = np.linalg.cholesky(along @ across + np.eye(int(seen.sum())))
+        new = np.linalg.solve(root, scaled[seen] - along @ self._theta)
+        gain = np.linalg.solve(root, across.T)
+        self._theta = self._theta + gain.T @ new
+        left = self._covariance - gain.T @ gain
+        self._covariance = 0.5 * (left + left.T)
+        found[seen] = new
+        return found
 
 
 def _by_limit(
@@ -165,7 +183,7 @@ def _by_limit(
     return statistic, 1.0, alarm
 
 
-def _rounded(samples: int) -> int:
+def rounded(samples: int) -> int:
     """Up to the next of a few lengths, so that few thresholds have to be computed."""
     return int(100 * np.ceil(samples / 100))
 

@@ -19,8 +19,10 @@ from rigwatch.structures.problem import Problem
 FloatArray = NDArray[np.float64]
 
 
-LARGE = 0.2
-"""Share of the signals that errors may be before it is remarked on."""
+SMALL = 0.02
+"""Share of the signals up to which errors may be the model's own faults."""
+LASTING = 0.4
+"""Correlation of consecutive errors from which they are no noise."""
 
 
 def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outcome:
@@ -52,16 +54,27 @@ def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outc
         found.append(found[-1] + step.change)
         covariance = step.covariance
         if turn and settled(found[-2], found[-1]):
-            return Outcome(found[1:], covariance, True, _remarks(problem.observed - outputs, scale))
+            remarks = _doubts(problem.observed - outputs, scale)
+            return Outcome(found[1:], covariance, not remarks, remarks)
     remark = "the model's trajectory parted from the record"
     return Outcome(found[1:] or found, covariance, False, (remark,))
 
 
-def _remarks(errors: FloatArray, scale: FloatArray) -> tuple[str, ...]:
+def _doubts(errors: FloatArray, scale: FloatArray) -> tuple[str, ...]:
+    """Why it settled at a wrong minimum, empty where it did not: what it leaves is no noise.
+
+    Errors of consecutive samples are independent where only noise is left. Where the model's
+    trajectory is another than the record's they go on from sample to sample, however large.
+    """
     share = float(np.sqrt(np.nanmean((errors / scale) ** 2)))
-    if share < LARGE:
+    along = np.nan_to_num(errors / scale)
+    lasting = float((along[1:] * along[:-1]).sum() / max(float((along**2).sum()), 1e-300))
+    if share < SMALL or lasting < LASTING:
         return ()
-    return (f"it settled where errors are {100 * share:.0f} % of the signals: a wrong minimum?",)
+    return (
+        f"a wrong minimum: it settled where errors are {100 * share:.2g} % of the signals, and go"
+        " on from sample to sample as noise does not",
+    )
 
 
 def _with_prior(  # noqa: PLR0917 -- a step's rows with what belongs to them

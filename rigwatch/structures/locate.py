@@ -80,17 +80,24 @@ class Ranking:
         candidates: all of them.
         first, last: samples that were used, the last excluded.
         unseen: coefficients that hardly move the record, whatever becomes of them.
+        second: what changed together with the best, None where one change is enough.
     """
 
     candidates: tuple[Candidate, ...]
     first: int
     last: int
     unseen: tuple[str, ...]
+    second: Candidate | None = None
 
     @property
     def best(self) -> Candidate:
         """The most likely one."""
         return self.candidates[0]
+
+    @property
+    def changed(self) -> tuple[Candidate, ...]:
+        """The best, and what changed together with it."""
+        return (self.best,) if self.second is None else (self.best, self.second)
 
 
 def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Ranking:
@@ -102,8 +109,8 @@ def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Rank
         refitted: how many candidates the second pass takes.
     """
     model, count = stretch.model, len(stretch.model.candidates)
-    residual, rows, fitted, scores = _scored(stretch, path)
-    shifts = _first_states(residual, rows, scores.strength)
+    residual, rows, fitted, scores = scored(stretch, path)
+    shifts = first_states(residual, rows, np.diag(scores.strength))
     state = model.shown_state(path, stretch.first)
     listed = [_first_pass(stretch, scores, i) for i in np.argsort(-scores.score).tolist()]
     chosen = [c for c in listed[:refitted] if c.score >= WORTH * listed[0].score]
@@ -120,12 +127,12 @@ def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Rank
 
 def unexplained(stretch: Stretch, path: FloatArray) -> float:
     """χ² that the best candidate leaves to first order; arguments as of `locate`."""
-    scores = _scored(stretch, path)[3]
+    scores = scored(stretch, path)[3]
     best = int(np.argmax(scores.score))
     return float(scores.score[best] * (1.0 / max(scores.explained[best], 1e-12) - 1.0))
 
 
-def _scored(stretch: Stretch, path: FloatArray) -> tuple[FloatArray, FloatArray, Projector, Scores]:
+def scored(stretch: Stretch, path: FloatArray) -> tuple[FloatArray, FloatArray, Projector, Scores]:
     """Scaled residual (k,), slopes (k, c + n), what the first states explain, and the scores."""
     model = stretch.model
     errors, slopes = model.along_record(stretch.parameters, path, stretch.first, stretch.last)
@@ -137,10 +144,16 @@ def _scored(stretch: Stretch, path: FloatArray) -> tuple[FloatArray, FloatArray,
     return residual, rows, fitted, scores
 
 
-def _first_states(residual: FloatArray, rows: FloatArray, strength: FloatArray) -> FloatArray:
-    """First-order change of the first states that goes with each candidate, shape (c, n)."""
-    count = len(strength)
-    left = residual[:, None] - rows[:, :count] * strength
+def first_states(residual: FloatArray, rows: FloatArray, changes: FloatArray) -> FloatArray:
+    """First-order change of the first states that goes with each column of changes, shape (k, n).
+
+    Args:
+        residual: scaled, shape (samples,).
+        rows: scaled slopes by candidates and states, shape (samples, c + n).
+        changes: of the candidates, shape (c, k).
+    """
+    count = len(changes)
+    left = residual[:, None] - rows[:, :count] @ changes
     return np.asarray(np.linalg.lstsq(rows[:, count:], left, rcond=1e-10)[0].T)
 
 
@@ -182,7 +195,7 @@ def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) 
         return best
     count, place = len(model.candidates), model.candidates.index(best.name)
     slopes = best.refit.slopes
-    unit = _freed(slopes[:, :count], slopes[:, count:])
+    unit = freed(slopes[:, :count], slopes[:, count:])
     cosines = np.minimum(np.abs(unit.T @ unit[:, place]), 1.0)
     # What is lost, to first order, where the best's direction is replaced by another.
     shares = (1.0 - cosines**2) * ((best.after - best.before) / max(best.deviation, 1e-300)) ** 2
@@ -195,7 +208,7 @@ def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) 
     return replace(best, alike=tuple(alike))
 
 
-def _freed(candidates: FloatArray, states: FloatArray) -> FloatArray:
+def freed(candidates: FloatArray, states: FloatArray) -> FloatArray:
     """Unit directions without what the first states could have made."""
     basis = np.linalg.qr(states).Q
     rest = candidates - basis @ (basis.T @ candidates)

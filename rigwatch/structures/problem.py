@@ -107,6 +107,19 @@ class Problem:
         """States as the record shows them, whole, shape (all samples, n)."""
         return initial_states(self.sweeper.compiled.system, self.recording)
 
+    @cached_property
+    def hidden(self) -> NDArray[np.bool_]:
+        """States of nodes of which the record holds neither position nor velocity, shape (n,)."""
+        system, outputs = self.sweeper.compiled.system, self.recording.outputs
+        there = [bool(np.isfinite(column).any()) for column in outputs.T]
+        channels = {
+            output.channel or name
+            for (name, output), seen in zip(system.model.outputs.items(), there, strict=True)
+            if seen
+        }
+        states = system.states.values()
+        return ~np.array([s.measured in channels or s.rate_of in channels for s in states], bool)
+
     def split(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
         """All parameters and initial states with the unknowns in their places."""
         parameters, initial = self.start.copy(), self.initial.copy()

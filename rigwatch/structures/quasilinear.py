@@ -4,7 +4,7 @@
 
 The equations are linearised about a nominal trajectory, which is the observed record itself: only
 the parameters change from one iteration to the next. The integration step is the record's, as in
-1999, by the classical Runge-Kutta method with straight lines between samples. What a record of
+1999; `integrators` says which methods there are, and which one was the thesis's. What a record of
 positions does not show is filled in thus:
 
 * velocities of observed positions are their local slopes (they matter only where forces are not
@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.structures.identification import Outcome, settled
+from rigwatch.structures.integrators import Integrator
+from rigwatch.structures.integrators import integrator as integrator_of
 from rigwatch.structures.least_squares import Step, require_determined
 from rigwatch.structures.least_squares import solve as least_squares
 from rigwatch.structures.problem import Problem, require_fine_enough
@@ -34,19 +36,27 @@ UNOBSERVED = (
 )
 
 
-def solve(problem: Problem, *, iterations: int = 25, scale: FloatArray | None = None) -> Outcome:
+def solve(
+    problem: Problem,
+    *,
+    iterations: int = 25,
+    scale: FloatArray | None = None,
+    integrator: str = "dormand-prince",
+) -> Outcome:
     """Iterate until four digits stay the same.
 
     Args:
         problem: what is unknown.
         iterations: most of them.
         scale: standard deviation of each output's noise; all alike if None, as published.
+        integrator: dormand-prince, the thesis's own, or runge-kutta.
 
     Raises:
-        ModelError: the step is too coarse, or the record does not determine the unknowns.
+        ModelError: there is no such integrator, the step is too coarse, or the record does
+            not determine the unknowns.
     """
     require_fine_enough(problem, problem.speed.whole, STABLE, "its Runge-Kutta step is stable")
-    follower = _Nominal(problem)
+    follower = _Nominal(problem, integrator_of(integrator))
     wanted = np.ones(problem.observed.shape[1]) if scale is None else scale
     found, step = [problem.guess], None
     for turn in range(iterations):
@@ -73,13 +83,10 @@ def _outcome(found: list[FloatArray], step: Step | None, remarks: tuple[str, ...
 class _Nominal:
     """The nominal trajectory: the record where it shows a state."""
 
-    def __init__(self, problem: Problem) -> None:
-        self._problem = problem
-        system = problem.sweeper.compiled.system
-        channels = {output.channel or name for name, output in system.model.outputs.items()}
+    def __init__(self, problem: Problem, method: Integrator) -> None:
+        self._problem, self._method = problem, method
         shown = problem.shown[problem.first :]
-        seen = [s.measured in channels or s.rate_of in channels for s in system.states.values()]
-        self._hidden = ~np.array(seen, bool)
+        self._hidden = problem.hidden
         self._states = shown.copy()
         self.remarks: tuple[str, ...] = ()
         if self._hidden.any():
@@ -92,7 +99,7 @@ class _Nominal:
         parameters, initial = problem.split(unknowns)
         return problem.sweeper.sweep(
             problem.inputs, problem.recording.dt, problem.first, self._states, parameters, initial,
-            problem.loose,
+            problem.loose, self._method,
         )  # fmt: skip
 
     def learn(self, swept: Swept, change: FloatArray) -> None:

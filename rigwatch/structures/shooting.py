@@ -8,6 +8,8 @@ whole record (`whole_record.py`).
 A longer window is believed as long as its errors stay what they were over shorter ones. Where they
 do not, disturbances grow along the way (a plant that runs away, a strongly nonlinear structure that
 is chaotic), and the longest windows that could be followed have the last word.
+
+Where nodes have no signal, `prolonged.py` follows one trajectory from the record's start instead.
 """
 
 from dataclasses import dataclass, replace
@@ -19,6 +21,7 @@ from rigwatch.structures.direct import solve as regression
 from rigwatch.structures.identification import Outcome, settled
 from rigwatch.structures.least_squares import FOUR_DIGITS, Step, require_determined
 from rigwatch.structures.problem import Problem
+from rigwatch.structures.prolonged import followed
 from rigwatch.structures.whole_record import WholeRecord
 from rigwatch.structures.windows import Windows
 from rigwatch.wire.errors import ModelError
@@ -30,8 +33,10 @@ SHORTEST = 4
 GROWTH = 4
 STEPS = 12
 """Most Gauss-Newton steps at each horizon but the last."""
-WORSE = 2.0
-"""How much larger errors may be over longer windows than over shorter ones."""
+WORSE = 1.25
+"""How much larger errors may be over longer windows: noise alone leaves them as they are."""
+SMALL = 2.0 * FOUR_DIGITS
+"""Share of the signals up to which errors are always small enough."""
 MOST_GROWTH = 4.0
 """Natural logarithm of what a disturbance may grow by within a window."""
 UNCERTAIN = 0.5
@@ -59,15 +64,35 @@ def solve(
     Raises:
         ModelError: the record does not determine the unknowns, and `partial` is not set.
     """
-    grown = _grown(problem)
-    ended = None
-    if not _runs_away(problem) and (grown.accepted or grown.windows is None):
-        ended = _over_the_whole(problem, grown, iterations, scale)
-    outcome, step = ended or _over_windows(problem, grown, iterations)
+    with np.errstate(all="ignore"):
+        outcome, step = _solved(problem, iterations, scale)
     if not partial:
         name = problem.sweeper.compiled.system.model.name
         require_determined(problem.names, step.blind, name)
     return replace(outcome, undetermined=_uncertain(problem, outcome.iterations[-1], step))
+
+
+def _solved(problem: Problem, iterations: int, scale: FloatArray | None) -> tuple[Outcome, Step]:
+    """Over the whole record where that can be followed, else over windows."""
+    tame = not _runs_away(problem)
+    if tame and problem.hidden.any() and (found := _followed(problem, iterations, scale)):
+        return found
+    grown = _grown(problem)
+    ended = None
+    if tame and (grown.accepted or grown.windows is None):
+        ended = _over_the_whole(problem, grown, iterations, scale)
+    if ended is None and tame and not problem.hidden.any():
+        # Heavy noise can look like a trajectory that parts from the record.
+        ended = _followed(problem, iterations, scale)
+    return ended or _over_windows(problem, grown, iterations)
+
+
+def _followed(
+    problem: Problem, iterations: int, scale: FloatArray | None
+) -> tuple[Outcome, Step] | None:
+    """The end along one trajectory from the record's start; None where none settled."""
+    found = followed(problem, iterations, scale)
+    return (Outcome(found.turns, found.step.covariance, True), found.step) if found else None
 
 
 @dataclass(eq=False)
@@ -96,7 +121,7 @@ def _grown(problem: Problem) -> _Grown:
         tried = [Windows(problem, horizon) for _ in starts]
         ends = [one.refined(start, STEPS) for one, start in zip(tried, starts, strict=True)]
         best = int(np.argmin([one.cost for one in tried]))
-        if grown.windows and tried[best].rms > WORSE * max(grown.windows.rms, FOUR_DIGITS):
+        if grown.windows and tried[best].rms > max(WORSE * grown.windows.rms, SMALL):
             grown.accepted = False
             return grown
         grown.windows, grown.parameters, starts = tried[best], ends[best], [ends[best]]
@@ -112,7 +137,7 @@ def _over_the_whole(
     """The end over the whole record; None where windows can do better."""
     expected = np.inf
     if grown.windows and not len(problem.loose):
-        expected = WORSE * max(grown.windows.rms, FOUR_DIGITS)
+        expected = max(WORSE * grown.windows.rms, SMALL)
     whole = WholeRecord(problem, scale, expected)
     try:
         turns, step, good = whole.refined(grown.found[-1], iterations)
@@ -132,7 +157,9 @@ def _over_windows(problem: Problem, grown: _Grown, iterations: int) -> tuple[Out
             f"{problem.sweeper.compiled.system.model.name}: found trajectories that part from the"
             " record, which do not determine initial states; expected known ones"
         )
-    last = grown.windows.refined(grown.parameters, iterations, FINEST)
+    near = grown.windows.refined(grown.parameters, iterations, FINEST)
+    grown.windows.weigh(near)
+    last = grown.windows.refined(near, iterations, FINEST)
     step = grown.windows.judged(last)
     found = last[problem.free]
     good = settled(found, found + step.change)

@@ -4,7 +4,7 @@ Along a nominal trajectory X̄ (states at the samples, straight lines between th
 
     dP/dt = f(X̄, p̄) + J·(P − X̄),   dH/dt = J·H + ∂f/∂p,   J = ∂f/∂x at (X̄, p̄)      (4.13), (4.14)
 
-with the classical Runge-Kutta method, one step a sample. The parameters count from p̄, so X = P +
+with an explicit Runge-Kutta method, one step a sample. The parameters count from p̄, so X = P +
 H·δ with the change δ to be found. The columns of H are the free parameters, then the unknown
 initial states. `rates` is the model's own kernel, so that J is exact and its zeros cost nothing.
 """
@@ -16,9 +16,15 @@ import numpy as np
 import sympy
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.compiled import CompiledSystem, compile_system, load_source
+from rigwatch.physics.engine.compiled import (
+    CompiledSystem,
+    compile_system,
+    load_source,
+    numba_module,
+)
 from rigwatch.physics.engine.scope import symbol
 from rigwatch.physics.engine.system import System
+from rigwatch.structures.integrators import CLASSICAL, Integrator
 from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
@@ -43,14 +49,38 @@ def place(u, nominal, k, share, hold, xs, us):
 
 
 @njit(cache=True, error_model="numpy")
-def sweep(u, dt, first, hold, nominal, p, s, y, dy, path):
+def linear(t, xs, us, p, s, part, f, ds, out):
+    """Adds `part` of the linear rates about xs to `out`; s: [H | P], not changed in the end."""
+    n, width = s.shape
+    for i in range(n):
+        s[i, width - 1] -= xs[i]
+    rates(t, xs, us, p, s, f, ds)
+    for i in range(n):
+        s[i, width - 1] += xs[i]
+        out[i, width - 1] += part * f[i]
+        for j in range(width):
+            out[i, j] += part * ds[i, j]
+
+
+@njit(cache=True, error_model="numpy")
+def add(dt, shares, ks, out):
+    for stage in range(shares.size):
+        weight = dt * shares[stage]
+        if weight != 0.0:
+            for i in range(out.shape[0]):
+                for j in range(out.shape[1]):
+                    out[i, j] += weight * ks[stage, i, j]
+
+
+@njit(cache=True, error_model="numpy")
+def sweep(u, dt, first, hold, a, b, c, apart, nominal, p, s, y, dy, path):
     """s: [H | P] at the start; y, dy: outputs of P and H; path: [H | P] at the samples."""
     count, n = nominal.shape
-    width = s.shape[1]
+    width, last = s.shape[1], s.shape[1] - 1
     xs, us, f = np.empty(n), np.empty(u.shape[1]), np.empty(n)
-    ss, ds, acc = np.empty((n, width)), np.zeros((n, width)), np.empty((n, width))
+    ss, ds = np.empty((n, width)), np.zeros((n, width))
+    ks = np.zeros((b.size, n, width))
     wide = np.empty((y.shape[1], width))
-    last = width - 1
     for k in range(count):
         place(u, nominal, k, 0.0, hold, xs, us)
         path[k] = s
@@ -65,22 +95,22 @@ def sweep(u, dt, first, hold, nominal, p, s, y, dy, path):
                 dy[k, o, j] = wide[o, j]
         if k + 1 == count:
             break
-        for stage in range(4):
-            weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
-            back = 0.0 if stage == 0 else (dt if stage == 3 else 0.5 * dt)
-            place(u, nominal, k, back / dt, hold, xs, us)
-            for i in range(n):
-                for j in range(width):
-                    ss[i, j] = s[i, j] + back * ds[i, j]
-                ss[i, last] -= xs[i]
-            rates((first + k) * dt + back, xs, us, p, ss, f, ds)
-            for i in range(n):
-                ds[i, last] += f[i]
-                for j in range(width):
-                    acc[i, j] = weight * ds[i, j] + (acc[i, j] if stage else 0.0)
-        for i in range(n):
-            for j in range(width):
-                s[i, j] += acc[i, j]
+        for stage in range(b.size):
+            ss[:] = s
+            add(dt, a[stage, :stage], ks, ss)
+            share, t = c[stage], (first + k + c[stage]) * dt
+            ks[stage] = 0.0
+            place(u, nominal, k, share, hold, xs, us)
+            if apart:
+                if share < 1.0:
+                    xs[:] = nominal[k]
+                    linear(t, xs, us, p, ss, 1.0 - share, f, ds, ks[stage])
+                if share > 0.0:
+                    xs[:] = nominal[k + 1]
+                    linear(t, xs, us, p, ss, share, f, ds, ks[stage])
+            else:
+                linear(t, xs, us, p, ss, 1.0, f, ds, ks[stage])
+        add(dt, b, ks, s)
 
 
 @njit(cache=True, error_model="numpy")
@@ -167,6 +197,7 @@ class Sweeper:
         parameters: FloatArray,
         initial: FloatArray,
         unknown: NDArray[np.int64],
+        method: Integrator = CLASSICAL,
     ) -> Swept:
         """One linear sweep along `nominal`.
 
@@ -178,6 +209,7 @@ class Sweeper:
             parameters: all of them, shape (n_p,).
             initial: shape (n,).
             unknown: which initial states are unknown, shape (k,).
+            method: of integration.
         """
         samples, n = nominal.shape
         free, wanted = len(self.compiled.system.free), len(self.compiled.system.outputs)
@@ -189,8 +221,8 @@ class Sweeper:
         slopes = np.empty((samples, wanted, width - 1))
         path = np.empty((samples, n, width))
         self.kernel.sweep(
-            np.ascontiguousarray(inputs), dt, first, self.hold, np.ascontiguousarray(nominal),
-            parameters, start, outputs, slopes, path,
+            np.ascontiguousarray(inputs), dt, first, self.hold, method.a, method.b, method.c,
+            method.apart, np.ascontiguousarray(nominal), parameters, start, outputs, slopes, path,
         )  # fmt: skip
         return Swept(outputs, slopes, path[..., -1], path[..., :-1])
 
@@ -219,6 +251,7 @@ def sweeper(system: System) -> Sweeper:
         ModelError: the system has no states.
     """
     compiled = compile_system(without_probes(system))
-    if not isinstance(compiled.kernel, ModuleType):
+    if not system.states:
         raise ModelError(f"{system.model.name}: found no states, expected equations of motion")
-    return Sweeper(compiled, load_source(_SOURCE.replace("{name}", compiled.kernel.__name__)))
+    equations = numba_module(compiled.system)
+    return Sweeper(compiled, load_source(_SOURCE.replace("{name}", equations.__name__)))

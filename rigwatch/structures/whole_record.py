@@ -75,6 +75,10 @@ class WholeRecord:
         share = errors / spreads(self.problem.observed)
         return bool(np.sqrt(np.nanmean(share**2)) <= self.expected)
 
+    def spread_cost(self, unknowns: FloatArray) -> float:
+        """Sum of the squared errors, each signal over its own spread."""
+        return self._cost(self._errors(unknowns)[0], spreads(self.problem.observed))
+
     def _shorter(
         self, now: FloatArray, change: FloatArray, errors: FloatArray, scale: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray] | None:

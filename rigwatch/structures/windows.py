@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rigwatch.structures.least_squares import FOUR_DIGITS, Step
 from rigwatch.structures.least_squares import solve as least_squares
 from rigwatch.structures.problem import Problem
+from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
 
@@ -73,14 +74,15 @@ class Windows:
     def __post_init__(self) -> None:
         problem, length = self.problem, self.length
         last = len(problem.recording) - length + 1
-        self._starts = np.arange(problem.first, last, length - 1, dtype=np.int64)
+        # No sample stands in two windows: its error would be counted twice.
+        self._starts = np.arange(problem.first, last, length, dtype=np.int64)
         rows = self._starts[:, None] + np.arange(length)
         self._measured = problem.recording.outputs[rows]
         self._initial = problem.shown[self._starts]
-        self._scale = spreads(problem.observed)
         weight = problem.weight[rows - problem.first]
-        self._factor = np.where(np.isfinite(self._measured), np.sqrt(weight)[..., None], 0.0)
-        self._factor = self._factor / self._scale
+        self._there = np.where(np.isfinite(self._measured), np.sqrt(weight)[..., None], 0.0)
+        self._factor = self._there / spreads(problem.observed)
+        self._least = FOUR_DIGITS**2
 
     @property
     def rms(self) -> float:
@@ -109,6 +111,21 @@ class Windows:
                 break
         return now
 
+    def weigh(self, parameters: FloatArray) -> None:
+        """From now on count each signal by the noise that it has shown, not by its spread.
+
+        Signals of unequal noise that are counted alike give intervals that are too narrow.
+        """
+        errors, slopes = self._run(parameters, self._initial)
+        if not np.isfinite(slopes).all():
+            return
+        size = spreads(self.problem.observed)
+        share = errors.reshape(self._factor.shape)
+        used = np.maximum((self._factor > 0).sum(axis=(0, 1)), 1)
+        noise = np.sqrt((share**2).sum(axis=(0, 1)) / used)
+        self._factor = self._there / (size * np.maximum(noise, FOUR_DIGITS))
+        self._least = 1.0
+
     def _run(self, parameters: FloatArray, initial: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Scaled errors (windows, k) and slopes (windows, k, m + n)."""
         problem = self.problem
@@ -133,15 +150,25 @@ class Windows:
         return change, starts.solved(errors - slopes[..., :count] @ change)
 
     def judged(self, parameters: FloatArray) -> Step:
-        """The last linear problem at what `refined` returned, with its covariance."""
+        """The last linear problem at what `refined` returned, with its covariance.
+
+        Raises:
+            ModelError: a window's trajectory leaves the finite numbers.
+        """
         errors, slopes = self._run(parameters, self._initial)
+        if not np.isfinite(slopes).all():
+            name = self.problem.sweeper.compiled.system.model.name
+            raise ModelError(
+                f"{name}: found no trajectories that follow the record, expected other guesses or"
+                " more signals"
+            )
         count = len(self.problem.free)
         starts = _Starts.of(slopes[..., count:])
         clean = starts.without(slopes[..., :count]).reshape(-1, 1, count)
         rest = starts.without(errors[..., None]).reshape(-1, 1)
         used = int((self._factor > 0).sum())
         left = max(used - self._initial.size - count, 1)
-        least = FOUR_DIGITS**2 * left / max(len(rest) - count, 1)
+        least = self._least * left / max(len(rest) - count, 1)
         step = least_squares(rest, clean, np.ones(len(rest)), np.ones(1), least_variance=least)
         return replace(step, covariance=step.covariance * (len(rest) - count) / left)
 

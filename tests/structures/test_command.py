@@ -108,10 +108,27 @@ def test_compare_writes_a_page_of_every_method(csv, tmp_path, capsys):
         ElementTree.fromstring(drawing)
 
 
+def test_compare_draws_every_method_for_the_viewer(csv, tmp_path):
+    target = tmp_path / "methods.rrd"
+    assert main(["structure", "compare", str(FILE), str(csv), "--save", str(target)]) == 0
+    content = target.read_bytes()
+    for method in METHODS:
+        assert f"/x6/residual/{method}".encode() in content
+
+
+def test_an_integrator_belongs_to_quasilinearization(csv, capsys):
+    arguments = ["structure", "identify", str(FILE), str(csv), "--integrator", "runge-kutta"]
+    assert main([*arguments, "--method", "quasilinearization"]) == 0
+    assert main(arguments) == 2
+    assert "found the method shooting, expected quasilinearization" in capsys.readouterr().err
+
+
 def test_the_page_of_a_wrong_minimum_does_not_praise_it(csv, tmp_path):
     page, arguments = tmp_path / "antenna.html", ["structure", "identify", str(FILE), str(csv)]
-    assert main([*arguments, "--method", "gauss-newton", "--report", str(page)]) == 0
-    assert "converged, but no trajectory follows" in page.read_text(encoding="utf-8")
+    assert main([*arguments, "--method", "gauss-newton", "--report", str(page)]) == 1
+    text = page.read_text(encoding="utf-8")
+    assert "no method converged" in text
+    assert "a wrong minimum: it settled where errors are" in text
 
 
 def test_a_method_that_gave_nothing_says_why_on_the_page():

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigwatch.structures.damage import Examination, Settings, examine
 from rigwatch.structures.damage_watch import innovations
-from rigwatch.structures.description import Structure, load_structure
+from rigwatch.structures.description import Structure, coefficients, load_structure
 from rigwatch.structures.record import FloatArray, Record
 from rigwatch.wire.errors import ModelError
 from sim_plant.structure import Damage, simulate, with_noise
@@ -139,7 +139,11 @@ def frame_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@settings(max_examples=6, deadline=None)
+# The same examples at every run: one that fails can be looked at.
+@settings(max_examples=6, deadline=None, derandomize=True)
+@example(spring="lower", share=0.9, time=6.0)
+@example(spring="top", share=0.9, time=6.0)
+@example(spring="top", share=0.3, time=3.0)
 @given(
     spring=st.sampled_from(["lower", "top"]),
     share=st.floats(0.3, 0.9),
@@ -155,9 +159,8 @@ def test_any_softening_of_a_small_frame_is_found(
     made = simulate(frame_file, 0.01, 9.0, damages=[damage])
     noisy = with_noise(made, {"x1": 0.01, "x2": 0.01}, 3)
     found = examine(structure, positions(noisy.columns, ["x1", "x2"]), Settings(undamaged=2.5))
-    best = found.damages[0].ranking.best
-    assert best.name == spring
-    assert best.after == pytest.approx(share * value, rel=0.05)
+    changes = [[(c.name, c.after) for c in d.ranking.changed] for d in found.damages]
+    assert changes == [[(spring, pytest.approx(share * value, rel=0.005))]]
 
 
 def test_springs_side_by_side_form_a_class(frame_file: Path) -> None:
@@ -168,11 +171,23 @@ def test_springs_side_by_side_form_a_class(frame_file: Path) -> None:
     assert {best.name, *best.alike} >= {"left", "right"}
 
 
-def test_two_springs_at_once_are_not_explained_by_one(frame_file: Path) -> None:
+def test_two_springs_at_once_are_both_named(frame_file: Path) -> None:
     both = Damage(4.0, {"springs.lower.stiffness": 250.0, "springs.top.stiffness": 120.0})
     made = simulate(frame_file, 0.01, 9.0, damages=[both])
     noisy = with_noise(made, {"x1": 0.01, "x2": 0.01}, 5)
     found = examine(load_structure(frame_file), positions(noisy.columns, ["x1", "x2"]))
+    assert [d.explained for d in found.damages] == [True]
+    after = {c.name: c.after for c in found.damages[0].ranking.changed}
+    assert after == pytest.approx({"lower": 250.0, "top": 120.0}, rel=0.05)
+
+
+def test_three_springs_at_once_are_not_explained(kabe: Structure) -> None:
+    shares = {"k1_2": 0.6, "k3_5": 0.7, "k4_46": 0.5}
+    values = coefficients(kabe)
+    places = {f"springs.{n}.stiffness": values[n].value * share for n, share in shares.items()}
+    made = simulate(KABE, 0.01, 10.0, damages=[Damage(5.0, places)])
+    noisy = with_noise(made, dict.fromkeys(SIGNALS, 0.01), 5)
+    found = examine(kabe, positions(noisy.columns, SIGNALS), Settings(known=True))
     assert [d.explained for d in found.damages] == [False]
 
 

@@ -53,7 +53,7 @@ def check_page(text: str) -> None:
     """It stands for itself: nothing is fetched, nothing runs, every drawing is whole."""
     assert "k4_46 softer at" in text
     assert not re.search(r"<script|<link|src=|@import|url\(", text)
-    assert set(re.findall(r"https?://[^\"'\s]+", text)) == {"http://www.w3.org/2000/svg"}
+    assert not re.search(r"https?://", text)
     drawings = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
     assert len(drawings) == 3
     for drawing in drawings:
