@@ -35,6 +35,7 @@ class Admitted:
         padding: samples at the head that were put in for missing ones.
         missing: samples known to be missing before the block, -1 for an unknown number.
         invalid_run: samples without a good reading up to and with this one, shape (n,).
+        good: whether each reading is one, shape (n, c).
     """
 
     signals: FloatArray
@@ -44,6 +45,7 @@ class Admitted:
     padding: int
     missing: int
     invalid_run: Codes
+    good: NDArray[np.bool_]
 
 
 class Admission:
@@ -92,7 +94,8 @@ class Admission:
         first = block.seq + seen - padding
         position_valid = good[:, min(1, good.shape[1] - 1)]
         seq = np.arange(first, first + len(values), dtype=np.int64)
-        return Admitted(values, code, position_valid.astype(np.uint8), seq, padding, missing, run)
+        valid_position = position_valid.astype(np.uint8)
+        return Admitted(values, code, valid_position, seq, padding, missing, run, good)
 
     def _mark_new_boot(self, code: Codes) -> None:
         """The first good sample of a boot restarts more than the filters."""

@@ -24,6 +24,7 @@ from monitor.model_file import (
 )
 from monitor.periodic import averaged, period_of
 from monitor.recordings import Recording, Role
+from monitor.repeats import chance_of_repeat
 from monitor.residual import modelled_acceleration
 from rigwatch.physics.frequency_fit import fit_transfer_function
 from rigwatch.physics.frequency_response import FrequencyResponse, frequency_response
@@ -190,7 +191,9 @@ def _reference(recording: Recording, plant: TransferPlant, rate: float) -> Refer
 
 
 def _noise(healthy: Sequence[Recording], plant: TransferPlant, rate: float) -> NoiseSection:
-    """The largest scatter of any healthy recording."""
+    """The largest scatter, and the largest chance of a repeated reading, of any healthy
+    recording.
+    """
     scatters = []
     for recording in healthy:
         signals, period = _steady(recording, plant, rate)
@@ -199,8 +202,21 @@ def _noise(healthy: Sequence[Recording], plant: TransferPlant, rate: float) -> N
         scatters.append(averaged(np.array([residual, signals[1], signals[0]]), period).scatter)
     residual_noise, position, voltage = np.max(scatters, axis=0)
     return NoiseSection(
-        residual=float(residual_noise), position=float(position), voltage=float(voltage)
+        residual=float(residual_noise),
+        position=float(position),
+        voltage=float(voltage),
+        repeat=tuple(max(chances) for chances in zip(*map(_repeats, healthy), strict=True)),
     )
+
+
+def _repeats(healthy: Recording) -> list[float]:
+    """Of each channel: readings as they came, from where everything has settled."""
+    rate = healthy.sample_rate
+    signals = np.array([healthy.channel(name) for name in CHANNELS])[:, round(4.0 * rate) :]
+    period = period_of(signals[0], longest=1024)
+    whole = signals[:, : signals.shape[1] // period * period]
+    mean = averaged(whole, period).mean
+    return [chance_of_repeat(row, average) for row, average in zip(whole, mean, strict=True)]
 
 
 def _settling(healthy: Recording, plant: TransferPlant, rate: float) -> int:

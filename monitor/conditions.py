@@ -14,10 +14,13 @@ DRY_FRICTION = "dry_friction"
 STICTION = "stiction"
 OTHER_FAULT = "other_fault"
 EXCITATION_CHANGED = "excitation_changed"
+REFERENCE_LEARNT = "reference_learnt"
 NOT_OBSERVABLE = "not_observable"
 ILL_CONDITIONED = "ill_conditioned"
 GAP = "gap"
 SENSOR_INVALID = "sensor_invalid"
+SENSOR_CLIPPED = "sensor_clipped"
+"""One a channel, as `sensor_clipped.position`; its value is the evidence S of `flat_top.py`."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,13 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
         False,
     ),
     ConditionKind(
+        REFERENCE_LEARNT,
+        "length of the stretch of this run that counts as healthy",
+        "s",
+        "healthy is what this run began with, not what commissioning found",
+        False,
+    ),
+    ConditionKind(
         NOT_OBSERVABLE,
         "velocity, root mean square over the window",
         "m/s",
@@ -103,7 +113,7 @@ class Condition:
     """One condition over a block of n samples.
 
     Args:
-        name: one of `CONDITION_KINDS`.
+        name: one of `CONDITION_KINDS`, or SENSOR_CLIPPED with its channel.
         active: 1 where the condition holds, shape (n,).
         value: the judged quantity, shape (n,), in the kind's unit; NaN where nothing was judged.
         low: lower limit of `value`, shape (n,); -inf where there is none.

@@ -12,7 +12,7 @@ from numba import njit
 
 from monitor.energies import Energies, energy, recent_energy
 from monitor.estimates import spread_of_change
-from monitor.reference import (
+from monitor.reference_state import (
     APERIODIC,
     FIXED,
     POSITION_NOISE,
@@ -21,7 +21,7 @@ from monitor.reference import (
     SWING,
     VOLTAGE_NOISE,
     Reference,
-)  # fmt: skip
+)
 from monitor.watch_state import DEVIATION, LONG, MOVED_VOLTAGE, SHORT, Rules, V, WatchState, X, Y
 from monitor.window import FILL
 

@@ -11,15 +11,18 @@ from monitor.departure import moved, position_limit, voltage_limit
 from monitor.estimates import spread_of_change
 from monitor.isolation import HISTORY, swing_of_voltage_change, weigh
 from monitor.reference import (
+    refine,
+    restart,
+)
+from monitor.reference_state import (
     ACCELERATION_SWING,
+    APERIODIC,
     CYCLE,
     FIXED,
     SOURCE,
     SWING,
     Reference,
-    refine,
-    restart,
-)  # fmt: skip
+)
 from monitor.verdict import Seen, verdict
 from monitor.watch_state import (
     DEVIATION,
@@ -55,6 +58,11 @@ PLAINLY_HEALTHY = 0.6
 """Share of the threshold below which a sample may enter the healthy average."""
 LOOKS_AT_NEW_EXCITATION = 32
 """Looks after which another excitation is taken for granted and learnt."""
+LOUDER = 2.0
+"""Swing of a voltage without a period, in that of the learnt stretch, that makes it another
+excitation. No fault is named there: beside what the model leaves of a motion that never repeats, a
+dead band looks like dry friction and heavy friction like anything else.
+"""
 SHORTEST_CYCLE, LONGEST_CYCLE = 32, 256
 """Samples; evidence needs some, and a slow drive must not put off the verdict for ever."""
 
@@ -106,6 +114,10 @@ def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     held, since = state.held, state.number[EPISODE]
     if ref.number[SOURCE] == FIXED:
         held[VERDICT] = FRICTION if held[THETA1] > rules.high1 else OTHER
+        return
+    if ref.number[SOURCE] == APERIODIC:
+        louder = swing_of_voltage_change(state.history, HISTORY) > LOUDER * ref.value[SWING]
+        held[VERDICT] = NEW_EXCITATION if louder else NO_VERDICT
         return
     cycle = max(SHORTEST_CYCLE, min(ref.number[CYCLE], LONGEST_CYCLE))
     evidence = weigh(state.history, ref, seq, min(since, HISTORY), min(since, 2 * cycle))

@@ -14,7 +14,17 @@ import numpy as np
 from numba import njit
 
 from monitor.energies import energy
-from monitor.reference import APERIODIC, DEPTH, FIXED, NOISE, SOURCE, Reference
+from monitor.reference_state import (
+    APERIODIC,
+    DEPTH,
+    FIXED,
+    LEFT_SHARE,
+    NOISE,
+    QUICK,
+    SLOW,
+    SOURCE,
+    Reference,
+)
 from monitor.watch_state import (
     CONDITION,
     DEVIATION,
@@ -41,9 +51,11 @@ _APERIODIC_VARIANCE = 9.0
 @njit(inline="always")
 def spread_of_change(ref: Reference) -> float:
     """Standard deviation of the change of the residual, error of the healthy average included."""
-    aperiodic = ref.number[SOURCE] == APERIODIC
-    extra = _APERIODIC_VARIANCE if aperiodic else 4.0 / max(ref.number[DEPTH], 1)
-    return ref.value[NOISE] * np.sqrt(1.0 + extra)
+    if ref.number[SOURCE] == APERIODIC:
+        level = max(ref.value[QUICK], ref.value[SLOW])
+        variance = ref.value[NOISE] ** 2 + ref.value[LEFT_SHARE] * level
+        return np.sqrt((1.0 + _APERIODIC_VARIANCE) * variance)
+    return ref.value[NOISE] * np.sqrt(1.0 + 4.0 / max(ref.number[DEPTH], 1))
 
 
 @njit(inline="always")

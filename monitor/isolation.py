@@ -28,7 +28,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.reference import PERIOD, POSITION_SWING, Reference, place_in_period
+from monitor.reference import (
+    place_in_period,
+)
+from monitor.reference_state import (
+    PERIOD,
+    POSITION_SWING,
+    Reference,
+)
 from rigwatch.physics.transfer_function import FloatArray, filter_sample
 
 HISTORY = 512
@@ -181,16 +188,42 @@ def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> No
 
 @njit()
 def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> Evidence:
-    size = gram.shape[0]
-    y, g1, g2 = size - 1, _RIVALS, _RIVALS + 1
-    yy = max(gram[y, y], 1e-30)
+    """The evidence in the normal matrix of rivals, friction regressors and y, in this order."""
+    yy = max(gram[-1, -1], 1e-30)
+    explained, dry = _friction_fit(gram, yy)
+    remains, jump, sign = _beyond_rivals(gram)
+    rho = sign * np.sqrt(min(jump / remains, 1.0)) if remains > 0.0 else 0.0
+    return Evidence(
+        explained,
+        sign * jump / yy,
+        rho,
+        rest,
+        rest_always,
+        1.0 - remains / yy,
+        jump,
+        1.0 - (remains - jump) / yy,
+        dry,
+        peak / yy,
+    )
+
+
+@njit()
+def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
+    """Shares of y² that both friction terms explain, and that the Coulomb term alone stands for."""
+    y, g1, g2 = gram.shape[0] - 1, _RIVALS, _RIVALS + 1
     determinant = gram[g1, g1] * gram[g2, g2] - gram[g1, g2] ** 2
-    explained = dry = 0.0
-    if determinant > 1e-12 * gram[g1, g1] * gram[g2, g2]:
-        theta1 = (gram[g2, g2] * gram[g1, y] - gram[g1, g2] * gram[g2, y]) / determinant
-        theta2 = (gram[g1, g1] * gram[g2, y] - gram[g1, g2] * gram[g1, y]) / determinant
-        explained = (theta1 * gram[g1, y] + theta2 * gram[g2, y]) / yy
-        dry = max(theta1, 0.0) ** 2 * gram[g1, g1] / yy
+    if determinant <= 1e-12 * gram[g1, g1] * gram[g2, g2]:
+        return 0.0, 0.0
+    theta1 = (gram[g2, g2] * gram[g1, y] - gram[g1, g2] * gram[g2, y]) / determinant
+    theta2 = (gram[g1, g1] * gram[g2, y] - gram[g1, g2] * gram[g1, y]) / determinant
+    explained = (theta1 * gram[g1, y] + theta2 * gram[g2, y]) / yy
+    return explained, max(theta1, 0.0) ** 2 * gram[g1, g1] / yy
+
+
+@njit()
+def _beyond_rivals(gram: FloatArray) -> tuple[float, float, float]:
+    """Energy that the rivals leave of y, what of it the jump explains, and the jump's sign."""
+    y, g1 = gram.shape[0] - 1, _RIVALS
     left = gram.copy()
     for i in range(_RIVALS):
         _eliminate(left, i, 1e-9 * gram[i, i])
@@ -198,13 +231,7 @@ def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> 
     jump = 0.0
     if left[g1, g1] > 1e-9 * max(gram[g1, g1], 1e-30) and remains > 0.0:
         jump = left[g1, y] ** 2 / left[g1, g1]
-    sign = 1.0 if left[g1, y] > 0.0 else -1.0
-    rho = sign * np.sqrt(min(jump / remains, 1.0)) if remains > 0.0 else 0.0
-    together = 1.0 - (remains - jump) / yy
-    rivals, share = 1.0 - remains / yy, sign * jump / yy
-    return Evidence(
-        explained, share, rho, rest, rest_always, rivals, jump, together, dry, peak / yy
-    )
+    return remains, jump, 1.0 if left[g1, y] > 0.0 else -1.0
 
 
 @njit()

@@ -83,6 +83,13 @@ class NoiseSection(Section, frozen=True, kw_only=True):
     residual: Annotated[float, Meta(gt=0, description="acceleration residual [m/s^2]")]
     position: Annotated[float, Meta(gt=0, description="position [m]")] = 1e-5
     voltage: Annotated[float, Meta(gt=0, description="voltage [V]")] = 1e-3
+    repeat: Annotated[
+        tuple[Annotated[float, Meta(gt=0, le=1)], ...],
+        Meta(
+            description="largest chance that a healthy reading repeats the one before it, in the "
+            "order of the channels; empty: no channel is judged for clipping"
+        ),
+    ] = ()
 
 
 class DecisionSection(Section, frozen=True, kw_only=True):
@@ -132,6 +139,9 @@ class PromotedSection(Section, frozen=True, kw_only=True):
     viscous: Annotated[float, Meta(description="in units of theta2")] = 0.0
     coulomb_by_direction: Annotated[float, Meta(description="half the difference, theta1")] = 0.0
     viscous_by_direction: Annotated[float, Meta(description="half the difference, theta2")] = 0.0
+    smooth: Annotated[
+        float, Meta(ge=0, description="speed over which the sign of v turns, 0 for at once [m/s]")
+    ] = 0.0
     study: Annotated[str, Meta(description="where it was learnt")] = ""
     sha256: Annotated[str, Meta(description="hash of the study's model and effects")] = ""
 
@@ -202,6 +212,8 @@ def check_model(model: RigModel, path: Path | str) -> None:
     wanted = 3 if isinstance(model.plant, TransferPlant) else 2
     if len(model.channels) != wanted:
         raise ConfigError(path, "channels", f"{len(model.channels)} names", f"{wanted} names")
+    if model.noise.repeat and len(model.noise.repeat) != wanted:
+        raise ConfigError(path, "noise.repeat", f"{len(model.noise.repeat)}", f"{wanted} or none")
     if (model.band is None) != isinstance(model.plant, TransferPlant):
         raise ConfigError(path, "band", "it missing or in excess", "a band with an inertia only")
     if isinstance(model.plant, TransferPlant) and not model.plant.function().is_stable:

@@ -1,13 +1,13 @@
 """The monitor as one pure object: sample blocks in, estimates and conditions out.
 
     SampleBlock ─▶ admission ─▶ residual ─▶ watch (reference, estimates, departure, verdict) ─▶
-    Result
+    Result               └─▶ clipping of each channel ─▶ Result
 
 It knows no clock, bus or file, and every stage goes sample by sample with carried state: the same
 samples give the same numbers to the last bit, live or replayed, however they are cut into blocks.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from monitor import conditions as kinds
 from monitor import watch_state as w
 from monitor.admission import Admission, Admitted
+from monitor.clipping import Clipping
 from monitor.conditions import Condition
 from monitor.inertia import InertiaResidual
 from monitor.limits import rules_for
 from monitor.model_file import InertiaPlant, RigModel
-from monitor.promoted import add_promoted, check_can_follow
-from monitor.reference import ReferenceRules, new_reference
+from monitor.promoted import PromotedFriction, check_can_follow
+from monitor.reference_state import ReferenceRules, new_reference
 from monitor.residual import TransferResidual
 from monitor.watch import watch_block
 from rigwatch.physics.transfer_function import FloatArray
@@ -57,7 +58,8 @@ class Result:
     Args:
         estimates: the published columns, one row a sample of the block that had not been seen
             before.
-        conditions: one of each of `conditions.CONDITION_KINDS`, of the same length.
+        conditions: one of each of `conditions.CONDITION_KINDS`, and one of clipping for each
+            channel that the model can judge, of the same length.
     """
 
     estimates: EstimateBlock
@@ -81,6 +83,8 @@ class Monitor:
         needed = model.channels if inertia else (model.channels[0], model.channels[2])
         self._admission = Admission(model.channels, needed, model.decision.longest_hold)
         self._residual = InertiaResidual(model) if inertia else TransferResidual(model)
+        self._clipping = Clipping(model)
+        self._promoted = PromotedFriction(model)
         self._arming = _arming_rules(model)
         self._reference = new_reference(self._arming, _known(model))
         self._state = _new_state(model)
@@ -95,6 +99,8 @@ class Monitor:
         if isinstance(self._residual, InertiaResidual) and isinstance(model.plant, InertiaPlant):
             self._residual.adopt(model.plant)
         self.model, self.rules = model, rules_for(model)
+        self._clipping = Clipping(model)
+        self._promoted = PromotedFriction(model)
         self._arming = _arming_rules(model)
         self._reference = new_reference(self._arming, _known(model))
         self._state = _new_state(model)
@@ -105,7 +111,8 @@ class Monitor:
         if admitted is None:
             return None
         data = self._residual.update(admitted.signals, admitted.code)
-        add_promoted(data, self.model.promoted)
+        clipping = self._clipping.update(admitted)
+        self._promoted.add(data, admitted.code)
         out = np.zeros((w.OUTPUTS, len(data)))
         watch_block(
             data,
@@ -118,7 +125,8 @@ class Monitor:
             self._state,
             out,
         )
-        return self._result(block, admitted, out)
+        result = self._result(block, admitted, out)
+        return replace(result, conditions=(*result.conditions, *clipping))
 
     def _result(self, block: SampleBlock, admitted: Admitted, out: FloatArray) -> Result:
         kept = out[:, admitted.padding :]
@@ -160,6 +168,12 @@ class Monitor:
                 armed & (verdict == w.NEW_EXCITATION),
                 out[w.MOVED_VOLTAGE],
                 0.1,
+            ),
+            _above(
+                kinds.REFERENCE_LEARNT,
+                armed & (out[w.LEARNT_HERE] > 0.0),
+                out[w.LEARNT_HERE] / self.model.sample_rate,
+                0.0,
             ),
             _below(kinds.NOT_OBSERVABLE, ~moving, out[w.SPEED_RMS], decision.least_velocity),
             _above(

@@ -1,21 +1,24 @@
-"""What is probably missing when an alarm stands: ranked in the background on recent samples.
+"""What is probably missing when an alarm stands: asked in the background on recent samples.
 
-The change from the healthy rig, as the monitor publishes it, is explained by one candidate at a
-time. Forces at the mass reach the acceleration through the friction filter Ge; faults of sensor and
-drive do not. Each candidate's size is fitted to the first part of the samples since the onset, and
-the rest decides, as everywhere: the share of its energy that the candidate takes away.
+The ranking itself is in `suspects.py` and runs in a process of its own; here is what of the samples
+is kept for it, when it is asked, and what becomes of the answer.
 """
 
 import queue
+import tempfile
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from monitor.model_file import RigModel
+from monitor.suspect_job import ask
 from rigwatch.physics.transfer_function import FloatArray
-from rigwatch.wire.messages import Alarm, EstimateBlock, Event
+from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event, SampleBlock
+from rigwatch.wire.quality import valid
 
 NAMED = ("departure", "dry_friction", "other_fault")
 """Alarms that ask for an explanation; a mass that sticks has its name."""
@@ -23,114 +26,42 @@ WAIT = 2.0
 """Samples since the onset that a ranking waits for [s]."""
 KEPT = 20.0
 """Samples that are kept [s]."""
-FITTED = 0.6
-"""Share of the samples that sizes are fitted to."""
-EXPLAINED = 0.7
-"""Share of the energy below which no candidate is named."""
-EQUAL = 0.03
-"""Difference in that share below which two candidates cannot be told apart."""
-COLUMNS = ("change", "velocity", "modelled_acceleration", "residual")
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One effect and how much of the change it explains.
-
-    Attributes:
-        name: in words.
-        explained: share of the energy of samples that its size was not fitted to; at most 1.
-    """
-
-    name: str
-    explained: float
-
-
-def rank_candidates(columns: dict[str, FloatArray], model: RigModel) -> list[Candidate]:
-    """All candidates, best first.
-
-    Args:
-        columns: those of `COLUMNS`, each of shape (n,), consecutive samples.
-        model: with the friction filter.
-    """
-    change = columns["change"]
-    good = np.isfinite(np.array([columns[name] for name in COLUMNS])).all(axis=0)
-    part = np.arange(len(change)) < FITTED * len(change)
-    fitted, judged = good & part, good & ~part
-    energy = float(np.sum(change[judged] ** 2))
-    found = []
-    for label, signal in _signals(columns, model).items():
-        power = float(np.sum(signal[fitted] ** 2))
-        if power > 0 and energy > 0:
-            size = float(np.sum(signal[fitted] * change[fitted])) / power
-            left = float(np.sum((change[judged] - size * signal[judged]) ** 2))
-            found.append(Candidate(label, 1.0 - left / energy))
-    return sorted(found, key=lambda candidate: -candidate.explained)
-
-
-def in_words(found: list[Candidate]) -> str:
-    """The ranking in a sentence."""
-    if not found or found[0].explained < EXPLAINED:
-        best = f"; the best, {found[0].name}, explains {found[0].explained:.0%}" if found else ""
-        return f"probably missing: none of the known effects{best}"
-    first = found[0]
-    rivals = [c.name for c in found[1:] if c.explained > first.explained - EQUAL]
-    text = f"probably missing: {first.name}, explains {first.explained:.0%} of the change"
-    return f"{text}; cannot be told from {', '.join(rivals)}" if rivals else text
-
-
-def _signals(columns: dict[str, FloatArray], model: RigModel) -> dict[str, FloatArray]:
-    speed, modelled = (np.nan_to_num(columns[name]) for name in ("velocity", COLUMNS[2]))
-    measured = modelled + np.nan_to_num(columns["residual"])
-    forces = {
-        "dry (Coulomb) friction": np.sign(speed),
-        "viscous friction": speed,
-        "quadratic drag": speed * np.abs(speed),
-        "friction that differs by direction": np.abs(speed),
-        "a spring": np.cumsum(speed - speed.mean()) / model.sample_rate,
-    }
-    through = {name: _through_filter(model, force) for name, force in forces.items()}
-    return through | {
-        "gain of the accelerometer": measured,
-        "offset of the accelerometer": np.ones(len(speed)),
-        "lag of the accelerometer": np.gradient(measured),
-        "gain of the drive": modelled,
-        "delay of the drive": np.gradient(modelled),
-    }
-
-
-def _through_filter(model: RigModel, force: FloatArray) -> FloatArray:
-    return model.friction.function().simulate(force)
+MOST_TOLD = 64
+"""Answers that are kept for those who list alarms later."""
+Judged = tuple[EstimateBlock, SampleBlock]
 
 
 class Explainer:
-    """Ranks in a thread of its own, one alarm at a time, and never makes samples wait.
+    """Asks for one alarm at a time, and never makes samples wait.
 
     Args:
         model: gives the model in force.
+        effect_files: own effects, ranked beside the library's.
     """
 
-    def __init__(self, model: Callable[[], RigModel]) -> None:
-        self._model = model
-        self._blocks: list[EstimateBlock] = []
+    def __init__(self, model: Callable[[], RigModel], effect_files: Sequence[str] = ()) -> None:
+        self._model, self._files = model, tuple(effect_files)
+        self._judged: deque[Judged] = deque()
         self._wanted: Alarm | None = None
-        self._told: set[tuple[int, int]] = set()
-        self._results: queue.SimpleQueue[Event] = queue.SimpleQueue()
+        self._told: dict[tuple[int, int], str] = {}
+        self._results: queue.SimpleQueue[tuple[Alarm, Event, str]] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
 
-    def take(self, block: EstimateBlock) -> None:
-        """Keep estimates, and begin where enough have come since an alarm's onset."""
-        if self._blocks and self._blocks[-1].boot != block.boot:
-            self._blocks.clear()
-        self._blocks.append(block)
+    def take(self, block: EstimateBlock, samples: SampleBlock) -> None:
+        """Keep estimates with the samples they are of, and ask where enough have come since an
+        alarm's onset.
+        """
+        if self._judged and self._judged[-1][0].boot != block.boot:
+            self._judged.clear()
+        self._judged.append((block, samples))
         rate, alarm = self._model().sample_rate, self._wanted
-        while self._blocks[0].seq < block.seq - KEPT * rate:
-            self._blocks.pop(0)
-        last = block.seq + len(block)
+        while self._judged[0][0].seq < block.seq - KEPT * rate:
+            self._judged.popleft()
         if not alarm or alarm.boot != block.boot or self._busy():
             return
-        if last - alarm.onset_seq >= WAIT * rate:
+        if block.seq + len(block) - alarm.onset_seq >= WAIT * rate:
             self._wanted = None
-            arguments = (list(self._blocks), alarm, self._model())
+            arguments = (list(self._judged), alarm, self._model())
             self._thread = threading.Thread(target=self._rank, args=arguments, daemon=True)
             self._thread.start()
 
@@ -140,19 +71,56 @@ class Explainer:
             self._wanted = None
         key = (alarm.boot, alarm.onset_seq)
         if alarm.state == "unacknowledged" and alarm.name in NAMED and key not in self._told:
-            self._told.add(key)
+            self._told[key] = ""
             self._wanted = alarm
+            while len(self._told) > MOST_TOLD:
+                self._told.pop(next(iter(self._told)))
 
     def results(self) -> list[Event]:
         """What has been found since."""
-        return [self._results.get() for _ in range(self._results.qsize())]
+        found = [self._results.get() for _ in range(self._results.qsize())]
+        for alarm, _, text in found:
+            self._told[alarm.boot, alarm.onset_seq] = text
+        return [event for _, event, _ in found]
+
+    def with_causes(self, standing: Sequence[Alarm]) -> list[Alarm]:
+        """The alarms that stand, each with what is probably missing beside its cause."""
+        return [self._with_cause(alarm) for alarm in standing]
+
+    def _with_cause(self, alarm: Alarm) -> Alarm:
+        text = self._told.get((alarm.boot, alarm.onset_seq), "")
+        if not text or alarm.name not in NAMED:
+            return alarm
+        return replace(alarm, cause=f"{alarm.cause}; {text}")
 
     def _busy(self) -> bool:
         return self._thread is not None and self._thread.is_alive()
 
-    def _rank(self, blocks: list[EstimateBlock], alarm: Alarm, model: RigModel) -> None:
-        since = [b for b in blocks if b.seq + len(b) > alarm.onset_seq]
-        columns = {name: np.concatenate([b.column(name).values for b in since]) for name in COLUMNS}
-        text = f"{alarm.name}: {in_words(rank_candidates(columns, model))}"
-        at = int(since[-1].t_ns[-1])
-        self._results.put(Event("monitor", at, alarm.severity, "PROBABLY MISSING", text))
+    def _rank(self, judged: Sequence[Judged], alarm: Alarm, model: RigModel) -> None:
+        signals, change = _arrays(judged, model.channels)
+        onset = max(alarm.onset_seq - judged[0][0].seq, 0)
+        with tempfile.TemporaryDirectory() as folder:
+            text = ask(Path(folder), signals, change, onset, model, self._files)
+        text = text or "probably missing: cannot tell, the ranking failed"
+        at = int(judged[-1][0].t_ns[-1])
+        event = Event("monitor", at, alarm.severity, PROBABLY_MISSING, f"{alarm.name}: {text}")
+        self._results.put((alarm, event, text))
+
+
+def _arrays(judged: Sequence[Judged], channels: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Channels, shape (n, channels), and change, shape (n,), of consecutive samples; NaN where
+    there is nothing valid.
+    """
+    first, last = judged[0][0].seq, judged[-1][0]
+    count = last.seq + len(last) - first
+    signals, change = np.full((count, len(channels)), np.nan), np.full(count, np.nan)
+    for block, samples in judged:
+        change[block.seq - first :][: len(block)] = block.column("change").values
+        at = max(samples.seq - first, 0)
+        skipped = at - (samples.seq - first)
+        for place, name in enumerate(channels):
+            column = samples.channel(name)
+            good = valid(column.quality) if len(column.quality) else np.True_
+            kept = np.where(good, column.values, np.nan)[skipped:]
+            signals[at : at + len(kept), place] = kept
+    return signals, change

@@ -19,6 +19,7 @@ from monitor.model_desk import ModelDesk, Place
 from monitor.model_file import RigModel, load_model
 from monitor.probable import Explainer
 from monitor.rig_monitor import RigMonitor, compile_kernels
+from monitor.starting import Patience
 from rigwatch.wire.alarm_list import serve_alarm_list
 from rigwatch.wire.blocks import cut, pieces
 from rigwatch.wire.bus import Bus, connect
@@ -32,8 +33,6 @@ from rigwatch.wire.topics import ALARMS, ALIVE_KEY, COMMANDS, ESTIMATES, EVENTS,
 
 TURN = 0.02
 """Longest wait for samples before commands and silence are looked at [s]."""
-GRACE = 5.0
-"""Silence after the start that is no alarm yet [s]."""
 LONGEST_BLOCK = 512
 """Samples judged and published at a time when the monitor is behind."""
 
@@ -64,6 +63,7 @@ class MonitorProcess:
         self._links = LinkWatch(config.daq.stale_after)
         self._health = HealthBook("monitor")
         self._device = config.daq.name
+        self._patience = Patience(time.monotonic())
         self._daq_alive = False
         self._daq_trouble = ""
         self._disk_trouble: Health | None = None
@@ -72,8 +72,8 @@ class MonitorProcess:
         self._commands = bus.subscribe(COMMANDS)
         self._healths = bus.subscribe(HEALTH)
         bus.watch_tokens(f"{ALIVE_KEY}/daq", self._daq_changed)
-        serve_alarm_list(bus, lambda: self._standing)
-        self._explainer = Explainer(lambda: self.rig.model)
+        self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
+        serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
         if section.journal:
             self.say(self.rig.alarms.restore(last_records(read_journal(section.journal)[0])))
         self._models = ModelDesk(bus, self.rig, Path(section.model))
@@ -148,7 +148,7 @@ class MonitorProcess:
             return
         self._unsuitable = ""
         self.bus.publish(ESTIMATES, judged[0])
-        self._explainer.take(judged[0])
+        self._explainer.take(judged[0], fresh)
         self._health.judged(int(block.t_ns[-1]), time.time_ns())
         self.say(self.rig.announce(*judged))
 
@@ -171,12 +171,16 @@ class MonitorProcess:
 
     def _seen(self) -> Seen:
         self._hear_of_others()
-        silent = self.reader.silent_for()
+        silent = self._patience.counted(
+            time.monotonic(),
+            self.reader.silent_for(),
+            daq_alive=self._daq_alive,
+            heard=self.reader.heard,
+        )
         return Seen(
             time.time_ns(),
             time.monotonic_ns(),
-            # One who has just started gives the others time to start as well.
-            silent if self.reader.heard or silent > GRACE else 0.0,
+            silent,
             self._daq_trouble if self._daq_alive else "the daq process is not there",
             self.reader.contested,
             self._device,

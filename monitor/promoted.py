@@ -4,27 +4,69 @@
 
 with g1, g2 the regressors of the residual stage, so that friction goes through the same filter as
 its estimates do; d, the halves of what differs by direction, only for an inertia, whose g have the
-sign of -v. What is estimated from then on is friction beyond that.
+sign of -v.
+
+Where the velocity is noisy, its sign turns a sample early or late, and a promoted friction jumps
+with it: noise that was not there before. With `smooth`, g1 is Ge[tanh(v/smooth)] here. What is
+estimated from then on is friction beyond that.
 """
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
+from numba import njit
+
+from monitor.admission import DEAD, NEW_BOOT, RESTART, Codes
 from monitor.model_file import InertiaPlant, PromotedSection, RigModel
-from monitor.residual import G1, G2, MODELLED
-from rigwatch.physics.transfer_function import FloatArray
+from monitor.residual import G1, G2, MODELLED, VELOCITY
+from rigwatch.physics.transfer_function import FloatArray, filter_sample
 from rigwatch.wire.errors import ModelError
 
 
-def add_promoted(data: FloatArray, promoted: PromotedSection | None) -> None:
-    """Add it to the residual stage's columns, shape (n, 7), sample by sample, in place."""
-    if promoted is None:
-        return
-    g1, g2 = data[:, G1], data[:, G2]
-    data[:, MODELLED] += promoted.coulomb * g1
-    data[:, MODELLED] += promoted.viscous * g2
-    if promoted.coulomb_by_direction or promoted.viscous_by_direction:
-        data[:, MODELLED] -= promoted.coulomb_by_direction * abs(g1)
-        data[:, MODELLED] -= promoted.viscous_by_direction * abs(g2)
+class PromotedFriction:
+    """The running stage, between residual and watch.
+
+    Args:
+        model: in force; without promoted friction nothing is added.
+    """
+
+    def __init__(self, model: RigModel) -> None:
+        self._promoted = model.promoted or PromotedSection()
+        self._b, self._a = model.friction.function().padded()
+        self._state = np.zeros(max(self._b.size - 1, 1))
+
+    def add(self, data: FloatArray, code: Codes) -> None:
+        """Add it to the residual stage's columns, shape (n, 7), sample by sample, in place."""
+        known = self._promoted
+        if known.smooth > 0.0:
+            g1 = np.zeros(len(data))
+            _smoothed(data, code, known.smooth, self._b, self._a, self._state, g1)
+        else:
+            g1 = data[:, G1]
+        g2 = data[:, G2]
+        data[:, MODELLED] += known.coulomb * g1
+        data[:, MODELLED] += known.viscous * g2
+        if known.coulomb_by_direction or known.viscous_by_direction:
+            data[:, MODELLED] -= known.coulomb_by_direction * abs(g1)
+            data[:, MODELLED] -= known.viscous_by_direction * abs(g2)
+
+
+@njit(cache=True)
+def _smoothed(  # noqa: PLR0917
+    data: FloatArray,
+    code: Codes,
+    smooth: float,
+    b: FloatArray,
+    a: FloatArray,
+    state: FloatArray,
+    out: FloatArray,
+) -> None:
+    for k in range(code.size):
+        if code[k] == RESTART or code[k] == NEW_BOOT:
+            state[:] = 0.0
+        if code[k] != DEAD:
+            out[k] = filter_sample(b, a, state, math.tanh(data[k, VELOCITY] / smooth))
 
 
 @dataclass(frozen=True)

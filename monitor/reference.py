@@ -11,6 +11,8 @@ with φ the place in the period, A and AM the averages of measured and modelled 
 amplitude scale. The average comes from the model file where that holds this very excitation, else
 from the first second of the run, and it goes on growing while the rig is plainly healthy.
 
+An excitation that does not repeat has no such average; see `aperiodic.py`.
+
     SETTLING ──settled, period found──▶ LEARNING ──enough periods, quiet──▶ ARMED
         ▲    ──a reference of the model file fits and agrees─────────────────▲
         └─────────── another excitation, or a new boot ────────────────────────┘
@@ -19,78 +21,42 @@ from the first second of the run, and it goes on growing while the rig is plainl
 # Compiled functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from monitor.aperiodic import learn_aperiodic
+from monitor.reference_state import (
+    ACCELERATION_SWING,
+    ANCHOR,
+    APERIODIC,
+    ARMED,
+    CYCLE,
+    DEPTH,
+    FIXED,
+    FROM_MODEL,
+    FROM_RUN,
+    LEARNING,
+    LEARNT,
+    LONGEST_AVERAGE,
+    MODE,
+    NO_REFERENCE,
+    NOISE,
+    PERIOD,
+    POSITION_NOISE,
+    POSITION_SWING,
+    RESUMING,
+    RING_FILL,
+    RING_HEAD,
+    SCALE,
+    SETTLING,
+    SINCE,
+    SOURCE,
+    SWING,
+    VOLTAGE_NOISE,
+    Reference,
+    ReferenceRules,
+)
 from rigwatch.physics.transfer_function import FloatArray
-
-SETTLING, LEARNING, ARMED, RESUMING = 0, 1, 2, 3
-NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC, FIXED = 0, 1, 2, 3, 4
-
-MODE, SOURCE, SINCE, PERIOD, ANCHOR, LEARNT, RING_FILL, RING_HEAD, DEPTH, CYCLE = range(10)
-"""Integers of the state: mode, where the reference is from, samples since the last restart, period
-[samples], sample number of its first place, samples learnt, fill and head of the voltage ring,
-periods averaged, one to and fro of the mass [samples].
-"""
-SCALE, NOISE, POSITION_NOISE, VOLTAGE_NOISE, SWING, POSITION_SWING, ACCELERATION_SWING = range(7)
-"""Floats: amplitude scale; noise of y, x, V; rms of the periodic part of V, x, a."""
-
-LONGEST_AVERAGE = 512
-"""Periods after which the reference is complete."""
-
-
-class Reference(NamedTuple):
-    """State. Templates and sums have one row a signal (V, x, a, am) and one column a place in the
-    period.
-    """
-
-    number: NDArray[np.int64]
-    value: FloatArray
-    template: FloatArray
-    sums: FloatArray
-    products: FloatArray
-    ring: FloatArray
-    known: FloatArray
-    known_period: NDArray[np.int64]
-    known_scale: FloatArray
-    known_depth: NDArray[np.int64]
-
-
-class ReferenceRules(NamedTuple):
-    """What arming goes by; see `DecisionSection` and `NoiseSection` for units."""
-
-    settle: int
-    learn: int
-    longest_period: int
-    residual_noise: float
-    position_noise: float
-    voltage_noise: float
-    fixed: bool
-
-
-def new_reference(rules: ReferenceRules, known: list[tuple[FloatArray, float, int]]) -> Reference:
-    """A state that knows the model file's references: ((4, P) signals, scale, periods averaged)."""
-    longest = max([rules.longest_period, *[signals.shape[1] for signals, _, _ in known]])
-    stored = np.zeros((len(known), 4, longest))
-    for place, (signals, _, _) in enumerate(known):
-        stored[place, :, : signals.shape[1]] = signals
-    number, value = np.zeros(10, np.int64), np.zeros(7)
-    value[SCALE] = 1.0
-    return Reference(
-        number,
-        value,
-        np.zeros((4, longest)),
-        np.zeros((4, longest)),
-        np.zeros(6),
-        np.zeros(2 * rules.longest_period),
-        stored,
-        np.array([signals.shape[1] for signals, _, _ in known], np.int64),
-        np.array([scale for _, scale, _ in known], np.float64),
-        np.array([depth for _, _, depth in known], np.int64),
-    )
 
 
 @njit()
@@ -110,6 +76,13 @@ def restart(ref: Reference, new_boot: bool) -> None:
 def place_in_period(ref: Reference, seq: int) -> int:
     """φ of sample number `seq`."""
     return (seq - ref.number[ANCHOR]) % ref.number[PERIOD]
+
+
+@njit(inline="always")
+def learnt_here(ref: Reference) -> int:
+    """Samples of this run that the reference rests on, 0 where the model file holds it."""
+    own = ref.number[SOURCE] == FROM_RUN or ref.number[SOURCE] == APERIODIC
+    return ref.number[DEPTH] * ref.number[PERIOD] if own else 0
 
 
 @njit()
@@ -250,6 +223,9 @@ def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) ->
 @njit()
 def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
     number, period = ref.number, ref.number[PERIOD]
+    if period == 1:
+        learn_aperiodic(ref, rules, row)
+        return
     place = place_in_period(ref, seq)
     for i in range(4):
         ref.sums[i, place] += row[i]
@@ -281,9 +257,6 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
         mm += ref.template[3, place] ** 2
         xx += ref.template[1, place] ** 2
         vv += ref.template[0, place] ** 2
-    if period == 1:
-        _arm_aperiodic(ref)
-        return
     scale = am / mm if mm > 0.0 else 0.0
     freedom = period * (depth - 1)
     p = ref.products
@@ -304,22 +277,6 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
         number[LEARNT] = 0
         ref.sums[:, :] = 0.0
         ref.products[:] = 0.0
-
-
-@njit()
-def _arm_aperiodic(ref: Reference) -> None:
-    """Nothing repeats: the residual itself is judged, against its own size while learning."""
-    p, learnt = ref.products, ref.number[LEARNT]
-    scale = p[1] / p[2] if p[2] > 0.0 else 0.0
-    ref.template[:, :] = 0.0
-    size = np.sqrt(max(p[0] - 2.0 * scale * p[1] + scale**2 * p[2], 0.0) / learnt)
-    ref.value[SCALE] = scale
-    ref.value[NOISE] = max(ref.value[NOISE], size)
-    ref.value[SWING] = np.sqrt(p[4] / learnt)
-    ref.value[POSITION_SWING] = np.sqrt(p[3] / learnt)
-    ref.value[ACCELERATION_SWING] = np.sqrt(p[0] / learnt)
-    ref.number[SOURCE] = APERIODIC
-    ref.number[MODE] = ARMED
 
 
 @njit()

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from monitor.alarms import AlarmManager, Announcement, quality_conditions
-from monitor.conditions import GAP, SENSOR_INVALID, Condition
+from monitor.conditions import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition
 from monitor.detectors.detector import Detector
 from monitor.model_file import RigModel
 from monitor.pipeline import Monitor
@@ -22,7 +22,7 @@ from rigwatch.wire.blocks import cut
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.rig_config import AlarmSection
 
-OF_SAMPLES = frozenset({GAP, SENSOR_INVALID})
+OF_SAMPLES = frozenset({GAP, SENSOR_CLIPPED, SENSOR_INVALID})
 """Conditions of the samples themselves, judged whether the friction scheme is wanted or not."""
 
 
@@ -88,7 +88,7 @@ class RigMonitor:
         quality = tuple(quality_conditions(fresh))
         own = result.conditions
         if not self._friction:
-            own = tuple(condition for condition in own if condition.name in OF_SAMPLES)
+            own = tuple(c for c in own if c.name.partition(".")[0] in OF_SAMPLES)
         return replace(at, columns=columns), (*own, *more, *quality)
 
     def announce(self, at: EstimateBlock, conditions: tuple[Condition, ...]) -> list[Announcement]:

@@ -17,25 +17,31 @@ from numba import njit
 from numpy.typing import NDArray
 
 from monitor.admission import DEAD, GOOD, HELD, NEW_BOOT, RESTART, Codes
+from monitor.aperiodic import follow_level
 from monitor.departure import departed
 from monitor.energies import add
 from monitor.episode import follow
 from monitor.estimates import estimate
-from monitor.isolation import remember
+from monitor.isolation import HISTORY, remember
 from monitor.reference import (
+    learnt_here,
+    observe,
+    place_in_period,
+    restart,
+)
+from monitor.reference_state import (
     ACCELERATION_SWING,
+    APERIODIC,
     ARMED,
     MODE,
     NOISE,
     PERIOD,
     POSITION_NOISE,
     SCALE,
+    SOURCE,
     Reference,
     ReferenceRules,
-    observe,
-    place_in_period,
-    restart,
-)  # fmt: skip
+)
 from monitor.residual import ACCELERATION, G1, G2, POSITION, VELOCITY, VOLTAGE
 from monitor.residual import MODELLED as MODELLED_COLUMN
 from monitor.watch_state import (
@@ -44,6 +50,7 @@ from monitor.watch_state import (
     DEVIATION,
     EPISODE,
     HOP,
+    LEARNT_HERE,
     MODELLED,
     OBSERVABLE,
     RESIDUAL,
@@ -60,7 +67,7 @@ from monitor.watch_state import (
 from monitor.window import FILL, Window, push
 from rigwatch.physics.transfer_function import FloatArray
 
-FINGERPRINT = "b44f32c5b9ac"
+FINGERPRINT = "d92a8c466e34"
 """Of every source file whose code is compiled into `watch_block`."""
 
 
@@ -98,9 +105,15 @@ def watch_block(  # noqa: PLR0917
 
 @njit()
 def _window_length(wanted: int, ref: Reference, window: Window) -> int:
-    """Whole periods of the excitation, at least what was wanted, at most what there is room for."""
+    """Whole periods of the excitation, at least what was wanted, at most what there is room for.
+
+    Without a period it is as long as the history: what the model leaves in a healthy rig comes and
+    goes with the drive, and averages out over seconds only.
+    """
     period = ref.number[PERIOD]
     room = window.rows.shape[0]
+    if ref.number[SOURCE] == APERIODIC:
+        return min(room, HISTORY)
     return min(((wanted + period - 1) // period) * period, (room // period) * period)
 
 
@@ -142,6 +155,8 @@ def _take(
     acceleration = data[ACCELERATION] - healthy[ACCELERATION, place]
     modelled = data[MODELLED_COLUMN] - healthy[MODELLED_COLUMN, place]
     y = acceleration - ref.value[SCALE] * modelled
+    if ref.number[SOURCE] == APERIODIC:
+        follow_level(ref, ref.value[SCALE] * modelled)
     signals[Y], signals[A], signals[S] = y, acceleration, data[VELOCITY]
     signals[X] = data[POSITION] - healthy[POSITION, place] if position_valid else 0.0
     signals[V] = data[VOLTAGE] - healthy[VOLTAGE, place]
@@ -183,6 +198,7 @@ def _write(data: FloatArray, code: int, ref: Reference, state: WatchState, out: 
     out[SPEED] = data[VELOCITY]
     armed = ref.number[MODE] == ARMED and code != DEAD and state.energies.place[FILL] > 0
     out[ARMED_FLAG] = 1.0 if armed else 0.0
+    out[LEARNT_HERE] = learnt_here(ref) if armed else 0.0
     if not armed:
         out[DEVIATION] = 0.0
         out[OBSERVABLE] = 0.0

@@ -145,6 +145,14 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         _SENSOR,
     ),
     AlarmKind(
+        "sensor_clipped",
+        "error",
+        "the {channel} signal is cut off at one value inside the sensor's range",
+        "Check the sensor's amplifier, its supply and its range. What lies beyond the "
+        "cut is lost, so do not trust estimates that need this channel.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
         "sensor_stuck",
         "error",
         "the {channel} code has not changed for longer than a live sensor can leave it",
@@ -236,6 +244,15 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "Go back to the known excitation, or record a healthy "
         "stretch with the new one and arm anew.",
         _PASSING,
+    ),
+    AlarmKind(
+        "reference_learnt",
+        "info",
+        "the model file holds no healthy recording of this excitation: the reference was learnt "
+        "from this run, and a fault that was there before counts as healthy",
+        "Make sure that the rig was healthy at the start, or commission with a healthy recording "
+        "of this excitation.",
+        _REMARK,
     ),
     AlarmKind(
         "not_observable",

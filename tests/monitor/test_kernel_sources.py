@@ -4,12 +4,14 @@ import hashlib
 import inspect
 
 from monitor import (
+    aperiodic,
     departure,
     energies,
     episode,
     estimates,
     isolation,
     reference,
+    reference_state,
     verdict,
     watch,
     watch_state,
@@ -18,8 +20,8 @@ from monitor import (
 from rigwatch.physics import transfer_function
 
 SOURCES = (
-    departure, energies, episode, estimates, isolation, reference, verdict, watch_state, window,
-    transfer_function,
+    aperiodic, departure, energies, episode, estimates, isolation, reference, reference_state,
+    verdict, watch_state, window, transfer_function,
 )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from monitor.pipeline import PUBLISHED, Monitor, Result
 from rigwatch.wire.messages import Column, SampleBlock
 from rigwatch.wire.quality import NON_FINITE
 from sim_plant.effects import EFFECTS
+from sim_plant.excitation import Shape, Square
 
 ONSET = int(4.0 * RATE)
 HEALTHY = run(SINE, 8.0, seed=21)
@@ -48,6 +49,26 @@ def test_friction_is_seen_at_once_and_named(drive: object, level: float) -> None
     assert not active(result, kinds.OTHER_FAULT).any()
     theta = values(result, "theta1")[-1]
     assert theta == pytest.approx(level / 0.4, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("drive", "effects"),
+    [(SINE, {}), (Square(amplitude=1.0, frequency=8.0), {"static_ratio": 1.3})],
+    ids=["sine", "square"],
+)
+def test_plain_friction_is_named_within_a_cycle_and_a_half(
+    drive: Shape, effects: dict[str, float]
+) -> None:
+    result = watched(run(drive, 6.0, friction(4.0, 0.8, **effects), seed=28))
+    named = np.flatnonzero(active(result, kinds.DRY_FRICTION))
+    assert ONSET < named[0] <= ONSET + 48
+
+
+def test_a_rig_that_is_damped_to_rest_does_not_rub() -> None:
+    drive, events = Square(amplitude=0.8, frequency=4.0), fault("viscous", 8.0)
+    result = watched(run(drive, 10.0, events, seed=29))
+    assert active(result, kinds.DEPARTURE)[ONSET:].any()
+    assert not active(result, kinds.DRY_FRICTION).any()
 
 
 def test_very_high_stiction_is_named_beside_friction() -> None:
@@ -146,6 +167,20 @@ def test_a_new_boot_starts_over() -> None:
 def test_friction_from_the_start_shows_where_the_model_knows_the_excitation() -> None:
     result = watched(run(SINE, 6.0, friction(0.0), seed=26))
     assert active(result, kinds.DEPARTURE)[-1] == 1
+
+
+def test_friction_from_the_start_that_the_model_cannot_know_is_learnt_and_that_is_said() -> None:
+    result = watched(run(OTHER_SINE, 6.0, friction(0.0), seed=26))
+    assert not active(result, kinds.DEPARTURE).any()
+    learnt = next(c for c in result.conditions if c.name == kinds.REFERENCE_LEARNT)
+    armed = values(result, "armed") == 1.0
+    assert np.array_equal(learnt.active == 1, armed)
+    assert armed.any()
+    assert learnt.value[armed][0] == pytest.approx(1.0, abs=0.2)
+
+
+def test_nothing_is_said_of_learning_where_the_model_knows_the_excitation() -> None:
+    assert not active(watched(HEALTHY), kinds.REFERENCE_LEARNT).any()
 
 
 def test_without_motion_friction_is_not_observable() -> None:

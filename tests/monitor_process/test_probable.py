@@ -1,76 +1,149 @@
 """An alarm is followed by what is probably missing, ranked without making samples wait."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
-from monitor.model_file import load_model
-from monitor.probable import Explainer, in_words, rank_candidates
+from monitor.model_file import RigModel, load_model
+from monitor.pipeline import Monitor
+from monitor.probable import Explainer
 from monitor.rig_monitor import RigMonitor
-from rigwatch.wire.blocks import pieces
-from rigwatch.wire.messages import Alarm, Event
+from monitor.suspect_job import ask
+from monitor.suspects import Evidence, Suspect, in_words, suspects
+from rigwatch.physics.engine.effect import Effect, EffectParameter, library
+from rigwatch.simulated import simulate
+from rigwatch.wire.blocks import concatenate, pieces
+from rigwatch.wire.messages import Alarm, Event, SampleBlock
 from rigwatch.wire.session import open_session
-from tests.monitor_process.model import MODEL
+from sim_plant.scenario import Event as Fault
+from sim_plant.scenario import load_scenario
+from tests.report.drive import COULOMB, VISCOUS, block
+from tests.report.drive import MODEL as INERTIA
 
 RECORDINGS = Path(__file__).parents[1] / "verify"
-N = 1024
+SCENARIOS = Path(__file__).parents[2] / "configs" / "scenarios"
+RIG = load_model(RECORDINGS / "model.toml")
+ONSET, SECONDS, RATE = 5.0, 7.5, 256
 
 
-def columns(share: dict[str, float], noise: float = 0.05) -> dict[str, np.ndarray]:
-    """A rig moved by two sines whose acceleration changes by shares of some signals."""
-    rng = np.random.default_rng(5)
-    time = np.arange(N) / MODEL.sample_rate
-    speed = 0.3 * np.sin(2 * np.pi * 3.1 * time) + 0.2 * np.sin(2 * np.pi * 0.9 * time)
-    modelled = np.gradient(speed, time)
-    signals = {
-        "dry": np.sign(speed), "viscous": speed, "gain": modelled, "offset": np.ones(N),
-        "lag": np.gradient(modelled), "nothing": np.zeros(N),
-        "strange": np.sign(np.sin(2 * np.pi * 7.7 * time)),
-    }  # fmt: skip
-    change = sum(size * signals[name] for name, size in share.items())
-    change = change + rng.normal(0, noise, N)
-    return {
-        "change": change, "velocity": speed, "modelled_acceleration": modelled,
-        "residual": change,
-    }  # fmt: skip
+def evidence(effect: str = "", value: float = 0.0, seed: int = 3) -> Evidence:
+    """The simulated rig with a fault from ONSET on, as the monitor judges it."""
+    healthy = load_scenario(SCENARIOS / "experiment_2.toml").healthy(SECONDS)
+    faults = (Fault(at_s=ONSET, effect=effect, value=value),) if effect else ()
+    samples = concatenate(list(simulate(structs.replace(healthy, events=faults), seed=seed)))
+    return _judged(RIG, samples, round(ONSET * RATE))
 
 
-@pytest.mark.parametrize(
-    ("share", "name"),
-    [
-        ({"dry": -0.5}, "dry (Coulomb) friction"),
-        ({"viscous": -1.0}, "viscous friction"),
-        ({"offset": 0.3}, "offset of the accelerometer"),
-        ({"gain": -0.2}, "gain of the drive"),
-    ],
-)
-def test_the_effect_that_was_put_in_comes_first(share: dict[str, float], name: str) -> None:
-    found = rank_candidates(columns(share), MODEL)
-    assert found[0].name == name
-    assert found[0].explained > 0.8
+def _judged(model: RigModel, samples: SampleBlock, onset: int) -> Evidence:
+    result = Monitor(model).update(samples)
+    assert result is not None
+    signals = np.stack([samples.channel(name).values for name in model.channels], axis=1)
+    return Evidence(signals, result.estimates.column("change").values, onset)
 
 
-@pytest.mark.parametrize("share", [{"nothing": 0.0}, {"strange": 0.5}])
-def test_nothing_is_named_where_nothing_explains_it(share: dict[str, float]) -> None:
-    assert "none of the known effects" in in_words(rank_candidates(columns(share), MODEL))
+def top_class(rows: list[Suspect]) -> set[str]:
+    return {rows[0].label, *rows[0].alike}
+
+
+FAULTS = [
+    ("coulomb", 0.3, "coulomb@load", 3),
+    ("viscous", 1.5, "viscous@load", 8),
+    ("spring", 100.0, "linear_stiffness@load", 3),
+    ("actuator_gain", 0.85, "gain@drive", 8),
+    ("actuator_deadband", 0.15, "dead_band@drive", 8),
+    ("acceleration_gain", 0.85, "gain@acceleration_sensor", 8),
+    ("acceleration_bias", 1.5, "offset@acceleration_sensor", 4),
+    ("acceleration_lag", 0.006, "lag@acceleration_sensor", 5),
+    ("chamber_leak", 0.02, "leakage@chambers", 8),
+]
+
+
+@pytest.mark.parametrize(("effect", "value", "name", "most"), FAULTS, ids=[f[0] for f in FAULTS])
+def test_the_fault_stands_in_the_first_class(
+    effect: str, value: float, name: str, most: int
+) -> None:
+    rows = suspects(evidence(effect, value), RIG, library())
+    assert name in top_class(rows)
+    assert len(top_class(rows)) <= most
+    assert rows[0].p_value < 1e-6
+
+
+def test_a_healthy_rig_leaves_nothing_to_be_named() -> None:
+    assert "cannot tell" in in_words(suspects(evidence(), RIG, library()))
+
+
+def test_what_no_effect_explains_is_not_given_a_name() -> None:
+    healthy = evidence()
+    time_ = np.arange(len(healthy.change)) / RATE
+    strange = healthy.change + 2.0 * np.sin(2 * np.pi * 13.7 * time_)
+    text = in_words(suspects(replace(healthy, change=strange), RIG, library()))
+    assert "cannot tell" in text or "no known effect" in text
 
 
 def test_samples_without_a_residual_do_not_count() -> None:
-    holed = columns({"dry": -0.5})
-    holed["change"][100:200] = np.nan
-    assert rank_candidates(holed, MODEL)[0].name == "dry (Coulomb) friction"
+    holed = evidence("coulomb", 0.3)
+    holed.change[1500:1600] = np.nan
+    holed.signals[1500:1600] = np.nan
+    assert suspects(holed, RIG, library())[0].label == "coulomb@load"
+
+
+def test_too_few_samples_are_not_judged() -> None:
+    holed = evidence("coulomb", 0.3)
+    holed.change[1400:] = np.nan
+    assert "cannot tell" in in_words(suspects(holed, RIG, library()))
+
+
+def test_an_effect_of_the_users_own_is_ranked_beside_ours() -> None:
+    own = Effect(
+        port="force",
+        expression="-b*v**3",
+        physics="Drag with the third power of speed.",
+        source="a test",
+        parameters={"b": EffectParameter(unit="{F}/({v}*{v}*{v})", role="strength", low=0.0)},
+    )
+    rows = suspects(evidence("viscous", 1.5), RIG, {"cubic_drag": own})
+    assert rows[0].label == "cubic_drag@load"
+
+
+def test_an_inertia_is_ranked_beyond_its_healthy_friction() -> None:
+    samples = block(3, 4000)
+    force, position = (samples.channel(name).values for name in ("force", "position"))
+    extra = np.where(np.arange(4000) < 1500, 0.0, 9.0)
+    pushed = replace(samples.channels[0], values=force + extra)
+    # Its band has friction in the middle, at what the drive has.
+    assert INERTIA.band is not None
+    assert np.mean([INERTIA.band.low, INERTIA.band.high], axis=0) == pytest.approx(
+        [COULOMB, VISCOUS]
+    )
+    plant = structs.replace(INERTIA.plant, mass=20.0, offset=3.0)
+    model = structs.replace(INERTIA, plant=plant)
+    found = _judged(model, replace(samples, channels=(pushed, samples.channels[1])), 1500)
+    assert np.ptp(position) > 0.1
+    rows = suspects(found, model, library())
+    assert top_class(rows) & {"constant_force@load", "offset@force_sensor", "offset@drive"}
+    assert rows[0].explained > 0.9
+
+
+def test_a_file_of_effects_that_does_not_fit_is_told_in_the_answer(tmp_path: Path) -> None:
+    wrong = tmp_path / "mine.toml"
+    wrong.write_text("[effects.mine]\n")
+    found = evidence("coulomb", 0.3)
+    text = ask(tmp_path, found.signals, found.change, found.onset, RIG, [str(wrong)])
+    assert text.startswith("probably missing: cannot tell")
+    assert "mine.toml" in text
 
 
 def test_friction_on_the_simulated_rig_is_named_after_its_alarm() -> None:
-    model = load_model(RECORDINGS / "model.toml")
-    monitor, explainer = RigMonitor(model), Explainer(lambda: model)
+    monitor, explainer = RigMonitor(RIG), Explainer(lambda: RIG)
     for whole in open_session(RECORDINGS / "friction.mcap").samples():
-        for block in pieces(whole, 16):
-            watched = monitor.update(block)
+        for piece in pieces(whole, 16):
+            watched = monitor.update(piece)
             assert watched is not None
-            explainer.take(watched.estimates)
+            explainer.take(watched.estimates, piece)
             for said in watched.announcements:
                 if isinstance(said, Alarm):
                     explainer.hear(said)
@@ -81,4 +154,6 @@ def test_friction_on_the_simulated_rig_is_named_after_its_alarm() -> None:
         time.sleep(0.01)
     assert len(found) == 1
     assert found[0].code == "PROBABLY MISSING"
-    assert "probably missing: dry (Coulomb) friction" in found[0].text
+    assert "probably missing: coulomb@load (p < 1e-6" in found[0].text
+    standing = explainer.with_causes(monitor.alarms.standing())
+    assert any("probably missing: coulomb@load" in alarm.cause for alarm in standing)
