@@ -18,7 +18,7 @@ import os
 import sys
 from types import ModuleType
 
-from rigwatch import __version__
+from rigwatch.version import __version__
 from rigwatch.wire.errors import RigwatchError
 
 COMMANDS: dict[str, str] = {
@@ -59,6 +59,9 @@ EXIT_INTERRUPTED = 130
 
 def main(argv: list[str] | None = None) -> int:
     """Entry point of `rigwatch`; returns the exit code."""
+    # Our matrices are small: a second thread of the linear algebra would spin, and take the time
+    # of the rig's other processes. NumPy reads this when a command first imports it.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     arguments = _parser(sys.argv[1:] if argv is None else argv).parse_args(argv)
     try:
         return int(arguments.run(arguments))

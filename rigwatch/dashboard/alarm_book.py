@@ -5,7 +5,7 @@ Fed with transitions in the order in which they come; no clock, no bus, no drawi
 
 from dataclasses import dataclass, field
 
-from rigwatch.wire.messages import Alarm
+from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, Event
 
 LANES: dict[str, str] = {
     "departure": "departure from the model",
@@ -36,15 +36,25 @@ class AlarmBook:
 
     Attributes:
         last: by name.
+        missing: what the model probably misses, by the alarm that asked for it.
     """
 
     last: dict[str, Alarm] = field(default_factory=dict)
+    missing: dict[str, str] = field(default_factory=dict)
 
     def record(self, alarm: Alarm) -> bool:
         """Take one transition; true where it changes the alarm's state."""
         before = self.last.get(alarm.name)
         self.last[alarm.name] = alarm
+        if before is None or before.onset_seq != alarm.onset_seq:
+            self.missing.pop(alarm.name, None)
         return before is None or before.state != alarm.state
+
+    def hear(self, event: Event) -> None:
+        """Take what the ranking of effects has found, from the event that tells it."""
+        if event.code == PROBABLY_MISSING:
+            name, _, text = event.text.partition(": ")
+            self.missing[name] = text
 
     def standing(self) -> list[Alarm]:
         """Alarms that are not normal, the oldest first."""

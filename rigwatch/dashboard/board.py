@@ -146,6 +146,7 @@ class Dashboard:
         self._stream.log(entity(view, name), line, static=True)
 
     def _event(self, event: Event) -> None:
+        self.facts.book.hear(event)
         text = f"{event.source}: {event.text}"
         self._line(at.EVENTS, event.t_ns, text, words.LEVELS[event.severity])
 

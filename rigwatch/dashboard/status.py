@@ -47,6 +47,8 @@ def _verdict(facts: Facts) -> Iterator[str]:
     verdict = facts.verdict()
     if faults:
         yield from _fault(faults[0], faults[1:])
+        if text := facts.book.missing.get(faults[0].name):
+            yield _sentence(text)
     elif facts.samples == 0:
         yield from (f"# Waiting for {facts.rig}", "No sample has arrived yet.")
     elif verdict == "stale":

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import daq
 import monitor
-import rigwatch
 import sim_plant
+from rigwatch import physics, wire
 from rigwatch.demo.rig_file import MODEL, find_config, relative
 from rigwatch.wire.errors import ModelError
 
@@ -73,9 +73,6 @@ def _made_from(config: Path) -> str:
 
 
 def _sources() -> Iterator[Path]:
-    for package in (daq, monitor, sim_plant, rigwatch):
+    for package in (daq, monitor, sim_plant, physics, wire):
         assert package.__file__ is not None
-        root = Path(package.__file__).parent
-        folders = [root] if package is not rigwatch else [root / "physics", root / "wire"]
-        for folder in folders:
-            yield from sorted(folder.rglob("*.py"))
+        yield from sorted(Path(package.__file__).parent.rglob("*.py"))

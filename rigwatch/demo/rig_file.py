@@ -9,7 +9,6 @@ from typing import Any
 import msgspec
 from msgspec import structs
 
-import rigwatch
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.ports import endpoint_address, free_port, is_free
 from rigwatch.wire.rig_config import (
@@ -36,7 +35,7 @@ def find_config(name: str) -> Path:
     Raises:
         ConfigError: there is none.
     """
-    checkout = Path(rigwatch.__file__).parents[1]
+    checkout = Path(__file__).parents[2]
     for root in (Path(), checkout):
         path = root / "configs" / name
         if path.is_file():

@@ -70,3 +70,12 @@ def test_a_recording_without_estimates_is_judged_with_a_model(
 def test_no_session(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["view", str(tmp_path / "none.mcap"), "--save", str(tmp_path / "x.rrd")]) == 2
     assert "none.mcap: no such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--save", "--picture"])
+def test_a_missing_folder_is_named(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str
+) -> None:
+    target = tmp_path / "nowhere" / "file"
+    assert main(["view", str(session), option, str(target)]) != 0
+    assert f"{target}: found no folder {target.parent}" in capsys.readouterr().err

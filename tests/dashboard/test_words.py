@@ -12,7 +12,7 @@ from rigwatch.dashboard.facts import SILENCE, Facts
 from rigwatch.dashboard.palette import VERDICTS
 from rigwatch.dashboard.status import advice, status
 from rigwatch.dashboard.words import alarm_level, alarm_line, gap_line
-from rigwatch.wire.messages import Alarm, EstimateBlock, Gap, SampleBlock
+from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event, Gap, SampleBlock
 from tests.dashboard.rig_messages import MARKS, Rig
 
 RIG = Rig()
@@ -74,6 +74,17 @@ def test_the_worst_fault_leads_and_the_others_are_named() -> None:
 def test_what_to_do_comes_before_why() -> None:
     text = advice(moving(alarm("dry_friction")))
     assert text.index("Stop soon") < text.index("The cause of dry_friction")
+
+
+def test_what_is_probably_missing_is_said_until_the_alarm_comes_anew() -> None:
+    facts = moving(alarm("dry_friction"))
+    text = "dry_friction: probably missing: coulomb@load"
+    facts.book.hear(Event("monitor", 0, "error", PROBABLY_MISSING, text))
+    assert "Probably missing: coulomb@load." in advice(facts)
+    facts.book.record(alarm("dry_friction", "acknowledged"))
+    assert "Probably missing" in advice(facts)
+    facts.book.record(replace(alarm("dry_friction"), onset_seq=5000))
+    assert "Probably missing" not in advice(facts)
 
 
 def test_estimates_stand_beside_thresholds_and_signature() -> None:
