@@ -62,6 +62,7 @@ def main() -> int:
     """0 when every row that has a bar reaches it, else 1."""
     parser = _parser()
     arguments = parser.parse_args()
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do
     if unknown := set(arguments.names) - set(names()):
         parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(names())}")
     results = {name: measure(name, arguments.quick) for name in arguments.names or names()}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from msgspec import structs
 
-from benchmarks.rig import delay, scenario, watched
+from benchmarks.rig import clipped, delay, scenario, watched
 from benchmarks.table import Row
 from monitor.conditions import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION
 from sim_plant.effects import EFFECTS, Effect
@@ -22,7 +22,10 @@ _LIMITS = ("saturation", "rate_limit")
 
 @dataclass(frozen=True)
 class Case:
-    """One fault under one excitation, and what the monitor made of it."""
+    """One fault under one excitation, and what the monitor made of it.
+
+    `alarmed` is a departure or a clipped channel; the verdict names the departure.
+    """
 
     effect: str
     dry: bool
@@ -30,6 +33,7 @@ class Case:
     strength: float
     alarmed: bool
     verdict: str
+    clipped: bool
 
 
 def value_of(effect: Effect, strength: float) -> float:
@@ -53,8 +57,9 @@ def judged(effect: Effect, test: int, strength: float, seed: int) -> Case:
     results = watched(faulty(effect, test, strength), seed)
     named = {name: delay(results, name, ONSET) for name in (DRY_FRICTION, STICTION, OTHER_FAULT)}
     verdict = next((name for name, when in named.items() if when is not None), "not named")
-    alarmed = delay(results, DEPARTURE, ONSET) is not None
-    return Case(effect.name, effect.dry, test, strength, alarmed, verdict)
+    cut_off = clipped(results, ONSET)
+    alarmed = cut_off or delay(results, DEPARTURE, ONSET) is not None
+    return Case(effect.name, effect.dry, test, strength, alarmed, verdict, cut_off)
 
 
 def visible(effect: Effect, test: int, strength: float) -> bool:
@@ -120,12 +125,13 @@ def _listed(found: list[Case]) -> str:
 def _matrix_row(name: str, found: list[Case]) -> Row:
     mine = [case for case in found if case.effect == name]
     counts = Counter(case.verdict for case in mine)
+    cut_off = sum(case.clipped for case in mine)
     truth = "dry friction" if mine[0].dry else "other"
     return Row(
         f"confusion: {name} ({truth})",
         ", ".join(f"{verdict} {count}" for verdict, count in counts.most_common()),
         "",
         "",
-        "",
+        f"said to be clipped: {cut_off} of {len(mine)}" if cut_off else "",
         passed=None,
     )

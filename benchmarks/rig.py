@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor.commission import commission
+from monitor.conditions import SENSOR_CLIPPED
 from monitor.model_file import RigModel
 from monitor.pipeline import Monitor, Result
 from monitor.recordings import Recording, Role, recording_of
@@ -92,6 +93,15 @@ def active(results: list[Result], name: str) -> NDArray[np.uint8]:
 def column(results: list[Result], name: str) -> NDArray[np.float64]:
     """One estimate over all results."""
     return np.concatenate([result.estimates.column(name).values for result in results])
+
+
+def clipped(results: list[Result], after_s: float, before_s: float = np.inf) -> bool:
+    """Whether any channel is said to be clipped between two times [s]."""
+    names = {c.name for result in results[:1] for c in result.conditions}
+    found = [active(results, name) for name in names if name.startswith(SENSOR_CLIPPED)]
+    first = int(np.ceil(after_s * RATE))
+    last = None if np.isinf(before_s) else int(before_s * RATE)
+    return any(bool(flags[first:last].any()) for flags in found)
 
 
 def delay(results: list[Result], name: str, after_s: float) -> float | None:

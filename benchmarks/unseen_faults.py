@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import structs
 
 from benchmarks.other_faults import value_of
-from benchmarks.rig import RATE, active, blocks, delay, record_of, scenario
+from benchmarks.rig import RATE, active, blocks, clipped, delay, record_of, scenario
 from benchmarks.table import Row
 from monitor.commission import commission
 from monitor.conditions import DEPARTURE, DRY_FRICTION, EXCITATION_CHANGED, OTHER_FAULT, STICTION
@@ -117,14 +117,14 @@ def _run(number: int, effects: tuple[Effect, ...], draw: np.random.Generator) ->
     kinds = (DRY_FRICTION, STICTION, OTHER_FAULT, EXCITATION_CHANGED)
     when = {name: delay(results, name, onset) for name in kinds}
     named = [name for name in kinds if when[name] is not None]
-    early = active(results, DEPARTURE)[: int(onset * RATE)].any()
+    early = active(results, DEPARTURE)[: int(onset * RATE)].any() or clipped(results, 0.0, onset)
     return Drawn(
         truth="dry friction" if any(effect.dry for effect in effects) else "other",
         what=" and ".join(f"{e.name} x{s:.2g}" for e, s in zip(effects, strengths, strict=True)),
         rig=number,
         drive=f"{type(drive).__name__.lower()} {drive.frequency:g} Hz",
         visible=_visible(healthy, faulty, seed, onset, model),
-        alarmed=delay(results, DEPARTURE, onset) is not None,
+        alarmed=delay(results, DEPARTURE, onset) is not None or clipped(results, onset),
         verdict="alarmed before" if early else named[0] if named else "not named",
     )
 
