@@ -6,6 +6,8 @@ STAMPS := $(VENV)/stamps
 
 # Compiled kernels are kept in the checkout, so that every process and every run finds them.
 export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba_cache
+# Two test workers on two cores: threads of the linear algebra would only wait for each other.
+export OPENBLAS_NUM_THREADS ?= 1
 export PATH := $(abspath $(VENV)/bin):$(PATH)
 
 # Measured data, where they lie beside the checkout.
@@ -67,8 +69,9 @@ $(STAMPS)/dev: requirements/dev.txt $(STAMPS)/run
 	@tools/setup.sh $(VENV) requirements/dev.txt
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/bench: requirements/bench.txt $(STAMPS)/dev
-	@tools/setup.sh $(VENV) requirements/bench.txt
+BENCH_LOCKS := requirements/bench.txt requirements/bench_unresolved.txt
+$(STAMPS)/bench: $(BENCH_LOCKS) $(STAMPS)/dev
+	@tools/setup.sh $(VENV) $(BENCH_LOCKS)
 	@mkdir -p $(STAMPS) && touch $@
 
 clean:  ## remove the environment and all that was computed
