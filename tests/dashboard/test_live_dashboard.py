@@ -16,7 +16,7 @@ from rigwatch.dashboard import palette
 from rigwatch.dashboard.feed import Feed
 from rigwatch.dashboard.viewer import answers, free_port
 from rigwatch.wire.alarm_list import serve_alarm_list
-from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus import Bus, Subscription, connect
 from rigwatch.wire.bus_zenoh import open_router
 from rigwatch.wire.messages import Alarm, EstimateBlock, Health, SampleBlock
 from rigwatch.wire.rig_config import RigConfig, load_rig
@@ -140,9 +140,9 @@ def test_the_screen_shows_the_rig_and_its_friction(
 def test_it_may_die_and_so_may_its_viewer(bus: Bus, config_file: Path, config: RigConfig) -> None:
     assert config.dashboard is not None
     port = config.dashboard.grpc_port
-    listener = bus.subscribe(SAMPLES)
+    listener, health = bus.subscribe(SAMPLES), bus.subscribe(HEALTH)
     with dashboard(config_file, "headless") as process, playing(bus) as player:
-        until(lambda: answers(port) or process.poll() is not None, "the viewer answers")
+        until(lambda: shows(health) or process.poll() is not None, "the dashboard shows the rig")
         viewer = psutil.Process(process.pid).children()[0]
         viewer.kill()
         assert process.stderr is not None
@@ -166,6 +166,11 @@ def test_a_late_screen_knows_the_alarms_that_stand(bus: Bus) -> None:
     assert [alarm.name for alarm in Feed(bus).standing()] == ["dry_friction"]
     close()
     assert Feed(bus).standing() == []
+
+
+def shows(health: Subscription) -> bool:
+    """Whether the dashboard has said that it runs, which it does once its viewer is open."""
+    return any(message.source == "dashboard" for message in health.drain())
 
 
 def new_viewer(dashboard: int, old: int) -> bool:
