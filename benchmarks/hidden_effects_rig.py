@@ -43,9 +43,8 @@ from rigwatch.physics.engine.effect import library
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import shipped_models
 from rigwatch.workbench.commissioned import commissioned
-from rigwatch.workbench.compare import Bench, noise_floor
+from rigwatch.workbench.compare import Bench, bench_of
 from rigwatch.workbench.explain import ranking
-from rigwatch.workbench.fitted import fit_base
 from rigwatch.workbench.noise_floor import quiet_scale
 from rigwatch.workbench.rank import Ranked, accepted_from
 from rigwatch.workbench.reference import referenced
@@ -194,9 +193,8 @@ def simulated(case: Case, effects: Mapping[str, float], healthy: Recording) -> D
 def explained(study: Study, data: Data) -> tuple[Bench, Verdict]:
     """The workbench's steps without its files; the healthy recording has been read before."""
     scale = quiet_scale(data.train)
-    data = referenced(study, data, scale)
-    base = fit_base(study, data, scale)
-    bench = Bench(study, data, base, noise_floor(study, data, base))
+    study, data = referenced(study, data, scale)
+    bench = bench_of(study, data, scale)
     return bench, ranking(bench)[1]
 
 

@@ -82,7 +82,7 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     data = prepare(study)
     scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
     study = commissioned(study, data, scale)
-    return study, referenced(study, data, scale), scale
+    return *referenced(study, data, scale), scale
 
 
 def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench:

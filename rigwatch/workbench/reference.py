@@ -2,9 +2,11 @@
 
 A linear black box leaves a tenth of the acceleration unexplained, and takes that for missing
 friction. Under the same excitation it leaves nearly the same on every run; so a healthy recording
-with this excitation tells what to subtract from a recording's outputs:
+with this excitation tells what to add to the model's outputs, before a sensor reads them:
 
-    y'(k) = y(k) - mean over healthy periods of (y_h - model(u_h))(k mod T),   T: the period
+    r(k) = mean over healthy periods of (y_h - model(u_h))(k mod T),   T: the period
+
+It enters the model as further inputs.
 
 The floor is what stays of each healthy period when the others are its reference, which counts the
 noise of the reference as well.
@@ -13,10 +15,12 @@ noise of the reference as well.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 from scipy.signal import correlate
 
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.physics.engine.fit import Recording, evaluate
+from rigwatch.physics.engine.model import Input, Model
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.fitted import Fitted, fit_model
 from rigwatch.workbench.noise_floor import find_period
@@ -43,8 +47,8 @@ class _Periods:
     left: FloatArray
 
 
-def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> Data:
-    """The recordings less what a rough model leaves of the healthy one.
+def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> tuple[Study, Data]:
+    """A rough model with what it leaves of the healthy recording added, and recordings of both.
 
     Args:
         study: with what the healthy recording told, see `commissioned`.
@@ -55,7 +59,7 @@ def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> Dat
         ModelError: there is no healthy recording, or none with this excitation.
     """
     if not study.model.rough:
-        return data
+        return study, data
     name = study.model.name
     alone = data.of_healthy
     if alone is None:
@@ -67,11 +71,11 @@ def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> Dat
     bare = fit_model(study, alone, (), study.file.start, scale)
     periods = _matching(study, bare, data.train, data, "train")
     beside = _matching(study, bare, data.held_out, data, "held_out")
-    remark = f"{name}: what it leaves of {len(beside.left)} healthy periods is subtracted"
-    return replace(
+    remark = f"{name}: what it leaves of {len(beside.left)} healthy periods is added to it"
+    return replace(study, model=_with_inputs(study.model)), replace(
         data,
-        train=_less(data.train, np.nanmean(periods.left, axis=0)),
-        held_out=_less(data.held_out, np.nanmean(beside.left, axis=0)),
+        train=_beside(data.train, np.nanmean(periods.left, axis=0)),
+        held_out=_beside(data.held_out, np.nanmean(beside.left, axis=0)),
         healthy=_against_each_other(alone.train.dt, beside),
         remarks=(*data.remarks, remark),
     )
@@ -121,18 +125,31 @@ def _left(bare: Fitted, healthy: Recording, row: FloatArray, horizon: int) -> Fl
     return np.asarray(residuals.reshape(len(row), -1))
 
 
-def _less(recording: Recording, reference: FloatArray) -> Recording:
-    at = np.arange(len(recording)) % len(reference)
-    return replace(recording, outputs=recording.outputs - reference[at])
+def _with_inputs(model: Model) -> Model:
+    """The model with an input added to each output."""
+    inputs = {f"unexplained_{name}": Input(unit=o.unit) for name, o in model.outputs.items()}
+    outputs = {
+        name: structs.replace(output, expression=f"({output.expression}) + {added}")
+        for (name, output), added in zip(model.outputs.items(), inputs, strict=True)
+    }
+    return structs.replace(model, inputs=model.inputs | inputs, outputs=outputs)
+
+
+def _beside(recording: Recording, reference: FloatArray) -> Recording:
+    """The recording with a periodic reference as further inputs."""
+    shown = reference[np.arange(len(recording)) % len(reference)]
+    return replace(
+        recording,
+        inputs=np.column_stack([recording.inputs, np.nan_to_num(shown)]),
+        outputs=np.where(np.isfinite(shown), recording.outputs, np.nan),
+    )
 
 
 def _against_each_other(dt: float, periods: _Periods) -> Recording:
-    """Each healthy period less what the model leaves of the others."""
+    """Each healthy period beside what the model leaves of the others."""
     count = len(periods.left)
     others = (np.sum(periods.left, axis=0) - periods.left) / (count - 1)
-    outputs = periods.outputs - others
-    return Recording(
-        dt,
-        periods.inputs.reshape(-1, periods.inputs.shape[-1]),
-        outputs.reshape(-1, outputs.shape[-1]),
+    inputs, outputs, flat = (
+        a.reshape(-1, a.shape[-1]) for a in (periods.inputs, periods.outputs, others)
     )
+    return _beside(Recording(dt, inputs, outputs), flat)

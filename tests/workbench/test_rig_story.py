@@ -111,7 +111,8 @@ def test_the_story_of_the_rig_as_it_is_typed(shell: Shell) -> None:
     watched = Watched(shell.config)
     try:
         watched.wait_for(ENOUGH)
-        assert "probably missing: coulomb@load" in shell.type(alarms)
+        told = "probably missing: coulomb@load"
+        eventually(lambda: told in shell.type(alarms), "the alarm says what is missing")
         said = [shell.type(command) for command in study]
         explained, added, compared = said[-3:]
         ranking = explained.partition("effect@port")[2].splitlines()[1]

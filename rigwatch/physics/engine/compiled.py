@@ -27,6 +27,7 @@ from rigwatch.wire.errors import ModelError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +89,7 @@ class CompiledSystem:
         initial: FloatArray,
         parameters: FloatArray,
         substeps: int = 4,
+        rows: int = 1,
     ) -> Simulation:
         """Simulate windows of the inputs, each from its own initial state.
 
@@ -99,6 +101,7 @@ class CompiledSystem:
             initial: shape (windows, states).
             parameters: all of them, shape (n_p,).
             substeps: Runge-Kutta steps between samples.
+            rows: of the inputs, after which those that are kept change; for inputs at finer nodes.
 
         Raises:
             ModelError: a window reaches beyond the inputs, or a shape does not fit.
@@ -106,7 +109,7 @@ class CompiledSystem:
         outputs = np.empty((len(starts), length, len(self.system.outputs)))
         slopes = np.empty((*outputs.shape, self.columns))
         arguments = self._arguments(inputs, dt, starts, length, initial, parameters, substeps)
-        self.kernel.simulate(*arguments, outputs, slopes)
+        self.kernel.simulate(*arguments, outputs, slopes, rows)
         return Simulation(outputs, slopes)
 
     @property

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import sympy
 from numba import njit
-from numpy.typing import NDArray
 
 from rigwatch.physics.engine.codegen import derivative
 from rigwatch.physics.engine.compiled import (
+    BoolArray,
     CompiledSystem,
     FloatArray,
     IntArray,
@@ -28,12 +28,10 @@ from rigwatch.physics.engine.compiled import (
 )
 from rigwatch.physics.engine.effect import Effect
 from rigwatch.physics.engine.expression import parse
-from rigwatch.physics.engine.memory import Memory
+from rigwatch.physics.engine.memory import Memory, held_at
 from rigwatch.physics.engine.numeric import numpy_function
 from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.system import PROBE, RATE, TIME, System
-
-BoolArray = NDArray[np.bool_]
+from rigwatch.physics.engine.system import LEFT, PROBE, RATE, TIME, System
 
 
 @dataclass(frozen=True)
@@ -113,8 +111,7 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
         pushes = np.stack([_push(at, c, seen[c.port]) for c in inner], axis=-1)
         columns = np.array([_probe_column(system, c.port) for c in inner])
         places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
-        kept = system.model.hold == "zero"
-        held = np.array([kept and kinds[c.port] == "actuator" for c in inner])
+        held = np.array([held_at(system.model, c.port) == "zero" for c in inner])
         found[..., places] = _propagated(run, len(system.free), pushes, columns, held)
     for index, candidate in enumerate(candidates):
         if kinds[candidate.port] == "sensor":
@@ -175,6 +172,7 @@ def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
     if port.kind != "force":
         signals["u"] = _along(at, _clean(system, port_name).subs(_known(at)))
         signals[RATE] = np.gradient(signals["u"], at.run.spacing, axis=1)
+        signals[LEFT] = _left(at)
     return signals
 
 
@@ -199,7 +197,14 @@ def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
     system = at.compiled.system
     values = dict(zip(system.states, np.moveaxis(at.run.states, -1, 0), strict=True))
     values |= dict(zip(system.model.inputs, np.moveaxis(at.inputs, -1, 0), strict=True))
-    return _evaluated(expression, values | {TIME: at.time}, at.time.shape)
+    return _evaluated(expression, values | {TIME: at.time, LEFT: _left(at)}, at.time.shape)
+
+
+def _left(at: Trajectory) -> FloatArray:
+    """Time until inputs that are kept change, at the nodes, shape (windows, nodes) [s]."""
+    kept = at.compiled.system.model.hold == "zero"
+    substep = np.arange(at.time.shape[1]) % at.run.substeps
+    return np.broadcast_to(kept * at.run.spacing * (at.run.substeps - substep), at.time.shape)
 
 
 def _memory(
@@ -207,11 +212,16 @@ def _memory(
 ) -> dict[str, FloatArray]:
     """The effect's own states at strength zero, driven by what it sees.
 
-    It runs through all windows in one go: what one window left is what the next begins with.
+    It runs through all windows in one go: what one window left is what the next begins with, after
+    the last sample of the first has been kept for as long as the others.
     """
-    along = {name: signal.ravel() for name, signal in signals.items()}
-    found = Memory(candidate.effect, along, at.run.spacing).run(_neutral_values(candidate))
-    return {name: state.reshape(at.time.shape) for name, state in found.items()}
+    more = ((0, 0), (0, at.run.substeps - 1))
+    along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
+    hold = held_at(at.compiled.system.model, candidate.port)
+    memory = Memory(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
+    found = memory.run(_neutral_values(candidate))
+    windows, nodes = at.time.shape
+    return {name: state.reshape(windows, -1)[:, :nodes] for name, state in found.items()}
 
 
 def _neutral_values(candidate: Candidate) -> dict[str, float]:

@@ -41,15 +41,20 @@ call: Any = intrinsic(_call)
 
 
 @njit(cache=True, error_model="numpy")
-def place(u: FloatArray, row: int, share: float, us: FloatArray) -> None:
-    """Inputs between one sample and the next."""
-    for j in range(us.size):
-        us[j] = u[row, j] + share * (u[row + 1, j] - u[row, j])
+def place(  # noqa: PLR0917 -- a kernel
+    u: FloatArray, row: int, at: float, hold: float, rows: int, dt: float, us: FloatArray
+) -> None:
+    """Inputs between one sample and the next, and the time until those that are kept change."""
+    for j in range(u.shape[1]):
+        ahead = u[row + 1, j] - u[row, j] if at > 0.0 and hold > 0.0 else 0.0
+        us[j] = u[row, j] + hold * at * ahead
+    us[u.shape[1]] = (1.0 - hold) * (rows - row % rows - at) * dt
 
 
 @njit(cache=True, error_model="numpy")
 def advance(  # noqa: PLR0917 -- a kernel
-    rates: int, u: FloatArray, row: int, step: int, substeps: int, hold: float, dt: float, pp: int,
+    rates: int, u: FloatArray, row: int, step: int, substeps: int, hold: float, rows: int,
+    dt: float, pp: int,
     z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
 ) -> None:  # fmt: skip
     """One step of the integration; z moves on."""
@@ -57,12 +62,12 @@ def advance(  # noqa: PLR0917 -- a kernel
     start, middle = step / substeps, (step + 0.5) / substeps
     end = (step + 1) / substeps
     zp, dp, up, size = zs.ctypes.data, dz.ctypes.data, us.ctypes.data, z.size
-    place(u, row, hold * start, us)
+    place(u, row, start, hold, rows, dt, us)
     call(rates, (row + start) * dt, z.ctypes.data, up, pp, dp, dp)
     for i in range(size):
         acc[i] = h / 6.0 * dz[i]
         zs[i] = z[i] + 0.5 * h * dz[i]
-    place(u, row, hold * middle, us)
+    place(u, row, middle, hold, rows, dt, us)
     call(rates, (row + middle) * dt, zp, up, pp, dp, dp)
     for i in range(size):
         acc[i] += h / 3.0 * dz[i]
@@ -71,7 +76,7 @@ def advance(  # noqa: PLR0917 -- a kernel
     for i in range(size):
         acc[i] += h / 3.0 * dz[i]
         zs[i] = z[i] + h * dz[i]
-    place(u, row, hold * end, us)
+    place(u, row, end, hold, rows, dt, us)
     call(rates, (row + end) * dt, zp, up, pp, dp, dp)
     for i in range(size):
         z[i] += acc[i] + h / 6.0 * dz[i]
@@ -91,20 +96,22 @@ def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def simulate(  # noqa: PLR0917 -- a kernel
-    rates: int, read: int, m: int, u: FloatArray, dt: float, substeps: int, hold: float,
+    rates: int, read: int, m: int, rows: int, u: FloatArray, dt: float, substeps: int, hold: float,
     starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray, dy: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill outputs y (windows, samples, outputs) and slopes dy (…, m) of each window."""
+    """Fill outputs y (windows, samples, outputs) and slopes dy (…, m) of each window.
+
+    Inputs that are kept change after every `rows` of them.
+    """
     size = x0.shape[1] * (1 + m)
     z, zs, dz, acc = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-    us, wanted = np.empty(u.shape[1]), y.shape[2]
+    us, wanted = np.empty(u.shape[1] + 1), y.shape[2]
     pp, out, slopes = p.ctypes.data, np.empty(wanted), np.empty(wanted * m)
     for w in range(starts.size):
         restart(z, x0, w, m)
         for k in range(y.shape[1]):
             row = starts[w] + k
-            for j in range(us.size):
-                us[j] = u[row, j]
+            place(u, row, 0.0, hold, rows, dt, us)
             call(
                 read, row * dt, z.ctypes.data, us.ctypes.data, pp, out.ctypes.data,
                 slopes.ctypes.data,
@@ -115,7 +122,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
                     dy[w, k, o, j] = slopes[o * m + j]
             if k + 1 < y.shape[1]:
                 for step in range(substeps):
-                    advance(rates, u, row, step, substeps, hold, dt, pp, z, zs, dz, acc, us)
+                    advance(rates, u, row, step, substeps, hold, rows, dt, pp, z, zs, dz, acc, us)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -127,7 +134,7 @@ def linearise(  # noqa: C901, PLR0917 -- a kernel
     """The trajectory without sensitivities, and the Jacobians at its nodes."""
     n, wide = x0.shape[1], slopes.shape[3]
     z, zs, dz, acc = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    us, wanted, pp = np.empty(u.shape[1]), y.shape[2], p.ctypes.data
+    us, wanted, pp = np.empty(u.shape[1] + 1), y.shape[2], p.ctypes.data
     out, flat = np.empty(max(wanted, n)), np.empty(max(wanted, n) * wide)
     zp, up, op, fp = z.ctypes.data, us.ctypes.data, out.ctypes.data, flat.ctypes.data
     for w in range(starts.size):
@@ -137,9 +144,7 @@ def linearise(  # noqa: C901, PLR0917 -- a kernel
             row, last = starts[w] + k, k + 1 == y.shape[1]
             for step in range(1 if last else substeps):
                 share = step / substeps
-                for j in range(us.size):
-                    ahead = 0.0 if last else u[row + 1, j] - u[row, j]
-                    us[j] = u[row, j] + hold * share * ahead
+                place(u, row, share, hold, 1, dt, us)
                 if step == 0:
                     call(read_slopes, row * dt, zp, up, pp, op, fp)
                     for o in range(wanted):
@@ -153,4 +158,4 @@ def linearise(  # noqa: C901, PLR0917 -- a kernel
                     for j in range(wide):
                         slopes[w, node, i, j] = flat[i * wide + j]
                 if not last:
-                    advance(rates, u, row, step, substeps, hold, dt, pp, z, zs, dz, acc, us)
+                    advance(rates, u, row, step, substeps, hold, 1, dt, pp, z, zs, dz, acc, us)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import savgol_filter
 
-from rigwatch.physics.engine.compiled import CompiledSystem, FloatArray, IntArray
+from rigwatch.physics.engine.compiled import BoolArray, CompiledSystem, FloatArray, IntArray
 from rigwatch.physics.engine.memory import Recall
 from rigwatch.physics.engine.system import System
 from rigwatch.physics.engine.thinning import Thinning
@@ -21,6 +21,12 @@ from rigwatch.wire.errors import ModelError
 
 START_STEPS = 2
 """Simulations for the initial states at each evaluation; they start from the last ones."""
+
+ROUNDS = 2
+"""Solutions at most, each from where the last has led, while windows that went astray come back."""
+
+ASTRAY = 4.0
+"""Squared error of a window over the median of all from which its initial state may be wrong."""
 
 SETTLED = 1e-10
 """Share of a window's squared error below which a better initial state is not looked for."""
@@ -140,30 +146,28 @@ def fit(
         return problem.result(begin)
     low, high = _bounds(compiled.system)
     free = problem.free
-    inside = np.clip(begin[free], low, high)
-    problem.recall(problem.whole(begin, inside))
-    problem.settle(problem.whole(begin, inside))
-    if not np.isfinite(problem.tried(problem.whole(begin, inside))).all():
-        raise ModelError(
-            f"{compiled.system.model.name}: the simulation leaves the finite numbers at the start;"
-            " try other starting values or more substeps"
-        )
-    found = least_squares(
-        lambda theta: problem.tried(problem.whole(begin, theta)),
-        inside,
-        jac=lambda theta: problem.projected(problem.whole(begin, theta))[1],
-        bounds=(low, high),
-        x_scale="jac",
-        max_nfev=60,
-    )
-    return problem.result(problem.whole(begin, found.x))
+    theta = np.clip(begin[free], low, high)
+    problem.recall(problem.whole(begin, theta))
+    problem.start_windows(problem.whole(begin, theta))
+    for _ in range(ROUNDS):
+        theta = least_squares(
+            lambda theta: problem.tried(problem.whole(begin, theta)),
+            theta,
+            jac=lambda theta: problem.projected(problem.whole(begin, theta))[1],
+            bounds=(low, high),
+            x_scale="jac",
+            max_nfev=60,
+        ).x
+        if not problem.start_windows(problem.whole(begin, theta)):
+            break
+    return problem.result(problem.whole(begin, theta))
 
 
 def evaluate(fitted: Fit, recording: Recording, horizon: int, substeps: int = 4) -> Fit:
     """The same parameters on another recording: only its windows' initial states are fitted."""
     problem = _Problem(fitted.compiled, recording, horizon, scale=fitted.scale, substeps=substeps)
     problem.recall(fitted.parameters)
-    problem.settle(fitted.parameters)
+    problem.start_windows(fitted.parameters)
     return replace(problem.result(fitted.parameters), covariance=fitted.covariance)
 
 
@@ -239,6 +243,42 @@ class _Problem:
             error, slopes = r.thinning.apply(error), r.thinning.apply(slopes)
         flat = error.reshape(len(error), -1)
         return flat, slopes.reshape(*flat.shape, slopes.shape[-1])
+
+    def start_windows(self, parameters: FloatArray) -> bool:
+        """Settle, and let windows that went astray begin where the one before has ended.
+
+        Initial states have local minima of their own. Returns whether a window came back.
+        """
+        self._initial = self._start_of(parameters)
+        error, _ = self.settle(parameters)
+        astray = _astray(error)
+        if not (self._compiled.system.states and astray.any()):
+            return False
+        kept = self._initial
+        self._initial = np.where(astray[:, None], self._ends_before(parameters), kept)
+        try:
+            size = np.sum(self.settle(parameters)[0] ** 2, axis=1)
+        except ModelError:
+            size = np.full(len(error), np.inf)
+        back = size < np.sum(error**2, axis=1) / ASTRAY
+        self._initial = np.where(back[:, None], self._initial, kept)
+        self._best, self._last = (math.inf, parameters, self._initial), None
+        return bool(back.any())
+
+    def _ends_before(self, parameters: FloatArray) -> FloatArray:
+        """States in which the windows before have ended, shape (windows, states)."""
+        r, starts = self._recording, self._cut.starts
+        run = self._compiled.linearise(
+            r.inputs, r.dt, starts[:-1], self._cut.length + 1, initial=self._initial[:-1],
+            parameters=parameters, substeps=self._substeps,
+        )  # fmt: skip
+        ended = np.clip(run.states[:, -1], self._low, self._high)
+        return np.concatenate([self._initial[:1], np.where(np.isfinite(ended), ended, 0.0)])
+
+    def _start_of(self, parameters: FloatArray) -> FloatArray:
+        """Initial states that the solver has met with its best parameters, if they are these."""
+        _, best, initial = self._best
+        return initial if np.array_equal(best, parameters) else self._initial
 
     def settle(self, parameters: FloatArray, steps: int = 6) -> tuple[FloatArray, FloatArray]:
         """Move the initial states to where they fit best; scaled residuals and slopes there.
@@ -320,8 +360,11 @@ class _Problem:
         return math.prod(thinned) * int(self._measured.shape[2])
 
     def _project(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return self._cleaned(*self.settle(parameters, START_STEPS))
+
+    def _cleaned(self, error: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residual and Jacobian without what the initial states could have made."""
         m = len(self.free)
-        error, slopes = self.settle(parameters, START_STEPS)
         clean = [
             _without(by_start[:, m + self._fitted_starts(w)], error[w], by_start[:, :m])
             for w, by_start in enumerate(slopes)
@@ -332,17 +375,9 @@ class _Problem:
 
     def result(self, parameters: FloatArray) -> Fit:
         """The fit at these parameters."""
-        _, tried, initial = self._best
-        if np.array_equal(tried, parameters):
-            self._initial = initial
-        self.settle(parameters)
-        residual, jacobian = self._project(parameters)
-        error, _ = self._simulated(parameters)
-        if not np.isfinite(error).all():
-            raise ModelError(
-                f"{self._compiled.system.model.name}: the simulation leaves the finite numbers;"
-                " try other starting values or more substeps"
-            )
+        self._initial = self._start_of(parameters)
+        error, slopes = self.settle(parameters)
+        residual, jacobian = self._cleaned(error, slopes)
         used = residual.size - self._initial.size - len(self.free)
         variance = float(residual @ residual) / max(used, 1)
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * variance, np.float64)
@@ -359,6 +394,12 @@ class _Problem:
             residual.reshape(len(error), -1),
             jacobian.reshape(len(error), -1, len(self.free)),
         )
+
+
+def _astray(error: FloatArray) -> BoolArray:
+    """Windows whose squared error is far beyond that of most."""
+    size = np.sum(error**2, axis=1)
+    return np.asarray(size > ASTRAY * np.median(size))
 
 
 def _without(

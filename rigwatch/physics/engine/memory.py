@@ -14,11 +14,11 @@ import numpy as np
 from rigwatch.physics.engine.compiled import CompiledSystem, FloatArray, compile_system
 from rigwatch.physics.engine.effect import Effect
 from rigwatch.physics.engine.expression import parse
-from rigwatch.physics.engine.model import Input, Model, Output, Parameter, State
+from rigwatch.physics.engine.model import Hold, Input, Model, Output, Parameter, State
 from rigwatch.physics.engine.numeric import numpy_function
 from rigwatch.physics.engine.scope import symbol
 from rigwatch.physics.engine.stability import stable_substeps
-from rigwatch.physics.engine.system import RATE, TIME, Placement, System
+from rigwatch.physics.engine.system import LEFT, RATE, TIME, Placement, System
 
 Signals = dict[str, FloatArray]
 
@@ -30,15 +30,24 @@ class Memory:
         effect: with states; its parameters stay parameters of the kernel, which is compiled once.
         signals: what the effect may name, by name, each of shape (nodes,); time may be among them.
         spacing: between the nodes [s].
+        hold: what signals do between the nodes, see `held_at`.
+        rows: nodes after which signals that are kept change.
     """
 
-    def __init__(self, effect: Effect, signals: Mapping[str, FloatArray], spacing: float) -> None:
-        inputs = [name for name in signals if name != TIME]
+    def __init__(
+        self,
+        effect: Effect,
+        signals: Mapping[str, FloatArray],
+        spacing: float,
+        hold: Hold,
+        rows: int = 1,
+    ) -> None:
+        inputs = [name for name in signals if name not in {TIME, LEFT}]
         self._driving = np.stack([signals[name] for name in inputs], axis=-1)
-        self._system = _alone(effect, inputs)
+        self._system = _alone(effect, inputs, hold)
         self._compiled: CompiledSystem = compile_system(self._system)
         self._first = np.array([[state.start for state in effect.states.values()]])
-        self._spacing = spacing
+        self._spacing, self._rows = spacing, rows
 
     def run(self, values: Mapping[str, float]) -> Signals:
         """Each state by name, shape (nodes,), for these values of the effect's parameters."""
@@ -50,16 +59,25 @@ class Memory:
             substeps=stable_substeps(
                 self._system, names, self._driving, None, parameters, self._spacing
             ),
+            rows=self._rows,
         )  # fmt: skip
         return dict(zip(names, run.outputs[0].T, strict=True))
 
 
-def _alone(effect: Effect, inputs: list[str]) -> System:
+def held_at(model: Model, port: str) -> Hold:
+    """How signals at a port go on between samples: those of an actuator as the model's inputs."""
+    return model.hold if model.ports[port].kind == "actuator" else "linear"
+
+
+def _alone(effect: Effect, inputs: list[str], hold: Hold) -> System:
     """The states of one effect as a system of their own."""
-    names = {name: symbol(name) for name in (*inputs, TIME, *effect.states, *effect.parameters)}
+    names = {
+        name: symbol(name) for name in (*inputs, TIME, LEFT, *effect.states, *effect.parameters)
+    }
     model = Model(
         name="memory of an effect",
         summary="the states of one effect",
+        hold=hold,
         inputs={name: Input(unit="1") for name in inputs},
         parameters={n: Parameter(value=0.0, unit="1", fixed=True) for n in effect.parameters},
         outputs={name: Output(unit="1", expression=name) for name in effect.states},
@@ -108,7 +126,12 @@ class Recall:
         self._kept = [
             _Kept(
                 placement,
-                Memory(placement.effect, _seen(system, placement, inputs, states, dt, values), dt),
+                Memory(
+                    placement.effect,
+                    _seen(system, placement, inputs, states, dt, values),
+                    dt,
+                    held_at(system.model, placement.port),
+                ),
                 [order.index(placement.prefix + name) for name in placement.effect.states],
             )
             for placement in system.placements

@@ -90,15 +90,16 @@ class Port(Section, frozen=True, kw_only=True):
     ] = field(default_factory=dict)
 
 
+Hold = Literal["linear", "zero"]
+
+
 class Model(Section, frozen=True, kw_only=True):
     """The whole file."""
 
     name: Text
     summary: Annotated[Text, Meta(description="what it describes, in a sentence")]
     source: Annotated[str, Meta(description="where its equations come from")] = ""
-    hold: Annotated[
-        Literal["linear", "zero"], Meta(description="input between samples: a line, or kept")
-    ] = "linear"
+    hold: Annotated[Hold, Meta(description="input between samples: a line, or kept")] = "linear"
     rough: Annotated[
         bool, Meta(description="leaves much unexplained on a healthy rig, too; see the workbench")
     ] = False

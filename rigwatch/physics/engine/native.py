@@ -1,7 +1,7 @@
 """The machine code of one system, and its kernel: the equations with the loops of `driver`.
 
 Functions of a system, each void(double t, double* a, u, p, out, slopes), with n states, m columns
-of sensitivities and q probes:
+of sensitivities and q probes; behind the inputs in u is the time until they change, where kept:
 
     rates        a = [x | S], out = [dx/dt | dS/dt]
     read         a = [x | S], out = y, slopes = ∂y of shape (outputs, m)
@@ -24,7 +24,7 @@ from rigwatch.physics.engine import driver
 from rigwatch.physics.engine.codegen import Differentiated, differentiated
 from rigwatch.physics.engine.llvm import Function, literal, machine_code
 from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.system import TIME, System
+from rigwatch.physics.engine.system import LEFT, TIME, System
 
 LARGE = 5_000_000
 """Steps times numbers that are integrated, from where all cores share a simulation."""
@@ -87,7 +87,7 @@ class NativeKernel:
 
     def simulate(  # noqa: PLR0917 -- they stand in the order of the driver's
         self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, y: Any,
-        dy: Any,
+        dy: Any, rows: int = 1,
     ) -> None:  # fmt: skip
         """Fill outputs (windows, samples, outputs) and their slopes (…, m)."""
         if not all(self._along):
@@ -96,7 +96,7 @@ class NativeKernel:
                 _with_sensitivities(self._system, "read", self._reads, behind=False),
             ])  # fmt: skip
             self._along = (address("rates"), address("read"))
-        kernel = partial(driver.simulate, *self._along, self._columns, u, dt, substeps, hold)
+        kernel = partial(driver.simulate, *self._along, self._columns, rows, u, dt, substeps, hold)
         numbers = x0.shape[1] * (1 + self._columns)
         if starts.size * y.shape[1] * substeps * numbers < LARGE:
             kernel(starts, x0, p, y, dy)
@@ -132,6 +132,7 @@ def _function(system: Equations, name: str) -> Function:
         ("p", system.parameters),
     ):
         places |= {symbol(each): (array, index) for index, each in enumerate(names)}
+    places[symbol(LEFT)] = ("u", len(system.inputs))
     return Function(name, places, {symbol(probe): 0.0 for probe in system.probes})
 
 

@@ -96,8 +96,9 @@ class StaticKernel:
         return whole[..., : self._outputs], slopes
 
     def simulate(  # noqa: PLR0917 -- the arguments of a compiled kernel
-        self, u: Any, dt: Any, _s: Any, _h: Any, starts: Any, _x: Any, p: Any, y: Any, dy: Any
-    ) -> None:
+        self, u: Any, dt: Any, _s: Any, _h: Any, starts: Any, _x: Any, p: Any, y: Any, dy: Any,
+        _r: Any,
+    ) -> None:  # fmt: skip
         """Fill outputs (windows, samples, outputs) and their slopes by the free parameters."""
         y[:], slopes = self._evaluate(u, dt, starts, y.shape[1], p)
         dy[:] = slopes[..., : self._free]

@@ -5,7 +5,7 @@ import ast
 from rigwatch.physics.engine.directions import Candidate
 from rigwatch.physics.engine.effect import Effect
 from rigwatch.physics.engine.model import Model, Port
-from rigwatch.physics.engine.system import RATE
+from rigwatch.physics.engine.system import LEFT, RATE
 
 
 def suits(effect: Effect, port: Port, model: Model) -> bool:
@@ -21,7 +21,14 @@ def suits(effect: Effect, port: Port, model: Model) -> bool:
 
 def knows(effect: Effect, port: Port) -> bool:
     """Whether the effect finds all that its equations name among what the port offers."""
-    own = {*effect.parameters, *effect.states, "t", RATE, *({"u"} if port.kind != "force" else ())}
+    own = {
+        *effect.parameters,
+        *effect.states,
+        "t",
+        RATE,
+        LEFT,
+        *({"u"} if port.kind != "force" else ()),
+    }
     return _named(effect) - own <= set(port.variables)
 
 

@@ -19,6 +19,8 @@ TIME = "t"
 PROBE = "probe_"
 RATE = "rate"
 """What an effect at a signal may call the signal's own rate of change."""
+LEFT = "left"
+"""What an effect at a signal may call the time until an input that is kept changes; 0 elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -190,6 +192,7 @@ class _Composer:
             units[name] = variable.unit
         if port.kind != "force":
             scope.define("u", arriving, unit)
+            scope.define(LEFT, symbol(LEFT), "s")
         self._adopt(placement, units)
         for name in (*placement.effect.parameters, *placement.effect.states):
             label = placement.prefix + name
