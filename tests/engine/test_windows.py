@@ -1,0 +1,100 @@
+"""Windows begin where they should: memory as its input led it, stray states brought back."""
+
+import numpy as np
+import pytest
+
+from rigwatch.physics.engine.compiled import compile_system
+from rigwatch.physics.engine.directions import directions, shaped, trajectory
+from rigwatch.physics.engine.effect import library
+from rigwatch.physics.engine.fit import Recording, evaluate, fit
+from rigwatch.physics.engine.model import Model
+from rigwatch.physics.engine.system import Placement, compose
+from rigwatch.wire.config import parse
+
+DT, N, HORIZON, RATE, FAST = 1 / 256, 1024, 128, 60.0, 50.0
+FOLLOWER = """
+name = "follower"
+summary = "a first-order lag behind a command that is kept from sample to sample"
+hold = "zero"
+inputs.command = { unit = "V" }
+states.x = { unit = "V", derivative = "w*(drive - x)", measured = "y" }
+parameters.w = { value = 50.0, unit = "1/s", low = 1.0 }
+outputs.y = { unit = "V", expression = "x" }
+ports.drive = { kind = "actuator", signal = "command" }
+"""
+WRAPPED = """
+name = "wrapped"
+summary = "an angle that is seen through a curve with many hills"
+inputs.speed = { unit = "1/s" }
+states.angle = { unit = "1", derivative = "k*speed" }
+parameters.k = { value = 1.0, unit = "1" }
+outputs.y = { unit = "1", expression = "angle + 1.5*sin(3*angle)" }
+"""
+
+
+def limited(command: np.ndarray, most: float) -> np.ndarray:
+    """What a controller lets through that moves by at most `most` a sample."""
+    out, at = np.empty_like(command), 0.0
+    for k, wanted in enumerate(command):
+        at += np.clip(wanted - at, -most, most)
+        out[k] = at
+    return out
+
+
+def followed(driven: np.ndarray) -> np.ndarray:
+    """The lag's answer to a command that jumps at samples: its closed form."""
+    share, x = 1 - np.exp(-FAST * DT), np.zeros(len(driven))
+    for k in range(1, len(driven)):
+        x[k] = x[k - 1] + share * (driven[k - 1] - x[k - 1])
+    return x
+
+
+@pytest.fixture
+def recording() -> Recording:
+    t = DT * np.arange(N)
+    command = 2 * np.sin(2 * np.pi * 4 * t) + np.sin(2 * np.pi * 9 * t + 1)
+    return Recording(DT, command[:, None], followed(limited(command, RATE * DT))[:, None])
+
+
+def test_a_limiter_that_steps_with_the_samples_is_followed_to_its_rate(recording):
+    placement = Placement("rate_limit", library()["rate_limit"].scaled(sizes(recording)), "drive")
+    compiled = compile_system(compose(parse(FOLLOWER, Model, "follower"), [placement]))
+    start = compiled.vector({"drive_rate_limit_w": 1.0, "drive_rate_limit_rm": 80.0})
+    found = fit(compiled, recording, HORIZON, start=start, substeps=4)
+    assert found.values()["drive_rate_limit_rm"] == pytest.approx(RATE, rel=0.01)
+    assert found.values()["w"] == pytest.approx(FAST, rel=0.01)
+    assert found.rms[0] < 0.01 * recording.outputs.std()
+
+
+def test_the_score_sees_the_same_limiter(recording):
+    compiled = compile_system(compose(parse(FOLLOWER, Model, "follower")))
+    at = trajectory(
+        compiled, recording.inputs, DT, np.arange(0, N, HORIZON), HORIZON,
+        initial=recording.outputs[::HORIZON], parameters=compiled.parameters,
+    )  # fmt: skip
+    effect = library()["rate_limit"].scaled(sizes(recording))
+    near = min(shaped("rate_limit", effect, "drive"), key=lambda c: abs(c.shape["rm"] - RATE))
+    moved = directions(at, [near])[..., 0, 0].ravel()
+    command = recording.inputs[:, 0]
+    wanted = followed(limited(command, near.shape["rm"] * DT)) - followed(command)
+    # Each window begins in a state that has been measured: what came before it does not count.
+    late = np.arange(N) % HORIZON > 40
+    assert np.corrcoef(moved[late], wanted[late])[0, 1] > 0.99
+
+
+def test_a_window_whose_initial_state_went_astray_begins_where_the_one_before_ended():
+    compiled = compile_system(compose(parse(WRAPPED, Model, "wrapped")))
+    speed = np.zeros((800, 1))
+    speed[320:380], speed[420:480] = 4.0, -4.0
+    angle = 1.1 * 0.01 * np.concatenate([[0.0], np.cumsum(speed[:-1] + speed[1:]) / 2])
+    noise = 0.01 * np.random.default_rng(1).normal(size=800)
+    turning = Recording(0.01, speed, (angle + 1.5 * np.sin(3 * angle) + noise)[:, None])
+    found = fit(compiled, turning, 100)
+    assert found.values()["k"] == pytest.approx(1.1, rel=0.01)
+    assert evaluate(found, turning, 100).rms[0] == pytest.approx(0.01, rel=0.1)
+
+
+def sizes(recording: Recording) -> dict[str, float]:
+    command = recording.inputs[:, 0]
+    rate = float(np.sqrt(np.mean(np.gradient(command, DT) ** 2)))
+    return {"u": float(command.std()), "rate": rate, "dt": DT}
