@@ -11,6 +11,9 @@ from rigwatch.workbench.rank import Progress, Ranked, accepted_from, rank, unhea
 from rigwatch.workbench.study import Study
 from rigwatch.workbench.verdict import Verdict, judge
 
+MOST_OF_THE_REST = 0.3
+"""Share of what the best leaves that a second effect must explain to first order to be tried."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -102,7 +105,7 @@ def _with_second(bench: Bench, verdict: Verdict, progress: Progress) -> Verdict:
     study = bench.study.with_effects([*bench.study.file.effects, accepted_from(best)])
     beside = dataclasses.replace(bench, study=study, base=best.fitted)
     progress(f"{best.label} leaves much: trying a second effect beside it")
-    rows = rank(study, beside.data, beside.base, bench.floor, progress)
+    rows = rank(study, beside.data, beside.base, bench.floor, progress, least=MOST_OF_THE_REST)
     second = judge(beside.base, rows, bench.floor)
     if second.best is None or second.best.fitted is None:
         return verdict

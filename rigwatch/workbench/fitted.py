@@ -134,13 +134,23 @@ def fit_model(
         # Over long horizons there are many local minima: start from where short ones lead.
         begin = fit_over(horizon // 10, start=begin).parameters
     found = fit_over(horizon, start=begin)
-    if substeps > study.file.substeps and scale is not None and _noisy(found):
+    if scale is not None and _noisy(found) and _last_is_stiff(study, data, placements, start):
         # What sticks and slips has many local minima too: try again by way of short horizons.
         near = fit_over(horizon // 8, start=begin)
         found = min(found, fit_over(horizon, start=near.parameters), key=_size)
     beside = data.horizon if study.model.states else len(data.held_out)
     judged = evaluate(found, data.held_out, beside, substeps=substeps)
     return Fitted(tuple(placements), found, judged, substeps, horizon)
+
+
+def _last_is_stiff(
+    study: Study, data: Data, placements: Sequence[Placement], start: Mapping[str, float]
+) -> bool:
+    """Whether the effect that came last asks for finer steps than the model."""
+    system = compose(study.model, placements[-1:])
+    values = {name: p.value for name, p in system.parameters.items()}
+    at = np.array([start.get(name, value) for name, value in values.items()])
+    return _needed(system, data.train, at) > study.file.substeps
 
 
 def _size(fitted: Fit) -> float:

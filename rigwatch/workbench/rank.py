@@ -160,8 +160,13 @@ def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatA
     return directions(at, found) / scale, run.slopes / scale
 
 
-def rank(
-    study: Study, data: Data, base: Fitted, floor: NoiseFloor, progress: Progress = unheard
+def rank(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    base: Fitted,
+    floor: NoiseFloor,
+    progress: Progress = unheard,
+    least: float = 0.0,
 ) -> list[Ranked]:
     """All effects at all ports, the best first; those worth it fitted and judged.
 
@@ -169,9 +174,13 @@ def rank(
         study, data, base: the model and what it was fitted to.
         floor: of the held-out recordings.
         progress: told which fit begins.
+        least: share of the residual's energy above the floor that an effect must explain to first
+            order to be worth a fit.
     """
+    above = max(1 - floor.ratio(base.train) ** -2, 0.0)
     rows = _scored(study, data, base, candidates(study, data.train))
-    chosen = _worth_a_fit(rows, "dynamic" if study.model.states else "static")
+    kind = "dynamic" if study.model.states else "static"
+    chosen = [row for row in _worth_a_fit(rows, kind) if row.explained >= least * above]
     enough: list[Ranked] = []
     for number, row in enumerate(chosen, start=1):
         if any(other.cosines[row.label] < SIMILAR for other in enough):

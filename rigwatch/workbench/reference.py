@@ -127,7 +127,10 @@ def _left(bare: Fitted, healthy: Recording, row: FloatArray, horizon: int) -> Fl
 
 def _with_inputs(model: Model) -> Model:
     """The model with an input added to each output."""
-    inputs = {f"unexplained_{name}": Input(unit=o.unit) for name, o in model.outputs.items()}
+    inputs = {
+        f"unexplained_{name}": Input(unit=o.unit, hold="linear")
+        for name, o in model.outputs.items()
+    }
     outputs = {
         name: structs.replace(output, expression=f"({output.expression}) + {added}")
         for (name, output), added in zip(model.outputs.items(), inputs, strict=True)

@@ -156,7 +156,7 @@ class CompiledSystem:
             )
         if len(starts) and (starts.min() < 0 or starts.max() + length > len(inputs)):
             raise ModelError(f"{model.name}: found a window beyond the recording's end")
-        hold = 1.0 if model.hold == "linear" else 0.0
+        hold = np.array([float(model.held(name) == "linear") for name in model.inputs])
         first = np.ascontiguousarray(initial, np.float64).reshape(len(starts), -1)
         values = np.ascontiguousarray(parameters, np.float64)
         driven = np.ascontiguousarray(inputs, np.float64)

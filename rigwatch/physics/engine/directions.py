@@ -95,8 +95,9 @@ def trajectory(
     row, place = nodes // substeps, (nodes % substeps) / substeps
     rows = starts[:, None] + row
     following = np.minimum(rows + 1, len(inputs) - 1)
-    share = place if compiled.system.model.hold == "linear" else np.zeros_like(place)
-    at_nodes = inputs[rows] + share[:, None] * (inputs[following] - inputs[rows])
+    model = compiled.system.model
+    share = np.outer(place, [model.held(name) == "linear" for name in model.inputs])
+    at_nodes = inputs[rows] + share * (inputs[following] - inputs[rows])
     return Trajectory(compiled, run, at_nodes, (rows + place) * dt, parameters)
 
 
@@ -202,7 +203,8 @@ def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
 
 def _left(at: Trajectory) -> FloatArray:
     """Time until inputs that are kept change, at the nodes, shape (windows, nodes) [s]."""
-    kept = at.compiled.system.model.hold == "zero"
+    model = at.compiled.system.model
+    kept = any(model.held(name) == "zero" for name in model.inputs)
     substep = np.arange(at.time.shape[1]) % at.run.substeps
     return np.broadcast_to(kept * at.run.spacing * (at.run.substeps - substep), at.time.shape)
 

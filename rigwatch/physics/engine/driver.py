@@ -42,18 +42,24 @@ call: Any = intrinsic(_call)
 
 @njit(cache=True, error_model="numpy")
 def place(  # noqa: PLR0917 -- a kernel
-    u: FloatArray, row: int, at: float, hold: float, rows: int, dt: float, us: FloatArray
+    u: FloatArray, row: int, at: float, hold: FloatArray, rows: int, dt: float, us: FloatArray
 ) -> None:
-    """Inputs between one sample and the next, and the time until those that are kept change."""
+    """Inputs between one sample and the next, and the time until those that are kept change.
+
+    An input whose `hold` is 1 goes on along a line, one whose `hold` is 0 is kept.
+    """
+    us[u.shape[1]] = 0.0
     for j in range(u.shape[1]):
-        ahead = u[row + 1, j] - u[row, j] if at > 0.0 and hold > 0.0 else 0.0
-        us[j] = u[row, j] + hold * at * ahead
-    us[u.shape[1]] = (1.0 - hold) * (rows - row % rows - at) * dt
+        us[j] = u[row, j]
+        if hold[j] == 0.0:
+            us[u.shape[1]] = (rows - row % rows - at) * dt
+        elif at > 0.0:
+            us[j] += at * (u[row + 1, j] - u[row, j])
 
 
 @njit(cache=True, error_model="numpy")
 def advance(  # noqa: PLR0917 -- a kernel
-    rates: int, u: FloatArray, row: int, step: int, substeps: int, hold: float, rows: int,
+    rates: int, u: FloatArray, row: int, step: int, substeps: int, hold: FloatArray, rows: int,
     dt: float, pp: int,
     z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
 ) -> None:  # fmt: skip
@@ -96,8 +102,9 @@ def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def simulate(  # noqa: PLR0917 -- a kernel
-    rates: int, read: int, m: int, rows: int, u: FloatArray, dt: float, substeps: int, hold: float,
-    starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray, dy: FloatArray,
+    rates: int, read: int, m: int, rows: int, u: FloatArray, dt: float, substeps: int,
+    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray,
+    dy: FloatArray,
 ) -> None:  # fmt: skip
     """Fill outputs y (windows, samples, outputs) and slopes dy (…, m) of each window.
 
@@ -128,7 +135,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
 @njit(cache=True, error_model="numpy", nogil=True)
 def linearise(  # noqa: C901, PLR0917 -- a kernel
     rates: int, read_slopes: int, rate_slopes: int, u: FloatArray, dt: float, substeps: int,
-    hold: float, starts: IntArray, x0: FloatArray, p: FloatArray, nodes: FloatArray,
+    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, nodes: FloatArray,
     slopes: FloatArray, y: FloatArray, dy: FloatArray,
 ) -> None:  # fmt: skip
     """The trajectory without sensitivities, and the Jacobians at its nodes."""

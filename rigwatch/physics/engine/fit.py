@@ -25,8 +25,11 @@ START_STEPS = 2
 ROUNDS = 2
 """Solutions at most, each from where the last has led, while windows that went astray come back."""
 
-ASTRAY = 4.0
+ASTRAY = 16.0
 """Squared error of a window over the median of all from which its initial state may be wrong."""
+
+BACK = 0.25
+"""Share of its squared error to which a window must fall to have come back."""
 
 SETTLED = 1e-10
 """Share of a window's squared error below which a better initial state is not looked for."""
@@ -142,14 +145,11 @@ def fit(
     """
     problem = _Problem(compiled, recording, horizon, scale=scale, substeps=substeps)
     begin = compiled.parameters if start is None else start.copy()
-    if not compiled.system.free:
-        return problem.result(begin)
     low, high = _bounds(compiled.system)
-    free = problem.free
-    theta = np.clip(begin[free], low, high)
+    theta = np.clip(begin[problem.free], low, high)
     problem.recall(problem.whole(begin, theta))
-    problem.start_windows(problem.whole(begin, theta))
-    for _ in range(ROUNDS):
+    found = problem.start_windows(problem.whole(begin, theta))
+    for _ in range(ROUNDS if len(theta) else 0):
         theta = least_squares(
             lambda theta: problem.tried(problem.whole(begin, theta)),
             theta,
@@ -158,17 +158,37 @@ def fit(
             x_scale="jac",
             max_nfev=60,
         ).x
-        if not problem.start_windows(problem.whole(begin, theta)):
+        found = problem.start_windows(problem.whole(begin, theta))
+        if not found.came_back:
             break
-    return problem.result(problem.whole(begin, theta))
+    return problem.result(found)
 
 
 def evaluate(fitted: Fit, recording: Recording, horizon: int, substeps: int = 4) -> Fit:
     """The same parameters on another recording: only its windows' initial states are fitted."""
     problem = _Problem(fitted.compiled, recording, horizon, scale=fitted.scale, substeps=substeps)
     problem.recall(fitted.parameters)
-    problem.start_windows(fitted.parameters)
-    return replace(problem.result(fitted.parameters), covariance=fitted.covariance)
+    found = problem.start_windows(fitted.parameters)
+    return replace(problem.result(found), covariance=fitted.covariance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Started:
+    """Windows at their best initial states.
+
+    Attributes:
+        parameters: all of them, shape (n_p,).
+        initial: shape (windows, states).
+        error: scaled, shape (windows, k).
+        slopes: by free parameters and initial states, shape (windows, k, free + states).
+        came_back: whether a window that went astray came back.
+    """
+
+    parameters: FloatArray
+    initial: FloatArray
+    error: FloatArray
+    slopes: FloatArray
+    came_back: bool = False
 
 
 def _bounds(system: System) -> tuple[FloatArray, FloatArray]:
@@ -244,26 +264,29 @@ class _Problem:
         flat = error.reshape(len(error), -1)
         return flat, slopes.reshape(*flat.shape, slopes.shape[-1])
 
-    def start_windows(self, parameters: FloatArray) -> bool:
+    def start_windows(self, parameters: FloatArray) -> _Started:
         """Settle, and let windows that went astray begin where the one before has ended.
 
-        Initial states have local minima of their own. Returns whether a window came back.
+        Initial states have local minima of their own.
         """
-        self._initial = self._start_of(parameters)
-        error, _ = self.settle(parameters)
+        _, best, initial = self._best
+        if np.array_equal(best, parameters):
+            self._initial = initial
+        error, slopes = self.settle(parameters)
+        found = _Started(parameters, self._initial, error, slopes)
         astray = _astray(error)
         if not (self._compiled.system.states and astray.any()):
-            return False
-        kept = self._initial
-        self._initial = np.where(astray[:, None], self._ends_before(parameters), kept)
+            return found
+        self._initial = np.where(astray[:, None], self._ends_before(parameters), found.initial)
         try:
-            size = np.sum(self.settle(parameters)[0] ** 2, axis=1)
+            again = _Started(parameters, self._initial, *self.settle(parameters))
         except ModelError:
-            size = np.full(len(error), np.inf)
-        back = size < np.sum(error**2, axis=1) / ASTRAY
-        self._initial = np.where(back[:, None], self._initial, kept)
-        self._best, self._last = (math.inf, parameters, self._initial), None
-        return bool(back.any())
+            self._initial = found.initial
+            return found
+        found = _better(found, again)
+        self._initial = found.initial
+        self._best, self._last = (math.inf, parameters, found.initial), None
+        return found
 
     def _ends_before(self, parameters: FloatArray) -> FloatArray:
         """States in which the windows before have ended, shape (windows, states)."""
@@ -274,11 +297,6 @@ class _Problem:
         )  # fmt: skip
         ended = np.clip(run.states[:, -1], self._low, self._high)
         return np.concatenate([self._initial[:1], np.where(np.isfinite(ended), ended, 0.0)])
-
-    def _start_of(self, parameters: FloatArray) -> FloatArray:
-        """Initial states that the solver has met with its best parameters, if they are these."""
-        _, best, initial = self._best
-        return initial if np.array_equal(best, parameters) else self._initial
 
     def settle(self, parameters: FloatArray, steps: int = 6) -> tuple[FloatArray, FloatArray]:
         """Move the initial states to where they fit best; scaled residuals and slopes there.
@@ -373,12 +391,11 @@ class _Problem:
         by_parameter = np.array([j for _, j in clean])
         return -error.ravel(), by_parameter.reshape(error.size, m)
 
-    def result(self, parameters: FloatArray) -> Fit:
-        """The fit at these parameters."""
-        self._initial = self._start_of(parameters)
-        error, slopes = self.settle(parameters)
-        residual, jacobian = self._cleaned(error, slopes)
-        used = residual.size - self._initial.size - len(self.free)
+    def result(self, found: _Started) -> Fit:
+        """The fit at the parameters that have been found."""
+        error = found.error
+        residual, jacobian = self._cleaned(error, found.slopes)
+        used = residual.size - found.initial.size - len(self.free)
         variance = float(residual @ residual) / max(used, 1)
         covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * variance, np.float64)
         left = error.reshape(len(error), -1, self._measured.shape[2]) * self.scale
@@ -386,14 +403,26 @@ class _Problem:
             left = np.where(np.isnan(self._measured), np.nan, left)
         return Fit(
             self._compiled,
-            parameters,
+            found.parameters,
             covariance,
-            self._initial,
+            found.initial,
             left,
             self.scale,
             residual.reshape(len(error), -1),
             jacobian.reshape(len(error), -1, len(self.free)),
         )
+
+
+def _better(found: _Started, again: _Started) -> _Started:
+    """The windows as they were found, but for those that have come back."""
+    back = np.sum(again.error**2, axis=1) < BACK * np.sum(found.error**2, axis=1)
+    return _Started(
+        found.parameters,
+        np.where(back[:, None], again.initial, found.initial),
+        np.where(back[:, None], again.error, found.error),
+        np.where(back[:, None, None], again.slopes, found.slopes),
+        bool(back.any()),
+    )
 
 
 def _astray(error: FloatArray) -> BoolArray:

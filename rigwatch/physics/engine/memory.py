@@ -65,8 +65,9 @@ class Memory:
 
 
 def held_at(model: Model, port: str) -> Hold:
-    """How signals at a port go on between samples: those of an actuator as the model's inputs."""
-    return model.hold if model.ports[port].kind == "actuator" else "linear"
+    """How signals at a port go on between samples: that of an actuator as the input that it is."""
+    place = model.ports[port]
+    return model.held(place.signal) if place.kind == "actuator" else "linear"
 
 
 def _alone(effect: Effect, inputs: list[str], hold: Hold) -> System:

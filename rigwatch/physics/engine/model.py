@@ -26,11 +26,17 @@ from rigwatch.wire.config import Section, load, parse
 Text = Annotated[str, Meta(min_length=1)]
 
 
+Hold = Literal["linear", "zero"]
+
+
 class Input(Section, frozen=True, kw_only=True):
     """A signal that drives the model."""
 
     unit: Annotated[str, Meta(description="its unit")]
     channel: Annotated[str, Meta(description="channel it is read from, its own name if empty")] = ""
+    hold: Annotated[
+        Hold | None, Meta(description="between samples, as the model's if not given")
+    ] = None
 
 
 class State(Section, frozen=True, kw_only=True):
@@ -90,9 +96,6 @@ class Port(Section, frozen=True, kw_only=True):
     ] = field(default_factory=dict)
 
 
-Hold = Literal["linear", "zero"]
-
-
 class Model(Section, frozen=True, kw_only=True):
     """The whole file."""
 
@@ -108,6 +111,10 @@ class Model(Section, frozen=True, kw_only=True):
     parameters: dict[str, Parameter]
     outputs: Annotated[dict[str, Output], Meta(min_length=1)]
     ports: dict[str, Port] = field(default_factory=dict)
+
+    def held(self, name: str) -> Hold:
+        """What an input does between samples."""
+        return self.inputs[name].hold or self.hold
 
 
 def load_model(path: Path | str) -> Model:
