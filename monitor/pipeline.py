@@ -77,17 +77,11 @@ class Monitor:
     """
 
     def __init__(self, model: RigModel) -> None:
-        self.model = model
-        self.rules = rules_for(model)
         inertia = isinstance(model.plant, InertiaPlant)
         needed = model.channels if inertia else (model.channels[0], model.channels[2])
         self._admission = Admission(model.channels, needed, model.decision.longest_hold)
         self._residual = InertiaResidual(model) if inertia else TransferResidual(model)
-        self._clipping = Clipping(model)
-        self._promoted = PromotedFriction(model)
-        self._arming = _arming_rules(model)
-        self._reference = new_reference(self._arming, _known(model))
-        self._state = _new_state(model)
+        self._follow(model)
 
     def adopt(self, model: RigModel) -> None:
         """Go on with another model from the next sample: filters run on, estimates start anew.
@@ -98,6 +92,10 @@ class Monitor:
         check_can_follow(self.model, model)
         if isinstance(self._residual, InertiaResidual) and isinstance(model.plant, InertiaPlant):
             self._residual.adopt(model.plant)
+        self._follow(model)
+
+    def _follow(self, model: RigModel) -> None:
+        """Judge by this model from the next sample on."""
         self.model, self.rules = model, rules_for(model)
         self._clipping = Clipping(model)
         self._promoted = PromotedFriction(model)

@@ -18,7 +18,6 @@ from monitor.model_file import RigModel
 from monitor.suspect_job import ask
 from rigwatch.physics.transfer_function import FloatArray
 from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event, SampleBlock
-from rigwatch.wire.quality import valid
 
 NAMED = ("departure", "dry_friction", "other_fault")
 """Alarms that ask for an explanation; a mass that sticks has its name."""
@@ -119,8 +118,6 @@ def _arrays(judged: Sequence[Judged], channels: Sequence[str]) -> tuple[FloatArr
         at = max(samples.seq - first, 0)
         skipped = at - (samples.seq - first)
         for place, name in enumerate(channels):
-            column = samples.channel(name)
-            good = valid(column.quality) if len(column.quality) else np.True_
-            kept = np.where(good, column.values, np.nan)[skipped:]
+            kept = samples.channel(name).usable()[skipped:]
             signals[at : at + len(kept), place] = kept
     return signals, change

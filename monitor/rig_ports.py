@@ -84,8 +84,8 @@ def _transfer(model: RigModel, plant: TransferPlant, signals: FloatArray) -> Rig
     ports = {
         "load": Port(kind="force", unit="1", variables=_motion("measured")),
         "chambers": Port(kind="force", unit="1", variables={"p": _variable("measured")}),
-        **_signal_ports("voltage", "voltage"),
-        **_sensor("acceleration"),
+        "drive": Port(kind="actuator", signal="voltage"),
+        **_sensors("voltage", "acceleration"),
     }
     outputs = made | {"voltage_sensor": "voltage_read", "acceleration_sensor": "acceleration_read"}
     return RigPorts(
@@ -115,8 +115,8 @@ def _inertia(model: RigModel, plant: InertiaPlant, signals: FloatArray) -> RigPo
     healthy = np.mean([model.band.low, model.band.high], axis=0)
     ports = {
         "load": Port(kind="force", unit="1", variables=_motion("force")),
-        **_signal_ports("force", "force"),
-        **_sensor("acceleration"),
+        "drive": Port(kind="actuator", signal="force"),
+        **_sensors("force", "acceleration"),
     }
     outputs = {
         "load": "load", "drive": "drive", "force_sensor": "force_read",
@@ -170,12 +170,5 @@ def _variable(signal: str) -> Variable:
     return Variable(expression=signal, unit="1")
 
 
-def _signal_ports(channel: str, signal: str) -> dict[str, Port]:
-    return {
-        "drive": Port(kind="actuator", signal=signal),
-        f"{channel}_sensor": Port(kind="sensor", signal=f"{channel}_read"),
-    }
-
-
-def _sensor(channel: str) -> dict[str, Port]:
-    return {f"{channel}_sensor": Port(kind="sensor", signal=f"{channel}_read")}
+def _sensors(*channels: str) -> dict[str, Port]:
+    return {f"{name}_sensor": Port(kind="sensor", signal=f"{name}_read") for name in channels}

@@ -1,12 +1,12 @@
 """`--save` and `--picture` of `rigwatch structure`: what was measured, modelled and concluded."""
 
 import argparse
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands._sessions import check_folder, say
+from rigwatch.commands._drawing import ready_to_draw
+from rigwatch.commands._sessions import say
 from rigwatch.commands._structures import figures
 
 if TYPE_CHECKING:
@@ -37,15 +37,9 @@ def wanted(arguments: argparse.Namespace) -> bool:
         MissingExtraError: Rerun is not installed.
         SessionError: a file's folder does not exist.
     """
-    files = [file for file in (arguments.save, arguments.picture) if file]
-    for file in files:
-        check_folder(file)
-    if not files:
+    if not (arguments.save or arguments.picture):
         return False
-    from rigwatch.dashboard import require_rerun
-
-    require_rerun()
-    os.environ.setdefault("RUST_LOG", "off")
+    ready_to_draw(arguments.save, arguments.picture)
     return True
 
 

@@ -33,6 +33,18 @@ def add_problem(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_test(parser: argparse.ArgumentParser, within: str, settle: str) -> None:
+    """How damage is looked for: `within` is what a false alarm is counted in."""
+    parser.add_argument(
+        "--false-alarms", type=float, default=0.01, metavar="P",
+        help=f"probability of any false alarm {within}, default 0.01",
+    )  # fmt: skip
+    parser.add_argument("--settle", type=float, default=2.0, metavar="SECONDS", help=settle)
+    parser.add_argument(
+        "--known", action="store_true", help="take the file's values as true, even unknown ones"
+    )
+
+
 def add_report(parser: argparse.ArgumentParser) -> None:
     """Where a web page is written."""
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a web page")

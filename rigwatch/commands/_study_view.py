@@ -1,30 +1,23 @@
 """What `rigwatch study view` does: the steps of a study in the viewer, a file or a picture."""
 
 import argparse
-import os
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands._sessions import check_folder, print_json, say
+from rigwatch.commands._drawing import ready_to_draw, show_until_closed
+from rigwatch.commands._sessions import print_json, say
 
 if TYPE_CHECKING:
     from rigwatch.dashboard.study_view import Output
+    from rigwatch.dashboard.viewer import ForeignViewer, Viewer
     from rigwatch.workbench.stages import Signals, Stage
     from rigwatch.workbench.study import Study
-
-_LOOK_AGAIN = 0.3
 
 
 def view(arguments: argparse.Namespace) -> int:
     """0 when it was drawn, and when a window was shown, once that is closed."""
-    from rigwatch.dashboard import require_rerun
-
-    require_rerun()
-    for target in (arguments.save, arguments.picture):
-        check_folder(target)
-    os.environ.setdefault("RUST_LOG", "off")
+    ready_to_draw(arguments.save, arguments.picture)
     from rigwatch.workbench.stages import signals, stages
     from rigwatch.workbench.study import open_study
 
@@ -76,30 +69,13 @@ def _show(
 
     if arguments.picture or arguments.save:
         write_views(draw, float(shown[0].time[-1]), arguments.picture)
-    else:
-        _in_a_viewer(draw)
+        return
 
-
-def _in_a_viewer(draw: Callable[[str], None]) -> None:
-    """Show it until the window is closed or the command is interrupted."""
-    from rigwatch.dashboard.opening import open_viewer
-    from rigwatch.dashboard.viewer import RECORDING_MEMORY
-    from rigwatch.wire.rig_config import DashboardSection
-
-    stop = threading.Event()
-    viewer = open_viewer(
-        "auto", DashboardSection(), stop, say, lambda: None, memory=RECORDING_MEMORY
-    )
-    assert viewer is not None  # only a wait for a foreign viewer can be given up
-    try:
+    def draw_into(viewer: "Viewer | ForeignViewer") -> str:
         draw(viewer.url)
-        say("shown; Ctrl-C ends")
-        while viewer.exit_code() is None:
-            stop.wait(_LOOK_AGAIN)
-    except KeyboardInterrupt:
-        say("")
-    finally:
-        viewer.stop()
+        return "shown"
+
+    show_until_closed("auto", draw_into, say)
 
 
 def _outputs(study: "Study", found: "list[Stage]", shown: "list[Signals]") -> "list[Output]":

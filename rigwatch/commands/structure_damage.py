@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigwatch.commands._sessions import print_json, say
 from rigwatch.commands._structure_view import add_views, draw_damage, told, wanted
-from rigwatch.commands._structures import add_record, add_report, write_page
+from rigwatch.commands._structures import add_record, add_report, add_test, write_page
 
 if TYPE_CHECKING:
     from rigwatch.structures.damage import Damage, Examination
@@ -30,19 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--undamaged", type=float, metavar="SECONDS", help="start that is sure to be undamaged"
     )
     parser.add_argument("--limit", type=float, help="fixed limit of the residual instead of a test")
-    parser.add_argument(
-        "--false-alarms", type=float, default=0.01, metavar="P",
-        help="probability of any false alarm in a whole record, default 0.01",
-    )  # fmt: skip
-    parser.add_argument(
-        "--settle", type=float, default=2.0, metavar="SECONDS",
-        help="data from which a damage is identified at first; at least this lies between damages",
-    )  # fmt: skip
+    add_test(
+        parser,
+        "in a whole record",
+        "data from which a damage is identified at first and least between two, default 2",
+    )
     add_report(parser)
     add_views(parser)
-    parser.add_argument(
-        "--known", action="store_true", help="take the file's values as true, even unknown ones"
-    )
 
 
 def run(arguments: argparse.Namespace) -> int:

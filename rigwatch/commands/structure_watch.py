@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands._sessions import print_json
+from rigwatch.commands._structures import add_test
 
 if TYPE_CHECKING:
     from rigwatch.structures.live import LiveDamage
@@ -25,16 +26,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--undamaged", type=float, default=2.0, metavar="SECONDS",
         help="start that is sure to be undamaged, default 2",
     )  # fmt: skip
-    parser.add_argument(
-        "--false-alarms", type=float, default=0.01, metavar="P",
-        help="probability of any false alarm within --span, default 0.01",
-    )  # fmt: skip
     parser.add_argument("--span", type=float, default=60.0, metavar="SECONDS", help="default 60")
-    parser.add_argument(
-        "--settle", type=float, default=2.0, metavar="SECONDS",
-        help="data after an alarm from which the place is found, default 2",
-    )  # fmt: skip
-    parser.add_argument("--known", action="store_true", help="take the file's values as true")
+    add_test(
+        parser, "within --span", "data after an alarm from which the place is found, default 2"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

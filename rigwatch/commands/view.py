@@ -1,8 +1,6 @@
 """`rigwatch view`: a recording on the screen of a live rig."""
 
 import argparse
-import os
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +13,6 @@ if TYPE_CHECKING:
 HELP = "show a recording: signals, residual, friction estimates, alarms and what to do"
 EXAMPLE = """  rigwatch view sessions/bench1-20260501T120000Z
   rigwatch view sessions/bench1-20260501T120000Z --start 60 --end 120 --save minute.rrd"""
-_LOOK_AGAIN = 0.3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,15 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when it was drawn, and when a window was shown, once that is closed."""
-    from rigwatch.commands._sessions import check_folder, print_json, say
-    from rigwatch.dashboard import require_rerun
+    from rigwatch.commands._drawing import ready_to_draw
+    from rigwatch.commands._sessions import print_json, say
 
-    require_rerun()
-    for target in (arguments.save, arguments.picture):
-        check_folder(target)
-    os.environ.setdefault("RUST_LOG", "off")
+    ready_to_draw(arguments.save, arguments.picture)
     drawn = _shown(arguments, _silent if arguments.json else say)
-    if arguments.json:
+    if arguments.json and drawn:
         print_json(drawn)
     return 0
 
@@ -53,7 +47,7 @@ def _silent(text: str) -> None:
     """Nothing but JSON is wanted."""
 
 
-def _shown(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn":
+def _shown(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn | None":
     from rigwatch.dashboard import recording
 
     if arguments.picture:
@@ -70,29 +64,22 @@ def _shown(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn"
     return _in_a_viewer(arguments, say)
 
 
-def _in_a_viewer(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn":
-    """Show it until the window is closed or the command is interrupted."""
+def _in_a_viewer(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn | None":
+    """Show it until the window is closed; None where it was interrupted while it was drawn."""
+    from rigwatch.commands._drawing import show_until_closed
     from rigwatch.dashboard import recording
-    from rigwatch.dashboard.opening import open_viewer
-    from rigwatch.dashboard.viewer import RECORDING_MEMORY, Viewer
-    from rigwatch.wire.rig_config import DashboardSection
+    from rigwatch.dashboard.viewer import ForeignViewer, Viewer
 
-    stop = threading.Event()
-    viewer = open_viewer(
-        arguments.viewer, DashboardSection(), stop, say, lambda: None, memory=RECORDING_MEMORY
-    )
-    assert viewer is not None  # only a wait for a foreign viewer can be given up
-    try:
+    drawn: Drawn | None = None
+
+    def draw(viewer: Viewer | ForeignViewer) -> str:
+        nonlocal drawn
         drawn = _draw(arguments, say, viewer.url)
         if isinstance(viewer, Viewer) and viewer.kind == "native":
             recording.point_cursor(viewer.url, drawn.cursor_ns())
-        say(f"{drawn.samples} samples shown; Ctrl-C ends")
-        while viewer.exit_code() is None:
-            stop.wait(_LOOK_AGAIN)
-    except KeyboardInterrupt:
-        say("")
-    finally:
-        viewer.stop()
+        return f"{drawn.samples} samples shown"
+
+    show_until_closed(arguments.viewer, draw, say)
     return drawn
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.structures.record import Record
-from rigwatch.wire.messages import Column, SampleBlock
-from rigwatch.wire.quality import valid
+from rigwatch.wire.messages import SampleBlock
 
 FloatArray = NDArray[np.float64]
 
@@ -55,8 +54,8 @@ class GrowingRecord:
 
     def take(self, block: SampleBlock, lost: int = 0) -> None:
         """The samples of a block, after some that were lost; KeyError where it lacks a channel."""
-        loads = [_values(block.channel(name)) for name in self._loads]
-        signals = [_values(block.channel(name)) for name in self._signals]
+        loads = [block.channel(name).usable() for name in self._loads]
+        signals = [block.channel(name).usable() for name in self._signals]
         begin, middle = self._count, self._count + lost
         self._count = middle + len(block)
         self._make_room()
@@ -83,10 +82,3 @@ class GrowingRecord:
             self._inputs = np.concatenate([self._inputs, np.zeros_like(self._inputs)])
             self._observed = np.concatenate([self._observed, np.zeros_like(self._observed)])
             self._t_ns = np.concatenate([self._t_ns, np.zeros_like(self._t_ns)])
-
-
-def _values(column: Column) -> FloatArray:
-    good = np.isfinite(column.values)
-    if len(column.quality):
-        good &= valid(column.quality)
-    return np.where(good, column.values, np.nan)

@@ -71,14 +71,15 @@ class LiveDamage:
         _check(settings)
         self._structure, self._dt, self._settings = structure, dt, settings
         self._learnt = max(1, round(settings.undamaged / dt))
+        self._loads = [load.channel for load in structure.loads.values() if load.channel]
         self._boot: int | None = None
 
     def prepare(self) -> None:
         """Compile now what the first samples will need; nothing is remembered."""
         settings = replace(self._settings, known=True, undamaged=LEAST * self._dt)
         trial, count = LiveDamage(self._structure, self._dt, settings), LEAST + 2
-        loads = [load.channel for load in self._structure.loads.values() if load.channel]
-        still = [Column(name, "", np.zeros(count)) for name in (*self._structure.signals, *loads)]
+        names = (*self._structure.signals, *self._loads)
+        still = [Column(name, "", np.zeros(count)) for name in names]
         numbers = np.arange(count)
         trial.update(SampleBlock("", 0, 0, numbers, numbers, tuple(still)))
 
@@ -101,9 +102,8 @@ class LiveDamage:
         return self._said()
 
     def _begin(self, block: SampleBlock) -> None:
-        loads = [load.channel for load in self._structure.loads.values() if load.channel]
         self._boot, self._first, self._device = block.boot, block.seq, block.device
-        self._record = GrowingRecord(self._dt, self._structure.signals, loads)
+        self._record = GrowingRecord(self._dt, self._structure.signals, self._loads)
         self._stage: Literal["learning", "watching", "gathering", "told"] = "learning"
         self._done = 0
 

@@ -11,7 +11,6 @@ import numpy as np
 from rigwatch.structures.record import FloatArray, Record, read_record, record_of
 from rigwatch.wire.errors import ImportDataError
 from rigwatch.wire.messages import SampleBlock
-from rigwatch.wire.quality import valid
 from rigwatch.wire.session.reader import SUFFIX, open_session
 
 TABLES = {".csv", ".npz"}
@@ -56,7 +55,4 @@ def _place(block: SampleBlock, at: int, columns: dict[str, FloatArray], clock: F
     rows = slice(at, at + len(block))
     clock[rows] = np.asarray(block.device_us, np.float64) * 1e-6
     for column in block.channels:
-        values = np.asarray(column.values, np.float64)
-        if len(column.quality):
-            values = np.where(valid(column.quality), values, np.nan)
-        columns[column.name][rows] = values
+        columns[column.name][rows] = column.usable()

@@ -9,11 +9,10 @@ H·δ with the change δ to be found. The columns of H are the free parameters, 
 initial states. `rates` is the model's own kernel, so that J is exact and its zeros cost nothing.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import ModuleType
 
 import numpy as np
-import sympy
 from numpy.typing import NDArray
 
 from rigwatch.physics.engine.compiled import (
@@ -22,7 +21,6 @@ from rigwatch.physics.engine.compiled import (
     load_source,
     numba_module,
 )
-from rigwatch.physics.engine.scope import symbol
 from rigwatch.physics.engine.system import System
 from rigwatch.structures.integrators import CLASSICAL, Integrator
 from rigwatch.wire.errors import ModelError
@@ -165,17 +163,6 @@ class Swept:
     state_slopes: FloatArray
 
 
-def without_probes(system: System) -> System:
-    """The same equations where nothing can enter: smaller, and safe for sweeps of any width."""
-    absent = {symbol(name): sympy.Integer(0) for name in system.probes}
-    return replace(
-        system,
-        probes=(),
-        derivatives={name: e.subs(absent) for name, e in system.derivatives.items()},
-        outputs={name: e.subs(absent) for name, e in system.outputs.items()},
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Sweeper:
     """A compiled system with its sweeps."""
@@ -245,12 +232,12 @@ class Sweeper:
 
 
 def sweeper(system: System) -> Sweeper:
-    """The kernels of `system` without its probes, from the cache where they are known.
+    """The kernels of `system`, from the cache where they are known.
 
     Raises:
         ModelError: the system has no states.
     """
-    compiled = compile_system(without_probes(system))
+    compiled = compile_system(system)
     if not system.states:
         raise ModelError(f"{system.model.name}: found no states, expected equations of motion")
     equations = numba_module(compiled.system)

@@ -17,6 +17,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rigwatch.wire.quality import valid
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
@@ -42,6 +44,13 @@ class Column:
     unit: str
     values: FloatArray
     quality: ByteArray = field(default_factory=lambda: np.zeros(0, np.uint8))
+
+    def usable(self) -> FloatArray:
+        """The values, NaN where they are invalid or no numbers; shape (n,)."""
+        good = np.isfinite(self.values)
+        if len(self.quality):
+            good &= valid(self.quality)
+        return np.where(good, self.values, np.nan)
 
 
 @dataclass(frozen=True, slots=True)

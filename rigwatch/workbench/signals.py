@@ -15,7 +15,6 @@ from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import Model
 from rigwatch.physics.engine.thinning import Thinning
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.quality import valid
 from rigwatch.wire.session import open_session
 from rigwatch.workbench.study import Derive, Span, Study, StudyFile, nearest
 
@@ -82,9 +81,8 @@ def read_columns(study: Study, span: Span) -> Columns:
     for block in blocks:
         at = block.seq - first.seq
         for column in block.channels:
-            good = valid(column.quality) if len(column.quality) else np.True_
-            kept = np.where(good & np.isfinite(column.values), column.values, np.nan)
-            values.setdefault(column.name, np.full(count, np.nan))[at : at + len(block)] = kept
+            into = values.setdefault(column.name, np.full(count, np.nan))
+            into[at : at + len(block)] = column.usable()
     begin, end = round(span.start / dt), min(count, round(min(span.end, 1e9) / dt))
     if end - begin < 2:
         raise ModelError(

@@ -3,11 +3,9 @@
 import numpy as np
 
 from rigwatch.physics.engine.compiled import FloatArray
-from rigwatch.physics.engine.expression import parse
 from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.physics.engine.model import Model, Port
-from rigwatch.physics.engine.numeric import numpy_function
-from rigwatch.physics.engine.scope import symbol
+from rigwatch.physics.engine.numeric import evaluated
 from rigwatch.physics.engine.system import compose
 
 Sizes = dict[str, float]
@@ -35,12 +33,9 @@ def _measured(model: Model, recording: Recording) -> dict[str, FloatArray]:
 
 def _sizes(port: Port, model: Model, signals: dict[str, FloatArray], recording: Recording) -> Sizes:
     values = {name: p.value for name, p in model.parameters.items()}
-    names = {name: symbol(name) for name in (*signals, *values, "t")}
     sizes = {"dt": recording.dt}
     for name, variable in port.variables.items():
-        expression = parse(variable.expression, names, f"port variable {name}")
-        function = numpy_function([*signals, *values], expression)
-        sizes[name] = _rms(function(*signals.values(), *values.values()))
+        sizes[name] = _rms(evaluated(variable.expression, signals, values, f"port variable {name}"))
     if port.signal:
         sizes["u"] = _rms(signals[port.signal])
         sizes["rate"] = _rms(np.gradient(signals[port.signal], recording.dt))

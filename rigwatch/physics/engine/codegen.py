@@ -165,11 +165,9 @@ def _unpacked(system: System) -> Iterator[str]:
 def _body(
     system: System, value: str, slope: str, expressions: Sequence[sympy.Expr]
 ) -> Iterator[str]:
-    found = differentiated(expressions, system.states, system.free, system.probes)
-    by_state, by_parameter, by_probe = found.by_state, found.by_parameter, found.by_probe
-    flat = [
-        e for rows in ([expressions], by_state, by_parameter, by_probe) for r in rows for e in r
-    ]
+    found = differentiated(expressions, system.states, system.free, ())
+    by_state, by_parameter = found.by_state, found.by_parameter
+    flat = [e for rows in ([expressions], by_state, by_parameter) for r in rows for e in r]
     shared, reduced = sympy.cse(flat, symbols=sympy.numbered_symbols(""), order="none")
     printer = _Printer()
     for name, expression in shared:
@@ -179,19 +177,8 @@ def _body(
         yield f"{value}[{i}] = {next(rest)}"
     for i, row in enumerate(by_state):
         yield from _chained(slope, i, row, rest)
-    yield from _added(slope, by_parameter, rest, 0)
-    first = len(system.free) + len(system.states)
-    yield f"if {slope}.shape[1] > {first}:"
-    yield "    pass"
-    yield from (f"    {line}" for line in _added(slope, by_probe, rest, first))
-
-
-def _added(
-    slope: str, rows: Sequence[Sequence[sympy.Expr]], rest: Iterator[str], first: int
-) -> Iterator[str]:
-    """The explicit part of the derivatives, from column `first` on; zero entries left out."""
-    for i, row in enumerate(rows):
-        for j, (entry, text) in enumerate(_with(row, rest), start=first):
+    for i, row in enumerate(by_parameter):
+        for j, (entry, text) in enumerate(_with(row, rest)):
             if entry != 0:
                 yield f"{slope}[{i}, {j}] += {text}"
 

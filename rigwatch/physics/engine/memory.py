@@ -15,7 +15,7 @@ from rigwatch.physics.engine.compiled import CompiledSystem, FloatArray, compile
 from rigwatch.physics.engine.effect import Effect
 from rigwatch.physics.engine.expression import parse
 from rigwatch.physics.engine.model import Hold, Input, Model, Output, Parameter, State
-from rigwatch.physics.engine.numeric import numpy_function
+from rigwatch.physics.engine.numeric import evaluated
 from rigwatch.physics.engine.scope import symbol
 from rigwatch.physics.engine.stability import stable_substeps
 from rigwatch.physics.engine.system import LEFT, RATE, TIME, Placement, System
@@ -174,12 +174,9 @@ def _seen(  # noqa: PLR0917 -- they belong together
     for name, other in system.model.ports.items():
         if other.kind != "sensor":
             known[name] = known.get(other.signal, np.zeros(len(inputs)))
-    names = {name: symbol(name) for name in (*known, *values)}
 
     def along(text: str) -> FloatArray:
-        expression = parse(text, names, f"port {placement.port}")
-        found = numpy_function([*known, *values], expression)(*known.values(), *values.values())
-        return np.asarray(np.broadcast_to(found, len(inputs)), np.float64)
+        return evaluated(text, known, values, f"port {placement.port}")
 
     seen = {name: along(variable.expression) for name, variable in port.variables.items()}
     if port.kind != "force":

@@ -4,7 +4,7 @@ Without states nothing is integrated, so nothing needs to be compiled either: a 
 in milliseconds. The kernel has the functions that a compiled one has, with the same arguments.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, reduce
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sympy.printing.numpy import NumPyPrinter
 
 from rigwatch.physics.engine.codegen import derivative
+from rigwatch.physics.engine.expression import parse
 from rigwatch.physics.engine.scope import symbol
 from rigwatch.physics.engine.system import TIME, System
 
@@ -70,6 +71,27 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
         for choice in reversed([*choices, *rest]):
             text = f"where({self._print(choice.cond)}, {self._print(choice.expr)}, {text})"
         return text
+
+
+def evaluated(
+    text: str, signals: Mapping[str, FloatArray], values: Mapping[str, float], where: str
+) -> FloatArray:
+    """An expression along signals, for values of parameters; shape (n,).
+
+    Args:
+        text: the expression.
+        signals: what it may name, each of shape (n,).
+        values: numbers that it may name.
+        where: what it is, for an error.
+
+    Raises:
+        ModelError: it does not parse, or names something else.
+    """
+    names = [*signals, *values]
+    expression = parse(text, {name: symbol(name) for name in names}, where)
+    found = numpy_function(names, expression)(*signals.values(), *values.values())
+    shape = next(iter(signals.values())).shape
+    return np.asarray(np.broadcast_to(found, shape), np.float64)
 
 
 class StaticKernel:
