@@ -34,8 +34,7 @@ from benchmarks.hidden_effects import (
 from benchmarks.table import Row
 from rigwatch.physics.engine.effect import load_effects
 from rigwatch.physics.engine.significance import corrected_p_values
-from rigwatch.workbench.compare import Bench, comparison, noise_floor
-from rigwatch.workbench.fitted import fit_base
+from rigwatch.workbench.compare import Bench, bench_of, comparison
 from rigwatch.workbench.rank import candidates, rank_only, refit, score_all
 from rigwatch.workbench.signals import Data
 from sim_plant.oscillator import Hidden, strength_for
@@ -67,9 +66,7 @@ def recordings() -> Data:
 
 def opened(data: Data) -> Bench:
     """The base model fitted, and the noise floor."""
-    of = study()
-    base = fit_base(of, data, NOISE * np.nanstd(data.train.outputs, axis=0))
-    return Bench(of, data, base, noise_floor(of, data, base))
+    return bench_of(study(), data, NOISE * np.nanstd(data.train.outputs, axis=0))
 
 
 def scoring(data: Data, repeats: int) -> Row:

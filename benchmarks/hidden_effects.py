@@ -30,9 +30,8 @@ from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import shipped_models
 from rigwatch.workbench import calibration
 from rigwatch.workbench.calibration import Evidence, cell_of
-from rigwatch.workbench.compare import Bench, noise_floor
+from rigwatch.workbench.compare import Bench, bench_of
 from rigwatch.workbench.explain import ranking
-from rigwatch.workbench.fitted import fit_base
 from rigwatch.workbench.intervals import values
 from rigwatch.workbench.rank import Ranked, accepted_from
 from rigwatch.workbench.signals import Data
@@ -243,8 +242,7 @@ def _named_next(best: Ranked, data: Data) -> tuple[str, ...]:
 def explained(of: Study, data: Data) -> tuple[Bench, list[Ranked], Verdict]:
     """The workbench's steps without its files."""
     scale = NOISE * np.nanstd(data.train.outputs, axis=0)
-    base = fit_base(of, data, scale)
-    bench = Bench(of, data, base, noise_floor(of, data, base))
+    bench = bench_of(of, data, scale)
     return bench, *ranking(bench)
 
 

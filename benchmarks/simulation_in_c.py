@@ -77,17 +77,7 @@ def in_c(task: Task) -> Simulator | None:
     folder = Path(tempfile.mkdtemp())
     (folder / "kernel.c").write_text(_source(task), encoding="utf-8")
     subprocess.run(
-        [
-            compiler,
-            "-O3",
-            "-march=native",
-            "-shared",
-            "-fPIC",
-            "kernel.c",
-            "-o",
-            "kernel.so",
-            "-lm",
-        ],
+        [compiler, *FLAGS, "-shared", "-fPIC", "kernel.c", "-o", "kernel.so", "-lm"],
         cwd=folder,
         check=True,
     )

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from rigwatch.physics.engine.effect import library
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import shipped_models
-from rigwatch.workbench.compare import Bench, noise_floor
-from rigwatch.workbench.fitted import fit_base
+from rigwatch.workbench.compare import Bench, bench_of
 from rigwatch.workbench.signals import Data
 from rigwatch.workbench.study import Span, Study, StudyFile
 from sim_plant.oscillator import DAMPING, MASS, RATE, STIFFNESS, Hidden, oscillate, strength_for
@@ -40,9 +39,7 @@ def fitted(force: FloatArray, hidden: tuple[Hidden, ...], noise: float, seed: in
         for k, effects in enumerate((hidden, hidden, ()))
     ]
     data = Data(made[0], made[1], made[2], HORIZON, ())
-    of = study()
-    base = fit_base(of, data, scale)
-    return Bench(of, data, base, noise_floor(of, data, base))
+    return bench_of(study(), data, scale)
 
 
 def study() -> Study:
