@@ -3,14 +3,12 @@
 What matters is the first alarm that means a fault, and where there is none, the end.
 """
 
-import io
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import rerun as rr
-from PIL import Image
 from rerun.experimental import ViewerClient
 
 from rigwatch.dashboard import entities as at
@@ -18,6 +16,7 @@ from rigwatch.dashboard.alarm_book import NAMED_FAULTS, is_active
 from rigwatch.dashboard.board import APPLICATION, Dashboard
 from rigwatch.dashboard.facts import Facts
 from rigwatch.dashboard.layout import Windows
+from rigwatch.dashboard.picture import save_picture
 from rigwatch.dashboard.viewer import RECORDING_MEMORY, Viewer, ViewerError
 from rigwatch.wire.messages import Alarm, Message
 
@@ -27,10 +26,6 @@ _SIGNALS = 5.0
 _HISTORY = 60.0
 _FLUSH_TIMEOUT = 60.0
 _DRAWING_TIMEOUT = 60.0
-_EMPTY_TOP = 36
-"""Where the viewer's own bar would be [pixels]."""
-_SETTLING = 6.0
-"""Until the viewer's own notices have gone from the screen [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,12 +120,7 @@ def point_cursor(url: str, t_ns: int) -> None:
 
 def take_picture(viewer: Viewer, path: Path) -> None:
     """Write what a headless viewer shows as a PNG file."""
-    time.sleep(_SETTLING)
-    client = ViewerClient.connect(viewer.url)
-    picture = Image.open(io.BytesIO(client.take_screenshot())).convert("RGB")
-    picture = picture.crop((0, _EMPTY_TOP, *picture.size))
-    # The viewer packs its pictures for speed; packed well they are a third smaller.
-    picture.save(path, format="PNG", optimize=True)
+    save_picture(ViewerClient.connect(viewer.url), path)
 
 
 def headless_viewer() -> Viewer:

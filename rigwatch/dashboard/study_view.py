@@ -8,7 +8,6 @@ Nothing of workbench and structures is known here: what is drawn comes as plain 
     test/statistic, test/threshold, test/<instant>          [share of the threshold]
 """
 
-import io
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,11 +16,11 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from PIL import Image
 from rerun.experimental import ViewerClient
 
 from rigwatch.dashboard import palette
 from rigwatch.dashboard.board import APPLICATION
+from rigwatch.dashboard.picture import save_picture
 from rigwatch.dashboard.viewer import Viewer, ViewerError
 from rigwatch.wire.messages import FloatArray
 
@@ -33,9 +32,6 @@ _TALL = 3.0
 """Upper end of the test's axis, in thresholds."""
 _FLUSH_TIMEOUT = 60.0
 _ARRIVAL_TIMEOUT = 30.0
-_SETTLING = 6.0
-"""Until the viewer's own notices have gone from the screen [s]."""
-_EMPTY_TOP = 36
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,10 +137,7 @@ def take_picture(viewer: Viewer, seconds: float, path: Path) -> None:
         if time.monotonic() > deadline:
             raise ViewerError("the viewer did not take all data in time")
         time.sleep(0.1)
-    time.sleep(_SETTLING)
-    picture = Image.open(io.BytesIO(client.take_screenshot())).convert("RGB")
-    picture = picture.crop((0, _EMPTY_TOP, *picture.size))
-    picture.save(path, format="PNG", optimize=True)
+    save_picture(client, path)
 
 
 def _end_of(client: ViewerClient) -> float:
