@@ -5,7 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from rigwatch.commands import main
 from tests.workbench.conftest import CONFIGS
@@ -37,7 +39,7 @@ def study(emps: Path, tmp_path: Path, told: Told) -> str:
 
 
 def test_the_error_falls_from_ten_newtons_to_two_and_decoys_are_refused(
-    study: str, told: Told
+    study: str, tmp_path: Path, told: Told
 ) -> None:
     _, start = told("compare", study)
     assert start["train_error"] == pytest.approx(9.49, abs=0.02)
@@ -67,6 +69,11 @@ def test_the_error_falls_from_ten_newtons_to_two_and_decoys_are_refused(
     code, checks = told("study", "replay", study)
     assert code == 0
     assert len(checks) == 3
+    picture = tmp_path / "emps.png"
+    code, drawn = told("study", "view", study, "--picture", str(picture))
+    assert code == 0
+    assert drawn["steps"] == ["model alone", *(f"+ {e.replace('_', ' ')}" for e, _ in steps)]
+    assert len(np.unique(np.asarray(Image.open(picture)).reshape(-1, 3), axis=0)) > 50
 
 
 def test_undo_brings_the_file_back_as_it_was(study: str, told: Told) -> None:
