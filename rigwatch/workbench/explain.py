@@ -7,12 +7,14 @@ from rigwatch.workbench.calibration import seen
 from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
 from rigwatch.workbench.intervals import Value, values
 from rigwatch.workbench.next_experiment import Experiment, propose
-from rigwatch.workbench.rank import Progress, Ranked, accepted_from, rank, unheard
+from rigwatch.workbench.rank import Progress, Ranked, accepted_from, rank, refit, unheard
 from rigwatch.workbench.study import Study
-from rigwatch.workbench.verdict import Verdict, judge
+from rigwatch.workbench.verdict import Verdict, Word, judge
 
 MOST_OF_THE_REST = 0.3
 """Share of what the best leaves that a second effect must explain to first order to be tried."""
+ROUGHLY = 0.02
+"""Share of the energy above the floor that two effects may leave of a rough model."""
 
 
 @dataclass(frozen=True)
@@ -97,22 +99,58 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
 def _with_second(bench: Bench, verdict: Verdict, progress: Progress) -> Verdict:
     """The verdict once a second effect has been tried beside the best: two may hide at once.
 
-    Two are named only where they leave nothing but noise: two wrong ones together explain much.
+    The best alone may have taken the place of one that is right only beside the second; so where
+    the two leave more than noise, the second is tried with every other first, too.
     """
     best = verdict.best
     assert best is not None
-    assert best.fitted is not None
-    study = bench.study.with_effects([*bench.study.file.effects, accepted_from(best)])
-    beside = dataclasses.replace(bench, study=study, base=best.fitted)
     progress(f"{best.label} leaves much: trying a second effect beside it")
-    rows = rank(study, beside.data, beside.base, bench.floor, progress, least=MOST_OF_THE_REST)
-    second = judge(beside.base, rows, bench.floor)
-    if second.best is None or second.best.fitted is None:
+    second = _beside(bench, best, progress)
+    if second.best is None or _enough(bench, second.best):
+        return _both(verdict, second, bench)
+    first = dataclasses.replace(second.best)
+    refit(bench.study, bench.data, bench.base, first)
+    if first.fitted is None:
         return verdict
-    if not bench.floor.reached(second.best.fitted.held_out):
-        return verdict
-    text = f"{best.label} is missing, and {second.best.label} as well"
-    return dataclasses.replace(verdict, word="missing_effect", text=text, second=second.members)
+    progress(f"{first.label} is trusted more: trying a second effect beside that")
+    return _both(
+        dataclasses.replace(second, best=first), _beside(bench, first, progress), bench, verdict
+    )
+
+
+def _beside(bench: Bench, first: Ranked, progress: Progress) -> Verdict:
+    """The verdict on what is missing once the first has been added."""
+    assert first.fitted is not None
+    study = bench.study.with_effects([*bench.study.file.effects, accepted_from(first)])
+    rows = rank(study, bench.data, first.fitted, bench.floor, progress, least=MOST_OF_THE_REST)
+    return judge(first.fitted, rows, bench.floor)
+
+
+def _enough(bench: Bench, second: Ranked) -> bool:
+    """Whether two effects leave so little that they are worth naming.
+
+    Nothing but noise, as two wrong ones together explain much. A rough model leaves more, since
+    what it leaves on a healthy rig changes with the fault.
+    """
+    assert second.fitted is not None
+    left = bench.floor.left_over(bench.base.held_out, second.fitted.held_out, tolerant=True)
+    return left == 0 or (bench.study.model.rough and left < ROUGHLY)
+
+
+def _both(
+    first: Verdict, second: Verdict, bench: Bench, otherwise: Verdict | None = None
+) -> Verdict:
+    """A verdict that names both where they explain enough, else the one there was."""
+    if second.best is None or not _enough(bench, second.best):
+        return otherwise or first
+    assert first.best is not None
+    assert second.best.fitted is not None
+    named = (*second.members, *second.rivals)
+    certain = bench.floor.reached(second.best.fitted.held_out) and not second.rivals
+    word: Word = "missing_effect" if certain else "undetermined"
+    also = f"{named[0]} as well" if certain else f"probably {' or '.join(named)} as well"
+    text = f"{first.best.label} is missing, and {also}"
+    return dataclasses.replace(first, word=word, text=text, second=named)
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:

@@ -73,3 +73,12 @@ def test_a_period_must_hold_whole_horizons(tmp_path):
     text = TEMPLATE.read_text(encoding="utf-8").replace("horizon = 0.5", "horizon = 0.6")
     with pytest.raises(ModelError, match="multiple of the horizon"):
         open_bench(study(tmp_path, text))
+
+
+def test_two_faults_at_once_are_named_whichever_is_found_first(tmp_path):
+    record(tmp_path, "healthy", 1)
+    record(tmp_path, "rig", 2, viscous=0.15, acceleration_lag=0.002)
+    _, verdict = ranking(open_bench(study(tmp_path)))
+    named = {*verdict.members, *verdict.rivals, *verdict.second}
+    assert {"viscous@load", "lag@acceleration_sensor"} <= named
+    assert verdict.word in {"missing_effect", "undetermined"}

@@ -90,6 +90,8 @@ def _headline(m: Material) -> str:
         "missing_effect": f"probably missing: {name}",
         "undetermined": f"this recording cannot tell {name} from {rivals}",
     }.get(m.explanation.verdict, VERDICTS[m.explanation.verdict])
+    if m.explanation.also:
+        words = m.explanation.text
     if len(m.stages) == 1:
         return words[0].upper() + words[1:]
     fall = f"Error {first.held_out_error:.3g} → {last.held_out_error:.3g} {last.unit}"
