@@ -13,8 +13,8 @@ from rigwatch.workbench.verdict import Verdict, Word, judge
 
 MOST_OF_THE_REST = 0.3
 """Share of what the best leaves that a second effect must explain to first order to be tried."""
-ROUGHLY = 0.02
-"""Share of the energy above the floor that two effects may leave of a rough model."""
+ROUGHLY = 1.5
+"""Error over the noise floor that two effects may leave of a rough model."""
 
 
 @dataclass(frozen=True)
@@ -133,8 +133,8 @@ def _enough(bench: Bench, second: Ranked) -> bool:
     what it leaves on a healthy rig changes with the fault.
     """
     assert second.fitted is not None
-    left = bench.floor.left_over(bench.base.held_out, second.fitted.held_out, tolerant=True)
-    return left == 0 or (bench.study.model.rough and left < ROUGHLY)
+    rough = bench.study.model.rough and bench.floor.ratio(second.fitted.held_out) < ROUGHLY
+    return rough or bench.floor.reached(second.fitted.held_out)
 
 
 def _both(
