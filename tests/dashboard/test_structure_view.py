@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from rigwatch.commands import main
-from rigwatch.dashboard import palette, study_view
+from rigwatch.dashboard import palette
 
 KABE = Path(__file__).parents[2] / "configs" / "structures" / "kabe_antenna.toml"
 
@@ -35,7 +35,8 @@ def test_a_damage_is_drawn_with_its_test_instant_and_verdict(record: Path, tmp_p
 def test_an_identification_is_drawn_as_a_picture(
     record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study_view, "_SETTLING", 1.0)  # the viewer's notices may be in the picture
+    # The viewer's notices may be in the picture.
+    monkeypatch.setattr("rigwatch.dashboard.picture._FRAMES", 8)
     target = tmp_path / "antenna.png"
     assert main(["structure", "identify", str(KABE), str(record), "--picture", str(target)]) < 2
     pixels = np.asarray(Image.open(target).convert("RGB")).astype(int)

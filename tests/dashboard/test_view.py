@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from rigwatch.commands import main
-from rigwatch.dashboard import palette, recording
+from rigwatch.dashboard import palette
 from rigwatch.wire.session import SessionWriter, run_info
 from tests.dashboard.rig_messages import Rig
 
@@ -28,7 +28,8 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_picture_shows_signals_and_verdict(
     session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recording, "_SETTLING", 1.0)  # the viewer's notices may be in the picture
+    # The viewer's notices may be in the picture.
+    monkeypatch.setattr("rigwatch.dashboard.picture._FRAMES", 8)
     picture = tmp_path / "rubbing.png"
     assert main(["view", str(session), "--picture", str(picture)]) == 0
     pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)

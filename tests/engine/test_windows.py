@@ -94,6 +94,21 @@ def test_a_window_whose_initial_state_went_astray_begins_where_the_one_before_en
     assert evaluate(found, turning, 100).rms[0] == pytest.approx(0.01, rel=0.1)
 
 
+def test_a_model_may_call_something_of_its_own_left(recording):
+    texts = FOLLOWER, FOLLOWER.replace("w*(", "left*(").replace("parameters.w", "parameters.left")
+    placement = Placement("rate_limit", library()["rate_limit"].scaled(sizes(recording)), "drive")
+    runs = []
+    for text in texts:
+        compiled = compile_system(compose(parse(text, Model, "follower"), [placement]))
+        runs.append(
+            compiled.simulate(
+                recording.inputs, DT, np.zeros(1, np.int64), N, initial=np.zeros((1, 2)),
+                parameters=compiled.parameters,
+            ).outputs
+        )  # fmt: skip
+    np.testing.assert_array_equal(*runs)
+
+
 def sizes(recording: Recording) -> dict[str, float]:
     command = recording.inputs[:, 0]
     rate = float(np.sqrt(np.mean(np.gradient(command, DT) ** 2)))

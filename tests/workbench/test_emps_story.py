@@ -38,6 +38,7 @@ def study(emps: Path, tmp_path: Path, told: Told) -> str:
     return folder
 
 
+@pytest.mark.long
 def test_the_error_falls_from_ten_newtons_to_two_and_decoys_are_refused(
     study: str, tmp_path: Path, told: Told
 ) -> None:

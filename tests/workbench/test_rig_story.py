@@ -101,6 +101,7 @@ def shell(tmp_path: Path) -> Iterator[Shell]:
     made.close()
 
 
+@pytest.mark.long
 def test_the_story_of_the_rig_as_it_is_typed(shell: Shell) -> None:
     commission, up, alarms, *study, promote, rollback = typed()
     assert "--commission-only" in commission

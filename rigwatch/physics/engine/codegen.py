@@ -16,7 +16,7 @@ import sympy
 from sympy.printing.pycode import PythonCodePrinter
 
 from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.system import LEFT, System
+from rigwatch.physics.engine.system import UNTIL, System
 
 _HEAD = '''"""Kernel of {title}; printed from its equations, not to be edited."""
 
@@ -158,7 +158,7 @@ def _unpacked(system: System) -> Iterator[str]:
     ):
         for index, name in enumerate(names):
             yield f"    _{name} = {array}[{index}]"
-    for name in (LEFT, *system.probes):
+    for name in (UNTIL, *system.probes):
         yield f"    _{name} = 0.0"
 
 

@@ -31,7 +31,7 @@ from rigwatch.physics.engine.expression import parse
 from rigwatch.physics.engine.memory import Memory, held_at
 from rigwatch.physics.engine.numeric import numpy_function
 from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.system import LEFT, PROBE, RATE, TIME, System
+from rigwatch.physics.engine.system import LEFT, PROBE, RATE, TIME, UNTIL, System
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,7 @@ def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
     system = at.compiled.system
     values = dict(zip(system.states, np.moveaxis(at.run.states, -1, 0), strict=True))
     values |= dict(zip(system.model.inputs, np.moveaxis(at.inputs, -1, 0), strict=True))
-    return _evaluated(expression, values | {TIME: at.time, LEFT: _left(at)}, at.time.shape)
+    return _evaluated(expression, values | {TIME: at.time, UNTIL: _left(at)}, at.time.shape)
 
 
 def _left(at: Trajectory) -> FloatArray:

@@ -18,7 +18,7 @@ from rigwatch.physics.engine.model import Hold, Input, Model, Output, Parameter,
 from rigwatch.physics.engine.numeric import evaluated
 from rigwatch.physics.engine.scope import symbol
 from rigwatch.physics.engine.stability import stable_substeps
-from rigwatch.physics.engine.system import LEFT, RATE, TIME, Placement, System
+from rigwatch.physics.engine.system import LEFT, RATE, TIME, UNTIL, Placement, System
 
 Signals = dict[str, FloatArray]
 
@@ -72,9 +72,8 @@ def held_at(model: Model, port: str) -> Hold:
 
 def _alone(effect: Effect, inputs: list[str], hold: Hold) -> System:
     """The states of one effect as a system of their own."""
-    names = {
-        name: symbol(name) for name in (*inputs, TIME, LEFT, *effect.states, *effect.parameters)
-    }
+    own = (*inputs, TIME, *effect.states, *effect.parameters)
+    names = {LEFT: symbol(UNTIL)} | {name: symbol(name) for name in own}
     model = Model(
         name="memory of an effect",
         summary="the states of one effect",

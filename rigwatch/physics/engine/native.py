@@ -24,7 +24,7 @@ from rigwatch.physics.engine import driver
 from rigwatch.physics.engine.codegen import Differentiated, differentiated
 from rigwatch.physics.engine.llvm import Function, literal, machine_code
 from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.system import LEFT, TIME, System
+from rigwatch.physics.engine.system import TIME, UNTIL, System
 
 LARGE = 5_000_000
 """Steps times numbers that are integrated, from where all cores share a simulation."""
@@ -132,7 +132,7 @@ def _function(system: Equations, name: str) -> Function:
         ("p", system.parameters),
     ):
         places |= {symbol(each): (array, index) for index, each in enumerate(names)}
-    places[symbol(LEFT)] = ("u", len(system.inputs))
+    places[symbol(UNTIL)] = ("u", len(system.inputs))
     return Function(name, places, {symbol(probe): 0.0 for probe in system.probes})
 
 

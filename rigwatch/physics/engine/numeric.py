@@ -16,7 +16,7 @@ from sympy.printing.numpy import NumPyPrinter
 from rigwatch.physics.engine.codegen import derivative
 from rigwatch.physics.engine.expression import parse
 from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.system import TIME, System
+from rigwatch.physics.engine.system import TIME, UNTIL, System
 
 FloatArray = NDArray[np.float64]
 
@@ -100,7 +100,7 @@ class StaticKernel:
     def __init__(self, system: System) -> None:
         outputs = list(system.outputs.values())
         names = (TIME, *system.model.inputs, *system.parameters)
-        at_rest = {symbol(probe): 0 for probe in system.probes}
+        at_rest = {symbol(name): 0 for name in (UNTIL, *system.probes)}
         by = [symbol(name) for name in (*system.free, *system.probes)]
         slopes = [derivative(output, s) for output in outputs for s in by]
         whole = [e.subs(at_rest) for e in (*outputs, *slopes)]

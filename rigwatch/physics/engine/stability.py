@@ -13,7 +13,7 @@ import sympy
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.physics.engine.numeric import numpy_function
 from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.system import LEFT, TIME, System, compose
+from rigwatch.physics.engine.system import TIME, UNTIL, System, compose
 
 STABLE = 2.0
 """Rate times step that is allowed, with a margin."""
@@ -83,7 +83,7 @@ def _fastest(  # noqa: PLR0917 -- they belong together
 ) -> float:
     """Largest |∂(dz/dt)/∂z| of the states `held` while all of them are at one value [1/s]."""
     rates = [sympy.diff(system.derivatives[name], symbol(name)) for name in held]
-    names = (TIME, LEFT, *system.states, *system.model.inputs, *system.parameters, *system.probes)
+    names = (TIME, UNTIL, *system.states, *system.model.inputs, *system.parameters, *system.probes)
     known = [
         at if name in held or states is None else states[:, index]
         for index, name in enumerate(system.states)

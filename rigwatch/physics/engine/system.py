@@ -19,8 +19,12 @@ TIME = "t"
 PROBE = "probe_"
 RATE = "rate"
 """What an effect at a signal may call the signal's own rate of change."""
+UNTIL = "until_"
 LEFT = "left"
-"""What an effect at a signal may call the time until an input that is kept changes; 0 elsewhere."""
+"""What an effect at a signal may call the time until an input that is kept changes; 0 elsewhere.
+
+Its symbol in a system is `UNTIL`, so that a model may call something of its own `left`.
+"""
 
 
 @dataclass(frozen=True)
@@ -192,7 +196,7 @@ class _Composer:
             units[name] = variable.unit
         if port.kind != "force":
             scope.define("u", arriving, unit)
-            scope.define(LEFT, symbol(LEFT), "s")
+            scope.define(LEFT, symbol(UNTIL), "s")
         self._adopt(placement, units)
         for name in (*placement.effect.parameters, *placement.effect.states):
             label = placement.prefix + name
