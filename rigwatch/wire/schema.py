@@ -177,7 +177,8 @@ def _read(kind: type[Any], proto: ProtoMessage) -> Any:
 def encode(message: Message) -> bytes:
     """The message as protobuf bytes."""
     kind = type(message)
-    return _fill(_proto_class(kind.__name__)(), message).SerializeToString()
+    # Counters are a map, whose order would change from run to run.
+    return _fill(_proto_class(kind.__name__)(), message).SerializeToString(deterministic=True)
 
 
 def decode(kind: type[M], data: bytes) -> M:
