@@ -106,16 +106,16 @@ def _with_second(bench: Bench, verdict: Verdict, progress: Progress) -> Verdict:
     assert best is not None
     progress(f"{best.label} leaves much: trying a second effect beside it")
     second = _beside(bench, best, progress)
-    if second.best is None or _enough(bench, second.best):
-        return _both(verdict, second, bench)
+    found = _both(bench, verdict, second)
+    if found is not None or second.best is None:
+        return found or verdict
     first = dataclasses.replace(second.best)
     refit(bench.study, bench.data, bench.base, first)
     if first.fitted is None:
         return verdict
     progress(f"{first.label} is trusted more: trying a second effect beside that")
-    return _both(
-        dataclasses.replace(second, best=first), _beside(bench, first, progress), bench, verdict
-    )
+    beside = _beside(bench, first, progress)
+    return _both(bench, dataclasses.replace(second, best=first), beside) or verdict
 
 
 def _beside(bench: Bench, first: Ranked, progress: Progress) -> Verdict:
@@ -137,12 +137,10 @@ def _enough(bench: Bench, second: Ranked) -> bool:
     return rough or bench.floor.reached(second.fitted.held_out)
 
 
-def _both(
-    first: Verdict, second: Verdict, bench: Bench, otherwise: Verdict | None = None
-) -> Verdict:
-    """A verdict that names both where they explain enough, else the one there was."""
+def _both(bench: Bench, first: Verdict, second: Verdict) -> Verdict | None:
+    """A verdict that names both; None where they do not explain enough."""
     if second.best is None or not _enough(bench, second.best):
-        return otherwise or first
+        return None
     assert first.best is not None
     assert second.best.fitted is not None
     named = (*second.members, *second.rivals)
