@@ -121,6 +121,11 @@ class Fit:
         return dict(zip(self.compiled.system.free, sd.tolist(), strict=True))
 
 
+# What blows up is looked at for being finite; it needs no warning as well.
+_QUIET = np.errstate(over="ignore", invalid="ignore")
+
+
+@_QUIET
 def fit(
     compiled: CompiledSystem,
     recording: Recording,
@@ -164,6 +169,7 @@ def fit(
     return problem.result(found)
 
 
+@_QUIET
 def evaluate(fitted: Fit, recording: Recording, horizon: int, substeps: int = 4) -> Fit:
     """The same parameters on another recording: only its windows' initial states are fitted."""
     problem = _Problem(fitted.compiled, recording, horizon, scale=fitted.scale, substeps=substeps)
@@ -319,8 +325,7 @@ class _Problem:
                 break
             self._initial = np.clip(best + step, self._low, self._high)
             tried, tried_slopes = self._simulated(parameters)
-            with np.errstate(over="ignore", invalid="ignore"):
-                better = np.sum(tried**2, axis=1) < np.sum(error**2, axis=1)
+            better = np.sum(tried**2, axis=1) < np.sum(error**2, axis=1)
             best = np.where(better[:, None], self._initial, best)
             error = np.where(better[:, None], tried, error)
             slopes = np.where(better[:, None, None], tried_slopes, slopes)
