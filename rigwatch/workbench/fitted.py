@@ -8,7 +8,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compiled import CompiledSystem, FloatArray, compile_system
 from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
-from rigwatch.physics.engine.stability import accurate_substeps, stable_substeps
+from rigwatch.physics.engine.stability import even_substeps
 from rigwatch.physics.engine.system import Placement, System, compose
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.signals import Data, parameters_of
@@ -16,9 +16,11 @@ from rigwatch.workbench.sizes import port_sizes
 from rigwatch.workbench.study import Study
 
 LONG = 2000
-"""Samples of a horizon from which a fit goes by way of a tenth of it."""
+"""Samples of a horizon from which a fit goes by way of a shorter one."""
+SHORTER = 8
+"""The horizon over that one."""
 WELL_ABOVE = 1.5
-"""Error over the channels' noise from which a fit may have stopped in a local minimum."""
+"""Error over the channels' noise from which a fit may have ended in a local minimum."""
 BLOCKS = 40
 """Blocks that a recording of a model without states is cut into for statistics."""
 
@@ -30,7 +32,7 @@ class Fitted:
     Attributes:
         placements: its effects.
         train, held_out: the fit, and the same parameters on the other recordings.
-        substeps: integration steps a sample.
+        substeps: integration steps a sample, where nothing is stiff.
         horizon: samples from one re-initialisation to the next.
     """
 
@@ -103,14 +105,39 @@ def fit_base(study: Study, data: Data, scale: FloatArray | None = None) -> Fitte
     """
     placements, start = placements_of(study, data.train), parameters_of(study.file)
     try:
-        return fit_model(study, data, placements, start, scale)
+        return fit_twice(study, data, placements, start, scale)
     except ModelError:
         if not placements:
             raise
     found = fit_model(study, data, (), start, scale)
     for count in range(1, len(placements) + 1):
-        found = fit_model(study, data, placements[:count], start | found.train.values(), scale)
+        found = fit_twice(study, data, placements[:count], start | found.train.values(), scale)
     return found
+
+
+def fit_twice(
+    study: Study,
+    data: Data,
+    placements: Sequence[Placement],
+    start: Mapping[str, float],
+    scale: FloatArray | None = None,
+) -> Fitted:
+    """`fit_model`, and once more where it may have ended in a local minimum."""
+    found = fit_model(study, data, placements, start, scale)
+    if scale is None or not may_be_better(study, data, found, start):
+        return found
+    return fit_again(study, data, found, start)
+
+
+def fit_again(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> Fitted:
+    """The better of a fit and another by way of short horizons."""
+    try:
+        again = fit_model(
+            study, data, found.placements, start, found.train.scale, by_way_of_short=True
+        )
+    except ModelError:
+        return found
+    return min(found, again, key=lambda fitted: _size(fitted.train))
 
 
 def fit_model(
@@ -119,62 +146,59 @@ def fit_model(
     placements: Sequence[Placement],
     start: Mapping[str, float],
     scale: FloatArray | None = None,
+    *,
+    by_way_of_short: bool = False,
 ) -> Fitted:
     """The study's model with `placements`, fitted from `start`.
+
+    Args:
+        study, data: what is fitted to.
+        placements: effects in the model.
+        start: values by name, the model's own where there are none.
+        scale: divisor of each output's residuals, shape (outputs,).
+        by_way_of_short: whether the search begins where short horizons lead: over long ones what
+            sticks and slips has many local minima.
 
     Raises:
         ModelError: an effect does not fit its port, or the simulation leaves the finite numbers.
     """
     compiled = compile_system(compose(study.model, placements))
     horizon = data.horizon if study.model.states else len(data.train)
-    begin = compiled.vector(start)
-    substeps = max(study.file.substeps, _needed(compiled.system, data.train, begin))
+    begin, substeps = compiled.vector(start), study.file.substeps
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
-    if study.model.states and horizon >= LONG:
-        # Over long horizons there are many local minima: start from where short ones lead.
-        begin = fit_over(horizon // 10, start=begin).parameters
+    if study.model.states and (horizon >= LONG or by_way_of_short):
+        begin = fit_over(horizon // SHORTER, start=begin).parameters
     found = fit_over(horizon, start=begin)
-    if scale is not None and _noisy(found) and _last_is_stiff(study, data, placements, start):
-        # What sticks and slips has many local minima too: try again by way of short horizons.
-        near = fit_over(horizon // 8, start=begin)
-        found = min(found, fit_over(horizon, start=near.parameters), key=_size)
     beside = data.horizon if study.model.states else len(data.held_out)
     judged = evaluate(found, data.held_out, beside, substeps=substeps)
     return Fitted(tuple(placements), found, judged, substeps, horizon)
 
 
-def _last_is_stiff(
-    study: Study, data: Data, placements: Sequence[Placement], start: Mapping[str, float]
-) -> bool:
-    """Whether the effect that came last asks for finer steps than the model."""
-    system = compose(study.model, placements[-1:])
+def may_be_better(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> bool:
+    """Whether a fit may have ended in a local minimum.
+
+    It leaves more than noise, and its last effect asks for finer steps than the model.
+    """
+    if not found.placements or _size(found.train) <= WELL_ABOVE**2:
+        return False
+    system = compose(study.model, found.placements[-1:])
     values = {name: p.value for name, p in system.parameters.items()}
     at = np.array([start.get(name, value) for name, value in values.items()])
-    return _needed(system, data.train, at) > study.file.substeps
+    return _even(system, data.train, at) > study.file.substeps
 
 
 def _size(fitted: Fit) -> float:
     return float(np.mean((fitted.rms / fitted.scale) ** 2))
 
 
-def _noisy(fitted: Fit) -> bool:
-    """Whether the residual is well above the noise that the channels are weighed by."""
-    return _size(fitted) > WELL_ABOVE**2
-
-
-def _needed(system: System, recording: Recording, parameters: FloatArray) -> int:
-    """Substeps that follow friction, and keep memory stable wherever its parameters may go."""
-    if not system.placements or not system.states:
-        return 1
+def _even(system: System, recording: Recording, parameters: FloatArray) -> int:
     states = initial_states(system, recording)
-    fine = accurate_substeps(system, recording.inputs, states, parameters, recording.dt)
-    memory = [name for name in system.states if name not in system.model.states]
-    corners = []
-    for bound in ("low", "high"):
-        at = np.array([getattr(p, bound) for p in system.parameters.values()])
-        corners.append(np.where(np.isfinite(at), at, parameters))
-    stable = (
-        stable_substeps(system, memory, recording.inputs, states, corner, recording.dt)
-        for corner in corners
-    )
-    return max(fine, *stable)
+    return even_substeps(system, recording.inputs, states, parameters, recording.dt)
+
+
+def nodes(fitted: Fitted, recording: Recording) -> int:
+    """Steps a sample that a linearisation takes, which are the same everywhere."""
+    system = fitted.compiled.system
+    if not system.states:
+        return 1
+    return max(fitted.substeps, _even(system, recording, fitted.train.parameters))

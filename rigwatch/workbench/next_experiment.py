@@ -20,6 +20,7 @@ from rigwatch.physics.engine.fit import initial_states
 from rigwatch.physics.engine.score import Projector
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.fitted import nodes
 from rigwatch.workbench.rank import Ranked
 from rigwatch.workbench.study import Derived
 
@@ -194,7 +195,7 @@ def _separation(
     bench: Bench, rows: Sequence[Ranked], inputs: FloatArray, first: FloatArray
 ) -> dict[str, float]:
     base, dt = bench.base, bench.data.train.dt
-    starts, substeps = np.zeros(1, np.int64), base.substeps if len(first) else 1
+    starts, substeps = np.zeros(1, np.int64), nodes(base, bench.data.train)
     run = base.compiled.simulate(
         inputs, dt, starts, len(inputs), initial=first[None], parameters=base.train.parameters,
         substeps=substeps,

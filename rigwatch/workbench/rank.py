@@ -21,7 +21,15 @@ from rigwatch.physics.engine.significance import corrected_p_values
 from rigwatch.physics.engine.suitable import possible, suits
 from rigwatch.physics.engine.system import Placement
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.fitted import Fitted, block_errors, fit_model
+from rigwatch.workbench.fitted import (
+    Fitted,
+    block_errors,
+    fit_again,
+    fit_model,
+    fit_twice,
+    may_be_better,
+    nodes,
+)
 from rigwatch.workbench.noise_floor import NoiseFloor
 from rigwatch.workbench.signals import Data
 from rigwatch.workbench.sizes import port_sizes
@@ -41,6 +49,7 @@ EXPLAINED = 0.95
 """Share of the energy above the floor that an effect must explain for the error to be known."""
 MOST_FITS = {"static": 24, "dynamic": 6}
 Progress = Callable[[str], None]
+Fitting = Callable[..., Fitted]
 
 
 def unheard(_: str) -> None:
@@ -147,7 +156,7 @@ def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatA
     """Scaled directions of the candidates and slopes of the model, at every sample."""
     fitted, recording = base.train, data.train
     cut = windows(base.compiled.system, len(recording), base.horizon)
-    substeps = base.substeps if base.compiled.system.states else 1
+    substeps = nodes(base, recording)
     at = trajectory(
         base.compiled, recording.inputs, recording.dt, cut.starts, cut.length,
         initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
@@ -187,13 +196,27 @@ def rank(  # noqa: PLR0917 -- they belong together
             row.reason = f"unlike {enough[0].label}, which leaves nothing to explain; not fitted"
             continue
         progress(f"fitting {row.label}, {number} of at most {len(chosen)}")
-        refit(study, data, base, row)
+        refit(study, data, base, row, fit_model)
         if row.accepted and _leaves_nothing(row, base, floor):
             enough.append(row)
+    if not enough:
+        _try_again(study, data, base, chosen, progress)
     while double := _unfitted_double(rows):
         progress(f"fitting {double.label}, which looks like the best")
-        refit(study, data, base, double)
+        refit(study, data, base, double, fit_model if enough else fit_twice)
     return sorted(rows, key=_order)
+
+
+def _try_again(
+    study: Study, data: Data, base: Fitted, rows: Sequence[Ranked], progress: Progress
+) -> None:
+    """Fit again what may have ended in a local minimum, as nothing explains the error."""
+    for row in rows:
+        if row.fitted is None or not may_be_better(study, data, row.fitted, _begin(base, row)):
+            continue
+        progress(f"fitting {row.label} again, by way of short horizons")
+        row.fitted = fit_again(study, data, row.fitted, _begin(base, row))
+        _judge(base, row)
 
 
 def _unfitted_double(rows: Sequence[Ranked]) -> Ranked | None:
@@ -295,17 +318,34 @@ def _told_by(row: Ranked, told: dict[str, Ranked], likely: Sequence[Ranked]) -> 
     return next((c for c in row.alike if c in told and told[c].free <= row.free), None)
 
 
-def refit(study: Study, data: Data, base: Fitted, row: Ranked) -> None:
-    """Fit the model with the row's effect and judge it on the recordings held out."""
+def _begin(base: Fitted, row: Ranked) -> dict[str, float]:
+    """Values that the row's fit starts from."""
     prefix = row.placement.prefix
-    start = base.train.values() | {prefix + name: value for name, value in row.start.items()}
+    return base.train.values() | {prefix + name: value for name, value in row.start.items()}
+
+
+def refit(
+    study: Study, data: Data, base: Fitted, row: Ranked, fitting: Fitting = fit_twice
+) -> None:
+    """Fit the model with the row's effect and judge it on the recordings held out.
+
+    Args:
+        study, data, base: the model and what it was fitted to.
+        row: the effect; the fit and what is made of it are added.
+        fitting: `fit_model` to be content with the first minimum.
+    """
+    placements = (*base.placements, row.placement)
     try:
-        row.fitted = fit_model(
-            study, data, (*base.placements, row.placement), start, base.train.scale
-        )
+        row.fitted = fitting(study, data, placements, _begin(base, row), base.train.scale)
     except ModelError as error:
         row.reason, row.trouble = "cannot be fitted", str(error)
         return
+    _judge(base, row)
+
+
+def _judge(base: Fitted, row: Ranked) -> None:
+    """Say whether the held-out error falls by more than chance."""
+    assert row.fitted is not None
     row.gain, row.gain_deviation = gain(base, row.fitted)
     count = len(block_errors(base.held_out))
     needed = student.ppf(1 - STEP, count - 1) * row.gain_deviation

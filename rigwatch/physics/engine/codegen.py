@@ -11,6 +11,7 @@ as having none. Zero entries of the Jacobians are not printed.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
@@ -194,8 +195,24 @@ def _with(row: Sequence[sympy.Expr], rest: Iterator[str]) -> list[tuple[sympy.Ex
     return [(entry, next(rest)) for entry in row]
 
 
+@lru_cache(maxsize=1 << 14)
 def derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
-    """∂expression/∂by, with jumps counted as having none."""
+    """∂expression/∂by, with jumps counted as having none.
+
+    Sums and products go term by term, as systems of one model share most of their terms.
+    """
+    if by not in expression.free_symbols:
+        return sympy.Integer(0)
+    if expression.is_Add:
+        return sympy.Add(*(derivative(term, by) for term in expression.args))
+    if expression.is_Mul:
+        factors = expression.args
+        moved = ((i, derivative(factor, by)) for i, factor in enumerate(factors))
+        return sympy.Add(*(sympy.Mul(*factors[:i], d, *factors[i + 1 :]) for i, d in moved if d))
+    return _by_rules(expression, by)
+
+
+def _by_rules(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
     steps = {step: sympy.Dummy(real=True) for step in expression.atoms(sympy.floor)}
     back = {dummy: step for step, dummy in steps.items()}
     slope = sympy.diff(expression.xreplace(steps), by).xreplace(back)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rigwatch.physics.engine.codegen import source
 from rigwatch.physics.engine.native import native_kernel
 from rigwatch.physics.engine.numeric import StaticKernel
+from rigwatch.physics.engine.pace import FINEST
 from rigwatch.physics.engine.system import System
 from rigwatch.wire.errors import ModelError
 
@@ -38,10 +39,12 @@ class Simulation:
         outputs: shape (windows, samples, outputs), in the outputs' units.
         slopes: shape (windows, samples, outputs, free parameters + states): ∂outputs by the free
             parameters, then by the window's initial states.
+        last: states at each window's last sample, shape (windows, states).
     """
 
     outputs: FloatArray
     slopes: FloatArray
+    last: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +92,7 @@ class CompiledSystem:
         initial: FloatArray,
         parameters: FloatArray,
         substeps: int = 4,
+        finest: int = FINEST,
         rows: int = 1,
     ) -> Simulation:
         """Simulate windows of the inputs, each from its own initial state.
@@ -101,6 +105,7 @@ class CompiledSystem:
             initial: shape (windows, states).
             parameters: all of them, shape (n_p,).
             substeps: Runge-Kutta steps between samples.
+            finest: steps at most between two samples, where effects are stiff, see `pace`.
             rows: of the inputs, after which those that are kept change; for inputs at finer nodes.
 
         Raises:
@@ -109,8 +114,9 @@ class CompiledSystem:
         outputs = np.empty((len(starts), length, len(self.system.outputs)))
         slopes = np.empty((*outputs.shape, self.columns))
         arguments = self._arguments(inputs, dt, starts, length, initial, parameters, substeps)
-        self.kernel.simulate(*arguments, outputs, slopes, rows)
-        return Simulation(outputs, slopes)
+        last = np.empty((len(starts), len(self.system.states)))
+        self.kernel.simulate(*arguments, outputs, slopes, last, rows, finest)
+        return Simulation(outputs, slopes, last)
 
     @property
     def columns(self) -> int:

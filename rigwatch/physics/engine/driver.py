@@ -9,6 +9,7 @@ as addresses of functions void(double t, double* a, u, p, out, slopes), so that 
 compiled once and kept, whatever the system.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 _DOUBLE = ir.DoubleType()
+WIDE = 1.5
+"""How far a state may go in an interval, over what a step of Euler's says."""
 
 
 def _call(  # noqa: PLR0917 -- numba wants them by name
@@ -100,17 +103,50 @@ def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
         z[n + i * m + m - n + i] = 1.0
 
 
+@njit(cache=True, error_model="numpy")
+def needed(  # noqa: PLR0917 -- a kernel
+    plain: int, pace: int, crossing: IntArray, u: FloatArray, row: int, hold: FloatArray,
+    rows: int, dt: float, pp: int, z: FloatArray, dx: FloatArray, end: FloatArray,
+    near: FloatArray, asked: FloatArray, us: FloatArray,
+) -> float:  # fmt: skip
+    """Steps that the next interval needs: what `pace` asks for, on the way that it will go.
+
+    Looked at are its beginning, its end after one step of Euler's, and where the states `crossing`
+    come closest to zero.
+    """
+    n, up, ap = dx.size, us.ctypes.data, asked.ctypes.data
+    place(u, row, 0.0, hold, rows, dt, us)
+    call(plain, row * dt, z.ctypes.data, up, pp, dx.ctypes.data, dx.ctypes.data)
+    for i in range(n):
+        near[i] = z[i]
+        end[i] = z[i] + dt * dx[i]
+    for i in crossing:
+        middle, reach = 0.5 * (z[i] + end[i]), 0.5 * WIDE * abs(end[i] - z[i])
+        near[i] = math.copysign(max(abs(middle) - reach, 0.0), middle)
+    worst = 0.0
+    for at, share in ((z, 0.0), (near, 0.0), (end, 1.0)):
+        if share > 0.0:
+            place(u, row, share, hold, rows, dt, us)
+        call(pace, (row + share) * dt, at.ctypes.data, up, pp, ap, ap)
+        for rate in asked:
+            worst = max(worst, abs(rate))
+    return worst * dt
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def simulate(  # noqa: PLR0917 -- a kernel
-    rates: int, read: int, m: int, rows: int, u: FloatArray, dt: float, substeps: int,
-    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray,
-    dy: FloatArray,
+    rates: int, read: int, plain: int, pace: int, asked: int, crossing: IntArray, m: int,
+    rows: int, u: FloatArray, dt: float, substeps: int, finest: int, hold: FloatArray,
+    starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray, dy: FloatArray,
+    last: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill outputs y (windows, samples, outputs) and slopes dy (…, m) of each window.
+    """Fill outputs y (windows, samples, outputs), slopes dy (…, m) and last states of each window.
 
-    Inputs that are kept change after every `rows` of them.
+    Inputs that are kept change after every `rows` of them. Each interval takes `substeps`, or as
+    many up to `finest` as the `asked` rates of `pace` need.
     """
-    size = x0.shape[1] * (1 + m)
+    n, size = x0.shape[1], x0.shape[1] * (1 + m)
+    dx, end, near, rate = np.empty(n), np.empty(n), np.empty(n), np.empty(asked)
     z, zs, dz, acc = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
     us, wanted = np.empty(u.shape[1] + 1), y.shape[2]
     pp, out, slopes = p.ctypes.data, np.empty(wanted), np.empty(wanted * m)
@@ -128,8 +164,17 @@ def simulate(  # noqa: PLR0917 -- a kernel
                 for j in range(m):
                     dy[w, k, o, j] = slopes[o * m + j]
             if k + 1 < y.shape[1]:
-                for step in range(substeps):
-                    advance(rates, u, row, step, substeps, hold, rows, dt, pp, z, zs, dz, acc, us)
+                steps = substeps
+                if asked > 0 and finest > substeps:
+                    wanted_steps = needed(
+                        plain, pace, crossing, u, row, hold, rows, dt, pp, z, dx, end, near, rate,
+                        us,
+                    )  # fmt: skip
+                    steps = int(min(float(finest), max(float(substeps), math.ceil(wanted_steps))))
+                for step in range(steps):
+                    advance(rates, u, row, step, steps, hold, rows, dt, pp, z, zs, dz, acc, us)
+        for i in range(n):
+            last[w, i] = z[i]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -16,11 +16,15 @@ from scipy.signal import savgol_filter
 from rigwatch.physics.engine.compiled import BoolArray, CompiledSystem, FloatArray, IntArray
 from rigwatch.physics.engine.memory import Recall
 from rigwatch.physics.engine.system import System
+from rigwatch.physics.engine.tangent import Tangent
 from rigwatch.physics.engine.thinning import Thinning
 from rigwatch.wire.errors import ModelError
 
 START_STEPS = 2
-"""Simulations for the initial states at each evaluation; they start from the last ones."""
+"""Simulations at most for the initial states at each evaluation; they start from the best ones."""
+
+ENOUGH = 1e-3
+"""Share of the squared error that the initial states may still gain there."""
 
 ROUNDS = 2
 """Solutions at most, each from where the last has led, while windows that went astray come back."""
@@ -31,8 +35,14 @@ ASTRAY = 16.0
 BACK = 0.25
 """Share of its squared error to which a window must fall to have come back."""
 
-SETTLED = 1e-10
+SETTLED = 1e-6
 """Share of a window's squared error below which a better initial state is not looked for."""
+
+FAR, CLOSE = 100.0, 0.01
+"""Deviations: where a search begins, and steps that are not worth another simulation."""
+
+CONVERGED = 1e-6
+"""Fall of the squared error, over all of it, at which a fit ends; noise moves it by 1/samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,30 +153,55 @@ def fit(
         horizon: samples from one re-initialisation to the next.
         start: all parameters to start from, shape (n_p,); the model's own if None.
         scale: divisor of each output's residuals, shape (outputs,); its standard deviation if None.
-        substeps: Runge-Kutta steps between samples.
+        substeps: Runge-Kutta steps between samples, where nothing is stiff.
 
     Raises:
         ModelError: the recording is too short, or the model leaves the finite numbers at the start.
     """
     problem = _Problem(compiled, recording, horizon, scale=scale, substeps=substeps)
     begin = compiled.parameters if start is None else start.copy()
-    low, high = _bounds(compiled.system)
-    theta = np.clip(begin[problem.free], low, high)
+    theta = np.clip(begin[problem.free], *_bounds(compiled.system))
     problem.recall(problem.whole(begin, theta))
     found = problem.start_windows(problem.whole(begin, theta))
     for _ in range(ROUNDS if len(theta) else 0):
-        theta = least_squares(
-            lambda theta: problem.tried(problem.whole(begin, theta)),
-            theta,
-            jac=lambda theta: problem.projected(problem.whole(begin, theta))[1],
-            bounds=(low, high),
-            x_scale="jac",
-            max_nfev=60,
-        ).x
+        theta = _smallest_error(problem, begin, theta)
         found = problem.start_windows(problem.whole(begin, theta))
         if not found.came_back:
             break
     return problem.result(found)
+
+
+def _smallest_error(problem: "_Problem", begin: FloatArray, theta: FloatArray) -> FloatArray:
+    """Free parameters at which SciPy's solver ends.
+
+    It moves them in deviations, as the data at the start tell them, and calls a step small by the
+    size of all that it moves. So it begins at `FAR`, whence a step of `CLOSE` deviations is small.
+    """
+    low, high = _bounds(problem.system)
+    unit = _deviations(*problem.projected(problem.whole(begin, theta)), theta)
+
+    def parameters(moved: FloatArray) -> FloatArray:
+        return problem.whole(begin, np.clip(theta + unit * (moved - FAR), low, high))
+
+    found = least_squares(
+        lambda moved: problem.tried(parameters(moved)),
+        np.full(len(theta), FAR),
+        jac=lambda moved: problem.projected(parameters(moved))[1] * unit,
+        bounds=(FAR + (low - theta) / unit, FAR + (high - theta) / unit),
+        x_scale="jac",
+        ftol=CONVERGED,
+        xtol=CLOSE / FAR,
+        max_nfev=60,
+    )
+    return np.asarray(parameters(found.x)[problem.free])
+
+
+def _deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -> FloatArray:
+    """Each parameter's deviation while the others are known; its size where it shows nowhere."""
+    slope = np.sqrt(np.sum(jacobian**2, axis=0))
+    noise = np.sqrt(np.mean(residual**2))
+    size = np.maximum(np.abs(theta), 1e-12)
+    return np.where(slope > noise / (1e6 * size), noise / np.where(slope > 0, slope, 1.0), size)
 
 
 @_QUIET
@@ -197,6 +232,21 @@ class _Started:
     came_back: bool = False
 
 
+@dataclass(frozen=True, eq=False)
+class _Met:
+    """The evaluation with the smallest error that the solver has met.
+
+    Attributes:
+        size: squared error, initial states projected out.
+        parameters: all of them, shape (n_p,).
+        initial: states that windows were simulated from, shape (windows, states).
+    """
+
+    size: float
+    parameters: FloatArray
+    initial: FloatArray
+
+
 def _bounds(system: System) -> tuple[FloatArray, FloatArray]:
     free = [system.parameters[name] for name in system.free]
     return np.array([p.low for p in free]), np.array([p.high for p in free])
@@ -215,7 +265,7 @@ class _Problem:
         substeps: int,
     ) -> None:
         self._compiled, self._recording, self._substeps = compiled, recording, substeps
-        system = compiled.system
+        system = self.system = compiled.system
         names = list(system.parameters)
         self.free = np.array([names.index(name) for name in system.free], dtype=np.int64)
         self._cut = windows(system, len(recording), horizon)
@@ -227,13 +277,17 @@ class _Problem:
         self._initial = shown[self._cut.starts]
         self._memory = Recall(system, recording.inputs, shown, recording.dt, compiled.parameters)
         known = self._memory.exact
-        self._unknown = np.array([i for i in range(len(system.states)) if i not in known], np.int64)
+        every = np.arange(len(system.states))
+        unknown = np.array([i for i in every if i not in known], np.int64)
+        # What an input led to is known, but at the recording's beginning.
+        self._groups = (
+            [(slice(0, 1), every), (slice(1, None), unknown)] if known else [(slice(None), every)]
+        )
         self._low, self._high = (
             np.array([getattr(state, end) for state in system.states.values()])
             for end in ("low", "high")
         )
-        self._best = (math.inf, compiled.parameters, self._initial)
-        """Smallest error that the solver has met, its parameters and initial states."""
+        self._best: _Met | None = None
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
 
     def whole(self, begin: FloatArray, theta: FloatArray) -> FloatArray:
@@ -275,9 +329,8 @@ class _Problem:
 
         Initial states have local minima of their own.
         """
-        _, best, initial = self._best
-        if np.array_equal(best, parameters):
-            self._initial = initial
+        if self._best is not None and np.array_equal(self._best.parameters, parameters):
+            self._initial = self._best.initial
         error, slopes = self.settle(parameters)
         found = _Started(parameters, self._initial, error, slopes)
         astray = _astray(error)
@@ -291,20 +344,22 @@ class _Problem:
             return found
         found = _better(found, again)
         self._initial = found.initial
-        self._best, self._last = (math.inf, parameters, found.initial), None
+        self._best = self._last = None
         return found
 
     def _ends_before(self, parameters: FloatArray) -> FloatArray:
         """States in which the windows before have ended, shape (windows, states)."""
         r, starts = self._recording, self._cut.starts
-        run = self._compiled.linearise(
+        run = self._compiled.simulate(
             r.inputs, r.dt, starts[:-1], self._cut.length + 1, initial=self._initial[:-1],
             parameters=parameters, substeps=self._substeps,
         )  # fmt: skip
-        ended = np.clip(run.states[:, -1], self._low, self._high)
+        ended = np.clip(run.last, self._low, self._high)
         return np.concatenate([self._initial[:1], np.where(np.isfinite(ended), ended, 0.0)])
 
-    def settle(self, parameters: FloatArray, steps: int = 6) -> tuple[FloatArray, FloatArray]:
+    def settle(
+        self, parameters: FloatArray, steps: int = 6, *, roughly: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
         """Move the initial states to where they fit best; scaled residuals and slopes there.
 
         Each window takes Gauss-Newton steps of its own. A step that makes its error larger, as one
@@ -321,11 +376,15 @@ class _Problem:
             return error, slopes
         step, best = self._steps(error, slopes), self._initial
         for further in reversed(range(steps - 1)):
-            if self._promise(step, slopes, error) < SETTLED:
+            promised = self._promise(step, slopes)
+            size = np.sum(error**2, axis=1)
+            if roughly and promised.sum() < ENOUGH * size.sum():
+                break
+            if np.all(promised < SETTLED * np.maximum(size, 1e-300)):
                 break
             self._initial = np.clip(best + step, self._low, self._high)
             tried, tried_slopes = self._simulated(parameters)
-            better = np.sum(tried**2, axis=1) < np.sum(error**2, axis=1)
+            better = np.sum(tried**2, axis=1) < size
             best = np.where(better[:, None], self._initial, best)
             error = np.where(better[:, None], tried, error)
             slopes = np.where(better[:, None, None], tried_slopes, slopes)
@@ -334,24 +393,17 @@ class _Problem:
         self._initial = best
         return error, slopes
 
-    def _promise(self, step: FloatArray, slopes: FloatArray, error: FloatArray) -> float:
-        """Largest share of a window's squared error that a step takes away to first order."""
-        moved = np.einsum("wkn,wn->wk", slopes[..., len(self.free) :], step)
-        size = np.maximum(np.sum(error**2, axis=1), 1e-300)
-        return float(np.max(np.sum(moved**2, axis=1) / size))
+    def _promise(self, step: FloatArray, slopes: FloatArray) -> FloatArray:
+        """What a step takes away of each window's squared error to first order."""
+        moved = slopes[..., len(self.free) :] @ step[..., None]
+        return np.asarray(np.sum(moved[..., 0] ** 2, axis=1))
 
     def _steps(self, error: FloatArray, slopes: FloatArray) -> FloatArray:
         """Gauss-Newton step of each window's initial state, shape (windows, states)."""
-        found = np.zeros_like(self._initial)
-        for w, (by_start, left) in enumerate(zip(slopes, error, strict=True)):
-            columns = self._fitted_starts(w)
-            by_columns = by_start[:, len(self.free) + columns]
-            found[w, columns] = np.linalg.lstsq(by_columns, left, rcond=1e-10)[0]
-        return found
+        return np.asarray(self._tangent(slopes).solve(error[..., None])[..., 0])
 
-    def _fitted_starts(self, window: int) -> IntArray:
-        """States whose initial values are fitted: what an input led to is known but at first."""
-        return self._unknown if window else np.arange(len(self._compiled.system.states))
+    def _tangent(self, slopes: FloatArray) -> Tangent:
+        return Tangent(slopes[..., len(self.free) :], self._groups)
 
     def projected(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals and Jacobian by the free parameters, initial states projected out."""
@@ -364,15 +416,10 @@ class _Problem:
         """Residuals for the solver; NaN where the simulation blows up, and it steps back."""
         before = self._initial
         try:
-            residual = self.projected(parameters)[0]
+            return self.projected(parameters)[0]
         except ModelError:
-            residual = np.full(self.count, np.nan)
-        size = float(residual @ residual)
-        if not np.isfinite(size):
             self._initial = before
-        elif size < self._best[0]:
-            self._best = (size, parameters.copy(), self._initial.copy())
-        return residual
+            return np.full(self.count, np.nan)
 
     @property
     def count(self) -> int:
@@ -383,18 +430,21 @@ class _Problem:
         return math.prod(thinned) * int(self._measured.shape[2])
 
     def _project(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return self._cleaned(*self.settle(parameters, START_STEPS))
+        if self._best is not None:
+            self._initial = self._best.initial
+        found = self._cleaned(*self.settle(parameters, START_STEPS, roughly=True))
+        size = float(found[0] @ found[0])
+        if self._best is None or size < self._best.size:
+            self._best = _Met(size, parameters.copy(), self._initial)
+        return found
 
     def _cleaned(self, error: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residual and Jacobian without what the initial states could have made."""
         m = len(self.free)
-        clean = [
-            _without(by_start[:, m + self._fitted_starts(w)], error[w], by_start[:, :m])
-            for w, by_start in enumerate(slopes)
-        ]
-        error = np.array([e for e, _ in clean])
-        by_parameter = np.array([j for _, j in clean])
-        return -error.ravel(), by_parameter.reshape(error.size, m)
+        both = self._tangent(slopes).without(
+            np.concatenate([error[..., None], slopes[..., :m]], axis=-1)
+        )
+        return -both[..., 0].ravel(), both[..., 1:].reshape(error.size, m)
 
     def result(self, found: _Started) -> Fit:
         """The fit at the parameters that have been found."""
@@ -434,16 +484,6 @@ def _astray(error: FloatArray) -> BoolArray:
     """Windows whose squared error is far beyond that of most."""
     size = np.sum(error**2, axis=1)
     return np.asarray(size > ASTRAY * np.median(size))
-
-
-def _without(
-    by_start: FloatArray, error: FloatArray, by_parameter: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Error (k,) and slopes (k, m) of a window without what its initial state could have made."""
-    if by_start.shape[-1] == 0:
-        return error, by_parameter
-    q = np.linalg.qr(by_start).Q
-    return error - q @ (q.T @ error), by_parameter - q @ (q.T @ by_parameter)
 
 
 def initial_states(system: System, recording: Recording) -> FloatArray:

@@ -17,7 +17,6 @@ from rigwatch.physics.engine.expression import parse
 from rigwatch.physics.engine.model import Hold, Input, Model, Output, Parameter, State
 from rigwatch.physics.engine.numeric import evaluated
 from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.stability import stable_substeps
 from rigwatch.physics.engine.system import LEFT, RATE, TIME, UNTIL, Placement, System
 
 Signals = dict[str, FloatArray]
@@ -55,11 +54,7 @@ class Memory:
         names = list(self._system.states)
         run = self._compiled.simulate(
             self._driving, self._spacing, np.zeros(1, np.int64), len(self._driving),
-            initial=self._first, parameters=parameters,
-            substeps=stable_substeps(
-                self._system, names, self._driving, None, parameters, self._spacing
-            ),
-            rows=self._rows,
+            initial=self._first, parameters=parameters, substeps=1, rows=self._rows,
         )  # fmt: skip
         return dict(zip(names, run.outputs[0].T, strict=True))
 

@@ -6,6 +6,7 @@ of sensitivities and q probes; behind the inputs in u is the time until they cha
     rates        a = [x | S], out = [dx/dt | dS/dt]
     read         a = [x | S], out = y, slopes = ∂y of shape (outputs, m)
     plain        a = x, out = dx/dt
+    pace         a = x, out = steps a second that are needed
     rate_slopes  a = x, out = dx/dt, slopes = ∂(dx/dt) by parameters, states, probes: (n, m + q)
     read_slopes  a = x, out = y, slopes = ∂y of shape (outputs, m + q)
 """
@@ -23,6 +24,7 @@ import sympy
 from rigwatch.physics.engine import driver
 from rigwatch.physics.engine.codegen import Differentiated, differentiated
 from rigwatch.physics.engine.llvm import Function, literal, machine_code
+from rigwatch.physics.engine.pace import Pace, pace
 from rigwatch.physics.engine.scope import symbol
 from rigwatch.physics.engine.system import TIME, UNTIL, System
 
@@ -43,6 +45,7 @@ class Equations:
         states, inputs, parameters, free, probes: names; `free` are those of the parameters by which
             outputs are differentiated.
         rates, reads: of the states, and of the outputs.
+        pace: what the steps must follow.
     """
 
     states: tuple[str, ...]
@@ -52,6 +55,7 @@ class Equations:
     probes: tuple[str, ...]
     rates: tuple[sympy.Expr, ...]
     reads: tuple[sympy.Expr, ...]
+    pace: Pace
 
 
 def native_kernel(system: System) -> "NativeKernel":
@@ -60,7 +64,7 @@ def native_kernel(system: System) -> "NativeKernel":
         Equations(
             tuple(system.states), tuple(system.model.inputs), tuple(system.parameters),
             system.free, system.probes, tuple(system.derivatives.values()),
-            tuple(system.outputs.values()),
+            tuple(system.outputs.values()), pace(system),
         )
     )  # fmt: skip
 
@@ -78,7 +82,8 @@ class NativeKernel:
         by = (system.states, system.free, system.probes)
         self._rates = differentiated(system.rates, *by)
         self._reads = differentiated(system.reads, *by)
-        self._kept, self._along, self._slopes = list[Any](), (0, 0), (0, 0, 0)
+        self._kept, self._along, self._slopes = list[Any](), (0, 0, 0, 0), (0, 0, 0)
+        self._crossing = np.array(system.pace.crossing, np.int64)
 
     def _compiled(self, functions: Sequence[Function]) -> Any:
         kept, address = machine_code(functions)
@@ -87,25 +92,31 @@ class NativeKernel:
 
     def simulate(  # noqa: PLR0917 -- they stand in the order of the driver's
         self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, y: Any,
-        dy: Any, rows: int = 1,
+        dy: Any, last: Any, rows: int, finest: int,
     ) -> None:  # fmt: skip
-        """Fill outputs (windows, samples, outputs) and their slopes (…, m)."""
+        """Fill outputs (windows, samples, outputs), their slopes (…, m) and the last states."""
+        asked = self._system.pace.asked
         if not all(self._along):
             address = self._compiled([
                 _with_sensitivities(self._system, "rates", self._rates, behind=True),
                 _with_sensitivities(self._system, "read", self._reads, behind=False),
+                _plain(self._system, "plain", self._rates.values),
+                _plain(self._system, "pace", asked),
             ])  # fmt: skip
-            self._along = (address("rates"), address("read"))
-        kernel = partial(driver.simulate, *self._along, self._columns, rows, u, dt, substeps, hold)
+            self._along = tuple(address(name) for name in ("rates", "read", "plain", "pace"))
+        kernel = partial(
+            driver.simulate, *self._along, len(asked), self._crossing, self._columns, rows, u, dt,
+            substeps, finest, hold,
+        )  # fmt: skip
         numbers = x0.shape[1] * (1 + self._columns)
         if starts.size * y.shape[1] * substeps * numbers < LARGE:
-            kernel(starts, x0, p, y, dy)
+            kernel(starts, x0, p, y, dy, last)
             return
         parts = np.array_split(np.arange(starts.size), min(cores(), starts.size))
         cuts = [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
         # Windows know nothing of each other, so that every cut gives the same numbers.
         with ThreadPoolExecutor(len(cuts)) as pool:
-            running = [pool.submit(kernel, starts[c], x0[c], p, y[c], dy[c]) for c in cuts]
+            running = [pool.submit(kernel, starts[c], x0[c], p, y[c], dy[c], last[c]) for c in cuts]
             for each in running:
                 each.result()
 
@@ -116,7 +127,7 @@ class NativeKernel:
         """Fill the states at the nodes, the slopes of rates there, outputs and their slopes."""
         if not all(self._slopes):
             address = self._compiled([
-                _plain(self._system, "plain", self._rates),
+                _plain(self._system, "plain", self._rates.values),
                 _jacobian(self._system, "read_slopes", self._reads),
                 _jacobian(self._system, "rate_slopes", self._rates),
             ])  # fmt: skip
@@ -168,9 +179,9 @@ def _with_sensitivities(
     return function
 
 
-def _plain(system: Equations, name: str, found: Differentiated) -> Function:
+def _plain(system: Equations, name: str, expressions: Sequence[sympy.Expr]) -> Function:
     function = _function(system, name)
-    for index, value in enumerate(list(_values(function, found.values))):
+    for index, value in enumerate(list(_values(function, expressions))):
         function.store("out", index, value or literal(0.0))
     return function
 

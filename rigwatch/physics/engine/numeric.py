@@ -119,7 +119,7 @@ class StaticKernel:
 
     def simulate(  # noqa: PLR0917 -- the arguments of a compiled kernel
         self, u: Any, dt: Any, _s: Any, _h: Any, starts: Any, _x: Any, p: Any, y: Any, dy: Any,
-        _r: Any,
+        _l: Any, _r: Any, _f: Any,
     ) -> None:  # fmt: skip
         """Fill outputs (windows, samples, outputs) and their slopes by the free parameters."""
         y[:], slopes = self._evaluate(u, dt, starts, y.shape[1], p)
