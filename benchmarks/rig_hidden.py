@@ -67,7 +67,7 @@ _LISTED = (
     Hidden("actuator_rate_limit", ("rate_limit@drive",), 120.0, "limit"),
     Hidden("actuator_lag", tuple(name.format("drive") for name in _LATE)),
     Hidden("actuator_delay", tuple(name.format("drive") for name in _LATE)),
-    Hidden("chamber_leak", ("leakage@between",)),
+    Hidden("chamber_leak", ("leakage@between", "orifice@between")),
     Hidden("leak_1", ("leakage@first",)),
     Hidden("leak_2", ("leakage@second",)),
     Hidden("position_gain", _GAINS, 1.0, "less"),

@@ -6,7 +6,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.workbench.commissioned import commissioned
-from rigwatch.workbench.fitted import Fitted, fit_base
+from rigwatch.workbench.fitted import Fitted, fit_base, fit_model
 from rigwatch.workbench.free_run import free_run
 from rigwatch.workbench.intervals import Value, values
 from rigwatch.workbench.ledger import check_data
@@ -97,11 +97,17 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
 
 
 def noise_floor(study: Study, data: Data, base: Fitted) -> NoiseFloor:
-    """The floor of the held-out recordings' error."""
-    healthy = data.of_healthy
+    """The floor of the held-out recordings' error.
+
+    On a healthy recording effects may be needed, or not even be able to vanish: a delay is not
+    shorter than its bound. So the model counts with them or without, whichever does better.
+    """
+    healthy, scale = data.of_healthy, base.train.scale
     if healthy is not None:
-        bare = fit_base(study, healthy, base.train.scale)
-        return NoiseFloor(bare.train.rms, "healthy")
+        fits = [fit_model(study, healthy, (), study.file.start, scale)]
+        if base.placements:
+            fits.append(fit_base(study, healthy, scale))
+        return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, "healthy")
     return from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
 
 

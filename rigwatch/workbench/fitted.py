@@ -6,11 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from rigwatch.physics.engine.compiled import CompiledSystem, FloatArray, compile_system
+from rigwatch.physics.engine.compiled import BoolArray, CompiledSystem, FloatArray, compile_system
 from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
 from rigwatch.physics.engine.stability import even_substeps
 from rigwatch.physics.engine.system import Placement, System, compose
 from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.jumps import between_jumps
 from rigwatch.workbench.signals import Data, parameters_of
 from rigwatch.workbench.sizes import port_sizes
 from rigwatch.workbench.study import Study
@@ -34,6 +35,8 @@ class Fitted:
         train, held_out: the fit, and the same parameters on the other recordings.
         substeps: integration steps a sample, where nothing is stiff.
         horizon: samples from one re-initialisation to the next.
+        calm: samples held out that are beside no jump of an effect, shape (windows, length); None
+            where nothing jumps.
     """
 
     placements: tuple[Placement, ...]
@@ -41,6 +44,7 @@ class Fitted:
     held_out: Fit
     substeps: int
     horizon: int
+    calm: BoolArray | None = None
 
     @property
     def compiled(self) -> CompiledSystem:
@@ -121,9 +125,11 @@ def fit_twice(
     placements: Sequence[Placement],
     start: Mapping[str, float],
     scale: FloatArray | None = None,
+    *,
+    base: Fitted | None = None,
 ) -> Fitted:
     """`fit_model`, and once more where it may have ended in a local minimum."""
-    found = fit_model(study, data, placements, start, scale)
+    found = fit_model(study, data, placements, start, scale, base=base)
     if scale is None or not may_be_better(study, data, found, start):
         return found
     return fit_again(study, data, found, start)
@@ -133,8 +139,9 @@ def fit_again(study: Study, data: Data, found: Fitted, start: Mapping[str, float
     """The better of a fit and another by way of short horizons."""
     try:
         again = fit_model(
-            study, data, found.placements, start, found.train.scale, by_way_of_short=True
-        )
+            study, data, found.placements, start, found.train.scale, base=found,
+            by_way_of_short=True,
+        )  # fmt: skip
     except ModelError:
         return found
     return min(found, again, key=lambda fitted: _size(fitted.train))
@@ -147,6 +154,7 @@ def fit_model(
     start: Mapping[str, float],
     scale: FloatArray | None = None,
     *,
+    base: Fitted | None = None,
     by_way_of_short: bool = False,
 ) -> Fitted:
     """The study's model with `placements`, fitted from `start`.
@@ -156,6 +164,7 @@ def fit_model(
         placements: effects in the model.
         start: values by name, the model's own where there are none.
         scale: divisor of each output's residuals, shape (outputs,).
+        base: a fit of less, whose initial states are a start for these.
         by_way_of_short: whether the search begins where short horizons lead: over long ones what
             sticks and slips has many local minima.
 
@@ -168,10 +177,12 @@ def fit_model(
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
     if study.model.states and (horizon >= LONG or by_way_of_short):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
-    found = fit_over(horizon, start=begin)
+    first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
+    found = fit_over(horizon, start=begin, initial=first)
     beside = data.horizon if study.model.states else len(data.held_out)
-    judged = evaluate(found, data.held_out, beside, substeps=substeps)
-    return Fitted(tuple(placements), found, judged, substeps, horizon)
+    judged = evaluate(found, data.held_out, beside, substeps, later)
+    calm = between_jumps(found, data.held_out, beside)
+    return Fitted(tuple(placements), found, judged, substeps, horizon, calm)
 
 
 def may_be_better(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> bool:

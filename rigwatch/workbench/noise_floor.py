@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import welch
 
-from rigwatch.physics.engine.compiled import FloatArray
+from rigwatch.physics.engine.compiled import BoolArray, FloatArray
 from rigwatch.physics.engine.fit import Fit, Recording
 
 METHODS = {
@@ -37,21 +37,28 @@ class NoiseFloor:
     rms: FloatArray
     method: str
 
-    def ratio(self, fitted: Fit) -> float:
-        """Error over the floor, over all channels."""
-        return float(np.sqrt(np.mean((fitted.rms / self.rms) ** 2)))
+    def ratio(self, fitted: Fit, at: BoolArray | None = None) -> float:
+        """Error over the floor, over all channels; `at` some samples, shape (windows, length)."""
+        rms = fitted.rms if at is None else fitted.rms_at(at)
+        return float(np.sqrt(np.mean((rms / self.rms) ** 2)))
 
     def reached(self, fitted: Fit) -> bool:
         """Whether the error is as small as noise makes it."""
         return self.ratio(fitted) <= ALLOWED[self.method]
 
-    def left_over(self, before: Fit, after: Fit, *, tolerant: bool = False) -> float:
+    def left_over(
+        self, before: Fit, after: Fit, at: BoolArray | None = None, *, tolerant: bool = False
+    ) -> float:
         """Share of the energy above the floor that is left from one fit to a better one.
 
-        Tolerant: an error that counts as small as noise makes it leaves nothing.
+        Args:
+            before, after: the fits.
+            at: samples that count, shape (windows, length); all if None.
+            tolerant: whether an error that counts as small as noise makes it leaves nothing.
         """
-        above, least = self.ratio(before) ** 2 - 1, ALLOWED[self.method] ** 2 if tolerant else 1.0
-        return max(self.ratio(after) ** 2 - least, 0.0) / max(above, 1e-12)
+        least = ALLOWED[self.method] ** 2 if tolerant else 1.0
+        above = self.ratio(before, at) ** 2 - 1
+        return max(self.ratio(after, at) ** 2 - least, 0.0) / max(above, 1e-12)
 
 
 def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int) -> NoiseFloor:

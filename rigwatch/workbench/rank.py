@@ -233,7 +233,8 @@ def _unfitted_double(rows: Sequence[Ranked]) -> Ranked | None:
 def _leaves_nothing(row: Ranked, base: Fitted, floor: NoiseFloor) -> bool:
     """Whether it explains so much of the error above the floor that only its like could as well."""
     assert row.fitted is not None
-    return floor.left_over(base.held_out, row.fitted.held_out) < 1 - EXPLAINED
+    left = floor.left_over(base.held_out, row.fitted.held_out, row.fitted.calm)
+    return left < 1 - EXPLAINED
 
 
 def rank_only(study: Study, data: Data, base: Fitted, found: Sequence[Candidate]) -> Ranked:
@@ -336,7 +337,9 @@ def refit(
     """
     placements = (*base.placements, row.placement)
     try:
-        row.fitted = fitting(study, data, placements, _begin(base, row), base.train.scale)
+        row.fitted = fitting(
+            study, data, placements, _begin(base, row), base.train.scale, base=base
+        )
     except ModelError as error:
         row.reason, row.trouble = "cannot be fitted", str(error)
         return

@@ -66,7 +66,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     accepted = [row for row in rows if row.accepted]
     if not accepted:
         return _nothing_found(base, floor)
-    best = _named(accepted, floor)
+    best = _named(base, accepted, floor)
     assert best.fitted is not None
     trusted = floor.reached(best.fitted.held_out)
     members, rivals = _undistinguished(best, rows, trusted=trusted)
@@ -81,9 +81,7 @@ def _word(
     base: Fitted, best: Ranked, rivals: tuple[str, ...], floor: NoiseFloor
 ) -> tuple[Word, str]:
     """The verdict where an effect lowers the error, and a sentence for people."""
-    assert best.fitted is not None
-    left = floor.left_over(base.held_out, best.fitted.held_out, tolerant=True)
-    if floor.method != "quiet band" and left > 1 - EXPLAINED:
+    if floor.method != "quiet band" and not _explains(base, best, floor):
         return "unknown_effect", (
             f"the best known effect, {best.label}, leaves much of the error above the noise floor"
         )
@@ -95,6 +93,13 @@ def _word(
         f"{best.label} is missing: the held-out error falls from {base.held_out_error:.3g} to"
         f" {best.held_out_error:.3g}"
     )
+
+
+def _explains(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
+    """Whether it explains the error above the floor, but for samples at which it jumps."""
+    assert row.fitted is not None
+    left = floor.left_over(base.held_out, row.fitted.held_out, row.fitted.calm, tolerant=True)
+    return left <= 1 - EXPLAINED
 
 
 def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> float:
@@ -161,11 +166,11 @@ def _nothing_found(base: Fitted, floor: NoiseFloor) -> Verdict:
     return Verdict("unknown_effect", None, (), (), text)
 
 
-def _named(accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranked:
+def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranked:
     """Of equals the one with the fewest parameters; what it refines first, while more is missing.
 
     While more is missing an effect of higher order takes some of that, too. Where it leaves nothing
-    but noise it is what is missing.
+    but noise, or explains what the other does not, it is what is missing.
     """
     top = min(accepted, key=lambda row: row.held_out_error)
     equals = [row for row in accepted if row is top or _equal(top, row, 0.0)]
@@ -176,7 +181,8 @@ def _named(accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranked:
     lower = best.placement.effect.refines
     for row in accepted:
         if row.effect == lower and row.gain and best.gain and row.gain > MOST_OF_IT * best.gain:
-            return row
+            alone = _explains(base, best, floor) and not _explains(base, row, floor)
+            return best if alone else row
     return best
 
 

@@ -155,13 +155,6 @@ def _push_function(
     return numpy_function(names, found), used
 
 
-def _evaluated(
-    expression: sympy.Expr, signals: dict[str, FloatArray], shape: tuple[int, ...]
-) -> FloatArray:
-    function = numpy_function(list(signals), expression)
-    return np.broadcast_to(np.asarray(function(*signals.values()), np.float64), shape)
-
-
 def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
     """What an effect at a port sees, at the nodes, each of shape (windows, nodes)."""
     system = at.compiled.system
@@ -169,9 +162,9 @@ def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
     signals = {TIME: at.time}
     for name, variable in port.variables.items():
         expression = parse(variable.expression, _symbols(system), f"port {port_name}")
-        signals[name] = _along(at, expression.subs(_known(at)))
+        signals[name] = _along(at, expression)
     if port.kind != "force":
-        signals["u"] = _along(at, _clean(system, port_name).subs(_known(at)))
+        signals["u"] = _along(at, system.ports[port_name])
         signals[RATE] = np.gradient(signals["u"], at.run.spacing, axis=1)
         signals[LEFT] = _left(at)
     return signals
@@ -182,23 +175,15 @@ def _symbols(system: System) -> dict[str, sympy.Expr]:
     return {name: symbol(name) for name in names} | dict(system.ports)
 
 
-def _clean(system: System, port_name: str) -> sympy.Expr:
-    return system.ports[port_name].subs({symbol(name): 0 for name in system.probes})
-
-
-def _known(at: Trajectory) -> dict[sympy.Symbol, float]:
-    system = at.compiled.system
-    numbers = dict(zip(system.parameters, at.parameters.tolist(), strict=True))
-    numbers |= dict.fromkeys(system.probes, 0.0)
-    return {symbol(name): value for name, value in numbers.items()}
-
-
 def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
-    """An expression in states, inputs and time along the trajectory."""
+    """An expression in all that a system has, along the trajectory."""
     system = at.compiled.system
-    values = dict(zip(system.states, np.moveaxis(at.run.states, -1, 0), strict=True))
+    values: dict[str, Any] = dict(zip(system.parameters, at.parameters.tolist(), strict=True))
+    values |= dict.fromkeys(system.probes, 0.0) | {TIME: at.time, UNTIL: _left(at)}
+    values |= dict(zip(system.states, np.moveaxis(at.run.states, -1, 0), strict=True))
     values |= dict(zip(system.model.inputs, np.moveaxis(at.inputs, -1, 0), strict=True))
-    return _evaluated(expression, values | {TIME: at.time, UNTIL: _left(at)}, at.time.shape)
+    found = numpy_function(list(values), expression)(*values.values())
+    return np.broadcast_to(np.asarray(found, np.float64), at.time.shape)
 
 
 def _left(at: Trajectory) -> FloatArray:

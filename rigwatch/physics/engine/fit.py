@@ -24,15 +24,15 @@ START_STEPS = 2
 """Simulations at most for the initial states at each evaluation; they start from the best ones."""
 
 ENOUGH = 1e-3
-"""Share of the squared error that the initial states may still gain there."""
+"""Share of a window's squared error that a second one must promise."""
 
 ROUNDS = 2
 """Solutions at most, each from where the last has led, while windows that went astray come back."""
 
-ASTRAY = 16.0
+ASTRAY = 2.0
 """Squared error of a window over the median of all from which its initial state may be wrong."""
 
-BACK = 0.25
+BACK = 0.8
 """Share of its squared error to which a window must fall to have come back."""
 
 SETTLED = 1e-6
@@ -120,6 +120,10 @@ class Fit:
         """Root mean square of the residuals of each output, shape (outputs,)."""
         return np.asarray(np.sqrt(np.nanmean(self.residuals**2, axis=(0, 1))))
 
+    def rms_at(self, samples: BoolArray) -> FloatArray:
+        """The same over some samples, given as truths of shape (windows, length)."""
+        return np.asarray(np.sqrt(np.nanmean(self.residuals[samples] ** 2, axis=0)))
+
     def values(self) -> dict[str, float]:
         """Parameters by name."""
         names = self.compiled.system.parameters
@@ -143,6 +147,7 @@ def fit(
     *,
     start: FloatArray | None = None,
     scale: FloatArray | None = None,
+    initial: FloatArray | None = None,
     substeps: int = 4,
 ) -> Fit:
     """Parameters that make the short-horizon error of `compiled` smallest.
@@ -153,12 +158,16 @@ def fit(
         horizon: samples from one re-initialisation to the next.
         start: all parameters to start from, shape (n_p,); the model's own if None.
         scale: divisor of each output's residuals, shape (outputs,); its standard deviation if None.
+        initial: states that the search begins with, those of the model first, shape (windows, …);
+            as the channels show them if None.
         substeps: Runge-Kutta steps between samples, where nothing is stiff.
 
     Raises:
         ModelError: the recording is too short, or the model leaves the finite numbers at the start.
     """
-    problem = _Problem(compiled, recording, horizon, scale=scale, substeps=substeps)
+    problem = _Problem(
+        compiled, recording, horizon, scale=scale, substeps=substeps, initial=initial
+    )
     begin = compiled.parameters if start is None else start.copy()
     theta = np.clip(begin[problem.free], *_bounds(compiled.system))
     problem.recall(problem.whole(begin, theta))
@@ -205,9 +214,17 @@ def _deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -
 
 
 @_QUIET
-def evaluate(fitted: Fit, recording: Recording, horizon: int, substeps: int = 4) -> Fit:
+def evaluate(
+    fitted: Fit,
+    recording: Recording,
+    horizon: int,
+    substeps: int = 4,
+    initial: FloatArray | None = None,
+) -> Fit:
     """The same parameters on another recording: only its windows' initial states are fitted."""
-    problem = _Problem(fitted.compiled, recording, horizon, scale=fitted.scale, substeps=substeps)
+    problem = _Problem(
+        fitted.compiled, recording, horizon, scale=fitted.scale, substeps=substeps, initial=initial
+    )
     problem.recall(fitted.parameters)
     found = problem.start_windows(fitted.parameters)
     return replace(problem.result(found), covariance=fitted.covariance)
@@ -263,6 +280,7 @@ class _Problem:
         *,
         scale: FloatArray | None,
         substeps: int,
+        initial: FloatArray | None,
     ) -> None:
         self._compiled, self._recording, self._substeps = compiled, recording, substeps
         system = self.system = compiled.system
@@ -275,14 +293,13 @@ class _Problem:
         self.scale = np.where(self.scale > 0, self.scale, 1.0)
         shown = initial_states(system, recording)
         self._initial = shown[self._cut.starts]
+        if initial is not None and len(initial) == len(self._initial):
+            own = len(system.model.states)
+            self._initial[:, :own] = initial[:, :own]
         self._memory = Recall(system, recording.inputs, shown, recording.dt, compiled.parameters)
         known = self._memory.exact
-        every = np.arange(len(system.states))
-        unknown = np.array([i for i in every if i not in known], np.int64)
-        # What an input led to is known, but at the recording's beginning.
-        self._groups = (
-            [(slice(0, 1), every), (slice(1, None), unknown)] if known else [(slice(None), every)]
-        )
+        self._every = np.arange(len(system.states))
+        self._unknown = np.array([i for i in self._every if i not in known], np.int64)
         self._low, self._high = (
             np.array([getattr(state, end) for state in system.states.values()])
             for end in ("low", "high")
@@ -300,23 +317,29 @@ class _Problem:
         """Let the memory of effects begin where the measured signals have led it."""
         self._remember(parameters, self._memory.columns)
 
-    def _remember(self, parameters: FloatArray, columns: list[int]) -> None:
+    def _follow_inputs(self, parameters: FloatArray) -> None:
+        """Let memory at actuators begin where the inputs lead it; what came first is fitted."""
+        self._remember(parameters, self._memory.exact, since=1)
+
+    def _remember(self, parameters: FloatArray, columns: list[int], since: int = 0) -> None:
         if columns:
             led = self._memory.at(parameters)
             self._initial = self._initial.copy()
             for column in columns:
-                self._initial[:, column] = led[column][self._cut.starts]
+                self._initial[since:, column] = led[column][self._cut.starts[since:]]
 
-    def _simulated(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Scaled residuals (windows, k), slopes (windows, k, free + states); 0 if unmeasured."""
+    def _simulated(
+        self, parameters: FloatArray, rows: IntArray, initial: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Scaled residuals (rows, k), slopes (rows, k, free + states); 0 if unmeasured."""
         r = self._recording
         run = self._compiled.simulate(
-            r.inputs, r.dt, self._cut.starts, self._cut.length, initial=self._initial,
+            r.inputs, r.dt, self._cut.starts[rows], self._cut.length, initial=initial,
             parameters=parameters, substeps=self._substeps,
         )  # fmt: skip
-        error = (self._measured - run.outputs) / self.scale
+        error = (self._measured[rows] - run.outputs) / self.scale
         slopes = run.slopes / self.scale[:, None]
-        missing = np.isnan(self._measured)
+        missing = np.isnan(self._measured[rows])
         if missing.any():
             error, slopes = np.where(missing, 0.0, error), np.where(missing[..., None], 0.0, slopes)
         if r.thinning:
@@ -332,65 +355,82 @@ class _Problem:
         if self._best is not None and np.array_equal(self._best.parameters, parameters):
             self._initial = self._best.initial
         error, slopes = self.settle(parameters)
-        found = _Started(parameters, self._initial, error, slopes)
-        astray = _astray(error)
-        if not (self._compiled.system.states and astray.any()):
+        found, rows = _Started(parameters, self._initial, error, slopes), _astray(error)
+        if not (self.system.states and len(rows)):
             return found
-        self._initial = np.where(astray[:, None], self._ends_before(parameters), found.initial)
+        self._initial = self._initial.copy()
+        self._initial[rows] = self._ends_before(parameters, rows)
         try:
-            again = _Started(parameters, self._initial, *self.settle(parameters))
+            again, again_slopes = self.settle(parameters, rows=rows)
         except ModelError:
             self._initial = found.initial
             return found
-        found = _better(found, again)
-        self._initial = found.initial
+        back = np.sum(again**2, axis=1) < BACK * np.sum(error[rows] ** 2, axis=1)
+        error[rows[back]], slopes[rows[back]] = again[back], again_slopes[back]
+        self._initial[rows[~back]] = found.initial[rows[~back]]
         self._best = self._last = None
-        return found
+        return _Started(parameters, self._initial, error, slopes, bool(back.any()))
 
-    def _ends_before(self, parameters: FloatArray) -> FloatArray:
-        """States in which the windows before have ended, shape (windows, states)."""
-        r, starts = self._recording, self._cut.starts
+    def _ends_before(self, parameters: FloatArray, rows: IntArray) -> FloatArray:
+        """States in which the windows before some have ended, shape (rows, states)."""
+        r, before = self._recording, rows - 1
         run = self._compiled.simulate(
-            r.inputs, r.dt, starts[:-1], self._cut.length + 1, initial=self._initial[:-1],
-            parameters=parameters, substeps=self._substeps,
+            r.inputs, r.dt, self._cut.starts[before], self._cut.length + 1,
+            initial=self._initial[before], parameters=parameters, substeps=self._substeps,
         )  # fmt: skip
         ended = np.clip(run.last, self._low, self._high)
-        return np.concatenate([self._initial[:1], np.where(np.isfinite(ended), ended, 0.0)])
+        return np.where(np.isfinite(ended), ended, self._initial[rows])
 
     def settle(
-        self, parameters: FloatArray, steps: int = 6, *, roughly: bool = False
+        self,
+        parameters: FloatArray,
+        steps: int = 6,
+        *,
+        worth: float = SETTLED,
+        rows: IntArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Move the initial states to where they fit best; scaled residuals and slopes there.
 
-        Each window takes Gauss-Newton steps of its own. A step that makes its error larger, as one
-        that leaves the play of a valve does, is tried again at a quarter of its length.
+        Each window takes Gauss-Newton steps of its own until they are worth nothing. A step that
+        makes its error larger, as one that leaves the play of a valve does, is tried again at a
+        quarter of its length.
+
+        Args:
+            parameters: all of them, shape (n_p,).
+            steps: simulations at most.
+            worth: share of a window's squared error that a step must promise.
+            rows: windows that are settled, all if None.
         """
-        self._remember(parameters, self._memory.exact)
-        error, slopes = self._simulated(parameters)
+        self._follow_inputs(parameters)
+        rows = np.arange(len(self._initial)) if rows is None else rows
+        best = self._initial[rows]
+        error, slopes = self._simulated(parameters, rows, best)
         if not (np.isfinite(slopes).all() and np.isfinite(error).all()):
             raise ModelError(
-                f"{self._compiled.system.model.name}: the simulation leaves the finite numbers;"
+                f"{self.system.model.name}: the simulation leaves the finite numbers;"
                 " try other starting values or more substeps"
             )
-        if not self._compiled.system.states:
+        if not self.system.states:
             return error, slopes
-        step, best = self._steps(error, slopes), self._initial
-        for further in reversed(range(steps - 1)):
-            promised = self._promise(step, slopes)
+        step = self._steps(error, slopes, rows)
+        for _ in range(steps - 1):
             size = np.sum(error**2, axis=1)
-            if roughly and promised.sum() < ENOUGH * size.sum():
+            (going,) = np.nonzero(self._promise(step, slopes) > worth * size)
+            if not len(going):
                 break
-            if np.all(promised < SETTLED * np.maximum(size, 1e-300)):
-                break
-            self._initial = np.clip(best + step, self._low, self._high)
-            tried, tried_slopes = self._simulated(parameters)
-            better = np.sum(tried**2, axis=1) < size
-            best = np.where(better[:, None], self._initial, best)
-            error = np.where(better[:, None], tried, error)
-            slopes = np.where(better[:, None, None], tried_slopes, slopes)
-            if further:
-                step = np.where(better[:, None], self._steps(error, slopes), step / 4)
-        self._initial = best
+            there = np.clip(best[going] + step[going], self._low, self._high)
+            tried, tried_slopes = self._simulated(parameters, rows[going], there)
+            better = np.sum(tried**2, axis=1) < size[going]
+            took = going[better]
+            best[took], error[took], slopes[took] = (
+                there[better],
+                tried[better],
+                tried_slopes[better],
+            )
+            step[took] = self._steps(error[took], slopes[took], rows[took])
+            step[going[~better]] /= 4
+        self._initial = self._initial.copy()
+        self._initial[rows] = best
         return error, slopes
 
     def _promise(self, step: FloatArray, slopes: FloatArray) -> FloatArray:
@@ -398,12 +438,17 @@ class _Problem:
         moved = slopes[..., len(self.free) :] @ step[..., None]
         return np.asarray(np.sum(moved[..., 0] ** 2, axis=1))
 
-    def _steps(self, error: FloatArray, slopes: FloatArray) -> FloatArray:
-        """Gauss-Newton step of each window's initial state, shape (windows, states)."""
-        return np.asarray(self._tangent(slopes).solve(error[..., None])[..., 0])
+    def _steps(self, error: FloatArray, slopes: FloatArray, rows: IntArray) -> FloatArray:
+        """Gauss-Newton step of each window's initial state, shape (rows, states)."""
+        return np.asarray(self._tangent(slopes, rows).solve(error[..., None])[..., 0])
 
-    def _tangent(self, slopes: FloatArray) -> Tangent:
-        return Tangent(slopes[..., len(self.free) :], self._groups)
+    def _tangent(self, slopes: FloatArray, rows: IntArray) -> Tangent:
+        """What an input led to is known, but at the recording's beginning."""
+        first = np.nonzero(rows == 0)[0], np.nonzero(rows > 0)[0]
+        groups = list(zip(first, (self._every, self._unknown), strict=True))
+        if len(self._unknown) == len(self._every):
+            groups = [(np.arange(len(rows)), self._every)]
+        return Tangent(slopes[..., len(self.free) :], groups)
 
     def projected(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals and Jacobian by the free parameters, initial states projected out."""
@@ -432,7 +477,7 @@ class _Problem:
     def _project(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         if self._best is not None:
             self._initial = self._best.initial
-        found = self._cleaned(*self.settle(parameters, START_STEPS, roughly=True))
+        found = self._cleaned(*self.settle(parameters, START_STEPS, worth=ENOUGH))
         size = float(found[0] @ found[0])
         if self._best is None or size < self._best.size:
             self._best = _Met(size, parameters.copy(), self._initial)
@@ -441,9 +486,8 @@ class _Problem:
     def _cleaned(self, error: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residual and Jacobian without what the initial states could have made."""
         m = len(self.free)
-        both = self._tangent(slopes).without(
-            np.concatenate([error[..., None], slopes[..., :m]], axis=-1)
-        )
+        tangent = self._tangent(slopes, np.arange(len(slopes)))
+        both = tangent.without(np.concatenate([error[..., None], slopes[..., :m]], axis=-1))
         return -both[..., 0].ravel(), both[..., 1:].reshape(error.size, m)
 
     def result(self, found: _Started) -> Fit:
@@ -468,22 +512,10 @@ class _Problem:
         )
 
 
-def _better(found: _Started, again: _Started) -> _Started:
-    """The windows as they were found, but for those that have come back."""
-    back = np.sum(again.error**2, axis=1) < BACK * np.sum(found.error**2, axis=1)
-    return _Started(
-        found.parameters,
-        np.where(back[:, None], again.initial, found.initial),
-        np.where(back[:, None], again.error, found.error),
-        np.where(back[:, None, None], again.slopes, found.slopes),
-        bool(back.any()),
-    )
-
-
-def _astray(error: FloatArray) -> BoolArray:
-    """Windows whose squared error is far beyond that of most."""
+def _astray(error: FloatArray) -> IntArray:
+    """Windows, but the first, whose squared error is beyond that of most."""
     size = np.sum(error**2, axis=1)
-    return np.asarray(size > ASTRAY * np.median(size))
+    return np.nonzero(size[1:] > ASTRAY * np.median(size))[0] + 1
 
 
 def initial_states(system: System, recording: Recording) -> FloatArray:

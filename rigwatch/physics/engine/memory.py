@@ -123,7 +123,7 @@ class Recall:
                 placement,
                 Memory(
                     placement.effect,
-                    _seen(system, placement, inputs, states, dt, values),
+                    seen(system, placement, inputs, states, dt, values),
                     dt,
                     held_at(system.model, placement.port),
                 ),
@@ -152,7 +152,7 @@ class Recall:
         return found
 
 
-def _seen(  # noqa: PLR0917 -- they belong together
+def seen(  # noqa: PLR0917 -- they belong together
     system: System,
     placement: Placement,
     inputs: FloatArray,
@@ -160,7 +160,16 @@ def _seen(  # noqa: PLR0917 -- they belong together
     dt: float,
     values: Mapping[str, float],
 ) -> Signals:
-    """The signals that an effect may name at its port, as the channels show them."""
+    """The signals that an effect may name at its port, as the channels show them.
+
+    Args:
+        system: a model with the effect.
+        placement: the effect.
+        inputs: shape (n, inputs).
+        states: as the channels show them, shape (n, states).
+        dt: time between samples [s].
+        values: parameters by name.
+    """
     port = system.model.ports[placement.port]
     known: Signals = {TIME: dt * np.arange(len(inputs), dtype=np.float64)}
     known |= dict(zip(system.states, states.T, strict=True))

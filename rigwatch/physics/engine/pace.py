@@ -71,4 +71,4 @@ def _of_memory(system: System) -> Sequence[sympy.Expr]:
     memory = [name for name in system.states if name not in system.model.states]
     slopes = [derivative(system.derivatives[name], symbol(name)) for name in memory]
     sides = [{symbol(name): side for name in memory} for side in (FILLED, -FILLED)]
-    return list(dict.fromkeys(s.subs(full) for s in slopes for full in sides if s != 0))
+    return list(dict.fromkeys(s.xreplace(full) for s in slopes for full in sides if s != 0))

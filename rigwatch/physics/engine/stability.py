@@ -8,6 +8,9 @@ from rigwatch.physics.engine.pace import pace
 from rigwatch.physics.engine.system import TIME, UNTIL, System
 
 MOST_SUBSTEPS = 64
+FINER = 4.0
+"""Steps over those that keep a memory stable: directions go by Heun's method, which must follow it,
+too."""
 
 
 def even_substeps(
@@ -32,5 +35,7 @@ def even_substeps(
     fastest = 0.0
     for at in (states, standing):
         asked = function(0.0, 0.0, *at.T, *inputs.T, *parameters, *[0.0] * len(system.probes))
-        fastest = max(fastest, *(float(np.nanmax(np.abs(rate))) for rate in asked))
+        sizes = [float(np.nanmax(np.abs(rate))) for rate in asked]
+        steep, memory = sizes[: len(wanted.crossing)], sizes[len(wanted.crossing) :]
+        fastest = max(fastest, *steep, *(FINER * size for size in memory))
     return int(min(MOST_SUBSTEPS, max(1, np.ceil(fastest * spacing))))

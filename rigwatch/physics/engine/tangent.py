@@ -22,12 +22,12 @@ class Tangent:
         groups: windows and the states that are unknown in them.
     """
 
-    def __init__(self, slopes: FloatArray, groups: Sequence[tuple[slice, IntArray]]) -> None:
+    def __init__(self, slopes: FloatArray, groups: Sequence[tuple[IntArray, IntArray]]) -> None:
         self._shape = (slopes.shape[0], slopes.shape[2])
         self._groups = [
             (windows, columns, *_split(slopes[windows][..., columns]))
             for windows, columns in groups
-            if len(columns)
+            if len(windows) and len(columns)
         ]
 
     def solve(self, values: FloatArray) -> FloatArray:
@@ -35,7 +35,7 @@ class Tangent:
         found = np.zeros((*self._shape, values.shape[-1]))
         for windows, columns, basis, inverse in self._groups:
             along = basis.swapaxes(1, 2) @ values[windows]
-            found[windows, columns] = inverse @ along
+            found[np.ix_(windows, columns)] = inverse @ along
         return found
 
     def without(self, values: FloatArray) -> FloatArray:
