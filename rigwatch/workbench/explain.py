@@ -1,20 +1,15 @@
 """Explains the gap: ranks what may be missing, gives a verdict and says what to do next."""
 
-import dataclasses
 from dataclasses import dataclass, field
 
 from rigwatch.workbench.calibration import seen
 from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
 from rigwatch.workbench.intervals import Value, values
 from rigwatch.workbench.next_experiment import Experiment, propose
-from rigwatch.workbench.rank import Progress, Ranked, accepted_from, rank, refit, unheard
+from rigwatch.workbench.pairs import two_effects
+from rigwatch.workbench.rank import Progress, Ranked, rank, unheard
 from rigwatch.workbench.study import Study
-from rigwatch.workbench.verdict import Verdict, Word, judge
-
-MOST_OF_THE_REST = 0.3
-"""Share of what the best leaves that a second effect must explain to first order to be tried."""
-ROUGHLY = 1.5
-"""Error over the noise floor that two effects may leave of a rough model."""
+from rigwatch.workbench.verdict import Verdict, judge
 
 
 @dataclass(frozen=True)
@@ -90,65 +85,11 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = judge(bench.base, rows, bench.floor)
     if verdict.word == "unknown_effect" and verdict.best is not None:
-        verdict = _with_second(bench, verdict, progress)
+        progress(f"{verdict.best.label} leaves much: trying two effects at once")
+        verdict = two_effects(bench, rows, verdict, progress)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
-
-
-def _with_second(bench: Bench, verdict: Verdict, progress: Progress) -> Verdict:
-    """The verdict once a second effect has been tried beside the best: two may hide at once.
-
-    The best alone may have taken the place of one that is right only beside the second; so where
-    the two leave more than noise, the second is tried with every other first, too.
-    """
-    best = verdict.best
-    assert best is not None
-    progress(f"{best.label} leaves much: trying a second effect beside it")
-    second = _beside(bench, best, progress)
-    found = _both(bench, verdict, second)
-    if found is not None or second.best is None:
-        return found or verdict
-    first = dataclasses.replace(second.best)
-    refit(bench.study, bench.data, bench.base, first)
-    if first.fitted is None:
-        return verdict
-    progress(f"{first.label} is trusted more: trying a second effect beside that")
-    beside = _beside(bench, first, progress)
-    return _both(bench, dataclasses.replace(second, best=first), beside) or verdict
-
-
-def _beside(bench: Bench, first: Ranked, progress: Progress) -> Verdict:
-    """The verdict on what is missing once the first has been added."""
-    assert first.fitted is not None
-    study = bench.study.with_effects([*bench.study.file.effects, accepted_from(first)])
-    rows = rank(study, bench.data, first.fitted, bench.floor, progress, least=MOST_OF_THE_REST)
-    return judge(first.fitted, rows, bench.floor)
-
-
-def _enough(bench: Bench, second: Ranked) -> bool:
-    """Whether two effects leave so little that they are worth naming.
-
-    Nothing but noise, as two wrong ones together explain much. A rough model leaves more, since
-    what it leaves on a healthy rig changes with the fault.
-    """
-    assert second.fitted is not None
-    rough = bench.study.model.rough and bench.floor.ratio(second.fitted.held_out) < ROUGHLY
-    return rough or bench.floor.reached(second.fitted.held_out)
-
-
-def _both(bench: Bench, first: Verdict, second: Verdict) -> Verdict | None:
-    """A verdict that names both; None where they do not explain enough."""
-    if second.best is None or not _enough(bench, second.best):
-        return None
-    assert first.best is not None
-    assert second.best.fitted is not None
-    named = (*second.members, *second.rivals)
-    certain = bench.floor.reached(second.best.fitted.held_out) and not second.rivals
-    word: Word = "missing_effect" if certain else "undetermined"
-    also = f"{named[0]} as well" if certain else f"probably {' or '.join(named)} as well"
-    text = f"{first.best.label} is missing, and {also}"
-    return dataclasses.replace(first, word=word, text=text, second=named)
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:

@@ -68,6 +68,7 @@ class Ranked:
         start: values that its fit starts from.
         alike: effects whose effect on this recording is nearly parallel, as "effect@port".
         cosines: with every other effect, by its label.
+        turned: the same with a sign: negative where both explain the residual in opposite ways.
         fitted: with it in the model; None where it was not worth a fit or the fit failed.
         gain: fall of the held-out mean squared error, None without a fit.
         gain_deviation: standard deviation of `gain`.
@@ -83,6 +84,7 @@ class Ranked:
     start: dict[str, float]
     alike: list[str]
     cosines: dict[str, float]
+    turned: dict[str, float]
     fitted: Fitted | None = None
     gain: float | None = None
     gain_deviation: float | None = None
@@ -169,13 +171,12 @@ def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatA
     return directions(at, found) / scale, run.slopes / scale
 
 
-def rank(  # noqa: PLR0917 -- they belong together
+def rank(
     study: Study,
     data: Data,
     base: Fitted,
     floor: NoiseFloor,
     progress: Progress = unheard,
-    least: float = 0.0,
 ) -> list[Ranked]:
     """All effects at all ports, the best first; those worth it fitted and judged.
 
@@ -183,13 +184,10 @@ def rank(  # noqa: PLR0917 -- they belong together
         study, data, base: the model and what it was fitted to.
         floor: of the held-out recordings.
         progress: told which fit begins.
-        least: share of the residual's energy above the floor that an effect must explain to first
-            order to be worth a fit.
     """
-    above = max(1 - floor.ratio(base.train) ** -2, 0.0)
     rows = _scored(study, data, base, candidates(study, data.train))
     kind = "dynamic" if study.model.states else "static"
-    chosen = [row for row in _worth_a_fit(rows, kind) if row.explained >= least * above]
+    chosen = _worth_a_fit(rows, kind)
     enough: list[Ranked] = []
     for number, row in enumerate(chosen, start=1):
         if any(other.cosines[row.label] < SIMILAR for other in enough):
@@ -216,7 +214,7 @@ def _try_again(
             continue
         progress(f"fitting {row.label} again, by way of short horizons")
         row.fitted = fit_again(study, data, row.fitted, _begin(base, row))
-        _judge(base, row)
+        judge_fit(base, row)
 
 
 def _unfitted_double(rows: Sequence[Ranked]) -> Ranked | None:
@@ -268,11 +266,13 @@ def _best_shapes(
         key = (candidate.name, candidate.port)
         if key not in best or scores.score[index] > scores.score[best[key]]:
             best[key] = index
-    rows = []
-    for (name, port), index in best.items():
-        cosines = {
-            f"{n}@{p}": float(scores.cosines[index, j]) for (n, p), j in best.items() if j != index
-        }
+    rows, signs = [], np.sign(scores.strength)
+    chosen = list(best.values())
+    turned = (scores.units[:, chosen] * signs[chosen]).T @ (scores.units[:, chosen] * signs[chosen])
+    for at, ((name, port), index) in enumerate(best.items()):
+        others = {f"{n}@{p}": j for j, (n, p) in enumerate(best) if j != at}
+        signed = {label: float(turned[at, j]) for label, j in others.items()}
+        cosines = {label: abs(cosine) for label, cosine in signed.items()}
         alike = [label for label, cosine in cosines.items() if cosine > ALIKE]
         candidate = found[index]
         rows.append(
@@ -280,7 +280,7 @@ def _best_shapes(
                 Placement(name, candidate.effect, port), study.model.ports[port].kind,
                 float(p_values[index]),
                 float(scores.explained[index]), _start(candidate, float(scores.strength[index])),
-                alike, cosines,
+                alike, cosines, signed,
             )
         )  # fmt: skip
     return sorted(rows, key=lambda row: -row.explained)
@@ -343,10 +343,10 @@ def refit(
     except ModelError as error:
         row.reason, row.trouble = "cannot be fitted", str(error)
         return
-    _judge(base, row)
+    judge_fit(base, row)
 
 
-def _judge(base: Fitted, row: Ranked) -> None:
+def judge_fit(base: Fitted, row: Ranked) -> None:
     """Say whether the held-out error falls by more than chance."""
     assert row.fitted is not None
     row.gain, row.gain_deviation = gain(base, row.fitted)

@@ -293,9 +293,7 @@ class _Problem:
         self.scale = np.where(self.scale > 0, self.scale, 1.0)
         shown = initial_states(system, recording)
         self._initial = shown[self._cut.starts]
-        if initial is not None and len(initial) == len(self._initial):
-            own = len(system.model.states)
-            self._initial[:, :own] = initial[:, :own]
+        self._offered = initial
         self._memory = Recall(system, recording.inputs, shown, recording.dt, compiled.parameters)
         known = self._memory.exact
         self._every = np.arange(len(system.states))
@@ -314,8 +312,20 @@ class _Problem:
         return parameters
 
     def recall(self, parameters: FloatArray) -> None:
-        """Let the memory of effects begin where the measured signals have led it."""
+        """Let the memory of effects begin where the measured signals have led it.
+
+        Windows begin as the channels show them or, where it is better, as they are offered.
+        """
         self._remember(parameters, self._memory.columns)
+        if self._offered is None or len(self._offered) != len(self._initial):
+            return
+        rows, own = np.arange(len(self._initial)), len(self.system.model.states)
+        other = np.column_stack([self._offered[:, :own], self._initial[:, own:]])
+        shown, offered = (
+            np.sum(self._simulated(parameters, rows, each)[0] ** 2, axis=1)
+            for each in (self._initial, other)
+        )
+        self._initial = np.where((offered < shown)[:, None], other, self._initial)
 
     def _follow_inputs(self, parameters: FloatArray) -> None:
         """Let memory at actuators begin where the inputs lead it; what came first is fitted."""

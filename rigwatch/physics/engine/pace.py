@@ -5,8 +5,8 @@ micrometres has 1e5 1/m times its speed there, far above the rates of the rig th
 friction is as steep, but only about standstill. So each interval between two samples is cut as
 finely as it needs:
 
-    steps a second = max(|∂(dz/dt)/∂z| / 2.0 of what effects remember,
-                         |∂(effect's share of dx/dt)/∂x| / 0.3 of what passes through zero)
+    steps a second = max(|∂(dz/dt)/∂z| / 1.0 of what effects remember,
+                         |∂(effect's share of dx/dt)/∂x| / 0.1 of what passes through zero)
 """
 
 from collections.abc import Sequence
@@ -18,9 +18,9 @@ from rigwatch.physics.engine.codegen import derivative
 from rigwatch.physics.engine.scope import symbol
 from rigwatch.physics.engine.system import System, compose
 
-STABLE = 2.0
+STABLE = 1.0
 """Rate times step that is allowed, with a margin."""
-ACCURATE = 0.3
+ACCURATE = 0.1
 """The same where a state passes through zero, as speed does: there accuracy asks for more."""
 FINEST = 256
 """Steps between two samples at most."""

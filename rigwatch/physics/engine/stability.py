@@ -8,9 +8,10 @@ from rigwatch.physics.engine.pace import pace
 from rigwatch.physics.engine.system import TIME, UNTIL, System
 
 MOST_SUBSTEPS = 64
-FINER = 4.0
-"""Steps over those that keep a memory stable: directions go by Heun's method, which must follow it,
-too."""
+FINER = 2.0
+"""Steps over those that keep a memory stable: directions go by Heun's method, which must follow."""
+COARSER = 3.0
+"""Steps about standstill over these: directions need no more than to see that it is steep."""
 
 
 def even_substeps(
@@ -37,5 +38,7 @@ def even_substeps(
         asked = function(0.0, 0.0, *at.T, *inputs.T, *parameters, *[0.0] * len(system.probes))
         sizes = [float(np.nanmax(np.abs(rate))) for rate in asked]
         steep, memory = sizes[: len(wanted.crossing)], sizes[len(wanted.crossing) :]
-        fastest = max(fastest, *steep, *(FINER * size for size in memory))
+        fastest = max(
+            fastest, *(size / COARSER for size in steep), *(FINER * size for size in memory)
+        )
     return int(min(MOST_SUBSTEPS, max(1, np.ceil(fastest * spacing))))
