@@ -19,8 +19,8 @@ import numpy as np
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.fitted import Fitted, fit_model, fit_twice
-from rigwatch.workbench.rank import SIMILAR, Fitting, Progress, Ranked, judge_fit, refit
+from rigwatch.workbench.fitted import Fitted, fit_model
+from rigwatch.workbench.rank import SIMILAR, Progress, Ranked, judge_fit, refit
 from rigwatch.workbench.verdict import Verdict, Word, judge
 
 LIKELY = 0.7
@@ -62,11 +62,8 @@ def two_effects(
         verdict: that no known effect alone explains the error.
         progress: told which pair is fitted.
     """
-    pairs = likely_pairs(bench, rows)
-    fits = _fitted(bench, pairs, fit_model, progress)
-    if not (good := _enough(bench, fits)):
-        fits = _fitted(bench, [pair for pair, _ in fits], fit_twice, progress)
-        good = _enough(bench, fits)
+    fits = _fitted(bench, likely_pairs(bench, rows), progress)
+    good = _enough(bench, fits)
     if not good:
         return verdict
     best, together = min(good, key=lambda found: found[1].held_out_error)
@@ -129,9 +126,7 @@ def _double(row: Ranked, other: Ranked) -> bool:
     return row is other or row.cosines[other.label] > ALIKE
 
 
-def _fitted(
-    bench: Bench, pairs: Sequence[Pair], fitting: Fitting, progress: Progress
-) -> list[tuple[Pair, Fitted]]:
+def _fitted(bench: Bench, pairs: Sequence[Pair], progress: Progress) -> list[tuple[Pair, Fitted]]:
     """The pairs that can be fitted, with their fits."""
     base, found = bench.base, []
     for pair in pairs:
@@ -139,7 +134,7 @@ def _fitted(
         placements = (*base.placements, pair.one.placement, pair.other.placement)
         start = base.train.values() | pair.start
         try:
-            fitted = fitting(
+            fitted = fit_model(
                 bench.study, bench.data, placements, start, base.train.scale, base=base
             )
         except ModelError:

@@ -47,6 +47,9 @@ SIMILAR = 0.8
 """Cosine below which two effects explain different parts of the error."""
 EXPLAINED = 0.95
 """Share of the energy above the floor that an effect must explain for the error to be known."""
+AGAIN = 0.25
+"""Share of the energy above the floor that an effect must explain to first order to be fitted once
+more, where its fit may have ended in a local minimum."""
 MOST_FITS = {"static": 24, "dynamic": 6}
 Progress = Callable[[str], None]
 Fitting = Callable[..., Fitted]
@@ -198,7 +201,9 @@ def rank(
         if row.accepted and _leaves_nothing(row, base, floor):
             enough.append(row)
     if not enough:
-        _try_again(study, data, base, chosen, progress)
+        above = max(1 - floor.ratio(base.train) ** -2, 0.0)
+        likely = [row for row in chosen if row.explained > AGAIN * above]
+        _try_again(study, data, base, likely, progress)
     while double := _unfitted_double(rows):
         progress(f"fitting {double.label}, which looks like the best")
         refit(study, data, base, double, fit_model if enough else fit_twice)

@@ -7,7 +7,7 @@ from rigwatch.physics.engine.compiled import compile_system
 from rigwatch.physics.engine.directions import directions, shaped, trajectory
 from rigwatch.physics.engine.effect import library
 from rigwatch.physics.engine.fit import Recording, evaluate, fit
-from rigwatch.physics.engine.model import Model
+from rigwatch.physics.engine.model import Model, shipped_models
 from rigwatch.physics.engine.system import Placement, compose
 from rigwatch.wire.config import parse
 
@@ -113,3 +113,25 @@ def sizes(recording: Recording) -> dict[str, float]:
     command = recording.inputs[:, 0]
     rate = float(np.sqrt(np.mean(np.gradient(command, DT) ** 2)))
     return {"u": float(command.std()), "rate": rate, "dt": DT}
+
+
+def test_a_lag_and_a_spring_that_hardens_are_fitted_together_wherever_the_lag_began():
+    placements = [
+        Placement("lag", library()["lag"].scaled({"u": 1.0, "rate": 1.0, "dt": DT}), "drive"),
+        Placement("cubic_stiffness", library()["cubic_stiffness"].scaled({"x": 0.1}), "load"),
+    ]
+    compiled = compile_system(compose(shipped_models()["mass-spring-damper"], placements))
+    t = DT * np.arange(N)
+    force = (4 * np.sin(2 * np.pi * 1.2 * t + 1) + 3 * np.sin(2 * np.pi * 2.7 * t))[:, None]
+    true = compiled.vector({"drive_lag_tau": 0.02, "load_cubic_stiffness_k3": 2000.0})
+    first = np.array([[0.02, 0.1, 3.0]])
+    run = compiled.simulate(
+        force, DT, np.zeros(1, np.int64), N, initial=first, parameters=true, substeps=8
+    )
+    noise = 1e-3 * run.outputs[0].std(axis=0)
+    measured = run.outputs[0] + noise * np.random.default_rng(2).normal(size=run.outputs[0].shape)
+    start = compiled.vector({"drive_lag_tau": 0.015, "load_cubic_stiffness_k3": 100.0})
+    found = fit(compiled, Recording(DT, force, measured), HORIZON, start=start, scale=noise)
+    assert found.values()["drive_lag_tau"] == pytest.approx(0.02, rel=0.01)
+    assert found.values()["load_cubic_stiffness_k3"] == pytest.approx(2000.0, rel=0.05)
+    assert (found.rms < 1.1 * noise).all()

@@ -1,0 +1,81 @@
+"""Steps that are as fine as each interval needs give what steps give that are fine everywhere."""
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from rigwatch.physics.engine.compiled import compile_system
+from rigwatch.physics.engine.effect import library
+from rigwatch.physics.engine.model import shipped_models
+from rigwatch.physics.engine.pace import pace
+from rigwatch.physics.engine.suitable import suits
+from rigwatch.physics.engine.system import Placement, compose
+
+MODEL = shipped_models()["mass-spring-damper"]
+DT, SAMPLES = 1 / 256, 512
+SIZES = {"x": 0.1, "v": 1.0, "L": 6.0, "u": 4.0, "rate": 200.0, "dt": DT, "p": 1.0}
+STRONG = 2.0
+"""Of what an effect is given where its strength has no size of its own."""
+
+
+def placed():
+    """Every effect at the first port that it may stand at, strong enough to be felt."""
+    found = []
+    for name, effect in library().items():
+        port = next((n for n, p in MODEL.ports.items() if suits(effect, p, MODEL)), None)
+        if port is None:
+            continue
+        scaled = effect.scaled(SIZES)
+        strength = scaled.parameters[scaled.strength]
+        if strength.role == "strength":
+            value = float(np.clip(STRONG, strength.low, min(strength.high, STRONG)))
+            changed = scaled.parameters | {scaled.strength: replace(strength, value=value)}
+            scaled = replace(scaled, parameters=changed)
+        found.append(pytest.param(Placement(name, scaled, port), id=f"{name}@{port}"))
+    return found
+
+
+def run(system, substeps, finest):
+    compiled = compile_system(system)
+    time = np.arange(SAMPLES) * DT
+    force = 4 * np.sin(2 * np.pi * 1.3 * time) + 3 * np.sin(2 * np.pi * 3.1 * time + 1)
+    return compiled.simulate(
+        force[:, None], DT, np.zeros(1, np.int64), SAMPLES,
+        initial=np.zeros((1, len(system.states))), parameters=compiled.parameters,
+        substeps=substeps, finest=finest,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("placement", placed())
+def test_every_effect_is_followed_as_by_steps_that_are_fine_everywhere(placement):
+    system = compose(MODEL, [placement])
+    found, fine = run(system, 2, 256), run(system, 256, 1)
+    wrong = np.sqrt(np.mean((found.outputs - fine.outputs) ** 2, axis=(0, 1)))
+    # A jump that lies a hair before or after a sample is a sample's worth of difference there.
+    assert (wrong < 0.01 * fine.outputs.std(axis=(0, 1))).all()
+
+
+def test_friction_needs_fine_steps_about_standstill_and_gets_them():
+    friction = Placement("coulomb", library()["coulomb"].scaled(SIZES), "load")
+    changed = friction.effect.parameters | {
+        "Fc": replace(friction.effect.parameters["Fc"], value=3.0)
+    }
+    system = compose(MODEL, [replace_effect(friction, changed)])
+    fine = run(system, 256, 1).outputs
+    coarse, paced = (run(system, 2, finest).outputs for finest in (1, 256))
+    assert np.abs(paced - fine)[..., 0].max() < 0.01 * np.abs(coarse - fine)[..., 0].max()
+
+
+def test_a_model_alone_and_one_that_is_not_stiff_ask_for_nothing():
+    assert pace(compose(MODEL)).asked == ()
+    spring = Placement("cubic_stiffness", library()["cubic_stiffness"].scaled(SIZES), "load")
+    assert pace(compose(MODEL, [spring])).asked == ()
+
+
+def test_the_last_states_are_those_of_the_last_sample():
+    found = run(compose(MODEL), 4, 1)
+    assert found.last[0, 0] == found.outputs[0, -1, 0]
+
+
+def replace_effect(placement, parameters):
+    return Placement(placement.name, replace(placement.effect, parameters=parameters), "load")
