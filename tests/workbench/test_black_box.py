@@ -8,7 +8,7 @@ from rigwatch.simulated import write_session
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain import ranking
-from rigwatch.workbench.study import Study, create
+from rigwatch.workbench.study import Accepted, Study, create
 from sim_plant.excitation import Multisine
 from sim_plant.scenario import Scenario
 
@@ -83,3 +83,13 @@ def test_two_faults_at_once_are_named_whichever_is_found_first(tmp_path):
     named = {*verdict.members, *verdict.rivals, *verdict.second}
     assert {"viscous@load", "lag@acceleration_sensor"} <= named
     assert verdict.word in {"missing_effect", "undetermined"}
+
+
+def test_an_effect_that_cannot_vanish_does_not_raise_the_floor(tmp_path):
+    record(tmp_path, "healthy", 1)
+    record(tmp_path, "rig", 2, actuator_delay=0.001)
+    opened = study(tmp_path)
+    alone = open_bench(opened)
+    added = open_bench(opened.with_effects([Accepted(effect="lag", port="drive")]))
+    assert (added.floor.rms <= alone.floor.rms * (1 + 1e-9)).all()
+    assert added.base.held_out_error < alone.base.held_out_error
