@@ -41,6 +41,10 @@ def acts(scenario: Scenario) -> Iterator[Act]:
         cycle += scenario.cycle_s
 
 
+NAMELESS = "departure"
+"""The alarm that says that something is wrong, and not yet what."""
+
+
 class Narrator:
     """Tells the acts as the samples reach them, and the alarms as they come.
 
@@ -84,9 +88,10 @@ class Narrator:
             return ""
         late = alarm.seq - self._last.seq
         onset = max(0, alarm.onset_seq - self._last.seq)
+        told = "raised" if alarm.name == NAMELESS else "named"
         return (
             f" (noticed {onset / self._rate * 1e3:.0f} ms after it began, "
-            f"named after {late / self._rate * 1e3:.0f} ms)"
+            f"{told} after {late / self._rate * 1e3:.0f} ms)"
         )
 
     def _time(self, seq: int) -> str:

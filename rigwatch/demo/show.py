@@ -110,7 +110,7 @@ class Show:
 
     def _take(self, blocks: list[SampleBlock]) -> None:
         if not self._seen:
-            self._say("samples arrive: the rig moves, healthy so far")
+            self._say("samples arrive: the rig moves, healthy so far; Ctrl-C ends the demo")
             self._first = blocks[0].seq
         self._seen = blocks[-1].seq + len(blocks[-1])
         self._narrator.samples(self._seen)

@@ -112,6 +112,8 @@ def test_an_alarm_is_told_with_its_cause_and_its_delay_after_what_was_done() -> 
     assert CAUSE in said[1]
     assert "noticed 47 ms after it began, named after 125 ms" in said[1]
     assert "Stop and look." in said[2]
+    narrator.alarm(alarm("departure", begins + 32))
+    assert "raised after 125 ms" in said[3]
 
 
 def test_a_whole_recording_with_the_alarm_has_nothing_to_complain_about(

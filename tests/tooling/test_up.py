@@ -49,9 +49,11 @@ class Rig:
         deadline = time.monotonic() + timeout
         while (left := deadline - time.monotonic()) > 0:
             try:
-                event = json.loads(self._lines.get(timeout=left))
+                line = self._lines.get(timeout=left)
             except queue.Empty:
                 break
+            assert line.startswith("{"), f"found {line!r}, expected an event"
+            event = json.loads(line)
             self.events.append(event)
             if event["event"] == kind and all(event.get(k) == v for k, v in wanted.items()):
                 return dict(event)
