@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from benchmarks.hidden import asked, collected, confusion, counted, share_row, wanted
 from benchmarks.table import Row, as_text
 from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import shipped_models
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.workbench import calibration
 from rigwatch.workbench.calibration import Evidence, cell_of
 from rigwatch.workbench.compare import Bench, bench_of

@@ -40,8 +40,8 @@ from benchmarks.rig_hidden import (
 )
 from benchmarks.table import Row, as_text
 from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import shipped_models
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.workbench.commissioned import commissioned
 from rigwatch.workbench.compare import Bench, bench_of
 from rigwatch.workbench.explain import ranking

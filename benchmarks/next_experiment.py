@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.hidden_effects import HORIZON, RIGHT, SAMPLES, explained, study
 from benchmarks.table import Row
-from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.workbench.explain import explanation
 from rigwatch.workbench.next_experiment import excitation
 from rigwatch.workbench.signals import Data

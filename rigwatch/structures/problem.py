@@ -13,8 +13,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.physics.engine.model import Model
+from rigwatch.physics.engine.recording import Recording, initial_states
 from rigwatch.physics.engine.system import compose
 from rigwatch.structures.description import Structure, coefficients
 from rigwatch.structures.edit import with_unknowns

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.structures.least_squares import Step
 from rigwatch.structures.problem import Problem
 from rigwatch.structures.whole_record import WholeRecord

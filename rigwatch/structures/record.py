@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import Model
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.wire.errors import ImportDataError, ModelError
 
 FloatArray = NDArray[np.float64]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from rigwatch.physics.engine.fit import initial_states
+from rigwatch.physics.engine.recording import initial_states
 from rigwatch.structures.description import Structure, coefficients, label
 from rigwatch.structures.edit import with_values
 from rigwatch.structures.problem import Problem, problem_of

@@ -7,7 +7,8 @@ from functools import partial
 import numpy as np
 
 from rigwatch.physics.engine.compiled import BoolArray, CompiledSystem, FloatArray, compile_system
-from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
+from rigwatch.physics.engine.fit import Fit, evaluate, fit
+from rigwatch.physics.engine.recording import Recording, initial_states
 from rigwatch.physics.engine.stability import even_substeps
 from rigwatch.physics.engine.system import Placement, System, compose
 from rigwatch.wire.errors import ModelError

@@ -7,7 +7,7 @@ make it worse. It is shown, and decides nothing.
 import numpy as np
 
 from rigwatch.physics.engine.compiled import FloatArray
-from rigwatch.physics.engine.fit import Recording, initial_states
+from rigwatch.physics.engine.recording import Recording, initial_states
 from rigwatch.workbench.fitted import Fitted
 
 

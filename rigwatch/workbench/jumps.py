@@ -8,9 +8,10 @@ it: in a right model with little noise such samples hold most of the error.
 import numpy as np
 
 from rigwatch.physics.engine.compiled import BoolArray
-from rigwatch.physics.engine.fit import Fit, Recording, initial_states, windows
+from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.memory import seen
 from rigwatch.physics.engine.numeric import evaluated
+from rigwatch.physics.engine.recording import Recording, initial_states, windows
 
 JUMP = 0.5
 """Change from one sample to the next, over the largest that the effect ever is."""

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from rigwatch.physics.engine.compiled import FloatArray, IntArray
-from rigwatch.physics.engine.fit import Recording, initial_states
+from rigwatch.physics.engine.recording import Recording, initial_states
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.noise_floor import find_period
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.physics.engine.directions import Candidate, directions, trajectory
-from rigwatch.physics.engine.fit import initial_states
+from rigwatch.physics.engine.recording import initial_states
 from rigwatch.physics.engine.score import Projector
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench

@@ -12,7 +12,8 @@ import numpy as np
 from scipy.signal import welch
 
 from rigwatch.physics.engine.compiled import BoolArray, FloatArray
-from rigwatch.physics.engine.fit import Fit, Recording
+from rigwatch.physics.engine.fit import Fit
+from rigwatch.physics.engine.recording import Recording
 
 METHODS = {
     "periods": "what differs between repeated periods of the excitation",

@@ -16,7 +16,8 @@ from msgspec.structs import replace as changed
 from scipy.stats import chi2
 
 from rigwatch.physics.engine.compiled import CompiledSystem
-from rigwatch.physics.engine.fit import Fit, Recording, fit
+from rigwatch.physics.engine.fit import Fit, fit
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.workbench.fitted import Fitted
 from rigwatch.workbench.intervals import CONFIDENCE, Value, covariance, values
 

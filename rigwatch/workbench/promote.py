@@ -25,7 +25,7 @@ from monitor.residual import (
 )
 from monitor.rig_monitor import RigMonitor
 from rigwatch.physics.engine.compiled import FloatArray
-from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages import SampleBlock
 from rigwatch.wire.session import open_session

@@ -15,7 +15,7 @@ from scipy.stats import t as student
 
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.physics.engine.directions import Candidate, directions, shaped, trajectory
-from rigwatch.physics.engine.fit import Recording, windows
+from rigwatch.physics.engine.recording import Recording, windows
 from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
 from rigwatch.physics.engine.significance import corrected_p_values
 from rigwatch.physics.engine.suitable import possible, suits

@@ -19,8 +19,9 @@ from msgspec import structs
 from scipy.signal import correlate
 
 from rigwatch.physics.engine.compiled import FloatArray
-from rigwatch.physics.engine.fit import Recording, evaluate
+from rigwatch.physics.engine.fit import evaluate
 from rigwatch.physics.engine.model import Input, Model
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.fitted import Fitted, fit_model
 from rigwatch.workbench.noise_floor import find_period

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from rigwatch.physics.engine.compiled import FloatArray
-from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import Model
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.physics.engine.thinning import Thinning
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.session import open_session

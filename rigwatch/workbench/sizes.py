@@ -3,9 +3,9 @@
 import numpy as np
 
 from rigwatch.physics.engine.compiled import FloatArray
-from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.physics.engine.model import Model, Port
 from rigwatch.physics.engine.numeric import evaluated
+from rigwatch.physics.engine.recording import Recording, initial_states
 from rigwatch.physics.engine.system import compose
 
 Sizes = dict[str, float]

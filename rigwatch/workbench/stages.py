@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigwatch.physics.engine.compiled import FloatArray
-from rigwatch.physics.engine.fit import Recording, evaluate
+from rigwatch.physics.engine.fit import evaluate
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.workbench.compare import Bench, Comparison, bench_of, comparison, prepared
 from rigwatch.workbench.study import Study
 

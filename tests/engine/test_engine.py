@@ -8,8 +8,9 @@ from msgspec.structs import replace
 from rigwatch.physics.engine.compiled import compile_system
 from rigwatch.physics.engine.dimension import describe, dimension
 from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import Recording, evaluate, fit
+from rigwatch.physics.engine.fit import evaluate, fit
 from rigwatch.physics.engine.model import Model, shipped_models
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.physics.engine.suitable import suits
 from rigwatch.physics.engine.system import Placement, compose
 from rigwatch.wire.config import parse

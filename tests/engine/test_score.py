@@ -7,8 +7,9 @@ from msgspec.structs import replace
 from rigwatch.physics.engine.compiled import compile_system
 from rigwatch.physics.engine.directions import Candidate, directions, shaped, trajectory
 from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import Recording, fit, windows
+from rigwatch.physics.engine.fit import fit
 from rigwatch.physics.engine.model import shipped_models
+from rigwatch.physics.engine.recording import Recording, windows
 from rigwatch.physics.engine.score import Projector, score
 from rigwatch.physics.engine.suitable import suits
 from rigwatch.physics.engine.system import Placement, compose

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import shipped_models
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.workbench.compare import Bench, bench_of
 from rigwatch.workbench.signals import Data
 from rigwatch.workbench.study import Span, Study, StudyFile

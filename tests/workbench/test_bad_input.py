@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.fit import Recording, fit
+from rigwatch.physics.engine.fit import fit
 from rigwatch.physics.engine.model import Model
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.physics.engine.system import compose
 from rigwatch.wire.config import parse
 from rigwatch.wire.errors import ConfigError, ModelError

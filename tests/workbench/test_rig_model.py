@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.model import shipped_models
+from rigwatch.physics.engine.recording import Recording
 from rigwatch.workbench.commissioned import commissioned
 from rigwatch.workbench.fitted import fit_base
 from rigwatch.workbench.signals import Data
