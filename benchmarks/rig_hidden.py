@@ -68,8 +68,8 @@ _LISTED = (
     Hidden("actuator_lag", tuple(name.format("drive") for name in _LATE)),
     Hidden("actuator_delay", tuple(name.format("drive") for name in _LATE)),
     Hidden("chamber_leak", ("leakage@between", "orifice@between")),
-    Hidden("leak_1", ("leakage@first",)),
-    Hidden("leak_2", ("leakage@second",)),
+    Hidden("leak_1", ("leakage@first", "orifice@first")),
+    Hidden("leak_2", ("leakage@second", "orifice@second")),
     Hidden("position_gain", _GAINS, 1.0, "less"),
     Hidden("position_bias", (f"offset@{_X}",)),
     Hidden("position_drift", (f"drift@{_X}",)),
@@ -97,8 +97,8 @@ A gain of one motion sensor is a gain of the other and of the valve together; a 
 balanced by pressure, as an offset of the valve is.
 """
 BLACK_BOX: dict[str, tuple[str, ...]] = {
-    "leak_1": ("leakage@between",),
-    "leak_2": ("leakage@between",),
+    "leak_1": ("leakage@between", "orifice@between"),
+    "leak_2": ("leakage@between", "orifice@between"),
 }
 """What differs for the black box, which has no chambers."""
 ABSORBED = tuple(h.name for h in _SWALLOWED)

@@ -9,13 +9,15 @@ the model stay as they are, and the others are fitted to each recording.
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
 from msgspec import structs
 
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.physics.engine.model import Model
 from rigwatch.workbench.fitted import fit_model
+from rigwatch.workbench.intervals import covariance
 from rigwatch.workbench.signals import Data
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.study import Kept, Study
 
 
 def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> Study:
@@ -32,13 +34,20 @@ def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> S
     healthy = data.of_healthy
     if healthy is None or not any(p.kept for p in study.model.parameters.values()):
         return study
-    loose = replace(study, model=_loosened(study.model))
+    loose = replace(study, model=loosened(study.model))
     found = fit_model(loose, healthy, (), study.file.start, scale)
-    return replace(study, model=_with_values(study.model, found.train.values()))
+    kept = [name for name, p in study.model.parameters.items() if p.kept]
+    places = [found.compiled.system.free.index(name) for name in kept]
+    uncertain = covariance(found.train)[0][np.ix_(places, places)]
+    return replace(
+        study,
+        model=_with_values(study.model, found.train.values()),
+        kept=Kept(tuple(kept), uncertain),
+    )
 
 
-def _loosened(model: Model) -> Model:
-    """The model with its kept parameters free."""
+def loosened(model: Model) -> Model:
+    """The model with its kept parameters free, also where they have been fixed since."""
     free = {
         name: structs.replace(p, fixed=p.fixed and not p.kept)
         for name, p in model.parameters.items()

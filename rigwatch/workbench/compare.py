@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rigwatch.physics.engine.compiled import FloatArray
+from rigwatch.workbench.beyond import beyond
 from rigwatch.workbench.commissioned import commissioned
 from rigwatch.workbench.fitted import Fitted, fit_base, fit_model
 from rigwatch.workbench.free_run import free_run
@@ -55,12 +56,20 @@ class Comparison:
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A study with its data and its model fitted: what every step starts from."""
+    """A study with its data and its model fitted: what every step starts from.
+
+    Attributes:
+        study, data: prepared.
+        base: the model with the effects accepted so far.
+        floor: of the held-out recordings' error.
+        bare: the model alone, fitted to the healthy recording; None where there is none.
+    """
 
     study: Study
     data: Data
     base: Fitted
     floor: NoiseFloor
+    bare: Fitted | None
 
 
 def open_bench(study: Study) -> Bench:
@@ -93,22 +102,24 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
         scale: divisor of each output's residuals, shape (outputs,); its spread if None.
     """
     base = fit_base(study, data, scale)
-    return Bench(study, data, base, noise_floor(study, data, base))
+    healthy = data.of_healthy
+    if healthy is None:
+        floor = from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
+        return Bench(study, data, base, floor, None)
+    bare = fit_model(study, healthy, (), study.file.start, base.train.scale)
+    return Bench(study, data, base, _of_healthy(study, healthy, base, bare), bare)
 
 
-def noise_floor(study: Study, data: Data, base: Fitted) -> NoiseFloor:
-    """The floor of the held-out recordings' error.
+def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> NoiseFloor:
+    """The floor from a healthy recording.
 
-    On a healthy recording effects may be needed, or not even be able to vanish: a delay is not
-    shorter than its bound. So the model counts with them or without, whichever does better.
+    There effects may be needed, or not even be able to vanish: a delay is not shorter than its
+    bound. So the model counts with them or without, whichever does better.
     """
-    healthy, scale = data.of_healthy, base.train.scale
-    if healthy is not None:
-        fits = [fit_model(study, healthy, (), study.file.start, scale)]
-        if base.placements:
-            fits.append(fit_base(study, healthy, scale))
-        return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, "healthy")
-    return from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
+    fits = [bare]
+    if base.placements:
+        fits.append(fit_base(study, healthy, base.train.scale))
+    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, "healthy")
 
 
 def compare(study: Study, *, profiled: bool = False) -> Comparison:
@@ -135,7 +146,7 @@ def comparison(bench: Bench) -> Comparison:
     }
     alone = len(channels) == 1
     total = floor.rms[0] if alone else np.sqrt(np.mean((floor.rms / base.train.scale) ** 2))
-    found = values(base.train)
+    found = values(base.train, beyond(bench.study, bench.data, bench.bare, base))
     weak = [f"{name}: {value.note}" for name, value in found.items() if value.note]
     return Comparison(
         base.train_error,

@@ -1,7 +1,9 @@
 """Explains the gap: ranks what may be missing, gives a verdict and says what to do next."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from rigwatch.workbench.beyond import beyond
 from rigwatch.workbench.calibration import seen
 from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
 from rigwatch.workbench.intervals import Value, values
@@ -98,7 +100,12 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     experiment = None
     if verdict.best is not None and rivals:
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
-    told = [_row(row, members if row is verdict.best else row.alike) for row in rows]
+    more: dict[str, float] = {}
+    if verdict.best is not None and verdict.best.fitted is not None:
+        more = beyond(bench.study, bench.data, bench.bare, verdict.best.fitted)
+    told = [
+        _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
+    ]
     return Explanation(
         verdict.word,
         verdict.text,
@@ -112,11 +119,11 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     )
 
 
-def _row(row: Ranked, alike: list[str]) -> Row:
+def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None) -> Row:
     found: dict[str, Value] = {}
     if row.fitted is not None:
         prefix = row.placement.prefix
-        every = values(row.fitted.train)
+        every = values(row.fitted.train, more)
         found = {n[len(prefix) :]: v for n, v in every.items() if n.startswith(prefix)}
     others = [label for label in alike if label != row.label]
     return Row(

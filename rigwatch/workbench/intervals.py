@@ -11,6 +11,7 @@ with N = JᵀJ, Nb = JbᵀJb and gb = Jbᵀrb of B blocks, and Student's t for B
 and m parameters.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,13 +70,19 @@ def _moved(normal: FloatArray, jacobian: FloatArray, error: FloatArray) -> Float
     )
 
 
-def values(fitted: Fit) -> dict[str, Value]:
-    """Every parameter of the model with its interval."""
+def values(fitted: Fit, beyond: Mapping[str, float] | None = None) -> dict[str, Value]:
+    """Every parameter of the model with its interval.
+
+    Args:
+        fitted: the fit.
+        beyond: variances that the recording does not show, by name.
+    """
     system = fitted.compiled.system
     spread: dict[str, float] = {}
     if system.free:
         matrix, free = covariance(fitted)
-        width = student.ppf(0.5 + CONFIDENCE / 2, free) * np.sqrt(np.diag(matrix))
+        more = np.array([(beyond or {}).get(name, 0.0) for name in system.free])
+        width = student.ppf(0.5 + CONFIDENCE / 2, free) * np.sqrt(np.diag(matrix) + more)
         spread = dict(zip(system.free, width.tolist(), strict=True))
     notes = identifiability(fitted)
     found = {}

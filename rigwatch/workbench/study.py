@@ -14,7 +14,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 from msgspec import Meta, field, structs
+from numpy.typing import NDArray
 
 from rigwatch.physics.engine.effect import Effect, library, load_effects
 from rigwatch.physics.engine.model import Model, load_model, shipped_models
@@ -92,6 +94,19 @@ class StudyFile(Section, frozen=True, kw_only=True):
     effects: Annotated[tuple[Accepted, ...], Meta(description="accepted so far, in order")] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """Parameters that the healthy recording told.
+
+    Attributes:
+        names: of the model's parameters.
+        covariance: of their values, shape (names, names).
+    """
+
+    names: tuple[str, ...]
+    covariance: NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class Study:
     """A study that has been opened.
@@ -102,6 +117,7 @@ class Study:
         model: the base model.
         effects: every effect that may be tried: shipped, from entry points, own; by name.
         own: names of those that are not shipped.
+        kept: what the healthy recording told, None before it was asked.
     """
 
     folder: Path
@@ -109,6 +125,7 @@ class Study:
     model: Model
     effects: Mapping[str, Effect]
     own: frozenset[str]
+    kept: Kept | None = None
 
     @property
     def ledger(self) -> Path:

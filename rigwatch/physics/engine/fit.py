@@ -1,6 +1,6 @@
 """Output-error fits over short horizons, each with its own unknown initial state.
 
-A recording is cut into windows. `Problem` takes their initial states out of the fit, so that SciPy's
+A recording is cut into windows. `Problem` takes their initial states out of the fit; so SciPy's
 bounded least squares sees the parameters alone.
 """
 
