@@ -191,15 +191,7 @@ def rank(
     rows = _scored(study, data, base, candidates(study, data.train))
     kind = "dynamic" if study.model.states else "static"
     chosen = _worth_a_fit(rows, kind)
-    enough: list[Ranked] = []
-    for number, row in enumerate(chosen, start=1):
-        if any(other.cosines[row.label] < SIMILAR for other in enough):
-            row.reason = f"unlike {enough[0].label}, which leaves nothing to explain; not fitted"
-            continue
-        progress(f"fitting {row.label}, {number} of at most {len(chosen)}")
-        refit(study, data, base, row, fit_model)
-        if row.accepted and _leaves_nothing(row, base, floor):
-            enough.append(row)
+    enough = _fit_each(study, data, base, floor, chosen, progress)
     if not enough:
         above = max(1 - floor.ratio(base.train) ** -2, 0.0)
         likely = [row for row in chosen if row.explained > AGAIN * above]
@@ -208,6 +200,27 @@ def rank(
         progress(f"fitting {double.label}, which looks like the best")
         refit(study, data, base, double, fit_model if enough else fit_twice)
     return sorted(rows, key=_order)
+
+
+def _fit_each(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    base: Fitted,
+    floor: NoiseFloor,
+    rows: Sequence[Ranked],
+    progress: Progress,
+) -> list[Ranked]:
+    """Fit rows in turn; those that leave nothing, after which only what is like them is fitted."""
+    enough: list[Ranked] = []
+    for number, row in enumerate(rows, start=1):
+        if any(other.cosines[row.label] < SIMILAR for other in enough):
+            row.reason = f"unlike {enough[0].label}, which leaves nothing to explain; not fitted"
+            continue
+        progress(f"fitting {row.label}, {number} of at most {len(rows)}")
+        refit(study, data, base, row, fit_model)
+        if row.accepted and _leaves_nothing(row, base, floor):
+            enough.append(row)
+    return enough
 
 
 def _try_again(
