@@ -83,7 +83,7 @@ def ours(task: Task) -> Simulator:
     def simulate() -> Result:
         run = compiled.simulate(
             task.inputs, task.dt, task.starts, task.length, initial=task.initial,
-            parameters=task.parameters, substeps=task.substeps,
+            parameters=task.parameters, substeps=task.substeps, finest=1,
         )  # fmt: skip
         return run.outputs, run.slopes
 

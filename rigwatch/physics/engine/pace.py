@@ -22,6 +22,8 @@ STABLE = 1.0
 """Rate times step that is allowed, with a margin."""
 ACCURATE = 0.1
 """The same where a state passes through zero, as speed does: there accuracy asks for more."""
+ALONE = 2.0
+"""The same of a memory that signals drive and that drives nothing itself."""
 FINEST = 256
 """Steps between two samples at most."""
 FILLED = 1
@@ -47,7 +49,8 @@ def pace(system: System) -> Pace:
         return Pace()
     steep = _steep(system)
     asked = [slope / ACCURATE for slope in steep.values()]
-    asked += [slope / STABLE for slope in _of_memory(system)]
+    allowed = STABLE if system.model.states else ALONE
+    asked += [slope / allowed for slope in _of_memory(system)]
     order = list(system.states)
     return Pace(tuple(order.index(name) for name in steep), tuple(asked))
 
