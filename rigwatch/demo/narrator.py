@@ -14,6 +14,8 @@ ACTS = {
     "actuator_gain": ("the valve's gain falls to {value:.0%}", "the valve's gain is whole again"),
 }
 NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
+NAMELESS = "departure"
+"""The alarm that says that something is wrong, and not yet what."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +41,6 @@ def acts(scenario: Scenario) -> Iterator[Act]:
         if not scenario.cycle_s:
             return
         cycle += scenario.cycle_s
-
-
-NAMELESS = "departure"
-"""The alarm that says that something is wrong, and not yet what."""
 
 
 class Narrator:

@@ -32,11 +32,11 @@ def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> S
         ModelError: the model cannot be fitted to the healthy recording.
     """
     healthy = data.of_healthy
-    if healthy is None or not any(p.kept for p in study.model.parameters.values()):
+    kept = [name for name, p in study.model.parameters.items() if p.kept]
+    if healthy is None or not kept:
         return study
     loose = replace(study, model=loosened(study.model))
     found = fit_model(loose, healthy, (), study.file.start, scale)
-    kept = [name for name, p in study.model.parameters.items() if p.kept]
     places = [found.compiled.system.free.index(name) for name in kept]
     uncertain = covariance(found.train)[0][np.ix_(places, places)]
     return replace(

@@ -44,11 +44,16 @@ def _beside_jumps(fitted: Fit, recording: Recording) -> BoolArray:
     """Whether an effect without memory changes at once before or after a sample, shape (n,)."""
     system, values = fitted.compiled.system, fitted.values()
     beside = np.zeros(len(recording), np.bool_)
+    able = [
+        placement
+        for placement in system.placements
+        if system.model.ports[placement.port].kind == "force" and not placement.effect.states
+    ]
+    if not able:
+        return beside
     states = initial_states(system, recording)
-    for placement in system.placements:
-        effect, port = placement.effect, system.model.ports[placement.port]
-        if port.kind != "force" or effect.states:
-            continue
+    for placement in able:
+        effect = placement.effect
         signals = seen(system, placement, recording.inputs, states, recording.dt, values)
         own = {name: values[placement.prefix + name] for name in effect.parameters}
         pushed = evaluated(effect.expression, signals, own, str(placement))

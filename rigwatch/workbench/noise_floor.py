@@ -43,6 +43,10 @@ class NoiseFloor:
         rms = fitted.rms if at is None else fitted.rms_at(at)
         return float(np.sqrt(np.mean((rms / self.rms) ** 2)))
 
+    def above(self, fitted: Fit) -> float:
+        """Share of the error's energy that is above the floor."""
+        return max(1 - self.ratio(fitted) ** -2, 0.0)
+
     def reached(self, fitted: Fit) -> bool:
         """Whether the error is as small as noise makes it."""
         return self.ratio(fitted) <= ALLOWED[self.method]

@@ -77,9 +77,9 @@ def two_effects(
 
 def likely_pairs(bench: Bench, rows: Sequence[Ranked]) -> list[Pair]:
     """The pairs that explain most to first order, but for doubles of one another."""
-    above = max(1 - bench.floor.ratio(bench.base.train) ** -2, 0.0)
+    least = LIKELY * bench.floor.above(bench.base.train)
     every = [_pair(one, other) for one, other in combinations(rows, 2)]
-    likely = [pair for pair in every if pair is not None and pair.explained > LIKELY * above]
+    likely = [pair for pair in every if pair is not None and pair.explained > least]
     chosen: list[Pair] = []
     for pair in sorted(likely, key=lambda pair: -pair.explained):
         if len(chosen) < MOST_PAIRS and not any(_same(pair, other) for other in chosen):
@@ -100,19 +100,8 @@ def _pair(one: Ranked, other: Ranked) -> Pair | None:
     if min(shares) <= 0:
         return None
     explained = a * shares[0] + b * shares[1]
-    start = _start(one, float(shares[0] / a)) | _start(other, float(shares[1] / max(b, 1e-12)))
+    start = one.begin(float(shares[0] / a)) | other.begin(float(shares[1] / max(b, 1e-12)))
     return Pair(one, other, float(explained), start)
-
-
-def _start(row: Ranked, share: float) -> dict[str, float]:
-    """Where a fit begins: the strength alone times a share."""
-    effect, prefix = row.placement.effect, row.placement.prefix
-    p = effect.parameters[effect.strength]
-    values = dict(row.start)
-    if p.role != "switch":
-        strength = p.neutral + share * (values[effect.strength] - p.neutral)
-        values[effect.strength] = float(np.clip(strength, p.low, p.high))
-    return {prefix + name: value for name, value in values.items()}
 
 
 def _same(pair: Pair, other: Pair) -> bool:

@@ -15,6 +15,7 @@ from scipy.stats import t as student
 
 from rigwatch.physics.engine.compiled import FloatArray
 from rigwatch.physics.engine.directions import Candidate, directions, shaped, trajectory
+from rigwatch.physics.engine.effect import EffectParameter
 from rigwatch.physics.engine.recording import Recording, windows
 from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
 from rigwatch.physics.engine.significance import corrected_p_values
@@ -115,6 +116,13 @@ class Ranked:
         """Effect and port in one word."""
         return f"{self.effect}@{self.port}"
 
+    def begin(self, share: float = 1.0) -> dict[str, float]:
+        """Values that its fit starts from, by the system's names: a share of its strength alone."""
+        effect, values = self.placement.effect, dict(self.start)
+        p = effect.parameters[effect.strength]
+        values[effect.strength] = _within(p, share * (values[effect.strength] - p.neutral))
+        return {self.placement.prefix + name: value for name, value in values.items()}
+
     @property
     def held_out_error(self) -> float:
         """Held-out error with it, infinite without a fit."""
@@ -193,8 +201,8 @@ def rank(
     chosen = _worth_a_fit(rows, kind)
     enough = _fit_each(study, data, base, floor, chosen, progress)
     if not enough:
-        above = max(1 - floor.ratio(base.train) ** -2, 0.0)
-        likely = [row for row in chosen if row.explained > AGAIN * above]
+        least = AGAIN * floor.above(base.train)
+        likely = [row for row in chosen if row.explained > least]
         _try_again(study, data, base, likely, progress)
     while double := _unfitted_double(rows):
         progress(f"fitting {double.label}, which looks like the best")
@@ -228,10 +236,11 @@ def _try_again(
 ) -> None:
     """Fit again what may have ended in a local minimum, as nothing explains the error."""
     for row in rows:
-        if row.fitted is None or not may_be_better(study, data, row.fitted, _begin(base, row)):
+        start = base.train.values() | row.begin()
+        if row.fitted is None or not may_be_better(study, data, row.fitted, start):
             continue
         progress(f"fitting {row.label} again, by way of short horizons")
-        row.fitted = fit_again(study, data, row.fitted, _begin(base, row))
+        row.fitted = fit_again(study, data, row.fitted, start)
         judge_fit(base, row)
 
 
@@ -248,9 +257,14 @@ def _unfitted_double(rows: Sequence[Ranked]) -> Ranked | None:
 
 def _leaves_nothing(row: Ranked, base: Fitted, floor: NoiseFloor) -> bool:
     """Whether it explains so much of the error above the floor that only its like could as well."""
+    return left_over(base, row, floor) < 1 - EXPLAINED
+
+
+def left_over(base: Fitted, row: Ranked, floor: NoiseFloor, *, tolerant: bool = False) -> float:
+    """Share of the error above the floor that a row leaves, but for samples at which it jumps."""
     assert row.fitted is not None
-    left = floor.left_over(base.held_out, row.fitted.held_out, row.fitted.calm)
-    return left < 1 - EXPLAINED
+    before, after = base.held_out, row.fitted.held_out
+    return floor.left_over(before, after, row.fitted.calm, tolerant=tolerant)
 
 
 def rank_only(study: Study, data: Data, base: Fitted, found: Sequence[Candidate]) -> Ranked:
@@ -306,8 +320,12 @@ def _best_shapes(
 
 def _start(candidate: Candidate, strength: float) -> dict[str, float]:
     p = candidate.effect.parameters[candidate.effect.strength]
-    value = 1.0 if p.role == "switch" else float(np.clip(p.neutral + strength, p.low, p.high))
-    return {**candidate.shape, candidate.effect.strength: value}
+    return {**candidate.shape, candidate.effect.strength: _within(p, strength)}
+
+
+def _within(p: EffectParameter, strength: float) -> float:
+    """Where the fit of an effect of this strength begins."""
+    return 1.0 if p.role == "switch" else float(np.clip(p.neutral + strength, p.low, p.high))
 
 
 def _worth_a_fit(rows: Sequence[Ranked], kind: str) -> list[Ranked]:
@@ -337,12 +355,6 @@ def _told_by(row: Ranked, told: dict[str, Ranked], likely: Sequence[Ranked]) -> 
     return next((c for c in row.alike if c in told and told[c].free <= row.free), None)
 
 
-def _begin(base: Fitted, row: Ranked) -> dict[str, float]:
-    """Values that the row's fit starts from."""
-    prefix = row.placement.prefix
-    return base.train.values() | {prefix + name: value for name, value in row.start.items()}
-
-
 def refit(
     study: Study, data: Data, base: Fitted, row: Ranked, fitting: Fitting = fit_twice
 ) -> None:
@@ -353,11 +365,9 @@ def refit(
         row: the effect; the fit and what is made of it are added.
         fitting: `fit_model` to be content with the first minimum.
     """
-    placements = (*base.placements, row.placement)
+    placements, start = (*base.placements, row.placement), base.train.values() | row.begin()
     try:
-        row.fitted = fitting(
-            study, data, placements, _begin(base, row), base.train.scale, base=base
-        )
+        row.fitted = fitting(study, data, placements, start, base.train.scale, base=base)
     except ModelError as error:
         row.reason, row.trouble = "cannot be fitted", str(error)
         return

@@ -18,7 +18,7 @@ from rigwatch.physics.engine.score import ALIKE
 from rigwatch.workbench.calibration import CLEAR, Evidence, doubt
 from rigwatch.workbench.fitted import Fitted, block_errors
 from rigwatch.workbench.noise_floor import NoiseFloor
-from rigwatch.workbench.rank import EXPLAINED, SAME, SIMILAR, Ranked
+from rigwatch.workbench.rank import EXPLAINED, SAME, SIMILAR, Ranked, left_over
 
 Word = Literal["nothing_missing", "missing_effect", "undetermined", "unknown_effect"]
 EQUAL = 2.0
@@ -97,9 +97,7 @@ def _word(
 
 def _explains(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
     """Whether it explains the error above the floor, but for samples at which it jumps."""
-    assert row.fitted is not None
-    left = floor.left_over(base.held_out, row.fitted.held_out, row.fitted.calm, tolerant=True)
-    return left <= 1 - EXPLAINED
+    return left_over(base, row, floor, tolerant=True) <= 1 - EXPLAINED
 
 
 def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> float:

@@ -220,7 +220,7 @@ class Problem:
         if not self.system.states:
             return error, slopes
         step = self._steps(error, slopes, rows)
-        for _ in range(steps - 1):
+        for further in reversed(range(steps - 1)):
             size = np.sum(error**2, axis=1)
             (going,) = np.nonzero(self._promise(step, slopes) > worth * size)
             if not len(going):
@@ -234,8 +234,9 @@ class Problem:
                 tried[better],
                 tried_slopes[better],
             )
-            step[took] = self._steps(error[took], slopes[took], rows[took])
-            step[going[~better]] /= 4
+            if further:
+                step[took] = self._steps(error[took], slopes[took], rows[took])
+                step[going[~better]] /= 4
         self._initial = self._initial.copy()
         self._initial[rows] = best
         return error, slopes
