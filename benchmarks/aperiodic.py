@@ -10,8 +10,14 @@ import numpy as np
 
 from benchmarks.rig import RATE, active, blocks, clipped, commissioned, delay, scenario, watched
 from benchmarks.table import Row
-from monitor.conditions import DEPARTURE, DRY_FRICTION, EXCITATION_CHANGED, OTHER_FAULT, STICTION
-from monitor.pipeline import Monitor
+from monitor.pipeline.pipeline import Monitor
+from monitor.signals.conditions import (
+    DEPARTURE,
+    DRY_FRICTION,
+    EXCITATION_CHANGED,
+    OTHER_FAULT,
+    STICTION,
+)
 from sim_plant.excitation import Chirp, Excitation, Multisine, Recorded
 from sim_plant.scenario import Event, Scenario
 

@@ -11,13 +11,13 @@ import numpy as np
 from msgspec import structs
 
 from benchmarks.table import Row
-from monitor.commission import commission
+from monitor.commissioning.commission import commission
 from monitor.detectors import DETECTORS
 from monitor.detectors.selection import detectors_of
-from monitor.model_file import RigModel
-from monitor.recordings import recording_of
-from monitor.rig_monitor import RigMonitor
-from rigwatch.wire.messages import Alarm, Column, SampleBlock
+from monitor.model.model_file import RigModel
+from monitor.pipeline.rig_monitor import RigMonitor
+from monitor.signals.recordings import recording_of
+from rigwatch.wire.messages.message_types import Alarm, Column, SampleBlock
 from sim_plant.scenario import Event, Scenario, ScenarioRun, load_scenario
 
 SCENARIOS = Path(__file__).parents[1] / "configs" / "scenarios"

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.rig import RATE, active, delay, scenario, watched
 from benchmarks.table import Row
-from monitor.conditions import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION
+from monitor.signals.conditions import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION
 from sim_plant.scenario import Experiment, ScenarioRun
 
 SEEDS = 20

@@ -32,11 +32,11 @@ from benchmarks.hidden_effects import (
     study,
 )
 from benchmarks.table import Row
-from rigwatch.physics.engine.effect import load_effects
-from rigwatch.physics.engine.significance import corrected_p_values
-from rigwatch.workbench.compare import Bench, bench_of, comparison
-from rigwatch.workbench.rank import candidates, rank_only, refit, score_all
-from rigwatch.workbench.signals import Data
+from rigwatch.physics.engine.equations.effect import load_effects
+from rigwatch.physics.engine.score.significance import corrected_p_values
+from rigwatch.workbench.compare.compare import Bench, bench_of, comparison
+from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.ranking.rank import candidates, rank_only, refit, score_all
 from sim_plant.oscillator import Hidden, strength_for
 
 CANDIDATES = 30

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from benchmarks.rig import RATE, blocks, commissioned, scenario
 from benchmarks.table import Row
-from monitor.conditions import CONDITION_KINDS, SENSOR_CLIPPED, Condition
-from monitor.limits import rules_for
-from monitor.pipeline import Monitor
+from monitor.decision.decision_rules import rules_for
+from monitor.pipeline.pipeline import Monitor
+from monitor.signals.conditions import CONDITION_KINDS, SENSOR_CLIPPED, Condition
 
 HOURS, QUICK_HOURS = 24.0, 0.1
 FACTORS = (3.0, 4.0, 5.0, 6.0, 7.0, 7.85, 9.0)

@@ -25,18 +25,18 @@ from numpy.typing import NDArray
 
 from benchmarks.hidden import asked, collected, confusion, counted, share_row, wanted
 from benchmarks.table import Row, as_text
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.model import shipped_models
-from rigwatch.physics.engine.recording import Recording
-from rigwatch.workbench import calibration
-from rigwatch.workbench.calibration import Evidence, cell_of
-from rigwatch.workbench.compare import Bench, bench_of
-from rigwatch.workbench.explain import ranking
-from rigwatch.workbench.intervals import values
-from rigwatch.workbench.rank import Ranked, accepted_from
-from rigwatch.workbench.signals import Data
-from rigwatch.workbench.study import Accepted, Span, Study, StudyFile
-from rigwatch.workbench.verdict import Verdict
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.workbench.compare.compare import Bench, bench_of
+from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.explain import verdict_calibration as calibration
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.explain.verdict import Verdict
+from rigwatch.workbench.explain.verdict_calibration import Evidence, cell_of
+from rigwatch.workbench.fit.intervals import values
+from rigwatch.workbench.ranking.rank import Ranked, accepted_from
+from rigwatch.workbench.study.study import Accepted, Span, Study, StudyFile
 from sim_plant.oscillator import (
     DAMPING,
     MASS,

@@ -19,7 +19,7 @@ from benchmarks.hidden import counted, share_row
 from benchmarks.hidden_effects import RIGHT, Case, explained, simulated, study
 from benchmarks.rivals import NOTHING, TERMS, pysindy_names, sysidentpy_names
 from benchmarks.table import Row
-from rigwatch.workbench.signals import Data
+from rigwatch.workbench.data.signals import Data
 from sim_plant.oscillator import UNKNOWN
 
 POLYNOMIAL = ("constant_force", "quadratic_stiffness", "cubic_stiffness")

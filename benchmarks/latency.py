@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from benchmarks.live_rig import LiveRig, live_rig
 from benchmarks.table import Row
-from rigwatch.wire.realtime import MONITOR, prepare_for_real_time, raise_priority
+from rigwatch.wire.host.realtime import MONITOR, prepare_for_real_time, raise_priority
 
 if TYPE_CHECKING:
     from sim_plant.serve.serial_server import SerialServer
@@ -143,9 +143,9 @@ def _serve(server: "SerialServer", stop: threading.Event) -> None:
 
 def subscriber(config: Path, out: Path, stop: threading.Event) -> None:
     """Notes when each sample's estimate is there."""
-    from rigwatch.wire.bus import connect
+    from rigwatch.wire.bus.bus import connect
+    from rigwatch.wire.messages.topics import ESTIMATES
     from rigwatch.wire.rig_config import load_rig
-    from rigwatch.wire.topics import ESTIMATES
 
     bus = connect(load_rig(config), "subscriber")
     estimates = bus.subscribe(ESTIMATES)

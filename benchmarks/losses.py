@@ -21,7 +21,7 @@ from benchmarks.live_rig import LiveRig, live_rig
 from benchmarks.table import Row
 
 if TYPE_CHECKING:
-    from rigwatch.wire.messages import Gap, SampleBlock
+    from rigwatch.wire.messages.message_types import Gap, SampleBlock
 
 READERS = ("reader-1", "reader-2")
 END_OF_RUN = 512
@@ -127,7 +127,7 @@ def read_ledger(path: Path) -> Spans:
 
 def read_recording(rig: LiveRig) -> Spans:
     """What the recorder kept, and what it reported lost."""
-    from rigwatch.wire.messages import Gap, SampleBlock
+    from rigwatch.wire.messages.message_types import Gap, SampleBlock
     from rigwatch.wire.session.reader import open_session
 
     spans: Spans = {}
@@ -144,10 +144,10 @@ def read_recording(rig: LiveRig) -> Spans:
 
 def reader(config: str, name: str, log: str) -> None:
     """A reader that writes down what it gets, and goes on there after it was killed."""
-    from rigwatch.wire.bus import connect
-    from rigwatch.wire.messages import Event
+    from rigwatch.wire.bus.bus import connect
+    from rigwatch.wire.delivery.sample_reader import SampleReader
+    from rigwatch.wire.messages.message_types import Event
     from rigwatch.wire.rig_config import load_rig
-    from rigwatch.wire.sample_reader import SampleReader
 
     file = os.open(log, os.O_RDWR | os.O_CREAT | os.O_APPEND)
     samples = SampleReader(connect(load_rig(config), name), resume_after=_position(file))
@@ -169,7 +169,7 @@ def _position(file: int) -> tuple[int, int] | None:
 
 
 def _lines(items: list["SampleBlock | Gap"]) -> Iterator[str]:
-    from rigwatch.wire.messages import Gap
+    from rigwatch.wire.messages.message_types import Gap
 
     for item in items:
         if isinstance(item, Gap):

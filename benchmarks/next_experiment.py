@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from benchmarks.hidden_effects import HORIZON, RIGHT, SAMPLES, explained, study
 from benchmarks.table import Row
-from rigwatch.physics.engine.recording import Recording
-from rigwatch.workbench.explain import explanation
-from rigwatch.workbench.next_experiment import excitation
-from rigwatch.workbench.signals import Data
+from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.explain.explain import explanation
+from rigwatch.workbench.explain.next_experiment import excitation
 from sim_plant.oscillator import RATE, Hidden, oscillate, strength_for
 
 NOISE = 0.02

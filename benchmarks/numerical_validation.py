@@ -11,10 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.table import Row
-from monitor.friction_filter import GAMMAS, VALIDATION_ORDERS, FrictionFilter, fit_friction_filter
-from monitor.thresholds import Thresholds, thesis_thresholds
-from monitor.window import new_window, windowed_least_squares
-from rigwatch.physics.transfer_function import FloatArray, TransferFunction
+from monitor.commissioning.friction_filter import (
+    GAMMAS,
+    VALIDATION_ORDERS,
+    FrictionFilter,
+    fit_friction_filter,
+)
+from monitor.estimation.thesis_thresholds import Thresholds, thesis_thresholds
+from monitor.estimation.window import new_window, windowed_least_squares
+from rigwatch.physics.transfer.transfer_function import FloatArray, TransferFunction
 from sim_plant.second_order import FAULT_TIME, NOISE, STEP, Validation, validation
 
 WINDOW, HOP = 300, 20

@@ -9,7 +9,7 @@ from msgspec import structs
 
 from benchmarks.rig import clipped, delay, scenario, watched
 from benchmarks.table import Row
-from monitor.conditions import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION
+from monitor.signals.conditions import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION
 from sim_plant.effects import EFFECTS, Effect
 from sim_plant.scenario import Event, Scenario
 

@@ -12,11 +12,11 @@ from msgspec import structs
 
 from benchmarks.rig import RATE, blocks, commissioned, scenario
 from benchmarks.table import Row
-from monitor.conditions import DEPARTURE
-from monitor.pipeline import Monitor
-from monitor.probable import WAIT
-from monitor.suspects import LEVEL, Evidence, Suspect, suspects
-from rigwatch.physics.engine.effect import library
+from monitor.diagnosis.background_ranking import WAIT
+from monitor.diagnosis.fault_candidates import LEVEL, Evidence, Suspect, suspects
+from monitor.pipeline.pipeline import Monitor
+from monitor.signals.conditions import DEPARTURE
+from rigwatch.physics.engine.equations.effect import library
 from sim_plant.effects import EFFECTS
 from sim_plant.scenario import Event
 

@@ -10,16 +10,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from benchmarks.table import Row
-from monitor.model_file import load_model
-from monitor.rig_monitor import RigMonitor, compile_kernels
+from monitor.model.model_file import load_model
+from monitor.pipeline.rig_monitor import RigMonitor, compile_kernels
 from rigwatch.replay.cases import load_cases, replayed
 from rigwatch.replay.choice import monitor_for
 from rigwatch.replay.reference import Output
 from rigwatch.replay.run import replay
 from rigwatch.simulated import simulate
-from rigwatch.wire.blocks import pieces
-from rigwatch.wire.messages import SampleBlock
-from rigwatch.wire.schema import encode
+from rigwatch.wire.messages.blocks import pieces
+from rigwatch.wire.messages.message_types import SampleBlock
+from rigwatch.wire.messages.protobuf import encode
 from rigwatch.wire.session import SessionWriter, open_session, run_info
 
 ROOT = Path(__file__).parents[1]

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor.commission import commission
-from monitor.conditions import SENSOR_CLIPPED
-from monitor.model_file import RigModel
-from monitor.pipeline import Monitor, Result
-from monitor.recordings import Recording, Role, recording_of
-from rigwatch.wire.messages import Column, SampleBlock
+from monitor.commissioning.commission import commission
+from monitor.model.model_file import RigModel
+from monitor.pipeline.pipeline import Monitor, Result
+from monitor.signals.conditions import SENSOR_CLIPPED
+from monitor.signals.recordings import Recording, Role, recording_of
+from rigwatch.wire.messages.message_types import Column, SampleBlock
 from sim_plant.scenario import Scenario, ScenarioRun, load_scenario
 
 SCENARIOS = Path(__file__).parents[1] / "configs" / "scenarios"

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.recording import Recording
+from rigwatch.physics.engine.fit.recording import Recording
 from sim_plant.excitation import Multisine, drive
 from sim_plant.parameters import RigParameters
 from sim_plant.rig import Rig

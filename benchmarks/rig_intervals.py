@@ -13,11 +13,11 @@ from benchmarks.hidden import counted, share_row
 from benchmarks.hidden_effects_rig import Case, simulated, study_of
 from benchmarks.rig_hidden import settings
 from benchmarks.table import Row
-from rigwatch.workbench.beyond import beyond
-from rigwatch.workbench.compare import bench_of
-from rigwatch.workbench.intervals import values
-from rigwatch.workbench.noise_floor import quiet_scale
-from rigwatch.workbench.rank import candidates, rank_only, refit
+from rigwatch.workbench.compare.compare import bench_of
+from rigwatch.workbench.compare.uncertainty_budget import beyond
+from rigwatch.workbench.data.noise_floor import quiet_scale
+from rigwatch.workbench.fit.intervals import values
+from rigwatch.workbench.ranking.rank import candidates, rank_only, refit
 
 STRENGTHS = {
     "viscous": ("viscous", "load", "d"),

@@ -25,7 +25,7 @@ from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
 from threadpoolctl import threadpool_limits
 
-from rigwatch.physics.engine.recording import Recording
+from rigwatch.physics.engine.fit.recording import Recording
 
 FloatArray = NDArray[np.float64]
 NOTHING = "nothing_missing"

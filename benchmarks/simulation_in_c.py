@@ -11,8 +11,8 @@ import numpy as np
 import sympy
 
 from benchmarks.simulation_task import Result, Simulator, Task
-from rigwatch.physics.engine.codegen import derivative
-from rigwatch.physics.engine.scope import symbol
+from rigwatch.physics.engine.compile.derivatives import derivative
+from rigwatch.physics.engine.equations.scope import symbol
 
 FLAGS = ("-O3", "-march=native")
 _DRIVER = """

@@ -21,7 +21,7 @@ from scipy.integrate import solve_ivp
 from sympy.printing.numpy import NumPyPrinter
 
 from benchmarks.simulation_task import FloatArray, Result, Simulator, Task
-from rigwatch.physics.engine.numeric import numpy_function
+from rigwatch.physics.engine.compile.static_kernel import numpy_function
 
 _CASADI = {
     "where": casadi.if_else, "maximum": casadi.fmax, "minimum": casadi.fmin,

@@ -24,10 +24,10 @@ from benchmarks.simulation_rivals import (
 )
 from benchmarks.simulation_task import FloatArray, Result, Simulator, Task
 from benchmarks.table import Row
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.model import shipped_models
-from rigwatch.physics.engine.system import Placement, System, compose
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.equations.system import Placement, System, compose
 
 LENGTH = 256
 BAR = 1.5

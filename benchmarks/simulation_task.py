@@ -7,8 +7,8 @@ import numpy as np
 import sympy
 from numpy.typing import NDArray
 
-from rigwatch.physics.engine.scope import symbol
-from rigwatch.physics.engine.system import TIME, System
+from rigwatch.physics.engine.equations.scope import symbol
+from rigwatch.physics.engine.equations.system import TIME, System
 
 FloatArray = NDArray[np.float64]
 Result = tuple[FloatArray, FloatArray]

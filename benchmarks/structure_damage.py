@@ -17,12 +17,12 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from benchmarks.table import Row
-from rigwatch.structures.damage import Examination, Settings, examine
-from rigwatch.structures.damage_threshold import false_alarm, threshold_for
-from rigwatch.structures.description import Load, Structure, coefficients, load_structure
-from rigwatch.structures.identification import identify
-from rigwatch.structures.record import FloatArray, Record
-from rigwatch.structures.spring_model import SpringModel, split
+from rigwatch.structures.damage.examination import Examination, Settings, examine
+from rigwatch.structures.damage.spring_model import SpringModel, split
+from rigwatch.structures.damage.threshold import false_alarm, threshold_for
+from rigwatch.structures.identification.identify import identify
+from rigwatch.structures.model.description import Load, Structure, coefficients, load_structure
+from rigwatch.structures.records.record import FloatArray, Record
 from rigwatch.wire.errors import RigwatchError
 from sim_plant.structure import Damage, simulate, with_noise
 

@@ -18,12 +18,12 @@ from scipy.optimize import least_squares
 from benchmarks.structures_published import NAMES, NOISE, ROWS, Published
 from benchmarks.structures_thesis import thesis_record
 from benchmarks.table import Row
-from rigwatch.structures.description import Load, Structure, coefficient, load_structure
-from rigwatch.structures.edit import with_values
-from rigwatch.structures.identification import Identification, identify, solved
-from rigwatch.structures.matrices import mass_matrix, stiffness_matrix
-from rigwatch.structures.problem import problem_of
-from rigwatch.structures.record import Record
+from rigwatch.structures.identification.identify import Identification, identify, solved
+from rigwatch.structures.identification.problem import problem_of
+from rigwatch.structures.model.description import Load, Structure, coefficient, load_structure
+from rigwatch.structures.model.edit import with_values
+from rigwatch.structures.model.matrices import mass_matrix, stiffness_matrix
+from rigwatch.structures.records.record import Record
 from sim_plant.structure import simulate, with_noise
 
 FILE = Path(__file__).parent.parent / "configs" / "structures" / "kabe_antenna.toml"

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.structures_published import Published
-from rigwatch.structures.description import Structure
-from rigwatch.structures.edit import with_values
-from rigwatch.structures.integrators import DORMAND_PRINCE
-from rigwatch.structures.matrices import mass_matrix, stiffness_matrix
-from rigwatch.structures.record import Record
+from rigwatch.structures.identification.integrators import DORMAND_PRINCE
+from rigwatch.structures.model.description import Structure
+from rigwatch.structures.model.edit import with_values
+from rigwatch.structures.model.matrices import mass_matrix, stiffness_matrix
+from rigwatch.structures.records.record import Record
 
 FloatArray = NDArray[np.float64]
 Rates = Callable[[float, FloatArray], FloatArray]

@@ -16,12 +16,18 @@ from msgspec import structs
 from benchmarks.other_faults import value_of
 from benchmarks.rig import RATE, active, blocks, clipped, delay, record_of, scenario
 from benchmarks.table import Row
-from monitor.commission import commission
-from monitor.conditions import DEPARTURE, DRY_FRICTION, EXCITATION_CHANGED, OTHER_FAULT, STICTION
-from monitor.model_file import RigModel
-from monitor.pipeline import Monitor
-from monitor.recordings import Role
-from rigwatch.physics.transfer_function import FloatArray
+from monitor.commissioning.commission import commission
+from monitor.model.model_file import RigModel
+from monitor.pipeline.pipeline import Monitor
+from monitor.signals.conditions import (
+    DEPARTURE,
+    DRY_FRICTION,
+    EXCITATION_CHANGED,
+    OTHER_FAULT,
+    STICTION,
+)
+from monitor.signals.recordings import Role
+from rigwatch.physics.transfer.transfer_function import FloatArray
 from sim_plant.effects import EFFECTS, Effect
 from sim_plant.excitation import Sine, Square, Triangle
 from sim_plant.parameters import RigParameters

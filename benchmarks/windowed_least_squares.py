@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.table import Row
-from monitor.window import new_window, windowed_least_squares
+from monitor.estimation.window import new_window, windowed_least_squares
 
 Floats = NDArray[np.float64]
 WINDOW = 300

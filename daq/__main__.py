@@ -15,11 +15,10 @@ from daq.adapters import adapter_for
 from daq.publisher import Publisher
 from daq.supervisor import Supervisor
 from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.heartbeat import Heartbeat
-from rigwatch.wire.realtime import DAQ, prepare_for_real_time, raise_priority
+from rigwatch.wire.host import DAQ, Heartbeat, prepare_for_real_time, raise_priority
 from rigwatch.wire.rig_config import RigConfig, load_rig
-from rigwatch.wire.ring import SampleRing
 
 
 def acquire(config: RigConfig, adapter: Adapter, bus: Bus, stop: threading.Event) -> None:

@@ -3,9 +3,19 @@
 from collections.abc import Iterable
 
 from rigwatch.wire.bus import Bus
-from rigwatch.wire.messages import Event, Gap, Health, Message, SampleBlock
-from rigwatch.wire.ring import SampleRing
-from rigwatch.wire.topics import EVENTS, GAPS, HEALTH, SAMPLES, Topic
+from rigwatch.wire.delivery import SampleRing
+from rigwatch.wire.messages import (
+    EVENTS,
+    GAPS,
+    HEALTH,
+    SAMPLES,
+    Event,
+    Gap,
+    Health,
+    Message,
+    SampleBlock,
+    Topic,
+)
 
 _TOPICS: dict[type[Message], Topic] = {
     SampleBlock: SAMPLES,

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.wire import quality
 from rigwatch.wire.messages import Event, Health, Message, SampleBlock, Severity
+from rigwatch.wire.messages import quality_flags as quality
 
 _SECOND = 1_000_000_000
 _SLOW = 0.9

@@ -10,20 +10,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.wire.errors import ConfigError, RigwatchError
-from rigwatch.wire.heartbeat import Heartbeat
+from rigwatch.wire.host import Heartbeat
 from rigwatch.wire.rig_config import PlantSection, RigConfig, load_rig, section_or_error
 from sim_plant.effects import CHANNELS, EFFECTS
 from sim_plant.scenario import ScenarioRun, load_scenario
-from sim_plant.serve.commands import Commands, Controlled
-from sim_plant.serve.control import ControlServer, control_path
-from sim_plant.serve.line_faults import LineFaults
-from sim_plant.serve.pty_bridge import PtyBridge
-from sim_plant.serve.pty_line import PtyLine
-from sim_plant.serve.serial_server import SerialServer
-from sim_plant.serve.source import Device
+from sim_plant.serve import (
+    Commands,
+    Controlled,
+    ControlServer,
+    Device,
+    LineFaults,
+    PtyBridge,
+    PtyLine,
+    SerialServer,
+    control_path,
+)
 
 if TYPE_CHECKING:
-    from sim_plant.serve.modbus_server import ModbusServer
+    from sim_plant.serve import ModbusServer
 
 
 def serve(config: RigConfig, plant: PlantSection, stop: threading.Event) -> None:
@@ -70,8 +74,7 @@ def _modbus_rtu(
 
 def _modbus(device: Device, rate: float) -> "ModbusServer":
     # pymodbus takes a third of a second to import, which the serial line need not wait for.
-    from sim_plant.serve.modbus_server import ModbusServer
-    from sim_plant.serve.register_bank import RegisterBank
+    from sim_plant.serve import ModbusServer, RegisterBank
 
     return ModbusServer(device, RegisterBank(len(CHANNELS)), rate, heartbeat=Heartbeat("plant"))
 

@@ -12,8 +12,8 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from rigwatch.wire.config import Section
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files import Section
 
 Source = Callable[[NDArray[np.int64]], NDArray[np.float64]]
 """Sample numbers to volts, same shape."""

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta, structs
 from numpy.typing import NDArray
 
-from rigwatch.wire.config import Section, load
+from rigwatch.wire.typed_files import Section, load
 
 INCH = 0.0254
 """[m]"""

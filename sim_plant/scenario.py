@@ -15,8 +15,8 @@ from typing import Annotated
 import numpy as np
 from msgspec import Meta, field, structs
 
-from rigwatch.wire.config import Section, load
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files import Section, load
 from sim_plant.effects import complaint
 from sim_plant.excitation import Excitation, drive
 from sim_plant.parameters import RigParameters

@@ -12,8 +12,8 @@ from typing import Any, cast
 import msgspec
 from msgspec import inspect
 
-from rigwatch.wire.config import Section
 from rigwatch.wire.rig_config import RigConfig
+from rigwatch.wire.typed_files.loading import Section
 from sim_plant.scenario import Scenario
 
 TARGET = Path(__file__).parent.parent / "docs" / "configuration.md"

@@ -1,47 +1,5 @@
-"""The adapters that come with rigwatch, and how others are found.
+"""Adapters: devices that samples are read from, found by name through entry points."""
 
-Adapters are entry points in the group `rigwatch.adapters`; the ones here are registered there like
-those of anybody else. An entry point names a callable `factory(section, channels) -> Adapter`.
-"""
+from daq.adapters.registry import adapter_for, known
 
-from collections.abc import Callable
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
-
-from daq.adapter import Adapter
-from rigwatch.wire.errors import DeviceError
-from rigwatch.wire.rig_config import ChannelSection, DeviceSection, PluginSection
-
-GROUP = "rigwatch.adapters"
-Factory = Callable[[Any, tuple[ChannelSection, ...]], Adapter]
-
-
-def adapter_for(section: DeviceSection, channels: tuple[ChannelSection, ...]) -> Adapter:
-    """The adapter that `section` asks for, not yet opened.
-
-    Raises:
-        DeviceError: no adapter has that name, or it cannot be loaded.
-    """
-    name = section.name if isinstance(section, PluginSection) else _tag(section)
-    options = section.options if isinstance(section, PluginSection) else section
-    return _factory(name)(options, channels)
-
-
-def known() -> dict[str, EntryPoint]:
-    """Every adapter that is installed, by name."""
-    return {point.name: point for point in entry_points(group=GROUP)}
-
-
-def _tag(section: DeviceSection) -> str:
-    return str(section.__struct_config__.tag)
-
-
-def _factory(name: str) -> Factory:
-    points = known()
-    if name not in points:
-        raise DeviceError(f"adapter {name!r} is not installed; found {', '.join(sorted(points))}")
-    try:
-        factory: Factory = points[name].load()
-    except Exception as error:
-        raise DeviceError(f"adapter {name!r} ({points[name].value}): {error}") from error
-    return factory
+__all__ = ["adapter_for", "known"]

@@ -15,14 +15,8 @@ from typing import Protocol
 import numpy as np
 
 from daq.adapter import RawBlock
+from rigwatch.wire.device import HEADER_LENGTH, Header, WordOrder, decode_header, decode_slots
 from rigwatch.wire.errors import DeviceError, ModbusError
-from rigwatch.wire.modbus_map import (
-    HEADER_LENGTH,
-    Header,
-    WordOrder,
-    decode_header,
-    decode_slots,
-)
 
 _FAILURES = 3
 _MARGIN = 8

@@ -19,8 +19,8 @@ import numpy as np
 import serial
 
 from daq.adapter import DeviceBusyError, RawBlock
+from rigwatch.wire.device import Frame, FrameDecoder
 from rigwatch.wire.errors import DeviceError
-from rigwatch.wire.frame import Frame, FrameDecoder
 from rigwatch.wire.rig_config import ChannelSection, SerialSection
 
 _CHUNK = 4096

@@ -24,7 +24,7 @@ from monitor.alarms.kinds import ALARM_FLOOD, REFINED, check_settings, order_of,
 from monitor.alarms.operator import refusal, wanted
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
-from monitor.conditions import Condition
+from monitor.signals import Condition
 from rigwatch.wire.messages import Alarm, AlarmCommand, Event, IntArray
 from rigwatch.wire.rig_config import AlarmSection
 

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 
 from monitor.alarms.debounce import is_zero
-from monitor.conditions import Condition
-from rigwatch.wire import quality
+from monitor.signals import Condition
 from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.messages import quality_flags as quality
 
 SENSOR_CONDITIONS = {
     quality.NON_FINITE: "sensor_non_finite",

@@ -12,14 +12,14 @@ from dataclasses import asdict
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor.admission import GOOD, NEW_BOOT
 from monitor.detectors.adaptive_threshold import AdaptiveThreshold, fit_threshold
 from monitor.detectors.detector import Channels
 from monitor.detectors.high_pass import high_passed, leaky
 from monitor.detectors.innovation_test import nis_limit
 from monitor.detectors.parity import OperatingPoint, ParityDetector
 from monitor.detectors.unknown_input import NoiseModel, UnknownInputDetector
-from rigwatch.physics.transfer_function import FloatArray, TransferFunction
+from monitor.signals import GOOD, NEW_BOOT
+from rigwatch.physics.transfer import FloatArray, TransferFunction
 from rigwatch.wire.errors import ModelError
 
 Figures = Mapping[str, float]

@@ -14,9 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from monitor.admission import Admission
-from monitor.conditions import Condition
-from rigwatch.physics.transfer_function import FloatArray
+from monitor.signals import Admission, Condition
+from rigwatch.physics.transfer import FloatArray
 from rigwatch.wire.messages import Column, SampleBlock
 
 Findings = tuple[tuple[Column, ...], tuple[Condition, ...]]

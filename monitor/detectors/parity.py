@@ -27,7 +27,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.admission import DEAD, HELD, NEW_BOOT, RESTART
 from monitor.detectors.adaptive_threshold import (
     AdaptiveThreshold,
     ThresholdState,
@@ -36,7 +35,8 @@ from monitor.detectors.adaptive_threshold import (
 )
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
 from monitor.detectors.high_pass import forgetting
-from rigwatch.physics.transfer_function import FloatArray, TransferFunction, filter_sample
+from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
+from rigwatch.physics.transfer import FloatArray, TransferFunction, filter_sample
 from rigwatch.wire.errors import ModelError
 
 

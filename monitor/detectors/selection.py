@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from monitor.detectors import detector_kind
 from monitor.detectors.detector import Channels, Detector
-from monitor.model_file import ReferenceSection, RigModel, TransferPlant
-from rigwatch.physics.transfer_function import FloatArray
+from monitor.detectors.registry import detector_kind
+from monitor.model import ReferenceSection, RigModel, TransferPlant
+from rigwatch.physics.transfer import FloatArray
 from rigwatch.wire.errors import ConfigError
 
 FRICTION = "friction"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.physics.transfer_function import FloatArray, TransferFunction
+from rigwatch.physics.transfer import FloatArray, TransferFunction
 from rigwatch.wire.errors import ModelError
 
 

@@ -24,18 +24,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.admission import DEAD, HELD, NEW_BOOT, RESTART
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
 from monitor.detectors.high_pass import forgetting, high_pass_sample, leaky
 from monitor.detectors.innovation_test import NisWindow, new_nis_window, push_nis
-from monitor.detectors.kalman import (
-    augmented_matrices,
-    generalised_update,
-    kalman_update,
-)
+from monitor.detectors.kalman import augmented_matrices, generalised_update, kalman_update
 from monitor.detectors.small_matrices import inverse, product, product_transposed, times
 from monitor.detectors.state_space import state_space
-from rigwatch.physics.transfer_function import FloatArray, TransferFunction
+from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
+from rigwatch.physics.transfer import FloatArray, TransferFunction
 from rigwatch.wire.errors import ModelError
 
 

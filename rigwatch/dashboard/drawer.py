@@ -10,8 +10,7 @@ import time
 
 import rerun as rr
 
-from rigwatch.dashboard.board import APPLICATION, Dashboard
-from rigwatch.dashboard.facts import Facts
+from rigwatch.dashboard.board import APPLICATION, Dashboard, Facts
 from rigwatch.dashboard.feed import Feed
 
 _FLUSH_TIMEOUT = 5.0

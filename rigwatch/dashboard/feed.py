@@ -4,11 +4,19 @@ A screen may leave something out, so that nothing is asked of anybody twice: wha
 drops is counted and shown.
 """
 
-from rigwatch.wire.alarm_list import ask_alarm_list
-from rigwatch.wire.bus import Bus
+from rigwatch.wire.bus import Bus, ask_alarm_list
 from rigwatch.wire.errors import BusError
-from rigwatch.wire.messages import Alarm, Message
-from rigwatch.wire.topics import ALARMS, ESTIMATES, EVENTS, GAPS, HEALTH, RUN, SAMPLES
+from rigwatch.wire.messages import (
+    ALARMS,
+    ESTIMATES,
+    EVENTS,
+    GAPS,
+    HEALTH,
+    RUN,
+    SAMPLES,
+    Alarm,
+    Message,
+)
 
 _DRAWN = (RUN, SAMPLES, ESTIMATES, ALARMS, GAPS, HEALTH, EVENTS)
 _ASK_TIMEOUT = 0.5

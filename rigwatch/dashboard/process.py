@@ -11,16 +11,14 @@ import threading
 import time
 from collections.abc import Callable
 
+from rigwatch.dashboard.board import Facts
 from rigwatch.dashboard.drawer import Drawer
-from rigwatch.dashboard.facts import Facts
 from rigwatch.dashboard.feed import Feed
-from rigwatch.dashboard.opening import Choice, open_viewer
-from rigwatch.dashboard.viewer import ForeignViewer, Viewer, ViewerError
+from rigwatch.dashboard.viewer import Choice, ForeignViewer, Viewer, ViewerError, open_viewer
 from rigwatch.wire.bus import Bus
-from rigwatch.wire.heartbeat import Heartbeat
-from rigwatch.wire.messages import Health
+from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.messages import HEALTH, Health
 from rigwatch.wire.rig_config import DashboardSection
-from rigwatch.wire.topics import HEALTH
 
 _TURN = 0.2
 _HEALTH_PERIOD = 1.0

@@ -11,13 +11,9 @@ from pathlib import Path
 import rerun as rr
 from rerun.experimental import ViewerClient
 
-from rigwatch.dashboard import entities as at
-from rigwatch.dashboard.alarm_book import NAMED_FAULTS, is_active
-from rigwatch.dashboard.board import APPLICATION, Dashboard
-from rigwatch.dashboard.facts import Facts
-from rigwatch.dashboard.layout import Windows
-from rigwatch.dashboard.picture import save_picture
-from rigwatch.dashboard.viewer import RECORDING_MEMORY, Viewer, ViewerError
+from rigwatch.dashboard.board import APPLICATION, NAMED_FAULTS, Dashboard, Facts, Windows, is_active
+from rigwatch.dashboard.board import entities as at
+from rigwatch.dashboard.viewer import RECORDING_MEMORY, Viewer, ViewerError, save_picture
 from rigwatch.wire.messages import Alarm, Message
 
 _FLUSH_AFTER = 16384

@@ -18,10 +18,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.experimental import ViewerClient
 
-from rigwatch.dashboard import palette
-from rigwatch.dashboard.board import APPLICATION
-from rigwatch.dashboard.picture import save_picture
-from rigwatch.dashboard.viewer import Viewer, ViewerError
+from rigwatch.dashboard.board import APPLICATION, palette
+from rigwatch.dashboard.viewer import Viewer, ViewerError, save_picture
 from rigwatch.wire.messages import FloatArray
 
 TIMELINE = "recording"

@@ -5,3 +5,9 @@ commissioning.py recordings of the simulated rig, and the monitor's model made f
 narrator.py      what happens, in plain words, as it happens
 verdict.py       whether the fault was found and named, and whether the recording is whole
 """
+
+from rigwatch.demo.commissioning import ensure_model
+from rigwatch.demo.rig_file import find_config, forget_alarms, write_rig_file
+from rigwatch.demo.show import Show
+
+__all__ = ["Show", "ensure_model", "find_config", "forget_alarms", "write_rig_file"]

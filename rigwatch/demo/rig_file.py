@@ -10,7 +10,7 @@ import msgspec
 from msgspec import structs
 
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.ports import endpoint_address, free_port, is_free
+from rigwatch.wire.host import endpoint_address, free_port, is_free
 from rigwatch.wire.rig_config import (
     BusSection,
     DaqSection,

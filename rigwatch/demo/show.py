@@ -17,9 +17,8 @@ from rigwatch.demo.rig_file import relative
 from rigwatch.demo.verdict import ALARM, Recording, complaints, newest_session, read_recording
 from rigwatch.wire.bus import connect, unique_process
 from rigwatch.wire.errors import DeviceError
-from rigwatch.wire.messages import Alarm, SampleBlock
+from rigwatch.wire.messages import ALARMS, SAMPLES, Alarm, SampleBlock
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.topics import ALARMS, SAMPLES
 from sim_plant.scenario import load_scenario
 
 START_TIMEOUT = 180.0

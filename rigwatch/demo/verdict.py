@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm
-from rigwatch.wire.session.reader import open_session
+from rigwatch.wire.session import open_session
 
 ALARM = "dry_friction"
 WORDS = "dry friction"

@@ -5,3 +5,11 @@ machine.py   Python, packages, compiled kernels, clock, scheduling, disk
 viewer.py    what the dashboard can be shown with
 rig.py       a configuration: files it names, ports, device
 """
+
+from rigwatch.doctor.alive import check_alive
+from rigwatch.doctor.finding import Finding
+from rigwatch.doctor.machine import check_machine
+from rigwatch.doctor.rig import check_rig
+from rigwatch.doctor.viewer import check_viewer
+
+__all__ = ["Finding", "check_alive", "check_machine", "check_rig", "check_viewer"]

@@ -7,10 +7,9 @@ from pathlib import Path
 from rigwatch.doctor.finding import Finding, judged
 from rigwatch.wire.bus import Bus, connect, unique_process
 from rigwatch.wire.errors import BusError
-from rigwatch.wire.messages import Health
-from rigwatch.wire.ports import endpoint_address
+from rigwatch.wire.host import endpoint_address
+from rigwatch.wire.messages import ALIVE_KEY, HEALTH, Health
 from rigwatch.wire.rig_config import PlantSection, RigConfig
-from rigwatch.wire.topics import ALIVE_KEY, HEALTH
 
 ROUTER_TIMEOUT = 3.0
 WORD_TIMEOUT = 3.0

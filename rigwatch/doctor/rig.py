@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rigwatch.doctor.finding import Finding, judged
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.ports import endpoint_address, is_free
+from rigwatch.wire.host import endpoint_address, is_free
 from rigwatch.wire.rig_config import ModbusRtuSection, RigConfig, SerialSection, load_rig
 
 LOOPBACK = "127.0.0.1"

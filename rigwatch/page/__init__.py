@@ -2,3 +2,8 @@
 
 Shared by the reports of workbench and structures; it knows neither of them.
 """
+
+from rigwatch.page.html import exact, figure, key, page, table
+from rigwatch.page.svg import Plot, limits
+
+__all__ = ["Plot", "exact", "figure", "key", "limits", "page", "table"]

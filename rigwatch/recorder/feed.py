@@ -1,9 +1,8 @@
 """Everything on the bus that is worth keeping: samples without a hole, the rest as it comes."""
 
 from rigwatch.wire.bus import Bus
-from rigwatch.wire.messages import Event, Gap, Message, SampleBlock
-from rigwatch.wire.sample_reader import SampleReader
-from rigwatch.wire.topics import RUN, SAMPLES, TOPICS
+from rigwatch.wire.delivery import SampleReader
+from rigwatch.wire.messages import RUN, SAMPLES, TOPICS, Event, Gap, Message, SampleBlock
 
 _SUBSCRIBED = tuple(line for line in TOPICS if line.recorded and line not in (SAMPLES, RUN))
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import RunInfo
-from rigwatch.wire.session.reader import SUFFIX, Session, open_session
+from rigwatch.wire.session import SUFFIX, Session, open_session
 
 LONGEST_BREAK = 120.0
 """Break after which a recorder begins a new session [s]."""

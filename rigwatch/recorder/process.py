@@ -14,11 +14,10 @@ from rigwatch.recorder.feed import Feed
 from rigwatch.recorder.folders import choose
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, connect
-from rigwatch.wire.heartbeat import Heartbeat
-from rigwatch.wire.messages import Event, Health, RunInfo
+from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.messages import EVENTS, HEALTH, RUN, Event, Health, RunInfo
 from rigwatch.wire.rig_config import RecorderSection, RigConfig, load_rig
-from rigwatch.wire.session.writer import run_info
-from rigwatch.wire.topics import EVENTS, HEALTH, RUN
+from rigwatch.wire.session import run_info
 
 PROCESS = "recorder"
 HEALTH_EVERY = 1.0

@@ -12,8 +12,7 @@ from pathlib import Path
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import EstimateBlock, Event, Message, RunInfo, SampleBlock, Severity
-from rigwatch.wire.session.reader import SUFFIX
-from rigwatch.wire.session.writer import SessionWriter, merge_pending
+from rigwatch.wire.session import SUFFIX, SessionWriter, merge_pending
 
 SOURCE = "recorder"
 RAM_BYTES = 64 << 20

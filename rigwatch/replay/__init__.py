@@ -1,1 +1,7 @@
 """The monitor over recordings: replayed for people, and compared with references in CI."""
+
+from rigwatch.replay.cases import Verdict, load_cases, verify
+from rigwatch.replay.choice import monitor_for
+from rigwatch.replay.run import Replay, replay
+
+__all__ = ["Replay", "Verdict", "load_cases", "monitor_for", "replay", "verify"]

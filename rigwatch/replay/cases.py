@@ -19,8 +19,8 @@ from msgspec import Meta, field
 from rigwatch.replay.choice import monitor_for
 from rigwatch.replay.compare import Difference, Rules, compare
 from rigwatch.replay.reference import Output, output_of, read_reference, write_reference
-from rigwatch.wire.config import Section, load
-from rigwatch.wire.session.reader import Session, open_session
+from rigwatch.wire.session import Session, open_session
+from rigwatch.wire.typed_files import Section, load
 
 Text = Annotated[str, Meta(min_length=1)]
 

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from monitor.detectors.selection import FRICTION, detectors_of
-from monitor.model_file import load_model
-from monitor.rig_monitor import RigMonitor
+from monitor.detectors import FRICTION, detectors_of
+from monitor.model import load_model
+from monitor.pipeline import RigMonitor
 from rigwatch.replay.run import check_suits
-from rigwatch.wire.config import parse
 from rigwatch.wire.errors import ConfigError, SessionError
 from rigwatch.wire.rig_config import MonitorSection, RigConfig, load_rig
-from rigwatch.wire.session.reader import Session
+from rigwatch.wire.session import Session
+from rigwatch.wire.typed_files import parse
 
 
 def monitor_for(session: Session, model: Path | None, config: Path | None) -> RigMonitor:

@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from monitor.alarms import Announcement
-from monitor.conditions import Condition
-from monitor.rig_monitor import RigMonitor, Watched
+from monitor.pipeline import RigMonitor, Watched
+from monitor.signals import Condition
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
-from rigwatch.wire.blocks import merged, pieces
 from rigwatch.wire.messages import (
     Alarm,
     Column,
@@ -22,9 +21,10 @@ from rigwatch.wire.messages import (
     Event,
     FloatArray,
     RunInfo,
+    merged,
+    pieces,
 )
-from rigwatch.wire.session.reader import Session, open_session
-from rigwatch.wire.session.writer import LARGEST_BLOCK, SessionWriter
+from rigwatch.wire.session import LARGEST_BLOCK, Session, SessionWriter, open_session
 
 CONDITION = "condition"
 _PARTS = ("active", "value", "low", "high")

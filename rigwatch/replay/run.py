@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Self
 
 from monitor.alarms import Announcement
-from monitor.model_file import RigModel, parse_model
-from monitor.rig_monitor import RigMonitor, Watched
+from monitor.model import RigModel, parse_model
+from monitor.pipeline import RigMonitor, Watched
 from rigwatch.replay.source import Item, items
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm, AlarmCommand, Event, ModelChange, SampleBlock
-from rigwatch.wire.session.reader import MERGED_SAMPLES, LostSpan, Session
-from rigwatch.wire.session.writer import SessionWriter
+from rigwatch.wire.session import MERGED_SAMPLES, LostSpan, Session, SessionWriter
 
 PACED_BLOCK = 0.05
 """Length of a block where the replay keeps time [s of the wall clock]."""

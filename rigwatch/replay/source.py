@@ -8,9 +8,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rigwatch.wire.blocks import cut, pieces
-from rigwatch.wire.messages import AlarmCommand, ModelChange, SampleBlock
-from rigwatch.wire.session.reader import MERGED_SAMPLES, Session
+from rigwatch.wire.messages import AlarmCommand, ModelChange, SampleBlock, cut, pieces
+from rigwatch.wire.session import MERGED_SAMPLES, Session
 
 Order = AlarmCommand | ModelChange
 Item = SampleBlock | Order

@@ -5,3 +5,9 @@ vitals.py      what a process has said, and when that means that it hangs
 child.py       one process: start, words, output, end
 supervisor.py  all of them: restart with back-off, status, orderly stop
 """
+
+from rigwatch.supervisor.console import Console, Flow
+from rigwatch.supervisor.plan import PROCESSES, plan
+from rigwatch.supervisor.supervisor import Supervisor
+
+__all__ = ["PROCESSES", "Console", "Flow", "Supervisor", "plan"]

@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from rigwatch.wire.config import Section, load
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files import Section, load
 
 Text = Annotated[str, Meta(min_length=1)]
 Positive = Annotated[float, Meta(gt=0)]

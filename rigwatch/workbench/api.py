@@ -9,22 +9,20 @@ from html import escape
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from rigwatch.workbench import change
-from rigwatch.workbench.change import Change
-from rigwatch.workbench.compare import Comparison, open_bench
+from rigwatch.workbench.compare import Comparison, Region, open_bench
 from rigwatch.workbench.compare import compare as _compare
+from rigwatch.workbench.compare import locate as _locate
 from rigwatch.workbench.explain import Explanation
 from rigwatch.workbench.explain import explain as _explain
-from rigwatch.workbench.locate import Region
-from rigwatch.workbench.locate import locate as _locate
-from rigwatch.workbench.report import write_report
-from rigwatch.workbench.study import create, open_study
-from rigwatch.workbench.words import (
+from rigwatch.workbench.report import (
     change_lines,
     comparison_lines,
     explanation_lines,
     region_lines,
+    write_report,
 )
+from rigwatch.workbench.steps import Change, change
+from rigwatch.workbench.study import create, open_study
 
 Found = TypeVar("Found")
 MOST_REGIONS = 3

@@ -13,7 +13,7 @@ from pymodbus.server import ModbusSerialServer, ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from rigwatch.wire.errors import DeviceError
-from rigwatch.wire.heartbeat import Heartbeat
+from rigwatch.wire.host import Heartbeat
 from sim_plant.serve.pty_bridge import PtyBridge
 from sim_plant.serve.register_bank import RegisterBank
 from sim_plant.serve.source import Device, Pace

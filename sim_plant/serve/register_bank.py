@@ -3,7 +3,7 @@
 import threading
 from collections import deque
 
-from rigwatch.wire.modbus_map import Header, WordOrder, encode_header, encode_slot
+from rigwatch.wire.device import Header, WordOrder, encode_header, encode_slot
 from sim_plant.serve.source import Sent
 
 SLOTS = 512

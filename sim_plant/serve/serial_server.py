@@ -2,8 +2,8 @@
 
 import threading
 
-from rigwatch.wire.frame import Frame, encode
-from rigwatch.wire.heartbeat import Heartbeat
+from rigwatch.wire.device import Frame, encode
+from rigwatch.wire.host import Heartbeat
 from sim_plant.serve.line_faults import LineFaults
 from sim_plant.serve.pty_line import PtyLine
 from sim_plant.serve.source import Device, Pace, Sent

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 from monitor.alarms import AlarmManager, Announcement
-from monitor.conditions import Condition
-from rigwatch.wire.messages import Alarm, AlarmCommand, Event
+from monitor.signals.conditions import Condition
+from rigwatch.wire.messages.message_types import Alarm, AlarmCommand, Event
 
 PERIOD_NS = 3_906_250
 START_NS = 1_700_000_000_000_000_000

@@ -5,7 +5,7 @@ from itertools import pairwise
 from alarm_signals import codes, condition, order, run, spell, steps, time_of, times
 
 from monitor.alarms import AlarmManager, Occasion
-from rigwatch.wire.messages import Alarm
+from rigwatch.wire.messages.message_types import Alarm
 
 MINUTE = 60 * 256
 

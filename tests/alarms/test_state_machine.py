@@ -6,7 +6,7 @@ from alarm_signals import codes, condition, order, run, spell, steps, times
 from monitor.alarms import AlarmManager, Occasion
 from monitor.alarms.kinds import AlarmSettings
 from monitor.alarms.state import AlarmInstance
-from rigwatch.wire.messages import Alarm, Event
+from rigwatch.wire.messages.message_types import Alarm, Event
 from rigwatch.wire.rig_config import AlarmSection
 
 GONE_AFTER = AlarmSection(persistence=3, clear_after=10, latch=False)

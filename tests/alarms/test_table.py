@@ -8,10 +8,10 @@ from alarm_signals import condition, run, spell
 
 from monitor.alarms import ALARM_KINDS, AlarmManager, check_settings, quality_conditions
 from monitor.alarms.kinds import kind_of, settings_of
-from monitor.conditions import CONDITION_KINDS
-from rigwatch.wire import quality
+from monitor.signals.conditions import CONDITION_KINDS
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.messages import Column, SampleBlock
+from rigwatch.wire.messages import quality_flags as quality
+from rigwatch.wire.messages.message_types import Column, SampleBlock
 from rigwatch.wire.rig_config import AlarmSection
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "alarms.md"

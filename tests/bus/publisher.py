@@ -8,11 +8,11 @@ import time
 
 import numpy as np
 
-from rigwatch.wire.bus import connect
-from rigwatch.wire.messages import Column, SampleBlock
+from rigwatch.wire.bus.bus import connect
+from rigwatch.wire.delivery.ring import SampleRing
+from rigwatch.wire.messages.message_types import Column, SampleBlock
+from rigwatch.wire.messages.topics import SAMPLES
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.ring import SampleRing
-from rigwatch.wire.topics import SAMPLES
 from tests.bus.samples import block
 
 

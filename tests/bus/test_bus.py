@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigwatch.wire.bus import MAX_PAYLOAD, Bus, Subscription, connect
-from rigwatch.wire.bus_memory import MemoryNetwork
-from rigwatch.wire.bus_zenoh import open_router
+from rigwatch.wire.bus.bus import MAX_PAYLOAD, Bus, Subscription, connect
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.bus.zenoh_transport import open_router
 from rigwatch.wire.errors import BusError
-from rigwatch.wire.messages import Event
+from rigwatch.wire.messages.message_types import Event
+from rigwatch.wire.messages.protobuf import encode
+from rigwatch.wire.messages.topics import EVENTS, SAMPLES
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.schema import encode
-from rigwatch.wire.topics import EVENTS, SAMPLES
 from tests.bus.rig import PATIENCE, TestRig, eventually, stopped
 from tests.bus.samples import block, is_intact
 

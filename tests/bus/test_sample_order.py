@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigwatch.wire.messages import SampleBlock
-from rigwatch.wire.ring import RingStore
-from rigwatch.wire.ring_protocol import OPEN, Ask, RingReply
-from rigwatch.wire.sample_order import TRIES, Loss, Outcome, Remark, SampleOrder
+from rigwatch.wire.delivery.ring import RingStore
+from rigwatch.wire.delivery.ring_protocol import OPEN, Ask, RingReply
+from rigwatch.wire.delivery.sample_order import TRIES, Loss, Outcome, Remark, SampleOrder
+from rigwatch.wire.messages.message_types import SampleBlock
 from tests.bus.samples import Ledger, block
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.wire.bus import Bus
-from rigwatch.wire.bus_memory import MemoryNetwork
-from rigwatch.wire.messages import Event, SampleBlock
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.delivery.ring import SampleRing
+from rigwatch.wire.delivery.sample_reader import Item, SampleReader
+from rigwatch.wire.messages.message_types import Event, SampleBlock
+from rigwatch.wire.messages.topics import EVENTS, GAPS, SAMPLES
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.ring import SampleRing
-from rigwatch.wire.sample_reader import Item, SampleReader
-from rigwatch.wire.topics import EVENTS, GAPS, SAMPLES
 from tests.bus.rig import TestRig, eventually, kill, stopped
 from tests.bus.samples import Ledger, block
 

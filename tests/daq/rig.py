@@ -14,9 +14,9 @@ from daq.acquisition import Acquisition
 from daq.adapter import Adapter
 from daq.adapters.serial_line import SerialAdapter, SerialPort
 from daq.supervisor import Supervisor
-from rigwatch.wire.config import parse
-from rigwatch.wire.messages import Event, Gap, Health, Message, SampleBlock
+from rigwatch.wire.messages.message_types import Event, Gap, Health, Message, SampleBlock
 from rigwatch.wire.rig_config import RigConfig
+from rigwatch.wire.typed_files.loading import parse
 from sim_plant.serve.line_faults import LineFaults
 from sim_plant.serve.pty_line import PtyLine
 from sim_plant.serve.serial_server import SerialServer

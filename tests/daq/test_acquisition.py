@@ -6,8 +6,8 @@ import pytest
 from daq.acquisition import LONGEST_BLOCK, Acquisition
 from daq.adapter import RawBlock
 from daq.watch import Link
-from rigwatch.wire.messages import Event, Health, SampleBlock
-from rigwatch.wire.schema import decode, encode
+from rigwatch.wire.messages.message_types import Event, Health, SampleBlock
+from rigwatch.wire.messages.protobuf import decode, encode
 from tests.daq.rig import codes_of, config_of
 
 SECOND = 1_000_000_000

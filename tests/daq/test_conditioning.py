@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from daq.adapter import RawBlock, picked
 from daq.conditioning import Conditioner
-from rigwatch.wire import quality
-from rigwatch.wire.calibration import Calibration
-from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.device.calibration import Calibration
+from rigwatch.wire.messages import quality_flags as quality
+from rigwatch.wire.messages.message_types import SampleBlock
 from rigwatch.wire.rig_config import ChannelSection
 
 

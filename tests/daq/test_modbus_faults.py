@@ -20,9 +20,9 @@ import pytest
 
 from daq.adapters import adapter_for
 from daq.adapters.modbus_poll import ModbusAdapter, RefusedError
+from rigwatch.wire.device.modbus_map import Header, encode_header
 from rigwatch.wire.errors import DeviceError, ModbusError
-from rigwatch.wire.modbus_map import Header, encode_header
-from rigwatch.wire.ports import free_port
+from rigwatch.wire.host.ports import free_port
 from sim_plant.serve.modbus_server import ModbusServer
 from sim_plant.serve.pty_bridge import PtyBridge
 from sim_plant.serve.register_bank import RegisterBank

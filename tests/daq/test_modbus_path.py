@@ -8,7 +8,7 @@ import pytest
 
 from daq.adapters import adapter_for
 from daq.adapters.modbus_poll import ModbusAdapter
-from rigwatch.wire.ports import free_port
+from rigwatch.wire.host.ports import free_port
 from sim_plant.serve.modbus_server import ModbusServer
 from sim_plant.serve.pty_bridge import PtyBridge
 from sim_plant.serve.register_bank import RegisterBank

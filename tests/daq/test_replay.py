@@ -11,7 +11,7 @@ from daq.adapter import RawBlock
 from daq.adapters.replay import ReplayAdapter
 from rigwatch.simulated import sensor_channels, write_session
 from rigwatch.wire.errors import DeviceError
-from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.messages.message_types import SampleBlock
 from rigwatch.wire.rig_config import ChannelSection
 from rigwatch.wire.session import open_session
 from sim_plant.parameters import RigParameters

@@ -13,8 +13,8 @@ import pytest
 
 from daq.adapter import DeviceBusyError
 from daq.adapters.serial_line import SerialPort
-from rigwatch.wire import quality
-from rigwatch.wire.messages import Gap
+from rigwatch.wire.messages import quality_flags as quality
+from rigwatch.wire.messages.message_types import Gap
 from tests.daq.rig import SerialBench, config_of
 
 Inject = Callable[[SerialBench], object]

@@ -5,7 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Health, Message, SampleBlock
+from rigwatch.wire.messages.message_types import (
+    Alarm,
+    Column,
+    EstimateBlock,
+    Health,
+    Message,
+    SampleBlock,
+)
 
 RATE = 256.0
 START_NS = 1_790_000_000_000_000_000

@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-from rigwatch.dashboard.palette import Colour
+from rigwatch.dashboard.board.palette import Colour
 
 PATIENCE = 60.0
 """Seconds until a test gives up; reached on a hopelessly busy machine only."""

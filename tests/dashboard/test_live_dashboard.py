@@ -12,15 +12,15 @@ from pathlib import Path
 import psutil
 import pytest
 
-from rigwatch.dashboard import palette
+from rigwatch.dashboard.board import palette
 from rigwatch.dashboard.feed import Feed
-from rigwatch.dashboard.viewer import answers, free_port
-from rigwatch.wire.alarm_list import serve_alarm_list
-from rigwatch.wire.bus import Bus, Subscription, connect
-from rigwatch.wire.bus_zenoh import open_router
-from rigwatch.wire.messages import Alarm, EstimateBlock, Health, SampleBlock
+from rigwatch.dashboard.viewer.viewer import answers, free_port
+from rigwatch.wire.bus.alarm_list import serve_alarm_list
+from rigwatch.wire.bus.bus import Bus, Subscription, connect
+from rigwatch.wire.bus.zenoh_transport import open_router
+from rigwatch.wire.messages.message_types import Alarm, EstimateBlock, Health, SampleBlock
+from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, HEALTH, SAMPLES
 from rigwatch.wire.rig_config import RigConfig, load_rig
-from rigwatch.wire.topics import ALARMS, ESTIMATES, HEALTH, SAMPLES
 from tests.dashboard.rig_messages import RATE, Rig
 from tests.dashboard.screen import Screen, until
 

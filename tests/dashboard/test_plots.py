@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigwatch.dashboard import quantities
-from rigwatch.dashboard.batches import Batches
-from rigwatch.dashboard.entities import HEALTH_VIEWS
-from rigwatch.dashboard.health import counters, view_of
-from rigwatch.dashboard.quantities import ESTIMATE_PLOTS, SAMPLE_PLOTS, plots_of
-from rigwatch.dashboard.ranges import around_signature, nice_above, peak, symmetric
-from rigwatch.dashboard.survey import Survey
-from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.dashboard.board import quantities
+from rigwatch.dashboard.board.batches import Batches
+from rigwatch.dashboard.board.entities import HEALTH_VIEWS
+from rigwatch.dashboard.board.health import counters, view_of
+from rigwatch.dashboard.board.quantities import ESTIMATE_PLOTS, SAMPLE_PLOTS, plots_of
+from rigwatch.dashboard.board.ranges import around_signature, nice_above, peak, symmetric
+from rigwatch.dashboard.board.survey import Survey
+from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from tests.dashboard.rig_messages import MARKS, Rig
 
 RIG = Rig()

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from rigwatch.commands import main
-from rigwatch.dashboard import palette
+from rigwatch.dashboard.board import palette
 
 KABE = Path(__file__).parents[2] / "configs" / "structures" / "kabe_antenna.toml"
 

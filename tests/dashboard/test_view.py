@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from rigwatch.commands import main
-from rigwatch.dashboard import palette
+from rigwatch.dashboard.board import palette
 from rigwatch.wire.session import SessionWriter, run_info
 from tests.dashboard.rig_messages import Rig
 

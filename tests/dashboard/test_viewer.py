@@ -13,8 +13,8 @@ import psutil
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.dashboard.opening import open_viewer
-from rigwatch.dashboard.viewer import Viewer, ViewerError, answers, free_port
+from rigwatch.dashboard.viewer.opening import open_viewer
+from rigwatch.dashboard.viewer.viewer import Viewer, ViewerError, answers, free_port
 from rigwatch.wire.rig_config import DashboardSection
 from tests.dashboard.screen import until
 

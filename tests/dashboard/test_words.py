@@ -7,12 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigwatch.dashboard.alarm_book import AlarmBook
-from rigwatch.dashboard.facts import SILENCE, Facts
-from rigwatch.dashboard.palette import VERDICTS
-from rigwatch.dashboard.status import advice, status
-from rigwatch.dashboard.words import alarm_level, alarm_line, gap_line
-from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event, Gap, SampleBlock
+from rigwatch.dashboard.board.alarm_book import AlarmBook
+from rigwatch.dashboard.board.facts import SILENCE, Facts
+from rigwatch.dashboard.board.palette import VERDICTS
+from rigwatch.dashboard.board.status import advice, status
+from rigwatch.dashboard.board.words import alarm_level, alarm_line, gap_line
+from rigwatch.wire.messages.message_types import (
+    PROBABLY_MISSING,
+    Alarm,
+    EstimateBlock,
+    Event,
+    Gap,
+    SampleBlock,
+)
 from tests.dashboard.rig_messages import MARKS, Rig
 
 RIG = Rig()

@@ -8,10 +8,10 @@ from msgspec import structs
 
 from monitor.detectors import DetectorKind
 from monitor.detectors.detector import Channels, Detector
-from rigwatch.physics.frequency_fit import fit_transfer_function
-from rigwatch.physics.frequency_response import frequency_response
-from rigwatch.physics.transfer_function import TransferFunction
-from rigwatch.wire.messages import Column, SampleBlock
+from rigwatch.physics.transfer.frequency_fit import fit_transfer_function
+from rigwatch.physics.transfer.frequency_response import frequency_response
+from rigwatch.physics.transfer.transfer_function import TransferFunction
+from rigwatch.wire.messages.message_types import Column, SampleBlock
 from sim_plant.scenario import Event, Scenario, ScenarioRun, load_scenario
 
 FOLDER = Path(__file__).parents[2] / "configs" / "scenarios"

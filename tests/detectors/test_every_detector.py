@@ -10,8 +10,8 @@ from simulated_rig import CHANNELS, RATE, block
 from monitor.alarms import ALARM_KINDS
 from monitor.detectors import DETECTORS, detector_kind
 from monitor.detectors.detector import LONGEST_HOLD
-from rigwatch.wire import quality
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.messages import quality_flags as quality
 
 FAULTS = {
     "parity-arma": ("coulomb", 0.75),

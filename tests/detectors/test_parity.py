@@ -9,7 +9,6 @@ numerator b1 … b4 with b0 = 0, as in (2.43).
 import numpy as np
 import pytest
 
-from monitor.admission import GOOD, NEW_BOOT
 from monitor.detectors.adaptive_threshold import (
     AdaptiveThreshold,
     fit_threshold,
@@ -18,7 +17,8 @@ from monitor.detectors.adaptive_threshold import (
 )
 from monitor.detectors.detector import Channels
 from monitor.detectors.parity import OperatingPoint, ParityDetector
-from rigwatch.physics.transfer_function import TransferFunction
+from monitor.signals.admission import GOOD, NEW_BOOT
+from rigwatch.physics.transfer.transfer_function import TransferFunction
 from rigwatch.wire.errors import ModelError
 
 RATE = 10.0

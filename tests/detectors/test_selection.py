@@ -5,14 +5,14 @@ import pytest
 from msgspec import structs
 from simulated_rig import CHANNELS, FOLDER, RATE, SimulatedRig, block, recorded
 
-from monitor.commission import commission
+from monitor.commissioning.commission import commission
 from monitor.detectors import DETECTORS
 from monitor.detectors.selection import detectors_of, healthy_signals
-from monitor.model_file import InertiaPlant, RigModel
-from monitor.recordings import recording_of
-from monitor.rig_monitor import RigMonitor
+from monitor.model.model_file import InertiaPlant, RigModel
+from monitor.pipeline.rig_monitor import RigMonitor
+from monitor.signals.recordings import recording_of
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.messages import Alarm
+from rigwatch.wire.messages.message_types import Alarm
 from sim_plant.scenario import load_scenario
 
 EVERY = ("friction", *(kind.name for kind in DETECTORS))

@@ -9,7 +9,7 @@ from monitor.detectors.innovation_test import new_nis_window, nis_limit, push_ni
 from monitor.detectors.kalman import augmented_matrices, generalised_update, kalman_update
 from monitor.detectors.small_matrices import inverse
 from monitor.detectors.state_space import state_space
-from rigwatch.physics.transfer_function import TransferFunction
+from rigwatch.physics.transfer.transfer_function import TransferFunction
 from rigwatch.wire.errors import ModelError
 
 LENGTH, MEASURED = 20, 3

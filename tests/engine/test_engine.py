@@ -5,16 +5,16 @@ import pytest
 import scipy.signal
 from msgspec.structs import replace
 
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.dimension import describe, dimension
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import evaluate, fit
-from rigwatch.physics.engine.model import Model, shipped_models
-from rigwatch.physics.engine.recording import Recording
-from rigwatch.physics.engine.suitable import suits
-from rigwatch.physics.engine.system import Placement, compose
-from rigwatch.wire.config import parse
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.dimension import describe, dimension
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import Model, shipped_models
+from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
+from rigwatch.physics.engine.score.compatibility import suits
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.typed_files.loading import parse
 
 MASS_SPRING_DAMPER = shipped_models()["mass-spring-damper"]
 DT = 1 / 256

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import sympy
 
-from rigwatch.physics.engine.expression import parse
-from rigwatch.physics.engine.llvm import Function, machine_code
-from rigwatch.physics.engine.numeric import numpy_function
-from rigwatch.physics.engine.scope import symbol
+from rigwatch.physics.engine.compile.llvm import Function, machine_code
+from rigwatch.physics.engine.compile.static_kernel import numpy_function
+from rigwatch.physics.engine.equations.expression import parse
+from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.wire.errors import ModelError
 
 NAMES = ("x", "v", "k")

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.model import shipped_models
-from rigwatch.physics.engine.suitable import suits
-from rigwatch.physics.engine.system import Placement, compose
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.score.compatibility import suits
 
 
 @pytest.mark.parametrize("name", sorted(shipped_models()))

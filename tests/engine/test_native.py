@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine import native
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.model import shipped_models
-from rigwatch.physics.engine.system import Placement, compose
+from rigwatch.physics.engine.compile import kernel as native
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.equations.system import Placement, compose
 
 MODEL = shipped_models()["mass-spring-damper"]
 FRICTION = library()["coulomb"].scaled({"x": 0.1, "v": 1.0})

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.model import shipped_models
-from rigwatch.physics.engine.pace import pace
-from rigwatch.physics.engine.suitable import suits
-from rigwatch.physics.engine.system import Placement, compose
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.compile.step_size import pace
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.score.compatibility import suits
 
 MODEL = shipped_models()["mass-spring-damper"]
 DT, SAMPLES = 1 / 256, 512

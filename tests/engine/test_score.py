@@ -4,15 +4,20 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.directions import Candidate, directions, shaped, trajectory
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import fit
-from rigwatch.physics.engine.model import shipped_models
-from rigwatch.physics.engine.recording import Recording, windows
-from rigwatch.physics.engine.score import Projector, score
-from rigwatch.physics.engine.suitable import suits
-from rigwatch.physics.engine.system import Placement, compose
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.fit.recording import Recording, windows
+from rigwatch.physics.engine.fit.windowed_fit import fit
+from rigwatch.physics.engine.score.compatibility import suits
+from rigwatch.physics.engine.score.effect_sensitivities import (
+    Candidate,
+    directions,
+    shaped,
+    trajectory,
+)
+from rigwatch.physics.engine.score.score_test import Projector, score
 
 MODEL = shipped_models()["mass-spring-damper"]
 DT = 1 / 256

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.tangent import Tangent
+from rigwatch.physics.engine.fit.initial_state_projection import Tangent
 
 RNG = np.random.default_rng(8)
 WINDOWS, SAMPLES, STATES = 5, 40, 3

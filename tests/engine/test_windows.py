@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.directions import directions, shaped, trajectory
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import evaluate, fit
-from rigwatch.physics.engine.model import Model, shipped_models
-from rigwatch.physics.engine.recording import Recording
-from rigwatch.physics.engine.system import Placement, compose
-from rigwatch.wire.config import parse
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import Model, shipped_models
+from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
+from rigwatch.physics.engine.score.effect_sensitivities import directions, shaped, trajectory
+from rigwatch.wire.typed_files.loading import parse
 
 DT, N, HORIZON, RATE, FAST = 1 / 256, 1024, 128, 60.0, 50.0
 FOLLOWER = """

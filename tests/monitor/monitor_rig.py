@@ -4,11 +4,11 @@ from functools import cache
 
 import numpy as np
 
-from monitor.commission import commission
-from monitor.model_file import RigModel
-from monitor.pipeline import Monitor, Result
-from monitor.recordings import recording_of
-from rigwatch.wire.messages import Column, SampleBlock
+from monitor.commissioning.commission import commission
+from monitor.model.model_file import RigModel
+from monitor.pipeline.pipeline import Monitor, Result
+from monitor.signals.recordings import recording_of
+from rigwatch.wire.messages.message_types import Column, SampleBlock
 from sim_plant.excitation import Chirp, Shape, Sine
 from sim_plant.scenario import Event, Scenario, ScenarioRun
 

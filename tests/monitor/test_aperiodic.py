@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from monitor_rig import RATE, SINE, UNITS, active, friction, run, watched
 
-from monitor import conditions as kinds
-from monitor.pipeline import Result
+from monitor.pipeline.pipeline import Result
+from monitor.signals import conditions as kinds
 from sim_plant.excitation import Chirp, Multisine, Recorded, Shape
 
 ARMED_BY = 25.0

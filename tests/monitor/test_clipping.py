@@ -5,10 +5,10 @@ import pytest
 from monitor_rig import RATE, SINE, UNITS, active, block, model, run
 from msgspec import structs
 
-from monitor.conditions import DEPARTURE
-from monitor.pipeline import Monitor, Result
-from monitor.repeats import chance_of_repeat, step_of
-from rigwatch.wire.messages import SampleBlock
+from monitor.commissioning.repeated_readings import chance_of_repeat, step_of
+from monitor.pipeline.pipeline import Monitor, Result
+from monitor.signals.conditions import DEPARTURE
+from rigwatch.wire.messages.message_types import SampleBlock
 from sim_plant.excitation import Chirp, Multisine, Recorded, Shape, Silence, Sine, Square, Triangle
 from sim_plant.scenario import Event
 

@@ -3,21 +3,14 @@
 import hashlib
 import inspect
 
-from monitor import (
-    aperiodic,
-    departure,
-    energies,
-    episode,
-    estimates,
-    isolation,
-    reference,
-    reference_state,
-    verdict,
-    watch,
-    watch_state,
-    window,
-)
-from rigwatch.physics import transfer_function
+from monitor.decision import departure, episode, estimates, isolation
+from monitor.decision import isolation_verdict as verdict
+from monitor.decision import kernel_state as watch_state
+from monitor.decision import sample_kernel as watch
+from monitor.estimation import energies, window
+from monitor.reference import aperiodic, reference_state
+from monitor.reference import learning as reference
+from rigwatch.physics.transfer import transfer_function
 
 SOURCES = (
     aperiodic, departure, energies, episode, estimates, isolation, reference, reference_state,

@@ -9,17 +9,17 @@ from monitor_rig import RATE, SINE, friction, model, run
 from scipy.io import loadmat
 from scipy.stats import chi2
 
-from monitor.commission import commission
-from monitor.friction_filter import fit_friction_filter
-from monitor.inertia import commission_inertia, kernels
-from monitor.limits import chance_a_look, rules_for
-from monitor.model_file import RigModel, load_model, model_text
-from monitor.pipeline import Monitor
-from monitor.recordings import Recording, recording_of
-from monitor.thresholds import tail_factor, thesis_thresholds
-from rigwatch.physics.transfer_function import TransferFunction
+from monitor.commissioning.commission import commission
+from monitor.commissioning.friction_filter import fit_friction_filter
+from monitor.decision.decision_rules import chance_a_look, rules_for
+from monitor.estimation.thesis_thresholds import tail_factor, thesis_thresholds
+from monitor.model.model_file import RigModel, load_model, model_text
+from monitor.pipeline.pipeline import Monitor
+from monitor.signals.inertia import commission_inertia, kernels
+from monitor.signals.recordings import Recording, recording_of
+from rigwatch.physics.transfer.transfer_function import TransferFunction
 from rigwatch.wire.errors import ConfigError, ModelError
-from rigwatch.wire.messages import Column, SampleBlock
+from rigwatch.wire.messages.message_types import Column, SampleBlock
 
 
 def saved(found: RigModel, folder: Path) -> Path:

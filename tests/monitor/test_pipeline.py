@@ -16,10 +16,10 @@ from monitor_rig import (
     watched,
 )
 
-from monitor import conditions as kinds
-from monitor.pipeline import PUBLISHED, Monitor, Result
-from rigwatch.wire.messages import Column, SampleBlock
-from rigwatch.wire.quality import NON_FINITE
+from monitor.pipeline.pipeline import PUBLISHED, Monitor, Result
+from monitor.signals import conditions as kinds
+from rigwatch.wire.messages.message_types import Column, SampleBlock
+from rigwatch.wire.messages.quality_flags import NON_FINITE
 from sim_plant.effects import EFFECTS
 from sim_plant.excitation import Shape, Square
 

@@ -3,10 +3,10 @@
 import numpy as np
 from monitor_rig import SINE, block, friction, model, run
 
-from monitor.rig_monitor import RigMonitor, compile_kernels
-from monitor.watch import watch_block
-from rigwatch.wire.messages import Alarm, Column, SampleBlock
-from rigwatch.wire.schema import decode, encode
+from monitor.decision.sample_kernel import watch_block
+from monitor.pipeline.rig_monitor import RigMonitor, compile_kernels
+from rigwatch.wire.messages.message_types import Alarm, Column, SampleBlock
+from rigwatch.wire.messages.protobuf import decode, encode
 
 
 def raised(watching: RigMonitor) -> set[str]:

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from monitor.energies import add, energy, new_energies, recent_energy
-from monitor.window import new_window, push, solve_two, sums, windowed_least_squares
+from monitor.estimation.energies import add, energy, new_energies, recent_energy
+from monitor.estimation.window import new_window, push, solve_two, sums, windowed_least_squares
 
 
 def fresh(g: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from monitor.model_file import (
+from monitor.model.model_file import (
     FrictionSection,
     NoiseSection,
     RigModel,

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from monitor.model_file import RigModel, load_model
-from monitor.pipeline import Monitor
-from monitor.probable import Explainer
-from monitor.rig_monitor import RigMonitor
-from monitor.suspect_job import ask
-from monitor.suspects import Evidence, Suspect, in_words, suspects
-from rigwatch.physics.engine.effect import Effect, EffectParameter, library
+from monitor.diagnosis.background_ranking import Explainer
+from monitor.diagnosis.fault_candidates import Evidence, Suspect, in_words, suspects
+from monitor.diagnosis.ranking_job import ask
+from monitor.model.model_file import RigModel, load_model
+from monitor.pipeline.pipeline import Monitor
+from monitor.pipeline.rig_monitor import RigMonitor
+from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, library
 from rigwatch.simulated import simulate
-from rigwatch.wire.blocks import concatenate, pieces
-from rigwatch.wire.messages import Alarm, Event, SampleBlock
+from rigwatch.wire.messages.blocks import concatenate, pieces
+from rigwatch.wire.messages.message_types import Alarm, Event, SampleBlock
 from rigwatch.wire.session import open_session
 from sim_plant.scenario import Event as Fault
 from sim_plant.scenario import load_scenario

@@ -8,19 +8,27 @@ import numpy as np
 import pytest
 
 from monitor.alarms import Occasion
-from monitor.links import LinkWatch, Seen
-from monitor.process import MonitorProcess, suitable_model
-from monitor.rig_monitor import RigMonitor
-from rigwatch.wire.alarm_list import ask_alarm_list
-from rigwatch.wire.blocks import concatenate
-from rigwatch.wire.bus import Subscription, wait_until
-from rigwatch.wire.bus_memory import MemoryNetwork
+from monitor.pipeline.rig_monitor import RigMonitor
+from monitor.process.link_watch import LinkWatch, Seen
+from monitor.process.loop import MonitorProcess, suitable_model
+from rigwatch.wire.bus.alarm_list import ask_alarm_list
+from rigwatch.wire.bus.bus import Subscription, wait_until
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.errors import BusError, ConfigError
-from rigwatch.wire.messages import AlarmCommand, EstimateBlock, Health, SampleBlock
+from rigwatch.wire.messages.blocks import concatenate
+from rigwatch.wire.messages.message_types import AlarmCommand, EstimateBlock, Health, SampleBlock
+from rigwatch.wire.messages.protobuf import encode
+from rigwatch.wire.messages.topics import (
+    ALARMS,
+    COMMANDS,
+    ESTIMATES,
+    EVENTS,
+    HEALTH,
+    SAMPLES,
+    Topic,
+)
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.ring import SampleRing
-from rigwatch.wire.schema import encode
-from rigwatch.wire.topics import ALARMS, COMMANDS, ESTIMATES, EVENTS, HEALTH, SAMPLES, Topic
 from tests.bus.publisher import wave
 from tests.bus.rig import PATIENCE, TestRig
 from tests.monitor_process.model import MODEL, monitor_section

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from monitor.admission import GOOD, RESTART
-from monitor.model_file import PromotedSection, load_model
-from monitor.promoted import PromotedFriction
-from monitor.residual import MODELLED, VELOCITY
+from monitor.model.model_file import PromotedSection, load_model
+from monitor.pipeline.promoted import PromotedFriction
+from monitor.signals.admission import GOOD, RESTART
+from monitor.signals.residual import MODELLED, VELOCITY
 
 MODEL = load_model(Path(__file__).parents[1] / "verify" / "model.toml")
 KNOWN = structs.replace(MODEL, promoted=PromotedSection(coulomb=0.4, smooth=0.02))

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.wire.bus import Bus
-from rigwatch.wire.messages import EstimateBlock
-from rigwatch.wire.topics import ESTIMATES
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.messages.message_types import EstimateBlock
+from rigwatch.wire.messages.topics import ESTIMATES
 from tests.bus.rig import PATIENCE, ROOT, TestRig, eventually, kill, stopped
 from tests.monitor_process.model import monitor_section
 

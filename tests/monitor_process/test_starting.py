@@ -2,7 +2,7 @@
 
 import pytest
 
-from monitor.starting import Patience
+from monitor.process.startup_grace import Patience
 
 NOW = 1000.0
 

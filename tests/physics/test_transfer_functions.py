@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from rigwatch.physics.frequency_fit import fit_transfer_function
-from rigwatch.physics.frequency_response import frequency_response
-from rigwatch.physics.output_error import OutputErrorOrders, fit_output_error
-from rigwatch.physics.transfer_function import Filter, TransferFunction, reflected
-from rigwatch.physics.velocity import velocity_filter
+from rigwatch.physics.transfer.frequency_fit import fit_transfer_function
+from rigwatch.physics.transfer.frequency_response import frequency_response
+from rigwatch.physics.transfer.output_error import OutputErrorOrders, fit_output_error
+from rigwatch.physics.transfer.transfer_function import Filter, TransferFunction, reflected
+from rigwatch.physics.transfer.velocity import velocity_filter
 from rigwatch.wire.errors import ModelError
 
 RATE = 256.0

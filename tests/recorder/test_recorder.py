@@ -16,14 +16,21 @@ import pytest
 
 from rigwatch.recorder.folders import choose
 from rigwatch.recorder.process import Recorder, describe_run
-from rigwatch.wire.bus import Bus, connect
-from rigwatch.wire.bus_memory import MemoryNetwork
-from rigwatch.wire.bus_zenoh import open_router
-from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Event, Gap, SampleBlock
+from rigwatch.wire.bus.bus import Bus, connect
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.bus.zenoh_transport import open_router
+from rigwatch.wire.delivery.ring import SampleRing
+from rigwatch.wire.messages.message_types import (
+    Alarm,
+    Column,
+    EstimateBlock,
+    Event,
+    Gap,
+    SampleBlock,
+)
+from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, EVENTS, GAPS, SAMPLES
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.ring import SampleRing
 from rigwatch.wire.session import open_session, run_info
-from rigwatch.wire.topics import ALARMS, ESTIMATES, EVENTS, GAPS, SAMPLES
 
 CONFIG = """
 [rig]

@@ -11,7 +11,7 @@ import pytest
 
 from rigwatch.recorder.disk import DiskWatch, free_share
 from rigwatch.recorder.store import Store
-from rigwatch.wire.messages import Column, Event, Health, SampleBlock
+from rigwatch.wire.messages.message_types import Column, Event, Health, SampleBlock
 from rigwatch.wire.session import open_session, run_info
 
 RUN = run_info("bench1", 256.0, t_ns=1)

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.workbench import ledger
-from rigwatch.workbench.change import add
-from rigwatch.workbench.study import Study, open_study
+from rigwatch.workbench.steps.change import add
+from rigwatch.workbench.study import ledger
+from rigwatch.workbench.study.study import Study, open_study
 from tests.report.drive import make_study
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from monitor.model_file import (
+from monitor.model.model_file import (
     BandSection,
     DecisionSection,
     FrictionSection,
@@ -13,9 +13,9 @@ from monitor.model_file import (
     RigModel,
     WindowSection,
 )
-from rigwatch.wire.messages import Column, SampleBlock
+from rigwatch.wire.messages.message_types import Column, SampleBlock
 from rigwatch.wire.session import SessionWriter, run_info
-from rigwatch.workbench.study import Study, create
+from rigwatch.workbench.study.study import Study, create
 
 RATE = 500.0
 SAMPLES = 6000

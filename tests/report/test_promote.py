@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from monitor.model_file import PromotedSection, load_model, model_text, parse_model
-from monitor.process import MonitorProcess, suitable_model
-from monitor.rig_monitor import RigMonitor
+from monitor.model.model_file import PromotedSection, load_model, model_text, parse_model
+from monitor.pipeline.rig_monitor import RigMonitor
+from monitor.process.loop import MonitorProcess, suitable_model
 from rigwatch.commands import main
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
-from rigwatch.wire.blocks import concatenate, cut, pieces
-from rigwatch.wire.bus_memory import MemoryNetwork
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.bus.model_change import Granted, Wish, ask_for_model
 from rigwatch.wire.errors import ConfigError, ModelError
-from rigwatch.wire.messages import EstimateBlock, ModelChange, SampleBlock
-from rigwatch.wire.model_wish import Granted, Wish, ask_for_model
+from rigwatch.wire.messages.blocks import concatenate, cut, pieces
+from rigwatch.wire.messages.message_types import EstimateBlock, ModelChange, SampleBlock
+from rigwatch.wire.messages.protobuf import encode
+from rigwatch.wire.messages.topics import ESTIMATES, MODELS, SAMPLES
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.schema import encode
 from rigwatch.wire.session import SessionWriter, open_session, run_info
-from rigwatch.wire.topics import ESTIMATES, MODELS, SAMPLES
-from rigwatch.workbench.promote import promotion
-from rigwatch.workbench.study import Study, open_study
+from rigwatch.workbench.steps.promotion import promotion
+from rigwatch.workbench.study.study import Study, open_study
 from tests.report.drive import COULOMB, MASS, MODEL, PUSH, RATE, VISCOUS, block, make_study
 
 RIG = """

@@ -10,7 +10,7 @@ import pytest
 
 from rigwatch.commands import main
 from rigwatch.page.svg import Plot, Scale, limits
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.study.study import Study
 
 SECTIONS = ("errors", "signals", "where", "ranking", "parameters", "ledger")
 VOID = ("meta", "path", "rect", "circle", "i")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.study.study import Study
 from tests.report.drive import SAMPLES
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from rigwatch.wire.device.frame import Frame, FrameDecoder
 from rigwatch.wire.errors import DeviceError
-from rigwatch.wire.frame import Frame, FrameDecoder
 from sim_plant.serve.line_faults import NAMES, LineFaults
 from sim_plant.serve.pty_line import PtyLine
 from sim_plant.serve.serial_server import SerialServer

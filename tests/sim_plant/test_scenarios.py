@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from rigwatch.wire.config import Section
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files.loading import Section
 from sim_plant.excitation import SHAPES
 from sim_plant.parameters import RigParameters, load_parameters
 from sim_plant.scenario import Event, Experiment, Scenario, ScenarioRun, load_scenario

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import msgspec
 
-from rigwatch.structures.description import Load, load_structure
-from rigwatch.structures.record import Record
+from rigwatch.structures.model.description import Load, load_structure
+from rigwatch.structures.records.record import Record
 from sim_plant.structure import simulate
 
 FOLDER = Path(__file__).parents[2] / "configs" / "structures"

@@ -5,10 +5,10 @@ from xml.etree import ElementTree
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.structures.identification import METHODS
-from rigwatch.structures.identification_report import Findings, report_html
-from rigwatch.structures.problem import problem_of
-from rigwatch.structures.record import read_record
+from rigwatch.structures.identification.identify import METHODS
+from rigwatch.structures.identification.problem import problem_of
+from rigwatch.structures.records.record import read_record
+from rigwatch.structures.report.identification_report import Findings, report_html
 from rigwatch.wire.errors import ImportDataError
 from tests.structures.antenna import FILE, FOLDER, TRUTH, antenna, record
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rigwatch.structures.damage import Examination, Settings, examine
-from rigwatch.structures.damage_watch import innovations
-from rigwatch.structures.description import Structure, coefficients, load_structure
-from rigwatch.structures.record import FloatArray, Record
+from rigwatch.structures.damage.detector import innovations
+from rigwatch.structures.damage.examination import Examination, Settings, examine
+from rigwatch.structures.model.description import Structure, coefficients, load_structure
+from rigwatch.structures.records.record import FloatArray, Record
 from rigwatch.wire.errors import ModelError
 from sim_plant.structure import Damage, simulate, with_noise
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.structures.record import read_record
-from rigwatch.structures.session_record import read_any, record_of_session
+from rigwatch.structures.records.record import read_record
+from rigwatch.structures.records.session_record import read_any, record_of_session
 
 KABE = Path(__file__).parents[2] / "configs" / "structures" / "kabe_antenna.toml"
 NODES = range(1, 9)

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigwatch.structures.damage_threshold import (
+from rigwatch.structures.damage.threshold import (
     FORGETTING,
     CumulativeSum,
     false_alarm,

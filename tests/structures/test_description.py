@@ -1,16 +1,16 @@
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.model import load_model
-from rigwatch.physics.engine.system import compose
-from rigwatch.structures.checks import check
-from rigwatch.structures.description import Structure, load_structure
-from rigwatch.structures.edit import Change, changed, with_unknowns, with_values
-from rigwatch.structures.matrices import modes, stiffness_matrix
-from rigwatch.structures.model import port_of, to_model, to_system
-from rigwatch.wire.config import parse
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.model import load_model
+from rigwatch.physics.engine.equations.system import compose
+from rigwatch.structures.model.checks import check
+from rigwatch.structures.model.description import Structure, load_structure
+from rigwatch.structures.model.edit import Change, changed, with_unknowns, with_values
+from rigwatch.structures.model.matrices import modes, stiffness_matrix
+from rigwatch.structures.model.structure_model import port_of, to_model, to_system
 from rigwatch.wire.errors import ConfigError, ModelError
+from rigwatch.wire.typed_files.loading import parse
 from sim_plant.structure import simulate
 from tests.structures.antenna import FILE, FOLDER, antenna
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from benchmarks.structures import Extreme
-from rigwatch.physics.engine.model import load_model
-from rigwatch.structures.description import load_structure
-from rigwatch.structures.identification import identify
-from rigwatch.structures.record import Record
+from rigwatch.physics.engine.equations.model import load_model
+from rigwatch.structures.identification.identify import identify
+from rigwatch.structures.model.description import load_structure
+from rigwatch.structures.records.record import Record
 from sim_plant import tower
 from sim_plant.earthquake import accelerogram
 from sim_plant.structure import simulate, with_noise

@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.structures.description import load_structure
-from rigwatch.structures.live import LiveDamage, LiveSettings, Said
-from rigwatch.structures.record import Record
+from rigwatch.structures.live.live_watch import LiveDamage, LiveSettings, Said
+from rigwatch.structures.model.description import load_structure
+from rigwatch.structures.records.record import Record
+from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Event, SampleBlock
-from rigwatch.wire.quality import STALE
-from rigwatch.wire.ring import SampleRing
-from rigwatch.wire.schema import encode
-from rigwatch.wire.topics import ALARMS, ESTIMATES, EVENTS, HEALTH, SAMPLES
+from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, Event, SampleBlock
+from rigwatch.wire.messages.protobuf import encode
+from rigwatch.wire.messages.quality_flags import STALE
+from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, EVENTS, HEALTH, SAMPLES
 from tests.bus.rig import TestRig, eventually
 from tests.structures.test_damage import K4, KABE, kabe_record
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.structures.drawing import shares_svg
-from rigwatch.structures.strain_energy import by_family, strain_energy
+from rigwatch.structures.model.strain_energy import by_family, strain_energy
+from rigwatch.structures.report.mode_drawing import shares_svg
 from tests.structures.antenna import FILE, antenna
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from rigwatch.wire.ports import free_port
+from rigwatch.wire.host.ports import free_port
 
 ROOT = Path(__file__).parents[2]
 STATE, MOUNTED = "/var/lib/rigwatch", "/etc/rigwatch/rig.toml"

@@ -10,7 +10,7 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.doctor.machine import check_disk, check_kernels, check_machine
 from rigwatch.doctor.rig import check_rig, check_serial
-from rigwatch.wire.ports import endpoint_address, free_port, is_free
+from rigwatch.wire.host.ports import endpoint_address, free_port, is_free
 
 RIG = """
 [rig]

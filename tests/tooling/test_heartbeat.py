@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.wire.heartbeat import INTERVAL, Heartbeat
+from rigwatch.wire.host.heartbeat import INTERVAL, Heartbeat
 
 
 @pytest.fixture

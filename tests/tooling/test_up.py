@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from rigwatch.demo.rig_file import find_config, write_rig_file
-from rigwatch.wire.ports import endpoint_address
+from rigwatch.wire.host.ports import endpoint_address
 from rigwatch.wire.rig_config import load_rig
 
 pytestmark = pytest.mark.xdist_group("rig")

@@ -13,9 +13,9 @@ import numpy as np
 
 from rigwatch.commands import main
 from rigwatch.simulated import simulate, write_session
-from rigwatch.wire import quality
-from rigwatch.wire.blocks import cut
-from rigwatch.wire.messages import AlarmCommand, Column, SampleBlock
+from rigwatch.wire.messages import quality_flags as quality
+from rigwatch.wire.messages.blocks import cut
+from rigwatch.wire.messages.message_types import AlarmCommand, Column, SampleBlock
 from rigwatch.wire.session import SessionWriter, run_info
 
 FOLDER = Path(__file__).parent

@@ -7,8 +7,8 @@ import msgspec
 import pytest
 
 from rigwatch.replay.cases import Case
-from rigwatch.wire.config import Section, load
 from rigwatch.wire.exchange.mapping import ImportMapping
+from rigwatch.wire.typed_files.loading import Section, load
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "sessions.md").read_text(encoding="utf-8")

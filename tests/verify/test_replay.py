@@ -9,7 +9,7 @@ import pytest
 
 from rigwatch.commands import main
 from rigwatch.replay.source import items
-from rigwatch.wire.messages import AlarmCommand, SampleBlock
+from rigwatch.wire.messages.message_types import AlarmCommand, SampleBlock
 from rigwatch.wire.session import SessionWriter, open_session, run_info
 
 HERE = Path(__file__).parent

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from monitor.model_file import load_model
-from monitor.rig_monitor import RigMonitor
+from monitor.model.model_file import load_model
+from monitor.pipeline.rig_monitor import RigMonitor
 from rigwatch.commands import main
 from rigwatch.replay.cases import Case, load_cases, replayed
 from rigwatch.replay.reference import Output
-from rigwatch.wire.blocks import pieces
-from rigwatch.wire.messages import Alarm
-from rigwatch.wire.schema import encode
+from rigwatch.wire.messages.blocks import pieces
+from rigwatch.wire.messages.message_types import Alarm
+from rigwatch.wire.messages.protobuf import encode
 from rigwatch.wire.session import SessionWriter, open_session
 
 HERE = Path(__file__).parent

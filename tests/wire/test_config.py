@@ -2,9 +2,9 @@
 
 import pytest
 
-from rigwatch.wire.config import load, parse
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.rig_config import RigConfig, load_rig, section_or_error
+from rigwatch.wire.typed_files.loading import load, parse
 
 GOOD = """[rig]
 id = "bench1"

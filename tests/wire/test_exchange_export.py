@@ -7,12 +7,12 @@ import pytest
 from scipy.io import loadmat
 
 from rigwatch.commands import main
-from rigwatch.wire import schema
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.exchange.exporting import export_session, variable_names
 from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping
-from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.session import Session, SessionWriter, open_session, run_info
 
 T0 = 1_700_000_000_123_456_789

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from scipy.io import loadmat, savemat
 
 from rigwatch.commands import main
-from rigwatch.wire import quality
-from rigwatch.wire.config import load
 from rigwatch.wire.errors import ImportDataError, RigwatchError
 from rigwatch.wire.exchange.importing import Imported, import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
 from rigwatch.wire.exchange.mat5 import read_mat5
 from rigwatch.wire.exchange.units import UNITS, conversion
-from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.messages import quality_flags as quality
+from rigwatch.wire.messages.message_types import SampleBlock
 from rigwatch.wire.session import open_session
+from rigwatch.wire.typed_files.loading import load
 
 MAPPINGS = Path(__file__).parents[2] / "configs" / "imports"
 GOOD = "t,qm,u\n0,1.0,5\n1,2.0,6\n2,3.0,7\n"

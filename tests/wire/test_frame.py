@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigwatch.wire import frame as wire
+from rigwatch.wire.device import frame as wire
+from rigwatch.wire.device.frame import Frame, FrameDecoder
 from rigwatch.wire.errors import FrameError
-from rigwatch.wire.frame import Frame, FrameDecoder
 
 U32 = st.integers(0, 2**32 - 1)
 FRAMES = st.builds(

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigwatch.wire.errors import ModbusError
-from rigwatch.wire.modbus_map import (
+from rigwatch.wire.device.modbus_map import (
     HEADER_LENGTH,
     READ_LIMIT,
     Header,
@@ -17,6 +16,7 @@ from rigwatch.wire.modbus_map import (
     encode_header,
     encode_slot,
 )
+from rigwatch.wire.errors import ModbusError
 
 U32 = st.integers(0, 2**32 - 1)
 ORDERS = st.sampled_from(["big", "little"])

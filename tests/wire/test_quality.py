@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rigwatch.wire import quality
+from rigwatch.wire.messages import quality_flags as quality
 
 
 def test_every_flag_has_a_name_and_a_bit_of_its_own():

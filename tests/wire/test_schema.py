@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages import (
+from rigwatch.wire.messages.message_types import (
     MESSAGE_TYPES,
     Alarm,
     AlarmCommand,
@@ -24,8 +24,8 @@ from rigwatch.wire.messages import (
     RunInfo,
     SampleBlock,
 )
-from rigwatch.wire.schema import decode, encode, file_descriptor_set, type_name
-from rigwatch.wire.topics import TOPICS
+from rigwatch.wire.messages.protobuf import decode, encode, file_descriptor_set, type_name
+from rigwatch.wire.messages.topics import TOPICS
 
 TIMES = np.array([1_700_000_000_000_000_000, 1_700_000_000_003_906_250])
 COLUMN = Column("voltage", "V", np.array([1.5, -0.1]), np.array([0, 2], np.uint8))

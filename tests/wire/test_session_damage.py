@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
-from rigwatch.wire import schema
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.session import Session, SessionWriter, open_session, run_info
 from rigwatch.wire.session.chunks import MAGIC, Chunk, Damage, scan
 

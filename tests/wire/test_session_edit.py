@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from rigwatch.commands import main
-from rigwatch.wire import schema
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.messages import (
+from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages.message_types import (
     Alarm,
     AlarmState,
     Column,

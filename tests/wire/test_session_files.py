@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from rigwatch.wire import schema
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import (
+from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages.message_types import (
     Alarm,
     AlarmCommand,
     Column,

@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigwatch.wire import schema
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.session.packed import decode_block
 
 Block = SampleBlock | EstimateBlock

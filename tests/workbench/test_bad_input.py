@@ -6,18 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.fit import fit
-from rigwatch.physics.engine.model import Model
-from rigwatch.physics.engine.recording import Recording
-from rigwatch.physics.engine.system import compose
-from rigwatch.wire.config import parse
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.model import Model
+from rigwatch.physics.engine.equations.system import compose
+from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option
-from rigwatch.workbench.compare import compare
-from rigwatch.workbench.intervals import identifiability
-from rigwatch.workbench.study import Study, create
+from rigwatch.wire.typed_files.loading import parse
+from rigwatch.workbench.compare.compare import compare
+from rigwatch.workbench.fit.intervals import identifiability
+from rigwatch.workbench.study.study import Study, create
 
 MODEL = """
 name = "line"

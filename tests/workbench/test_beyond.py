@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from rigwatch.workbench.beyond import beyond
-from rigwatch.workbench.compare import open_bench
-from rigwatch.workbench.explain import explain
-from rigwatch.workbench.intervals import values
-from rigwatch.workbench.study import create
+from rigwatch.workbench.compare.compare import open_bench
+from rigwatch.workbench.compare.uncertainty_budget import beyond
+from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.fit.intervals import values
+from rigwatch.workbench.study.study import create
 from tests.workbench.simulated import multisine, opened
 from tests.workbench.test_black_box import record
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigwatch.workbench.calibration import Evidence, cell_of, doubt, seen
+from rigwatch.workbench.explain.verdict_calibration import Evidence, cell_of, doubt, seen
 
 
 def test_a_clear_verdict_is_doubted_less_than_one_that_leaves_much() -> None:

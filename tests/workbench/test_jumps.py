@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.compiled import compile_system
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.fit import fit
-from rigwatch.physics.engine.system import Placement, compose
-from rigwatch.workbench.explain import ranking
-from rigwatch.workbench.jumps import MOST, between_jumps
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.fit.windowed_fit import fit
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.fit.discontinuities import MOST, between_jumps
 from tests.workbench.simulated import HORIZON, multisine, opened
 
 FORCE = multisine(np.arange(0.25, 8.0, 0.25), 1.0)

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from rigwatch.wire.errors import ConfigError
-from rigwatch.workbench.change import add
-from rigwatch.workbench.compare import compare
-from rigwatch.workbench.explain import explain
-from rigwatch.workbench.study import create, open_study
+from rigwatch.workbench.compare.compare import compare
+from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.steps.change import add
+from rigwatch.workbench.study.study import create, open_study
 from tests.workbench.conftest import CONFIGS
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rigwatch.workbench.explain import ranking
-from rigwatch.workbench.pairs import _pair, likely_pairs, two_effects
-from rigwatch.workbench.rank import SIMILAR, rank, unheard
-from rigwatch.workbench.verdict import judge
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.explain.pairs import _pair, likely_pairs, two_effects
+from rigwatch.workbench.explain.verdict import judge
+from rigwatch.workbench.ranking.rank import SIMILAR, rank, unheard
 from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.simulated import fitted, multisine
 

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.effect import library
-from rigwatch.physics.engine.model import shipped_models
-from rigwatch.physics.engine.recording import Recording
-from rigwatch.workbench.commissioned import commissioned
-from rigwatch.workbench.fitted import fit_base
-from rigwatch.workbench.signals import Data
-from rigwatch.workbench.study import Span, Study, StudyFile
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.fit.fitted_model import fit_base
+from rigwatch.workbench.fit.healthy_parameters import commissioned
+from rigwatch.workbench.study.study import Span, Study, StudyFile
 from sim_plant.excitation import Multisine, drive
 from sim_plant.parameters import RigParameters
 from sim_plant.rig import Rig

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.wire.bus import connect
-from rigwatch.wire.messages import EstimateBlock
+from rigwatch.wire.bus.bus import connect
+from rigwatch.wire.messages.message_types import EstimateBlock
+from rigwatch.wire.messages.topics import ESTIMATES
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.topics import ESTIMATES
 from tests.bus.rig import ROOT, eventually, free_port
 
 PAGE = (ROOT / "docs" / "rig-story.md").read_text(encoding="utf-8")

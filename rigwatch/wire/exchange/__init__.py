@@ -1,1 +1,7 @@
-"""Sessions from and to the files of other tools: CSV, MAT and Parquet."""
+"""Sessions to and from other formats: CSV, Parquet and MAT files, with units converted."""
+
+from rigwatch.wire.exchange.exporting import export_session
+from rigwatch.wire.exchange.importing import import_file
+from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option
+
+__all__ = ["ImportMapping", "export_session", "import_file", "parse_map_option"]

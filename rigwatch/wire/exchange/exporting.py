@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from rigwatch.wire.blocks import Block
 from rigwatch.wire.errors import MissingExtraError, SessionError
-from rigwatch.wire.exchange.native import Array, table_columns
-from rigwatch.wire.session.reader import Session
+from rigwatch.wire.exchange.session_columns import Array, table_columns
+from rigwatch.wire.messages import Block
+from rigwatch.wire.session import Session
 
 LARGEST_MAT = 1 << 31
 """MAT files of version 5 hold no variable beyond this [bytes]."""

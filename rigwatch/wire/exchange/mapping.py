@@ -11,8 +11,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from rigwatch.wire.config import Section
 from rigwatch.wire.errors import ImportDataError
+from rigwatch.wire.typed_files import Section
 
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_-]+$")]
 _WITH_UNIT = re.compile(r"^(?P<source>.*?)\s*\[(?P<unit>[^\[\]]*)\]$", re.DOTALL)

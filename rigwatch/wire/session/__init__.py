@@ -1,10 +1,46 @@
-"""Session files: what a rig said, kept as MCAP with protobuf messages.
+"""Session files: MCAP recordings that survive kill -9 and say what is missing.
 
-`SessionWriter` writes one file, `open_session` reads a file or a folder of segments, damaged or
-not.
+`SessionWriter` writes, `SessionReader` reads and salvages, `edit` trims and recovers, `summary`
+describes.
 """
 
-from rigwatch.wire.session.reader import LostSpan, Recorded, Session, open_session
-from rigwatch.wire.session.writer import SessionWriter, run_info
+from rigwatch.wire.session.edit import Written, first_time, iso_time, recover, trim
+from rigwatch.wire.session.reader import (
+    MERGED_SAMPLES,
+    SUFFIX,
+    LostSpan,
+    Recorded,
+    Session,
+    open_session,
+)
+from rigwatch.wire.session.summary import ChannelSummary, DeviceSummary, Summary, summarise
+from rigwatch.wire.session.writer import (
+    LARGEST_BLOCK,
+    SessionWriter,
+    merge_pending,
+    message_time,
+    run_info,
+)
 
-__all__ = ["LostSpan", "Recorded", "Session", "SessionWriter", "open_session", "run_info"]
+__all__ = [
+    "LARGEST_BLOCK",
+    "MERGED_SAMPLES",
+    "SUFFIX",
+    "ChannelSummary",
+    "DeviceSummary",
+    "LostSpan",
+    "Recorded",
+    "Session",
+    "SessionWriter",
+    "Summary",
+    "Written",
+    "first_time",
+    "iso_time",
+    "merge_pending",
+    "message_time",
+    "open_session",
+    "recover",
+    "run_info",
+    "summarise",
+    "trim",
+]

@@ -8,14 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rigwatch.wire import blocks
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import (
-    Alarm,
-    Message,
-    RunInfo,
-    SampleBlock,
-)
+from rigwatch.wire.messages import Alarm, Message, RunInfo, SampleBlock, blocks
 from rigwatch.wire.session.reader import LostSpan, Recorded, Session
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
 

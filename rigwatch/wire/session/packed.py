@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rigwatch.wire import schema
 from rigwatch.wire.messages import ByteArray, Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages import protobuf as schema
 
 _NO_QUALITY: ByteArray = np.zeros(0, np.uint8)
 _F8, _I8, _U1 = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")

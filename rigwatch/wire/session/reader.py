@@ -19,14 +19,24 @@ from typing import Any, cast
 from mcap.data_stream import ReadDataStream
 from mcap.records import Channel, Schema
 
-from rigwatch.wire import blocks, schema
 from rigwatch.wire.errors import MessageError, SessionError
-from rigwatch.wire.messages import EstimateBlock, Message, RunInfo, SampleBlock
+from rigwatch.wire.messages import (
+    ESTIMATES,
+    SAMPLES,
+    TOPICS,
+    EstimateBlock,
+    Message,
+    RunInfo,
+    SampleBlock,
+    Topic,
+    blocks,
+    topic,
+)
+from rigwatch.wire.messages import protobuf as schema
 from rigwatch.wire.session.chunks import Damage, ends_closed, scan
 from rigwatch.wire.session.packed import decode_block
 from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY, message_time
-from rigwatch.wire.topics import ESTIMATES, SAMPLES, TOPICS, Topic, topic
 
 SUFFIX = ".mcap"
 MERGED_SAMPLES = 16384

@@ -5,9 +5,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigwatch.wire import blocks, quality
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Gap, Message, RunInfo, SampleBlock
+from rigwatch.wire.messages import (
+    Alarm,
+    Column,
+    EstimateBlock,
+    Gap,
+    Message,
+    RunInfo,
+    SampleBlock,
+    blocks,
+)
+from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.session.reader import LostSpan, Session
 from rigwatch.wire.session.writer import message_time
 

@@ -22,16 +22,17 @@ from typing import Self
 from mcap.writer import CompressionType, Writer
 
 from rigwatch.version import __version__
-from rigwatch.wire import blocks, schema
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import (
+    TOPICS,
     AlarmCommand,
     EstimateBlock,
     Message,
     RunInfo,
     SampleBlock,
+    blocks,
 )
-from rigwatch.wire.topics import TOPICS
+from rigwatch.wire.messages import protobuf as schema
 
 PROFILE = "rigwatch"
 FORMAT = 1

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import welch
 
-from rigwatch.page.svg import Plot, limits
-from rigwatch.physics.engine.compiled import FloatArray
-from rigwatch.workbench.locate import Region, motion, sample_numbers
-from rigwatch.workbench.stages import Signals, Stage
+from rigwatch.page import Plot, limits
+from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.workbench.compare import Region, motion, sample_numbers
+from rigwatch.workbench.steps import Signals, Stage
 
 CELLS = 22
 CROSSINGS = 8

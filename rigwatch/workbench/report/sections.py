@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from rigwatch.page.html import exact, figure, key, table
-from rigwatch.page.svg import limits
-from rigwatch.physics.engine.compiled import FloatArray
+from rigwatch.page import exact, figure, key, limits, table
+from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.workbench.compare import Region
 from rigwatch.workbench.explain import Explanation, Row
-from rigwatch.workbench.locate import Region
 from rigwatch.workbench.report import charts
-from rigwatch.workbench.stages import Signals, Stage
+from rigwatch.workbench.report.text_report import VERDICTS, doubt_of
+from rigwatch.workbench.steps import Signals, Stage
 from rigwatch.workbench.study import Study
-from rigwatch.workbench.words import VERDICTS, doubt_of
 
 VIEWS = {
     "direction": "direction of motion",

@@ -1,0 +1,6 @@
+"""Readings that repeat at the top: a sensor or converter at its limit."""
+
+from monitor.clipping.clipping import Clipping
+from monitor.clipping.flat_top import NEVER, judge_flat_tops, new_flat_tops
+
+__all__ = ["NEVER", "Clipping", "judge_flat_tops", "new_flat_tops"]

@@ -1,0 +1,52 @@
+"""Clipping of each channel as conditions: `flat_top.py` with the model's figures."""
+
+import numpy as np
+
+from monitor.clipping.flat_top import NEVER, forget_flat_tops, judge_flat_tops, new_flat_tops
+from monitor.decision import rules_for
+from monitor.model import RigModel
+from monitor.signals import SENSOR_CLIPPED, Admitted, Condition
+
+
+class Clipping:
+    """Carries the evidence of every channel from block to block.
+
+    Args:
+        model: says how often a healthy reading repeats; where it does not, nothing is judged.
+    """
+
+    def __init__(self, model: RigModel) -> None:
+        known = model.noise.repeat or (NEVER,) * len(model.channels)
+        self._chance = np.array(known)
+        self._limit = 0.5 * rules_for(model).factor ** 2
+        self._names = [
+            (place, f"{SENSOR_CLIPPED}.{channel}")
+            for place, channel in enumerate(model.channels)
+            if known[place] < NEVER
+        ]
+        self._state = new_flat_tops(len(model.channels))
+
+    def update(self, admitted: Admitted) -> tuple[Condition, ...]:
+        """Conditions of the block's samples, those that were put in for missing ones left out."""
+        if not self._names:
+            return ()
+        if admitted.missing < 0:
+            forget_flat_tops(self._state)
+        elif admitted.missing:
+            self._state.last[:] = np.nan
+        score = np.zeros(admitted.signals.shape)
+        judge_flat_tops(
+            admitted.signals, admitted.good, self._chance, self._limit, self._state, score
+        )
+        kept = score[admitted.padding :]
+        none, limit = np.full(len(kept), -np.inf), np.full(len(kept), self._limit)
+        return tuple(
+            Condition(
+                name,
+                (kept[:, place] > self._limit).astype(np.uint8),
+                kept[:, place].copy(),
+                none,
+                limit,
+            )
+            for place, name in self._names
+        )

@@ -1,0 +1,137 @@
+"""Clipping inside the range: a channel whose peaks are cut off at one and the same value.
+
+A live reading carries noise, so it seldom repeats to the last digit; a clipped one repeats for as
+long as the signal would go further. Every reading that stands at the extreme of the last one to two
+spans is a trial: does the next one repeat it? With p the largest chance that the noise allows and
+q = (1 + p)/2, Page's cumulative sum, one for each end of each channel,
+
+    S ← max(0, S + ln(q/p))            repeated
+    S ← max(0, S + ln((1-q)/(1-p)))    not repeated
+
+leaves h in a healthy channel after e^h trials on average, at the earliest (Lorden, Annals of
+Mathematical Statistics 42, 1971). The h is that of every other threshold: e^-h is the chance that
+is allowed at one look. It needs no amplitude, range, period or model. Where the converter's step
+hides the noise p is near 1, and nothing is said; a channel that does not move at all is not clipped
+but stuck.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigwatch.physics.transfer import FloatArray
+
+SPAN = 256
+"""Samples. Extremes are those of the running span and of the one before it, so that a peak from
+before the fault is forgotten, and motion down to a hertz comes to its own extremes.
+"""
+NEVER = 1.0
+"""Chance of a repeat with which a channel is not judged."""
+_CEILING = 2.0
+"""S stops at this many h, so that it comes back soon after the clipping has gone."""
+
+
+class FlatTops(NamedTuple):
+    """State; the last axis is upper and lower end.
+
+    Args:
+        score: S, shape (c, 2).
+        extreme: largest x and largest -x of the running span and of the one before, (2, c, 2).
+        last: newest reading, NaN where it was not good, shape (c,).
+        filled: samples in the running span, shape (1,).
+        trials, repeats: counted since the start, shape (c, 2).
+    """
+
+    score: FloatArray
+    extreme: FloatArray
+    last: FloatArray
+    filled: NDArray[np.int64]
+    trials: NDArray[np.int64]
+    repeats: NDArray[np.int64]
+
+
+def new_flat_tops(channels: int) -> FlatTops:
+    """A state that has seen nothing."""
+    state = FlatTops(
+        np.zeros((channels, 2)),
+        np.zeros((2, channels, 2)),
+        np.zeros(channels),
+        np.zeros(1, np.int64),
+        np.zeros((channels, 2), np.int64),
+        np.zeros((channels, 2), np.int64),
+    )
+    forget_flat_tops(state)
+    return state
+
+
+@njit(cache=True)
+def forget_flat_tops(state: FlatTops) -> None:
+    """Back to nothing seen; the counts stay."""
+    state.score[:, :] = 0.0
+    state.extreme[:, :, :] = -np.inf
+    state.last[:] = np.nan
+    state.filled[0] = 0
+
+
+@njit(cache=True)
+def judge_flat_tops(  # noqa: PLR0917
+    values: FloatArray,
+    good: NDArray[np.bool_],
+    chance: FloatArray,
+    limit: float,
+    state: FlatTops,
+    score: FloatArray,
+) -> None:
+    """Take samples in; `score` gets the larger S of the two ends, after each sample.
+
+    Args:
+        values: readings, shape (n, c); those that are not good may be anything.
+        good: shape (n, c).
+        chance: p of each channel, shape (c,); NEVER where it is not to be judged.
+        limit: h.
+        state: carried on.
+        score: shape (n, c).
+    """
+    for k in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            if good[k, c]:
+                for end in range(2):
+                    side = values[k, c] if end == 0 else -values[k, c]
+                    _try(side, c, end, chance[c], limit, state)
+                state.last[c] = values[k, c]
+            else:
+                state.last[c] = np.nan
+            score[k, c] = max(state.score[c, 0], state.score[c, 1])
+        state.filled[0] += 1
+        if state.filled[0] == SPAN:
+            state.filled[0] = 0
+            state.extreme[1] = state.extreme[0]
+            state.extreme[0, :, :] = -np.inf
+
+
+@njit()
+def _try(  # noqa: PLR0917
+    side: float, c: int, end: int, chance: float, limit: float, state: FlatTops
+) -> None:
+    """One reading of one channel, seen from one end: `side` is x or -x."""
+    before = state.last[c] if end == 0 else -state.last[c]
+    at_extreme = before >= _extreme(state, c, end)
+    if at_extreme and before > -_extreme(state, c, 1 - end):
+        repeats = side == before
+        state.trials[c, end] += 1
+        state.repeats[c, end] += 1 if repeats else 0
+        if chance < NEVER:
+            likely = 0.5 * (1.0 + chance)
+            step = np.log(likely / chance) if repeats else np.log((1 - likely) / (1 - chance))
+            state.score[c, end] = min(max(state.score[c, end] + step, 0.0), _CEILING * limit)
+    state.extreme[0, c, end] = max(state.extreme[0, c, end], side)
+
+
+@njit()
+def _extreme(state: FlatTops, c: int, end: int) -> float:
+    return max(state.extreme[0, c, end], state.extreme[1, c, end])

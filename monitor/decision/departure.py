@@ -1,0 +1,82 @@
+"""Whether the rig has left its healthy course: the estimates, the change of the residual over 8 and
+64 samples, and how far position and voltage have moved from the healthy period.
+
+A fault of one sensor shows in one channel alone, and not every fault shows in the estimates.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import numpy as np
+from numba import njit
+
+from monitor.decision.estimates import spread_of_change
+from monitor.decision.kernel_state import (
+    DEVIATION,
+    LONG,
+    MOVED_VOLTAGE,
+    SHORT,
+    Rules,
+    V,
+    WatchState,
+    X,
+    Y,
+)
+from monitor.estimation import FILL, Energies, energy, recent_energy
+from monitor.reference import (
+    APERIODIC,
+    FIXED,
+    POSITION_NOISE,
+    POSITION_SWING,
+    SOURCE,
+    SWING,
+    VOLTAGE_NOISE,
+    Reference,
+)
+
+_NOISES = 6.0
+"""Root mean square over a window that a channel's own noise does not reach, in its deviations."""
+
+
+@njit(inline="always")
+def moved(energies: Energies, signal: int, count: int) -> float:
+    """Root mean square of the newest `count` samples."""
+    if count >= energies.rows.shape[0]:
+        return np.sqrt(energy(energies, signal) / max(energies.place[FILL], 1))
+    return np.sqrt(recent_energy(energies, signal, count) / max(count, 1))
+
+
+@njit(inline="always")
+def position_limit(rules: Rules, ref: Reference) -> float:
+    """How far the position may lie from its healthy period, root mean square [m]."""
+    return max(
+        _NOISES * ref.value[POSITION_NOISE], rules.position_floor * ref.value[POSITION_SWING]
+    )
+
+
+@njit(inline="always")
+def voltage_limit(rules: Rules, ref: Reference) -> float:
+    """The same of the voltage [V]."""
+    return max(_NOISES * ref.value[VOLTAGE_NOISE], rules.voltage_floor * ref.value[SWING])
+
+
+@njit(inline="always")
+def departed(rules: Rules, ref: Reference, state: WatchState) -> bool:
+    """Whether anything has left its limits; the largest of all goes into the deviation, in units
+    of k.
+    """
+    held, energies = state.held, state.energies
+    if ref.number[SOURCE] == FIXED:
+        return held[DEVIATION] > rules.factor
+    variance = spread_of_change(ref) ** 2
+    largest = held[DEVIATION] / rules.factor
+    largest = max(largest, np.sqrt(recent_energy(energies, Y, SHORT) / variance / rules.limit_8))
+    if energies.place[FILL] >= LONG:
+        largest = max(largest, np.sqrt(energy(energies, Y) / variance / rules.limit_64))
+    if ref.number[SOURCE] != APERIODIC:
+        largest = max(largest, moved(energies, X, LONG) / position_limit(rules, ref))
+        voltage = moved(energies, V, LONG)
+        held[MOVED_VOLTAGE] = voltage / max(ref.value[SWING], 1e-12)
+        largest = max(largest, voltage / voltage_limit(rules, ref))
+    held[DEVIATION] = largest * rules.factor
+    return largest > 1.0

@@ -1,0 +1,143 @@
+"""Episodes: from a departure until everything has been quiet, with a look at what it is every four
+samples. Between episodes the healthy average grows.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from numba import njit
+
+from monitor.decision.departure import moved, position_limit, voltage_limit
+from monitor.decision.estimates import spread_of_change
+from monitor.decision.isolation import HISTORY, swing_of_voltage_change, weigh
+from monitor.decision.isolation_verdict import Seen, verdict
+from monitor.decision.kernel_state import (  # fmt: skip
+    DEVIATION,
+    EPISODE,
+    EXCITED,
+    EXPLAINED,
+    FRICTION,
+    LONG,
+    NEW_EXCITATION,
+    NO_VERDICT,
+    OTHER,
+    QUIET,
+    REST,
+    RHO,
+    SHARE,
+    THETA1,
+    TOGETHER,
+    VERDICT,
+    A,
+    Rules,
+    V,
+    WatchState,
+    X,
+    forget,
+)
+from monitor.reference import (
+    ACCELERATION_SWING,
+    APERIODIC,
+    CYCLE,
+    FIXED,
+    SOURCE,
+    SWING,
+    Reference,
+    refine,
+    restart,
+)
+from rigwatch.physics.transfer import FloatArray
+
+ENDS_AFTER = 64
+"""Quiet samples that end an episode."""
+FIRST_LOOK, LOOK_EVERY = 12, 4
+"""Samples after the departure before the first look, and between looks."""
+PLAINLY_HEALTHY = 0.6
+"""Share of the threshold below which a sample may enter the healthy average."""
+LOOKS_AT_NEW_EXCITATION = 32
+"""Looks after which another excitation is taken for granted and learnt."""
+LOUDER = 2.0
+"""Swing of a voltage without a period, in that of the learnt stretch, that makes it another
+excitation. No fault is named there: beside what the model leaves of a motion that never repeats, a
+dead band looks like dry friction and heavy friction like anything else.
+"""
+SHORTEST_CYCLE, LONGEST_CYCLE = 32, 256
+"""Samples; evidence needs some, and a slow drive must not put off the verdict for ever."""
+
+
+@njit(inline="always")
+def follow(  # noqa: PLR0917
+    out: bool,
+    seq: int,
+    place: int,
+    row: FloatArray,
+    rules: Rules,
+    ref: Reference,
+    state: WatchState,
+) -> None:
+    """Take sample `seq`, at `place` of the period, which is `out` of its limits or not."""
+    number = state.number
+    _count(out, state)
+    if number[EPISODE] == 0:
+        if state.held[DEVIATION] < PLAINLY_HEALTHY * rules.factor:
+            refine(ref, place, row)
+    elif number[EPISODE] >= FIRST_LOOK and seq % LOOK_EVERY == 0:
+        _look(seq, rules, ref, state)
+        excited = state.held[VERDICT] == NEW_EXCITATION
+        number[EXCITED] = number[EXCITED] + 1 if excited else 0
+        if number[EXCITED] >= LOOKS_AT_NEW_EXCITATION:
+            restart(ref, True)
+            forget(state, rules.window)
+
+
+@njit(inline="always")
+def _count(out: bool, state: WatchState) -> None:
+    """Begin, continue or end the episode."""
+    number, held = state.number, state.held
+    if out:
+        number[QUIET] = 0
+        number[EPISODE] += 1
+    elif number[EPISODE] > 0:
+        number[QUIET] += 1
+        number[EPISODE] += 1
+        if number[QUIET] >= ENDS_AFTER:
+            number[EPISODE] = number[QUIET] = 0
+            held[VERDICT] = NO_VERDICT
+            held[EXPLAINED] = held[SHARE] = held[RHO] = held[REST] = 0.0
+
+
+@njit()
+def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
+    """Weigh the evidence since the departure and judge by it."""
+    held, since = state.held, state.number[EPISODE]
+    if ref.number[SOURCE] == FIXED:
+        held[VERDICT] = FRICTION if held[THETA1] > rules.high1 else OTHER
+        return
+    if ref.number[SOURCE] == APERIODIC:
+        louder = swing_of_voltage_change(state.history, HISTORY) > LOUDER * ref.value[SWING]
+        held[VERDICT] = NEW_EXCITATION if louder else NO_VERDICT
+        return
+    cycle = max(SHORTEST_CYCLE, min(ref.number[CYCLE], LONGEST_CYCLE))
+    evidence = weigh(state.history, ref, seq, min(since, HISTORY), min(since, 2 * cycle))
+    held[EXPLAINED], held[SHARE] = evidence.explained, evidence.share
+    held[RHO], held[REST] = evidence.rho, evidence.rest
+    held[TOGETHER] = evidence.together
+    held[VERDICT] = verdict(_seen(since, cycle, rules, ref, state), evidence, state)
+
+
+@njit()
+def _seen(since: int, cycle: int, rules: Rules, ref: Reference, state: WatchState) -> Seen:
+    """Which channels have moved since the departure."""
+    energies, count = state.energies, min(since, LONG)
+    spread = spread_of_change(ref)
+    acceleration_limit = max(3.0 * spread, 0.002 * ref.value[ACCELERATION_SWING])
+    return Seen(
+        state.held[VERDICT],
+        since,
+        cycle,
+        moved(energies, V, count) > voltage_limit(rules, ref),
+        moved(energies, X, count) > position_limit(rules, ref),
+        moved(energies, A, count) > acceleration_limit,
+        swing_of_voltage_change(state.history, count) / max(ref.value[SWING], 1e-30),
+        spread,
+    )

@@ -1,0 +1,95 @@
+"""Coulomb and viscous estimates with their limits (5.39), at each hop of the window.
+
+    D² = Σ explained / (σ²·(1 + 4/depth)),   θ leaves its thresholds where D > k
+
+D is how far (θ1, θ2) lies from healthy in standard deviations, both taken together: the thresholds
+are the ellipse that the normal matrix gives, and the printed limits ±k·sd its half axes. `depth`
+is the number of periods in the healthy average, whose own error does not average out.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import numpy as np
+from numba import njit
+
+from monitor.decision.kernel_state import (  # fmt: skip
+    CONDITION,
+    DEVIATION,
+    HIGH1,
+    HIGH2,
+    LOW1,
+    LOW2,
+    OBSERVABLE,
+    SPEED_RMS,
+    THETA1,
+    THETA2,
+    Rules,
+    S,
+    WatchState,
+)
+from monitor.estimation import FILL, LENGTH, energy, solve_two, sums
+from monitor.reference import (
+    APERIODIC,
+    DEPTH,
+    FIXED,
+    LEFT_SHARE,
+    NOISE,
+    QUICK,
+    SLOW,
+    SOURCE,
+    Reference,
+)
+
+LEAST_FILL = 8
+"""Samples before two parameters are estimated at all."""
+_APERIODIC_VARIANCE = 9.0
+"""Without a period the residual itself is judged, which swings by about three of its own sizes."""
+
+
+@njit(inline="always")
+def spread_of_change(ref: Reference) -> float:
+    """Standard deviation of the change of the residual, error of the healthy average included."""
+    if ref.number[SOURCE] == APERIODIC:
+        level = max(ref.value[QUICK], ref.value[SLOW])
+        variance = ref.value[NOISE] ** 2 + ref.value[LEFT_SHARE] * level
+        return np.sqrt((1.0 + _APERIODIC_VARIANCE) * variance)
+    return ref.value[NOISE] * np.sqrt(1.0 + 4.0 / max(ref.number[DEPTH], 1))
+
+
+@njit(inline="always")
+def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
+    """θ, its limits, D and whether friction can be seen at all, into `state.held`."""
+    held, s = state.held, state.sums
+    sums(state.window, s)
+    theta1, theta2, condition = solve_two(s)
+    speed = np.sqrt(energy(state.energies, S) / max(state.energies.place[FILL], 1))
+    held[CONDITION], held[SPEED_RMS] = condition, speed
+    observable = speed >= rules.least_velocity and state.window.place[FILL] >= LEAST_FILL
+    held[OBSERVABLE] = 1.0 if observable else 0.0
+    if not observable:
+        held[CONDITION] = 1.0
+    if not observable or not condition < rules.worst_condition:
+        held[DEVIATION] = 0.0
+        return
+    spread = spread_of_change(ref)
+    determinant = s[0] * s[3] - s[1] * s[1]
+    reach1 = rules.factor * spread * np.sqrt(s[3] / determinant)
+    reach2 = rules.factor * spread * np.sqrt(s[0] / determinant)
+    held[THETA1], held[THETA2] = theta1, theta2
+    held[LOW1], held[HIGH1], held[LOW2], held[HIGH2] = -reach1, reach1, -reach2, reach2
+    held[DEVIATION] = np.sqrt(max(theta1 * s[2] + theta2 * s[4], 0.0)) / spread
+    if ref.number[SOURCE] == FIXED:
+        _judge_by_band(rules, state)
+
+
+@njit()
+def _judge_by_band(rules: Rules, state: WatchState) -> None:
+    """Fixed limits; the deviation is k at a limit. A window that is not full yet has no say."""
+    held, place = state.held, state.window.place
+    held[LOW1], held[HIGH1] = rules.low1, rules.high1
+    held[LOW2], held[HIGH2] = rules.low2, rules.high2
+    out1 = abs(2.0 * held[THETA1] - rules.low1 - rules.high1) / (rules.high1 - rules.low1)
+    out2 = abs(2.0 * held[THETA2] - rules.low2 - rules.high2) / (rules.high2 - rules.low2)
+    full = place[FILL] == place[LENGTH]
+    held[DEVIATION] = rules.factor * max(out1, out2) if full else 0.0

@@ -1,0 +1,243 @@
+"""What kind of change it is: dry friction, or one of its rivals.
+
+The change of the residual since its onset is put before two explanations over the same samples:
+
+    friction   y = θ1·Ge[sgn v] + θ2·Ge[v]                                                 (5.33)
+    rivals     any change that is smooth in the healthy motion: gain, lag, delay, lost pressure,
+        spring, mass,
+               damping, bias, and what bends them; as  A, dA, X, dX, 1, the first two growing in
+               time, and the products X², X·dX, X³, X²·dX, with A and X one healthy period of
+               acceleration and position and d a difference of neighbours
+
+Other faults are smooth in the healthy motion or nearly so. Dry friction is not: it jumps where the
+velocity turns. So the question is what the jump explains that no rival can,
+
+    share = (part of y that Ge[sgn v] explains beyond the rivals)² / y²,   ρ = the same over what
+    the rivals leave,
+
+with the sign that takes energy out (θ1 > 0). A mass that stands still where the healthy one moves,
+by position and acceleration alike, is stick; no smooth fault does that either.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from monitor.reference import PERIOD, POSITION_SWING, Reference, place_in_period
+from rigwatch.physics.transfer import FloatArray, filter_sample
+
+HISTORY = 512
+"""Samples that are kept for judging."""
+Y, SIGN_PART, SPEED_PART, SPEED, AT_REST, VOLTS = range(6)
+"""Columns of the history: change of the residual, g1, g2, velocity, 1 at rest, change of the
+voltage.
+"""
+_RIVALS = 11
+
+
+class History(NamedTuple):
+    """Ring of the newest samples, with the friction filter for judging from the onset on."""
+
+    rows: FloatArray
+    head: NDArray[np.int64]
+    b: FloatArray
+    a: FloatArray
+
+
+class Evidence(NamedTuple):
+    """What the samples since the onset say.
+
+    Args:
+        explained: share of y² that friction explains.
+        share: share of y² that the jump explains beyond the rivals, negative where it would put
+            energy in.
+        rho: correlation of the jump with what the rivals leave.
+        rest: share of the samples at rest.
+        rest_always: the same of the half of the samples that has less of it.
+        rivals: share of y² that the rivals explain.
+        jump: energy explained by the jump beyond the rivals [(m/s^2)^2].
+        together: share of y² that rivals and jump explain together.
+        dry: share of y² in the Coulomb part of the friction fit, zero where θ1 is negative.
+        peak: share of y² in its largest sample; near 1 for a spike.
+    """
+
+    explained: float
+    share: float
+    rho: float
+    rest: float
+    rest_always: float
+    rivals: float
+    jump: float
+    together: float
+    dry: float
+    peak: float
+
+
+def new_history(b: FloatArray, a: FloatArray) -> History:
+    """An empty history for the friction filter b/a, padded to one length."""
+    return History(np.zeros((HISTORY, 6)), np.zeros(1, np.int64), b, a)
+
+
+@njit(inline="always")
+def remember(  # noqa: PLR0917
+    history: History, y: float, g1: float, g2: float, speed: float, rest: float, volts: float
+) -> None:
+    """Keep one sample."""
+    row = history.rows[history.head[0]]
+    row[Y], row[SIGN_PART], row[SPEED_PART], row[SPEED] = y, g1, g2, speed
+    row[AT_REST], row[VOLTS] = rest, volts
+    head = history.head[0] + 1
+    history.head[0] = head if head < HISTORY else 0
+
+
+@njit()
+def weigh(history: History, ref: Reference, seq: int, since: int, count: int) -> Evidence:
+    """Evidence of the newest `count` samples.
+
+    Args:
+        history: the newest samples, the last of them number `seq`.
+        ref: one period of the healthy rig.
+        since: samples since the onset of the change, the regressors start from rest there where it
+            is kept.
+        count: samples that are judged, at most HISTORY and `since`.
+    """
+    n = min(count, HISTORY)
+    data = np.zeros((n, _RIVALS + 3))
+    _fill_rivals(data, ref, seq, n)
+    _fill_friction(data, history, since, n)
+    first = second = peak = 0.0
+    for k in range(n):
+        at = (history.head[0] - n + k) % HISTORY
+        data[k, _RIVALS + 2] = history.rows[at, Y]
+        at_rest = history.rows[at, AT_REST]
+        if 2 * k < n:
+            first += at_rest
+        else:
+            second += at_rest
+        peak = max(peak, history.rows[at, Y] ** 2)
+    gram = data.T @ data
+    return _compare(gram, (first + second) / n, 2.0 * min(first, second) / n, peak)
+
+
+@njit()
+def swing_of_voltage_change(history: History, count: int) -> float:
+    """Standard deviation of the voltage's change over the newest `count` samples [V]; a shifted
+    mean is none.
+    """
+    mean = square = 0.0
+    for k in range(count):
+        volts = history.rows[(history.head[0] - 1 - k) % HISTORY, VOLTS]
+        mean += volts / count
+        square += volts * volts / count
+    return np.sqrt(max(square - mean * mean, 0.0))
+
+
+@njit()
+def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
+    period = ref.number[PERIOD]
+    mean = 0.0
+    for place in range(period):
+        mean += ref.template[1, place] / period
+    swing = max(ref.value[POSITION_SWING], 1e-12)
+    for k in range(n):
+        place = place_in_period(ref, seq - n + 1 + k)
+        later, earlier = (place + 1) % period, (place - 1) % period
+        data[k, 0] = ref.template[2, place]
+        data[k, 1] = ref.template[2, later] - ref.template[2, earlier]
+        data[k, 2] = x = (ref.template[1, place] - mean) / swing
+        data[k, 3] = dx = (ref.template[1, later] - ref.template[1, earlier]) / swing
+        data[k, 4] = 1.0
+        time = (k + 0.5) / n - 0.5
+        data[k, 5] = time * data[k, 0]
+        data[k, 6] = time * data[k, 1]
+        data[k, 7], data[k, 8], data[k, 9], data[k, 10] = x * x, x * dx, x * x * x, x * x * dx
+
+
+@njit()
+def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> None:
+    rows, head = history.rows, history.head[0]
+    if since >= HISTORY:
+        for k in range(n):
+            at = (head - n + k) % HISTORY
+            data[k, _RIVALS] = rows[at, SIGN_PART]
+            data[k, _RIVALS + 1] = rows[at, SPEED_PART]
+        return
+    order = max(history.b.size - 1, 1)
+    sign_state, speed_state = np.zeros(order), np.zeros(order)
+    for k in range(since):
+        speed = rows[(head - since + k) % HISTORY, SPEED]
+        sign = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
+        g1 = filter_sample(history.b, history.a, sign_state, sign)
+        g2 = filter_sample(history.b, history.a, speed_state, speed)
+        place = k - (since - n)
+        if place >= 0:
+            data[place, _RIVALS], data[place, _RIVALS + 1] = g1, g2
+
+
+@njit()
+def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> Evidence:
+    """The evidence in the normal matrix of rivals, friction regressors and y, in this order."""
+    yy = max(gram[-1, -1], 1e-30)
+    explained, dry = _friction_fit(gram, yy)
+    remains, jump, sign = _beyond_rivals(gram)
+    rho = sign * np.sqrt(min(jump / remains, 1.0)) if remains > 0.0 else 0.0
+    return Evidence(
+        explained,
+        sign * jump / yy,
+        rho,
+        rest,
+        rest_always,
+        1.0 - remains / yy,
+        jump,
+        1.0 - (remains - jump) / yy,
+        dry,
+        peak / yy,
+    )
+
+
+@njit()
+def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
+    """Shares of y² that both friction terms explain, and that the Coulomb term alone stands for."""
+    y, g1, g2 = gram.shape[0] - 1, _RIVALS, _RIVALS + 1
+    determinant = gram[g1, g1] * gram[g2, g2] - gram[g1, g2] ** 2
+    if determinant <= 1e-12 * gram[g1, g1] * gram[g2, g2]:
+        return 0.0, 0.0
+    theta1 = (gram[g2, g2] * gram[g1, y] - gram[g1, g2] * gram[g2, y]) / determinant
+    theta2 = (gram[g1, g1] * gram[g2, y] - gram[g1, g2] * gram[g1, y]) / determinant
+    explained = (theta1 * gram[g1, y] + theta2 * gram[g2, y]) / yy
+    return explained, max(theta1, 0.0) ** 2 * gram[g1, g1] / yy
+
+
+@njit()
+def _beyond_rivals(gram: FloatArray) -> tuple[float, float, float]:
+    """Energy that the rivals leave of y, what of it the jump explains, and the jump's sign."""
+    y, g1 = gram.shape[0] - 1, _RIVALS
+    left = gram.copy()
+    for i in range(_RIVALS):
+        _eliminate(left, i, 1e-9 * gram[i, i])
+    remains = max(left[y, y], 0.0)
+    jump = 0.0
+    if left[g1, g1] > 1e-9 * max(gram[g1, g1], 1e-30) and remains > 0.0:
+        jump = left[g1, y] ** 2 / left[g1, g1]
+    return remains, jump, 1.0 if left[g1, y] > 0.0 else -1.0
+
+
+@njit()
+def _eliminate(gram: FloatArray, pivot: int, least: float) -> None:
+    """Take out of every column what column `pivot` explains; a column that others explained
+    already is skipped.
+    """
+    strength = gram[pivot, pivot]
+    if strength <= least or strength <= 0.0:
+        return
+    size = gram.shape[0]
+    row = gram[pivot].copy()
+    for i in range(size):
+        factor = row[i] / strength
+        for j in range(size):
+            gram[i, j] -= factor * row[j]

@@ -1,0 +1,110 @@
+"""What the watch carries from sample to sample, and the names of its places.
+
+`WatchState.held` holds the newest value of every output; `number` counts samples of the running
+episode, the stretch from a departure until everything has been quiet again.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from monitor.decision.isolation import History, new_history
+from monitor.estimation import (
+    Energies,
+    Window,
+    new_energies,
+    new_window,
+    restart_energies,
+    restart_window,
+)
+from rigwatch.physics.transfer import FloatArray
+
+NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
+
+(
+    MODELLED, RESIDUAL, CHANGE, SPEED, THETA1, THETA2, LOW1, HIGH1, LOW2, HIGH2,
+    OBSERVABLE, ARMED_FLAG, DEVIATION, EXPLAINED, SHARE, RHO, REST, VERDICT, CONDITION,
+    MOVED_VOLTAGE, SPEED_RMS, TOGETHER, LEARNT_HERE,
+) = range(23)  # fmt: skip
+OUTPUTS = 23
+"""Places in `held` and in the kernel's output."""
+
+EPISODE, QUIET, AGREED, HOP, EXCITED = range(5)
+"""Counters in `number`: samples since the departure; quiet samples; looks in a row that found
+friction; samples since the last estimate; looks in a row that found another excitation.
+"""
+Y, X, V, A, S = range(5)
+"""Signals whose energies are kept: change of the residual, of position, voltage and acceleration
+against the healthy period, and the velocity itself.
+"""
+SHORT, LONG = 8, 64
+"""Samples over which energies are judged: a blow shows in the short, a small change in the long."""
+
+
+class Rules(NamedTuple):
+    """Everything a departure is judged by; see `limits.py` for where the figures come from."""
+
+    window: int
+    hop: int
+    factor: float
+    limit_8: float
+    limit_64: float
+    least_velocity: float
+    worst_condition: float
+    position_floor: float
+    voltage_floor: float
+    low1: float
+    high1: float
+    low2: float
+    high2: float
+
+
+class WatchState(NamedTuple):
+    """All that is carried: sliding sums, the newest samples, counters, outputs, and room for one
+    sample's signals, regressors and sums.
+    """
+
+    window: Window
+    energies: Energies
+    history: History
+    number: NDArray[np.int64]
+    held: FloatArray
+    recent: FloatArray
+    signals: FloatArray
+    row: FloatArray
+    sums: FloatArray
+
+
+def new_watch_state(
+    longest_window: int, friction_b: FloatArray, friction_a: FloatArray
+) -> WatchState:
+    """A state that has seen nothing.
+
+    Args:
+        longest_window: samples that the sliding least squares has to have room for.
+        friction_b, friction_a: friction filter Ge, padded to one length.
+    """
+    return WatchState(
+        new_window(longest_window, 2),
+        new_energies(LONG, 5),
+        new_history(friction_b, friction_a),
+        np.zeros(5, np.int64),
+        np.zeros(OUTPUTS),
+        np.zeros(8),
+        np.zeros(5),
+        np.zeros(3),
+        np.zeros(6),
+    )
+
+
+@njit()
+def forget(state: WatchState, window: int) -> None:
+    """Back to nothing seen; from now on the least squares spans `window` samples."""
+    restart_window(state.window, window)
+    restart_energies(state.energies)
+    state.history.rows[:, :] = 0.0
+    state.number[:] = 0
+    state.held[:] = 0.0
+    state.recent[:] = 0.0

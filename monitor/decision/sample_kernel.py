@@ -1,0 +1,213 @@
+"""Sample by sample, while armed: change of the residual, estimates, departure, verdict
+(theory 1.4).
+
+    change ─▶ sums and history ─▶ estimates ─▶ departure ─▶ episode ─▶ verdict
+
+Before that, the healthy reference takes the samples until it is armed.
+
+Only `watch_block` is kept compiled. numba compiles it anew where this file has changed and knows
+nothing of the files that it calls, so their fingerprint stands here; a test says what to put in.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from monitor.decision.departure import departed
+from monitor.decision.episode import follow
+from monitor.decision.estimates import estimate
+from monitor.decision.isolation import HISTORY, remember
+from monitor.decision.kernel_state import (  # fmt: skip
+    ARMED_FLAG,
+    CHANGE,
+    DEVIATION,
+    EPISODE,
+    HOP,
+    LEARNT_HERE,
+    MODELLED,
+    OBSERVABLE,
+    RESIDUAL,
+    SPEED,
+    A,
+    Rules,
+    S,
+    V,
+    WatchState,
+    X,
+    Y,
+    forget,
+)
+from monitor.estimation import FILL, Window, add, push
+from monitor.reference import (
+    ACCELERATION_SWING,
+    APERIODIC,
+    ARMED,
+    MODE,
+    NOISE,
+    PERIOD,
+    POSITION_NOISE,
+    SCALE,
+    SOURCE,
+    Reference,
+    ReferenceRules,
+    follow_level,
+    learnt_here,
+    observe,
+    place_in_period,
+    restart,
+)
+from monitor.signals import (
+    ACCELERATION,
+    DEAD,
+    G1,
+    G2,
+    GOOD,
+    HELD,
+    NEW_BOOT,
+    POSITION,
+    RESTART,
+    VELOCITY,
+    VOLTAGE,
+    Codes,
+)
+from monitor.signals import MODELLED as MODELLED_COLUMN
+from rigwatch.physics.transfer import FloatArray
+
+FINGERPRINT = "d92a8c466e34"
+"""Of every source file whose code is compiled into `watch_block`."""
+
+
+@njit(cache=True)
+def watch_block(  # noqa: PLR0917
+    data: FloatArray,
+    code: Codes,
+    position_valid: NDArray[np.uint8],
+    first: int,
+    rules: Rules,
+    arming: ReferenceRules,
+    ref: Reference,
+    state: WatchState,
+    out: FloatArray,
+) -> None:
+    """Take the residual stage's columns for samples `first`, `first` + 1, … and fill `out`, shape
+    (OUTPUTS, n).
+    """
+    for k in range(code.size):
+        seq = first + k
+        if code[k] == RESTART or code[k] == NEW_BOOT:
+            restart(ref, code[k] == NEW_BOOT)
+            forget(state, rules.window)
+        good = code[k] == GOOD or code[k] == RESTART or code[k] == NEW_BOOT
+        if good and ref.number[MODE] != ARMED:
+            observe(ref, arming, seq, data[k])
+            if ref.number[MODE] == ARMED:
+                forget(state, _window_length(rules.window, ref, state.window))
+        elif good:
+            _judge(data[k], seq, position_valid[k], rules, ref, state)
+        elif code[k] == HELD and ref.number[MODE] == ARMED:
+            _skip(state)
+        _write(data[k], code[k], ref, state, out[:, k])
+
+
+@njit()
+def _window_length(wanted: int, ref: Reference, window: Window) -> int:
+    """Whole periods of the excitation, at least what was wanted, at most what there is room for.
+
+    Without a period it is as long as the history: what the model leaves in a healthy rig comes and
+    goes with the drive, and averages out over seconds only.
+    """
+    period = ref.number[PERIOD]
+    room = window.rows.shape[0]
+    if ref.number[SOURCE] == APERIODIC:
+        return min(room, HISTORY)
+    return min(((wanted + period - 1) // period) * period, (room // period) * period)
+
+
+@njit()
+def _skip(state: WatchState) -> None:
+    """A sample that counts in nothing, so that the windows stay stretches of time."""
+    push(state.window, np.zeros(3))
+    add(state.energies, np.zeros(5))
+    remember(state.history, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if state.number[EPISODE] > 0:
+        state.number[EPISODE] += 1
+
+
+@njit(inline="always")
+def _judge(  # noqa: PLR0917
+    data: FloatArray,
+    seq: int,
+    position_valid: int,
+    rules: Rules,
+    ref: Reference,
+    state: WatchState,
+) -> None:
+    """One good sample."""
+    place = place_in_period(ref, seq)
+    _take(data, place, position_valid, ref, state)
+    state.number[HOP] += 1
+    if state.number[HOP] >= rules.hop:
+        state.number[HOP] = 0
+        estimate(rules, ref, state)
+    follow(departed(rules, ref, state), seq, place, data, rules, ref, state)
+
+
+@njit(inline="always")
+def _take(
+    data: FloatArray, place: int, position_valid: int, ref: Reference, state: WatchState
+) -> None:
+    """The sample's changes against the healthy period into sums and history."""
+    signals, row, healthy = state.signals, state.row, ref.template
+    acceleration = data[ACCELERATION] - healthy[ACCELERATION, place]
+    modelled = data[MODELLED_COLUMN] - healthy[MODELLED_COLUMN, place]
+    y = acceleration - ref.value[SCALE] * modelled
+    if ref.number[SOURCE] == APERIODIC:
+        follow_level(ref, ref.value[SCALE] * modelled)
+    signals[Y], signals[A], signals[S] = y, acceleration, data[VELOCITY]
+    signals[X] = data[POSITION] - healthy[POSITION, place] if position_valid else 0.0
+    signals[V] = data[VOLTAGE] - healthy[VOLTAGE, place]
+    add(state.energies, signals)
+    row[0], row[1], row[2] = data[G1], data[G2], y
+    push(state.window, row)
+    rest = _at_rest(data, ref, state)
+    remember(state.history, y, data[G1], data[G2], data[VELOCITY], rest, signals[V])
+    state.held[CHANGE] = y
+
+
+@njit(inline="always")
+def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
+    """1.0 where position and acceleration have stood still over four samples.
+
+    Position within its noise (six deviations between the largest and the smallest of four), the
+    acceleration within ten, and small: what is left of it is the piezo's own high-pass.
+    """
+    recent = state.recent
+    for n in range(3):
+        recent[n], recent[n + 4] = recent[n + 1], recent[n + 5]
+    recent[3], recent[7] = data[POSITION], data[ACCELERATION]
+    spread = max(recent[0], recent[1], recent[2], recent[3])
+    spread -= min(recent[0], recent[1], recent[2], recent[3])
+    shaken = max(recent[4], recent[5], recent[6], recent[7])
+    shaken -= min(recent[4], recent[5], recent[6], recent[7])
+    weak = abs(recent[7]) < 0.15 * ref.value[ACCELERATION_SWING] + 5.0 * ref.value[NOISE]
+    still = spread < 6.0 * ref.value[POSITION_NOISE] and shaken < 10.0 * ref.value[NOISE] and weak
+    return 1.0 if still else 0.0
+
+
+@njit(inline="always")
+def _write(data: FloatArray, code: int, ref: Reference, state: WatchState, out: FloatArray) -> None:
+    for i in range(out.size):
+        out[i] = state.held[i]
+    scale = ref.value[SCALE]
+    out[MODELLED] = scale * data[MODELLED_COLUMN]
+    out[RESIDUAL] = data[ACCELERATION] - scale * data[MODELLED_COLUMN]
+    out[SPEED] = data[VELOCITY]
+    armed = ref.number[MODE] == ARMED and code != DEAD and state.energies.place[FILL] > 0
+    out[ARMED_FLAG] = 1.0 if armed else 0.0
+    out[LEARNT_HERE] = learnt_here(ref) if armed else 0.0
+    if not armed:
+        out[DEVIATION] = 0.0
+        out[OBSERVABLE] = 0.0

@@ -1,0 +1,123 @@
+"""What is probably missing when an alarm stands: asked in the background on recent samples.
+
+The ranking itself is in `suspects.py` and runs in a process of its own; here is what of the samples
+is kept for it, when it is asked, and what becomes of the answer.
+"""
+
+import queue
+import tempfile
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from monitor.diagnosis.ranking_job import ask
+from monitor.model import RigModel
+from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event, SampleBlock
+
+NAMED = ("departure", "dry_friction", "other_fault")
+"""Alarms that ask for an explanation; a mass that sticks has its name."""
+WAIT = 2.0
+"""Samples since the onset that a ranking waits for [s]."""
+KEPT = 20.0
+"""Samples that are kept [s]."""
+MOST_TOLD = 64
+"""Answers that are kept for those who list alarms later."""
+Judged = tuple[EstimateBlock, SampleBlock]
+
+
+class Explainer:
+    """Asks for one alarm at a time, and never makes samples wait.
+
+    Args:
+        model: gives the model in force.
+        effect_files: own effects, ranked beside the library's.
+    """
+
+    def __init__(self, model: Callable[[], RigModel], effect_files: Sequence[str] = ()) -> None:
+        self._model, self._files = model, tuple(effect_files)
+        self._judged: deque[Judged] = deque()
+        self._wanted: Alarm | None = None
+        self._told: dict[tuple[int, int], str] = {}
+        self._results: queue.SimpleQueue[tuple[Alarm, Event, str]] = queue.SimpleQueue()
+        self._thread: threading.Thread | None = None
+
+    def take(self, block: EstimateBlock, samples: SampleBlock) -> None:
+        """Keep estimates with the samples they are of, and ask where enough have come since an
+        alarm's onset.
+        """
+        if self._judged and self._judged[-1][0].boot != block.boot:
+            self._judged.clear()
+        self._judged.append((block, samples))
+        rate, alarm = self._model().sample_rate, self._wanted
+        while self._judged[0][0].seq < block.seq - KEPT * rate:
+            self._judged.popleft()
+        if not alarm or alarm.boot != block.boot or self._busy():
+            return
+        if block.seq + len(block) - alarm.onset_seq >= WAIT * rate:
+            self._wanted = None
+            arguments = (list(self._judged), alarm, self._model())
+            self._thread = threading.Thread(target=self._rank, args=arguments, daemon=True)
+            self._thread.start()
+
+    def hear(self, alarm: Alarm) -> None:
+        """Want an explanation where an alarm that needs one comes up, once an onset."""
+        if alarm.name == "stiction" and alarm.state == "unacknowledged":
+            self._wanted = None
+        key = (alarm.boot, alarm.onset_seq)
+        if alarm.state == "unacknowledged" and alarm.name in NAMED and key not in self._told:
+            self._told[key] = ""
+            self._wanted = alarm
+            while len(self._told) > MOST_TOLD:
+                self._told.pop(next(iter(self._told)))
+
+    def results(self) -> list[Event]:
+        """What has been found since."""
+        found = [self._results.get() for _ in range(self._results.qsize())]
+        for alarm, _, text in found:
+            self._told[alarm.boot, alarm.onset_seq] = text
+        return [event for _, event, _ in found]
+
+    def with_causes(self, standing: Sequence[Alarm]) -> list[Alarm]:
+        """The alarms that stand, each with what is probably missing beside its cause."""
+        return [self._with_cause(alarm) for alarm in standing]
+
+    def _with_cause(self, alarm: Alarm) -> Alarm:
+        text = self._told.get((alarm.boot, alarm.onset_seq), "")
+        if not text or alarm.name not in NAMED:
+            return alarm
+        return replace(alarm, cause=f"{alarm.cause}; {text}")
+
+    def _busy(self) -> bool:
+        return self._thread is not None and self._thread.is_alive()
+
+    def _rank(self, judged: Sequence[Judged], alarm: Alarm, model: RigModel) -> None:
+        signals, change = _arrays(judged, model.channels)
+        onset = max(alarm.onset_seq - judged[0][0].seq, 0)
+        with tempfile.TemporaryDirectory() as folder:
+            text = ask(Path(folder), signals, change, onset, model, self._files)
+        text = text or "probably missing: cannot tell, the ranking failed"
+        at = int(judged[-1][0].t_ns[-1])
+        event = Event("monitor", at, alarm.severity, PROBABLY_MISSING, f"{alarm.name}: {text}")
+        self._results.put((alarm, event, text))
+
+
+def _arrays(judged: Sequence[Judged], channels: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Channels, shape (n, channels), and change, shape (n,), of consecutive samples; NaN where
+    there is nothing valid.
+    """
+    first, last = judged[0][0].seq, judged[-1][0]
+    count = last.seq + len(last) - first
+    signals, change = np.full((count, len(channels)), np.nan), np.full(count, np.nan)
+    for block, samples in judged:
+        change[block.seq - first :][: len(block)] = block.column("change").values
+        at = max(samples.seq - first, 0)
+        skipped = at - (samples.seq - first)
+        for place, name in enumerate(channels):
+            kept = samples.channel(name).usable()[skipped:]
+            signals[at : at + len(kept), place] = kept
+    return signals, change

@@ -1,0 +1,81 @@
+"""Ranks in a process of its own: `python -m monitor.suspect_job FOLDER`, started by the monitor.
+
+A thread would share the interpreter with the monitor's loop, and make samples wait while it imports
+and computes. The folder holds what is asked, and takes the answer.
+"""
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from monitor.model import RigModel, load_model, model_text
+from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.errors import RigwatchError
+
+LONGEST = 300
+"""A job that takes longer is given up [s]; the first on a machine compiles what effects need."""
+NICENESS = 10
+_EVIDENCE, _MODEL, _EFFECTS, _ANSWER = "evidence.npz", "model.toml", "effects.json", "answer.txt"
+
+
+def ask(  # noqa: PLR0917 -- what is put into the folder
+    folder: Path,
+    signals: FloatArray,
+    change: FloatArray,
+    onset: int,
+    model: RigModel,
+    effect_files: Sequence[str],
+) -> str:
+    """What is probably missing, in words; empty where the job failed. Waits for it."""
+    np.savez(folder / _EVIDENCE, signals=signals, change=change, onset=onset)
+    (folder / _MODEL).write_text(model_text(model), encoding="utf-8")
+    (folder / _EFFECTS).write_text(json.dumps(list(effect_files)), encoding="utf-8")
+    child = os.posix_spawn(
+        sys.executable, [sys.executable, "-m", "monitor.suspect_job", str(folder)], os.environ,
+        # The monitor's own real-time class would be handed on.
+        scheduler=(os.SCHED_OTHER, os.sched_param(0)),
+    )  # fmt: skip
+    os.waitpid(child, 0)
+    answer = folder / _ANSWER
+    return answer.read_text(encoding="utf-8") if answer.exists() else ""
+
+
+def answer(folder: Path) -> str:
+    """Do what is asked in `folder`.
+
+    Raises:
+        RigwatchError: a file of effects does not fit.
+    """
+    from monitor.diagnosis.fault_candidates import Evidence, in_words, suspects
+    from rigwatch.physics.engine.equations import library, offered
+
+    with np.load(folder / _EVIDENCE) as kept:
+        evidence = Evidence(kept["signals"], kept["change"], int(kept["onset"]))
+    files = json.loads((folder / _EFFECTS).read_text(encoding="utf-8"))
+    effects = library() | offered(files)
+    return in_words(suspects(evidence, load_model(folder / _MODEL), effects))
+
+
+def main() -> int:
+    """0 where there is an answer."""
+    os.nice(NICENESS)
+    signal.alarm(LONGEST)
+    folder = Path(sys.argv[1])
+    # Written beside and renamed, so that half an answer is none.
+    beside = folder / "answer.new"
+    try:
+        text = answer(folder)
+    except RigwatchError as error:
+        text = f"probably missing: cannot tell, {error}"
+    beside.write_text(text, encoding="utf-8")
+    beside.replace(folder / _ANSWER)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,83 @@
+"""Running mean squares over a short window, exact like `window.py`: a queue made of two stacks, no
+subtraction.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigwatch.physics.transfer import FloatArray
+
+HEAD, FILL, FRONT_LEFT = 0, 1, 2
+
+
+class Energies(NamedTuple):
+    """Squares of several signals: ring (N, k), suffix sums (N + 1, k), running sum (k,), places."""
+
+    rows: FloatArray
+    front: FloatArray
+    back: FloatArray
+    place: NDArray[np.int64]
+
+
+def new_energies(length: int, signals: int) -> Energies:
+    """An empty window over `length` samples of `signals` signals."""
+    return Energies(
+        np.zeros((length, signals)),
+        np.zeros((length + 1, signals)),
+        np.zeros(signals),
+        np.zeros(3, np.int64),
+    )
+
+
+@njit()
+def restart_energies(energies: Energies) -> None:
+    """Forget every sample."""
+    energies.place[:] = 0
+    energies.front[0, :] = 0.0
+    energies.back[:] = 0.0
+
+
+@njit(inline="always")
+def add(energies: Energies, signals: FloatArray) -> None:
+    """Take the squares of one sample's signals in, the oldest out."""
+    rows, front, back, place = energies
+    length, width = rows.shape
+    head = place[HEAD]
+    if place[FILL] == length:
+        if place[FRONT_LEFT] == 0:
+            for n in range(length):
+                at = (head - 1 - n) % length
+                for i in range(width):
+                    front[n + 1, i] = front[n, i] + rows[at, i]
+            back[:] = 0.0
+            place[FRONT_LEFT] = length
+        place[FRONT_LEFT] -= 1
+    else:
+        place[FILL] += 1
+    for i in range(width):
+        rows[head, i] = signals[i] * signals[i]
+        back[i] += rows[head, i]
+    place[HEAD] = head + 1 if head + 1 < length else 0
+
+
+@njit(inline="always")
+def energy(energies: Energies, signal: int) -> float:
+    """Sum of squares of one signal over the window."""
+    return energies.front[energies.place[FRONT_LEFT], signal] + energies.back[signal]
+
+
+@njit(inline="always")
+def recent_energy(energies: Energies, signal: int, count: int) -> float:
+    """Sum of squares of the newest `count` samples."""
+    length, at = energies.rows.shape[0], energies.place[HEAD]
+    total = 0.0
+    for _ in range(min(count, energies.place[FILL])):
+        at = at - 1 if at > 0 else length - 1
+        total += energies.rows[at, signal]
+    return total

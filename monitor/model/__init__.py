@@ -1,0 +1,39 @@
+"""The monitor's model: its file, and the versions that it has had."""
+
+from monitor.model import model_versions
+from monitor.model.model_file import (
+    BandSection,
+    DecisionSection,
+    FrictionSection,
+    InertiaPlant,
+    NoiseSection,
+    PromotedSection,
+    RecordingSection,
+    ReferenceSection,
+    RigModel,
+    TransferPlant,
+    VelocitySection,
+    WindowSection,
+    load_model,
+    model_text,
+    parse_model,
+)
+
+__all__ = [
+    "BandSection",
+    "DecisionSection",
+    "FrictionSection",
+    "InertiaPlant",
+    "NoiseSection",
+    "PromotedSection",
+    "RecordingSection",
+    "ReferenceSection",
+    "RigModel",
+    "TransferPlant",
+    "VelocitySection",
+    "WindowSection",
+    "load_model",
+    "model_text",
+    "model_versions",
+    "parse_model",
+]

@@ -1,0 +1,270 @@
+"""The model file: all that commissioning found out about a rig, as one TOML file that people can
+read.
+
+`load_model` reads it, `model_text` prints it. Numbers are printed with all their digits, so a file
+read back gives the same estimates to the last bit.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta, field, structs
+
+from rigwatch.physics.transfer import TransferFunction
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files import Section, load, parse
+
+Floats = tuple[float, ...]
+Positive = Annotated[float, Meta(gt=0)]
+
+
+class FunctionSection(Section, frozen=True, kw_only=True):
+    """B(q⁻¹)/A(q⁻¹), ascending powers of q⁻¹."""
+
+    b: Annotated[Floats, Meta(min_length=1, description="numerator")]
+    a: Annotated[Floats, Meta(min_length=1, description="denominator, begins with 1")]
+
+    def function(self) -> TransferFunction:
+        """The transfer function."""
+        return TransferFunction.of(self.b, self.a)
+
+
+class TransferPlant(
+    FunctionSection, frozen=True, kw_only=True, tag="transfer_function", tag_field="kind"
+):
+    """[plant] kind = "transfer_function": voltage [V] to position [m], (5.16)."""
+
+    shift: Annotated[
+        int, Meta(ge=0, le=8, description="samples by which the second difference is advanced")
+    ] = 1
+
+
+class InertiaPlant(Section, frozen=True, kw_only=True, tag="inertia", tag_field="kind"):
+    """[plant] kind = "inertia": M·q̈ = force + offset."""
+
+    mass: Annotated[float, Meta(gt=0, description="moving mass M [kg]")]
+    offset: Annotated[float, Meta(description="constant force [N]")] = 0.0
+    half_width: Annotated[
+        int, Meta(ge=2, description="half length of the differentiating filter [samples]")
+    ] = 20
+
+
+Plant = TransferPlant | InertiaPlant
+
+
+class VelocitySection(Section, frozen=True, kw_only=True):
+    """[velocity] — velocity from the accelerometer (theory 1.3)."""
+
+    corner: Annotated[float, Meta(gt=0, description="corner of the high-pass [Hz]")] = 0.5
+    sensor_corner: Annotated[
+        float, Meta(ge=0, description="corner of the accelerometer's own high-pass [Hz]")
+    ] = 0.0
+
+
+class FrictionSection(FunctionSection, frozen=True, kw_only=True):
+    """[friction] — friction filter Ge and signature (5.29)."""
+
+    gamma: Annotated[float, Meta(ge=0, description="signature (1, gamma) [s/m]")]
+    explained: Annotated[float, Meta(le=1, description="share of the known fault explained")] = 0.0
+
+
+class WindowSection(Section, frozen=True, kw_only=True):
+    """[window] — windowed least squares (5.39)."""
+
+    length: Annotated[
+        int, Meta(ge=8, description="samples; rounded up to whole periods of the excitation")
+    ] = 32
+    hop: Annotated[int, Meta(ge=1, description="samples between estimates")] = 1
+
+
+class NoiseSection(Section, frozen=True, kw_only=True):
+    """[noise] — what a healthy rig leaves unexplained, standard deviations."""
+
+    residual: Annotated[float, Meta(gt=0, description="acceleration residual [m/s^2]")]
+    position: Annotated[float, Meta(gt=0, description="position [m]")] = 1e-5
+    voltage: Annotated[float, Meta(gt=0, description="voltage [V]")] = 1e-3
+    repeat: Annotated[
+        tuple[Annotated[float, Meta(gt=0, le=1)], ...],
+        Meta(
+            description="largest chance that a healthy reading repeats the one before it, in the "
+            "order of the channels; empty: no channel is judged for clipping"
+        ),
+    ] = ()
+
+
+class DecisionSection(Section, frozen=True, kw_only=True):
+    """[decision] — when an estimate has left, and what counts as friction."""
+
+    false_alarm: Annotated[
+        float, Meta(gt=0, lt=1, description="allowed chance of a false alarm in a year")
+    ] = 1e-3
+    settle: Annotated[int, Meta(ge=0, description="samples after a start that are not judged")] = (
+        128
+    )
+    learn: Annotated[int, Meta(ge=16, description="samples the run's own reference takes")] = 256
+    longest_period: Annotated[int, Meta(ge=4, description="samples a period may have")] = 1024
+    longest_hold: Annotated[int, Meta(ge=0, description="samples predicted through")] = 2
+    least_velocity: Annotated[
+        float, Meta(ge=0, description="rms below which friction is not observable [m/s]")
+    ] = 0.005
+    worst_condition: Annotated[float, Meta(gt=1, description="of the normal matrix")] = 1e8
+
+
+class BandSection(Section, frozen=True, kw_only=True):
+    """[band] — fixed limits of the estimates, for plants whose healthy state has friction."""
+
+    low: Annotated[tuple[float, float], Meta(description="of (theta1, theta2)")]
+    high: Annotated[tuple[float, float], Meta(description="of (theta1, theta2)")]
+
+
+class ReferenceSection(Section, frozen=True, kw_only=True):
+    """[[reference]] — one period of the healthy rig under one excitation."""
+
+    periods: Annotated[int, Meta(ge=1, description="periods that were averaged")]
+    scale: Annotated[float, Meta(description="amplitude scale, measured over modelled")]
+    voltage: Annotated[Floats, Meta(description="[V]")]
+    position: Annotated[Floats, Meta(description="[m]")]
+    acceleration: Annotated[Floats, Meta(description="measured [m/s^2]")]
+    modelled: Annotated[Floats, Meta(description="modelled, before the scale [m/s^2]")]
+
+
+class PromotedSection(Section, frozen=True, kw_only=True):
+    """[promoted] — friction that the model has learnt: part of what is expected from now on.
+
+    Friction is (coulomb + coulomb_by_direction·sgn v)·sgn v + (viscous + viscous_by_direction·sgn
+    v)·v, in units of θ.
+    """
+
+    coulomb: Annotated[float, Meta(description="in units of theta1")] = 0.0
+    viscous: Annotated[float, Meta(description="in units of theta2")] = 0.0
+    coulomb_by_direction: Annotated[float, Meta(description="half the difference, theta1")] = 0.0
+    viscous_by_direction: Annotated[float, Meta(description="half the difference, theta2")] = 0.0
+    smooth: Annotated[
+        float, Meta(ge=0, description="speed over which the sign of v turns, 0 for at once [m/s]")
+    ] = 0.0
+    study: Annotated[str, Meta(description="where it was learnt")] = ""
+    sha256: Annotated[str, Meta(description="hash of the study's model and effects")] = ""
+
+
+class RecordingSection(Section, frozen=True, kw_only=True):
+    """[[recording]] — what the model was made from."""
+
+    role: Annotated[str, Meta(description="chirp, healthy or friction")]
+    name: Annotated[str, Meta(description="file name")]
+    sha256: Annotated[str, Meta(description="hash of the file or of its samples")] = ""
+
+
+class RigModel(Section, frozen=True, kw_only=True):
+    """The whole model file."""
+
+    sample_rate: Annotated[float, Meta(gt=0, description="[Hz]")]
+    channels: Annotated[tuple[str, ...], Meta(min_length=2, description="input, position, …")]
+    plant: Plant
+    friction: FrictionSection
+    noise: NoiseSection
+    velocity: VelocitySection = field(default_factory=VelocitySection)
+    window: WindowSection = field(default_factory=WindowSection)
+    decision: DecisionSection = field(default_factory=DecisionSection)
+    band: BandSection | None = None
+    promoted: PromotedSection | None = None
+    reference: tuple[ReferenceSection, ...] = ()
+    recording: tuple[RecordingSection, ...] = ()
+
+    @property
+    def signature(self) -> tuple[float, float]:
+        """(θ1, θ2) of the fault the filter was made with: (1, γf)."""
+        return 1.0, self.friction.gamma
+
+
+def load_model(path: Path | str) -> RigModel:
+    """The model at `path`.
+
+    Raises:
+        ConfigError: the file cannot be read or does not fit.
+    """
+    model = load(path, RigModel)
+    check_model(model, path)
+    return model
+
+
+def parse_model(text: str, name: str) -> RigModel:
+    """The model in a file's text; `name` stands in errors.
+
+    Raises:
+        ConfigError: it does not fit.
+    """
+    model = parse(text, RigModel, name)
+    check_model(model, name)
+    return model
+
+
+def check_model(model: RigModel, path: Path | str) -> None:
+    """What the types alone cannot say.
+
+    Raises:
+        ConfigError: the parts of the model do not fit together.
+    """
+    for index, reference in enumerate(model.reference):
+        lengths = {len(getattr(reference, name)) for name in _COLUMNS}
+        if len(lengths) != 1 or 0 in lengths:
+            key = f"reference[{index}]"
+            raise ConfigError(path, key, f"columns of {sorted(lengths)} samples", "one length")
+    wanted = 3 if isinstance(model.plant, TransferPlant) else 2
+    if len(model.channels) != wanted:
+        raise ConfigError(path, "channels", f"{len(model.channels)} names", f"{wanted} names")
+    if model.noise.repeat and len(model.noise.repeat) != wanted:
+        raise ConfigError(path, "noise.repeat", f"{len(model.noise.repeat)}", f"{wanted} or none")
+    if (model.band is None) != isinstance(model.plant, TransferPlant):
+        raise ConfigError(path, "band", "it missing or in excess", "a band with an inertia only")
+    if isinstance(model.plant, TransferPlant) and not model.plant.function().is_stable:
+        raise ConfigError(path, "plant.a", "poles outside the unit circle", "a stable model")
+    if not model.friction.function().is_stable:
+        raise ConfigError(path, "friction.a", "poles outside the unit circle", "a stable filter")
+    if model.promoted and isinstance(model.plant, TransferPlant):
+        by_direction = model.promoted.coulomb_by_direction, model.promoted.viscous_by_direction
+        if any(by_direction):
+            found = "friction that differs by direction"
+            raise ConfigError(path, "promoted", found, "it with an inertia only")
+
+
+_COLUMNS = ("voltage", "position", "acceleration", "modelled")
+
+
+def model_text(model: RigModel) -> str:
+    """The model as TOML."""
+    lines = [
+        "# Made by `rigwatch commission`; read by `rigwatch monitor` and `rigwatch replay`.",
+        "",
+    ]
+    tables: list[str] = []
+    for key, value in structs.asdict(model).items():
+        if value is None:
+            continue
+        if isinstance(value, Section):
+            tables += ["", f"[{key}]", *_table(value)]
+        elif isinstance(value, tuple) and value and isinstance(value[0], Section):
+            for item in value:
+                tables += ["", f"[[{key}]]", *_table(item)]
+        elif not (isinstance(value, tuple) and not value):
+            lines.append(f"{key} = {_toml(value)}")
+    return "\n".join(lines + tables) + "\n"
+
+
+def _table(section: Section) -> list[str]:
+    tag = section.__struct_config__.tag
+    head = [f'kind = "{tag}"'] if tag else []
+    return head + [f"{name} = {_toml(value)}" for name, value in structs.asdict(section).items()]
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, tuple):
+        parts = [_toml(item) for item in value]
+        if len(parts) <= 6:
+            return "[" + ", ".join(parts) + "]"
+        rows = [", ".join(parts[i : i + 4]) for i in range(0, len(parts), 4)]
+        return "[\n    " + ",\n    ".join(rows) + ",\n]"
+    return repr(float(value)) if isinstance(value, float) else str(value)

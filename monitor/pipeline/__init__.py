@@ -1,0 +1,9 @@
+"""From samples to results, without a clock, a bus or a file.
+
+RigMonitor.update(block) ──▶ admission ──▶ residual ──▶ decision ──▶ estimates ──▶ alarms
+"""
+
+from monitor.pipeline.promoted import check_can_follow
+from monitor.pipeline.rig_monitor import RigMonitor, Watched, compile_kernels
+
+__all__ = ["RigMonitor", "Watched", "check_can_follow", "compile_kernels"]

@@ -1,0 +1,98 @@
+"""Friction that the model has learnt, as part of the modelled acceleration.
+
+    am ← am + θ1·g1 + θ2·g2 - d1·|g1| - d2·|g2|
+
+with g1, g2 the regressors of the residual stage, so that friction goes through the same filter as
+its estimates do; d, the halves of what differs by direction, only for an inertia, whose g have the
+sign of -v.
+
+Where the velocity is noisy, its sign turns a sample early or late, and a promoted friction jumps
+with it: noise that was not there before. With `smooth`, g1 is Ge[tanh(v/smooth)] here. What is
+estimated from then on is friction beyond that.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from monitor.model import InertiaPlant, PromotedSection, RigModel
+from monitor.signals import DEAD, G1, G2, MODELLED, NEW_BOOT, RESTART, VELOCITY, Codes
+from rigwatch.physics.transfer import FloatArray, filter_sample
+from rigwatch.wire.errors import ModelError
+
+
+class PromotedFriction:
+    """The running stage, between residual and watch.
+
+    Args:
+        model: in force; without promoted friction nothing is added.
+    """
+
+    def __init__(self, model: RigModel) -> None:
+        self._promoted = model.promoted or PromotedSection()
+        self._b, self._a = model.friction.function().padded()
+        self._state = np.zeros(max(self._b.size - 1, 1))
+
+    def add(self, data: FloatArray, code: Codes) -> None:
+        """Add it to the residual stage's columns, shape (n, 7), sample by sample, in place."""
+        known = self._promoted
+        if known.smooth > 0.0:
+            g1 = np.zeros(len(data))
+            _smoothed(data, code, known.smooth, self._b, self._a, self._state, g1)
+        else:
+            g1 = data[:, G1]
+        g2 = data[:, G2]
+        data[:, MODELLED] += known.coulomb * g1
+        data[:, MODELLED] += known.viscous * g2
+        if known.coulomb_by_direction or known.viscous_by_direction:
+            data[:, MODELLED] -= known.coulomb_by_direction * abs(g1)
+            data[:, MODELLED] -= known.viscous_by_direction * abs(g2)
+
+
+@njit(cache=True)
+def _smoothed(  # noqa: PLR0917
+    data: FloatArray,
+    code: Codes,
+    smooth: float,
+    b: FloatArray,
+    a: FloatArray,
+    state: FloatArray,
+    out: FloatArray,
+) -> None:
+    for k in range(code.size):
+        if code[k] == RESTART or code[k] == NEW_BOOT:
+            state[:] = 0.0
+        if code[k] != DEAD:
+            out[k] = filter_sample(b, a, state, math.tanh(data[k, VELOCITY] / smooth))
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """What of a model must stay as it is while the monitor runs on."""
+
+    sample_rate: float
+    channels: tuple[str, ...]
+    plant: object
+    filters: object
+
+
+def check_can_follow(old: RigModel, new: RigModel) -> None:
+    """Refuse a model that the running filters do not suit.
+
+    Raises:
+        ModelError: more differs than mass, offset, friction, noise and limits.
+    """
+    if _frozen(old) != _frozen(new):
+        raise ModelError(
+            "the new model: found other channels, rate or filters than the running one's, expected"
+            " the same: stop the monitor to change them"
+        )
+
+
+def _frozen(model: RigModel) -> Frozen:
+    inertia = isinstance(model.plant, InertiaPlant)
+    plant = model.plant.half_width if isinstance(model.plant, InertiaPlant) else model.plant
+    filters = None if inertia else (model.velocity, model.friction)
+    return Frozen(model.sample_rate, model.channels, plant, (filters, model.decision.longest_hold))

@@ -1,0 +1,283 @@
+"""The monitor as a process: samples in, estimates and alarms out, alarms kept through restarts.
+
+samples ─▶ RigMonitor ─▶ estimates, alarms, events
+commands ─▶ alarms ─┘          link, silence, losses ─▶ alarms
+"""
+
+import signal
+import threading
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+from monitor.alarms import AlarmJournal, Announcement, last_records, read_journal
+from monitor.detectors import FRICTION, detectors_of
+from monitor.diagnosis import Explainer
+from monitor.model import RigModel, load_model
+from monitor.pipeline import RigMonitor, compile_kernels
+from monitor.process.cursor import Cursor
+from monitor.process.health import HealthBook
+from monitor.process.link_watch import LinkWatch, Seen, disk_report
+from monitor.process.model_requests import ModelDesk, Place
+from monitor.process.startup_grace import Patience
+from rigwatch.wire.bus import Bus, connect, serve_alarm_list
+from rigwatch.wire.delivery import SampleReader
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.host import MONITOR, Heartbeat, prepare_for_real_time, raise_priority
+from rigwatch.wire.messages import (
+    ALARMS,
+    ALIVE_KEY,
+    COMMANDS,
+    ESTIMATES,
+    EVENTS,
+    HEALTH,
+    MODELS,
+    Alarm,
+    Event,
+    Gap,
+    Health,
+    SampleBlock,
+    cut,
+    pieces,
+)
+from rigwatch.wire.rig_config import MonitorSection, RigConfig, load_rig, section_or_error
+
+TURN = 0.02
+"""Longest wait for samples before commands and silence are looked at [s]."""
+LONGEST_BLOCK = 512
+"""Samples judged and published at a time when the monitor is behind."""
+
+
+class MonitorProcess:
+    """Everything that one run of the monitor has open.
+
+    Args:
+        config: the rig's configuration, with a section [monitor].
+        path: its file, for errors.
+        model: as `suitable_model` gives it.
+        bus: where samples come from and results go.
+
+    Raises:
+        ConfigError: a section of [monitor.alarms] names no alarm, or a detector does not suit.
+        SessionError: journal or cursor cannot be opened.
+    """
+
+    def __init__(self, config: RigConfig, path: Path | str, model: RigModel, bus: Bus) -> None:
+        section = monitor_section(config, path)
+        detectors = detectors_of(section.detectors, model, path)
+        friction = FRICTION in section.detectors
+        self.rig = RigMonitor(model, section.alarms, detectors, str(path), friction)
+        self.bus = bus
+        self._journal = AlarmJournal(section.journal) if section.journal else None
+        self._cursor = Cursor(f"{section.journal}.position") if section.journal else None
+        self._done = self._cursor.read() if self._cursor else None
+        self._links = LinkWatch(config.daq.stale_after)
+        self._health = HealthBook("monitor")
+        self._device = config.daq.name
+        self._patience = Patience(time.monotonic())
+        self._daq_alive = False
+        self._daq_trouble = ""
+        self._disk_trouble: Health | None = None
+        self._unsuitable = ""
+        self._standing = self.rig.alarms.standing()
+        self._commands = bus.subscribe(COMMANDS)
+        self._healths = bus.subscribe(HEALTH)
+        bus.watch_tokens(f"{ALIVE_KEY}/daq", self._daq_changed)
+        self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
+        serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
+        if section.journal:
+            self.say(self.rig.alarms.restore(last_records(read_journal(section.journal)[0])))
+        self._models = ModelDesk(bus, self.rig, Path(section.model))
+        self._judged_ns = 0
+        self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
+
+    def take(self, item: SampleBlock | Gap | Event) -> None:
+        """Deal with one thing that the reader gave."""
+        if isinstance(item, SampleBlock):
+            for block in pieces(item, LONGEST_BLOCK):
+                self._judge(block)
+        elif isinstance(item, Gap):
+            self._links.lost(max(0, item.last - item.first + 1), time.monotonic_ns())
+
+    def look_around(self) -> None:
+        """Remember how far it has come, obey commands, judge the link, tell the health."""
+        if self._cursor and (position := self.reader.position):
+            self._cursor.write(*position)
+        for command in self._commands.drain():
+            self.say(self.rig.alarms.command(command))
+        self._change_models()
+        for event in self._explainer.results():
+            self.bus.publish(EVENTS, event)
+        seen = self._seen()
+        for name, occasion, holds in self._links.reports(seen):
+            self.say(self.rig.alarms.report(name, occasion, active=holds))
+        name, occasion, holds = disk_report(seen, self._disk_trouble)
+        self.say(self.rig.alarms.report(name, occasion, active=holds))
+        if self._health.is_due(seen.monotonic_ns):
+            self._tell_health(seen)
+
+    def say(self, announcements: Iterable[Announcement]) -> None:
+        """Journal what changed, then publish it."""
+        if changes := self.rig.alarms.take_changes():
+            self._standing = self.rig.alarms.standing()
+            if self._journal:
+                self._journal.write(changes)
+        for said in announcements:
+            if isinstance(said, Alarm):
+                self._explainer.hear(said)
+            self.bus.publish(ALARMS if isinstance(said, Alarm) else EVENTS, said)
+
+    def close(self) -> None:
+        """Leave everything in order."""
+        self.reader.close()
+        self._models.close()
+        for kept in (self._journal, self._cursor):
+            if kept:
+                kept.close()
+
+    def _change_models(self) -> None:
+        """Between two samples: all that the reader has given so far has been judged."""
+        boot, last = self.reader.position or (0, -1)
+        at = self._judged_ns + 1 if last >= 0 else time.time_ns()
+        for change in self._models.changes(Place(self._device, boot, last + 1, at)):
+            self.bus.publish(MODELS, change)
+            text = f"{change.text} ({change.user}), from sample {change.seq} on"
+            self.bus.publish(EVENTS, Event("monitor", at, "info", "MODEL", text))
+
+    def _judge(self, block: SampleBlock) -> None:
+        self._judged_ns = int(block.t_ns[-1])
+        known = self._known_of(block)
+        try:
+            if known:
+                self.rig.learn(cut(block, 0, known))
+            fresh = cut(block, known, len(block)) if known else block
+            judged = self.rig.judge(fresh) if len(fresh) else None
+        except KeyError as error:
+            self._unsuitable = f"samples without the channel {error} that the model needs"
+            return
+        if judged is None:
+            return
+        self._unsuitable = ""
+        self.bus.publish(ESTIMATES, judged[0])
+        self._explainer.take(judged[0], fresh)
+        self._health.judged(int(block.t_ns[-1]), time.time_ns())
+        self.say(self.rig.announce(*judged))
+
+    def _known_of(self, block: SampleBlock) -> int:
+        """How many of the block's samples an earlier run has judged already."""
+        if self._done is None or self._done[0] != block.boot:
+            return 0
+        return max(0, min(len(block), self._done[1] + 1 - block.seq))
+
+    def _daq_changed(self, _key: str, alive: bool) -> None:
+        self._daq_alive = alive
+
+    def _hear_of_others(self) -> None:
+        for health in self._healths.drain():
+            if health.source.startswith("daq"):
+                self._daq_trouble = health.text if health.state == "reconnecting" else ""
+            elif health.source.startswith("recorder"):
+                troubled = health.counters.get("disk_trouble", 0.0) > 0.0
+                self._disk_trouble = health if troubled else None
+
+    def _seen(self) -> Seen:
+        self._hear_of_others()
+        silent = self._patience.counted(
+            time.monotonic(),
+            self.reader.silent_for(),
+            daq_alive=self._daq_alive,
+            heard=self.reader.heard,
+        )
+        return Seen(
+            time.time_ns(),
+            time.monotonic_ns(),
+            silent,
+            self._daq_trouble if self._daq_alive else "the daq process is not there",
+            self.reader.contested,
+            self._device,
+            self.reader.position or (0, -1),
+        )
+
+    def _tell_health(self, seen: Seen) -> None:
+        if step := self._links.clock_step(seen):
+            text = f"the wall clock was set by {step / 1e9:+.1f} s"
+            self.bus.publish(EVENTS, Event("monitor", seen.t_ns, "warning", "CLOCK STEP", text))
+        stale = seen.silent_s > 1.0
+        state = "unsuitable" if self._unsuitable else "stale" if stale else "running"
+        text = self._unsuitable or ("no samples arrive" if stale else "")
+        if self._journal and self._journal.failure:
+            text = self._journal.failure
+        extra = {
+            "queue_length": float(len(self.reader)),
+            "rejected": float(self.reader.rejected),
+            "dropped": float(self.reader.dropped),
+        }
+        self.bus.publish(
+            HEALTH, self._health.message(seen.t_ns, state, text, self.reader.counters, extra)
+        )
+
+
+def monitor_section(config: RigConfig, path: Path | str) -> MonitorSection:
+    """The section [monitor].
+
+    Raises:
+        ConfigError: there is none.
+    """
+    section_or_error(config, "monitor", path)
+    assert config.monitor is not None
+    return config.monitor
+
+
+def suitable_model(config: RigConfig, path: Path | str) -> RigModel:
+    """The model that the configuration at `path` names.
+
+    Raises:
+        ConfigError: it cannot be read, or needs channels or a rate that the rig does not have.
+    """
+    file = monitor_section(config, path).model
+    model = load_model(file)
+    names = [channel.name for channel in config.channels]
+    if missing := [name for name in model.channels if name not in names]:
+        raise ConfigError(file, "channels", f"{', '.join(missing)}", f"channels of {path}")
+    if model.sample_rate != config.rig.sample_rate:
+        found = f"{model.sample_rate:g} Hz"
+        raise ConfigError(file, "sample_rate", found, f"{config.rig.sample_rate:g} Hz as in {path}")
+    return model
+
+
+def watch(process: MonitorProcess, stop: threading.Event) -> None:
+    """The loop: samples as they come, everything else in between, until `stop` is set."""
+    heartbeat = Heartbeat("monitor")
+    prepare_for_real_time()
+    heartbeat.ready()
+    while not stop.is_set():
+        for item in process.reader.read(TURN):
+            process.take(item)
+        process.look_around()
+        heartbeat.advance(process.reader.counters.delivered)
+    heartbeat.stopping()
+
+
+def run(path: Path | str) -> int:
+    """Monitor the rig at `path` until a signal ends it; the exit code.
+
+    Raises:
+        RigwatchError: configuration, model, journal or bus are not as they should be.
+    """
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    config = load_rig(path)
+    model = suitable_model(config, path)
+    # Before the bus is joined, so that one who is seen there is ready to judge.
+    names = monitor_section(config, path).detectors
+    compile_kernels(model, detectors_of(names, model, path))
+    raise_priority(MONITOR)
+    bus = connect(config, "monitor")
+    try:
+        process = MonitorProcess(config, path, model, bus)
+        watch(process, stop)
+        process.close()
+    finally:
+        bus.close()
+    return 0

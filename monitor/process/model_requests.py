@@ -1,0 +1,106 @@
+"""Takes wishes for another model while the monitor runs, and grants them between two samples."""
+
+import queue
+import threading
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from monitor.model import RigModel, model_text, parse_model
+from monitor.model import model_versions as versions
+from monitor.pipeline import RigMonitor, check_can_follow
+from rigwatch.wire.bus import KEY, PATIENCE, Bus, Granted, Wish
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.messages import ModelChange
+
+
+@dataclass(eq=False)
+class _Waiting:
+    """A wish whose sender waits for the answer."""
+
+    wish: Wish
+    withdrawn: bool = False
+    answered: threading.Event = field(default_factory=threading.Event)
+    answer: Granted = field(default_factory=lambda: Granted(False, "the monitor is busy"))
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in the stream of samples the monitor stands: the next sample and its time at least."""
+
+    device: str
+    boot: int
+    seq: int
+    t_ns: int
+
+
+class ModelDesk:
+    """One desk of one monitor.
+
+    Args:
+        bus: where wishes come from.
+        rig: what judges with the model.
+        path: the model file.
+    """
+
+    def __init__(self, bus: Bus, rig: RigMonitor, path: Path) -> None:
+        self._rig, self._path = rig, path
+        self._waiting: queue.SimpleQueue[_Waiting] = queue.SimpleQueue()
+        self._close = bus.serve(KEY, self._take)
+
+    def changes(self, place: Place) -> list[ModelChange]:
+        """Grant what waits, in the monitor's own thread; what is to be published."""
+        found = []
+        while not self._waiting.empty():
+            one = self._waiting.get()
+            if one.withdrawn:
+                continue
+            try:
+                found.append(self._grant(one.wish, place))
+                text = f"in force from sample {place.seq} of boot {place.boot} on"
+                one.answer = Granted(True, text, place.boot, place.seq)
+            except RigwatchError as error:
+                one.answer = Granted(False, str(error))
+            one.answered.set()
+        return found
+
+    def close(self) -> None:
+        """Take no more wishes."""
+        self._close()
+
+    def _take(self, question: bytes) -> list[bytes]:
+        """In a thread of the bus: hand over and wait."""
+        try:
+            one = _Waiting(msgspec.json.decode(question, type=Wish))
+        except msgspec.DecodeError as error:
+            return [msgspec.json.encode(Granted(False, f"not a wish for a model: {error}"))]
+        self._waiting.put(one)
+        one.withdrawn = not one.answered.wait(0.8 * PATIENCE)
+        return [msgspec.json.encode(one.answer)]
+
+    def _grant(self, wish: Wish, place: Place) -> ModelChange:
+        """The file first: what is in force must survive a restart."""
+        previous = self._rig.model
+        model = self._wanted(wish)
+        check_can_follow(previous, model)
+        if wish.action == "rollback":
+            versions.roll_back(self._path, place.t_ns, wish.user, wish.text)
+        else:
+            versions.install(self._path, wish.model, place.t_ns, wish.user, wish.text)
+        self._rig.adopt(model)
+        return ModelChange(
+            place.device,
+            place.boot,
+            place.seq,
+            place.t_ns,
+            wish.user,
+            wish.text or wish.action,
+            model_text(model),
+            model_text(previous),
+        )
+
+    def _wanted(self, wish: Wish) -> RigModel:
+        if wish.action == "rollback":
+            return parse_model(versions.version_before(self._path), str(self._path))
+        return parse_model(wish.model, "the new model")

@@ -1,0 +1,1 @@
+"""Commands that list, acknowledge and reset alarms."""

@@ -1,0 +1,87 @@
+"""`rigwatch alarms`: what is wrong with a rig now, or as it happens."""
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rigwatch.wire.bus import Subscription
+    from rigwatch.wire.messages import Alarm
+
+HELP = "list a rig's alarms, or follow them"
+EXAMPLE = """  rigwatch alarms configs/demo.toml
+  rigwatch alarms configs/demo.toml --follow --json"""
+TIMEOUT = 3.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
+    parser.add_argument(
+        "--follow", action="store_true", help="go on with every change, as it comes"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the alarms; 0 however many there are."""
+    from rigwatch.wire.bus import ask_alarm_list, connect, unique_process
+    from rigwatch.wire.messages import ALARMS
+    from rigwatch.wire.rig_config import load_rig
+
+    bus = connect(load_rig(arguments.config), unique_process("alarms"), TIMEOUT)
+    try:
+        changes = bus.subscribe(ALARMS)
+        standing = ask_alarm_list(bus, TIMEOUT)
+        if arguments.follow:
+            _follow(standing, changes, arguments.json)
+        elif arguments.json:
+            print(json.dumps([as_dict(alarm) for alarm in standing], indent=2))
+        else:
+            print("\n\n".join(as_text(alarm) for alarm in standing) or "no alarm stands")
+    finally:
+        bus.close()
+    return 0
+
+
+def _follow(standing: "list[Alarm]", changes: "Subscription", as_json: bool) -> None:
+    for alarm in standing:
+        _print_line(alarm, as_json)
+    print("following; Ctrl-C ends", file=sys.stderr)
+    while True:
+        alarm = changes.get(timeout=0.5)
+        if alarm is not None:
+            _print_line(alarm, as_json)
+
+
+def _print_line(alarm: "Alarm", as_json: bool) -> None:
+    print(json.dumps(as_dict(alarm)) if as_json else as_line(alarm), flush=True)
+
+
+def as_dict(alarm: "Alarm") -> dict[str, Any]:
+    """The alarm as JSON can say it: null where a figure is none."""
+    from dataclasses import asdict
+
+    plain = asdict(alarm)
+    return {
+        key: None if isinstance(value, float) and not math.isfinite(value) else value
+        for key, value in plain.items()
+    }
+
+
+def as_line(alarm: "Alarm") -> str:
+    """One line: when, how bad, what, its state."""
+    from datetime import datetime
+
+    when = datetime.fromtimestamp(alarm.t_ns / 1e9).astimezone()
+    mark = " FIRST OUT" if alarm.first_out and alarm.state != "normal" else ""
+    who = f" by {alarm.user}" if alarm.user else ""
+    state = alarm.state.replace("_", " ")
+    return f"{when:%Y-%m-%d %H:%M:%S} {alarm.severity:8} {alarm.name}: {state}{who}{mark}"
+
+
+def as_text(alarm: "Alarm") -> str:
+    """The alarm with its cause and what to do."""
+    return f"{as_line(alarm)}\n    {alarm.cause}\n    {alarm.guidance}"

@@ -1,0 +1,30 @@
+"""What several commands share: opening sessions, drawing, progress."""
+
+from rigwatch.commands.common import watched
+from rigwatch.commands.common.drawing import ready_to_draw, show_until_closed
+from rigwatch.commands.common.marks import marks_of
+from rigwatch.commands.common.session_files import (
+    add_session_and_target,
+    add_span,
+    damage_lines,
+    print_json,
+    report_written,
+    say,
+    span_of,
+    unix_time,
+)
+
+__all__ = [
+    "add_session_and_target",
+    "add_span",
+    "damage_lines",
+    "marks_of",
+    "print_json",
+    "ready_to_draw",
+    "report_written",
+    "say",
+    "show_until_closed",
+    "span_of",
+    "unix_time",
+    "watched",
+]

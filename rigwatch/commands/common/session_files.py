@@ -1,0 +1,128 @@
+"""What the commands on session files share: times, JSON, words for damage."""
+
+import argparse
+import sys
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from rigwatch.wire.errors import SessionError
+
+if TYPE_CHECKING:
+    from rigwatch.wire.session import LostSpan, Session, Written
+
+
+def print_json(value: Any) -> None:
+    """The value, of plain data and dataclasses, as one JSON document; NaN becomes null."""
+    text = msgspec.json.encode(value, enc_hook=_plain, order="deterministic")
+    print(msgspec.json.format(text).decode())
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(value)
+    raise NotImplementedError(f"{type(value).__name__} has no JSON form")
+
+
+def say(text: str) -> None:
+    """A remark or progress, on stderr."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def check_folder(target: Path | None) -> None:
+    """Refuse a file to write whose folder is missing, before long work is begun for it.
+
+    Raises:
+        SessionError: there is no such folder.
+    """
+    if target is not None and not target.absolute().parent.is_dir():
+        raise SessionError(f"{target}: found no folder {target.parent}, expected one to write to")
+
+
+def add_session_and_target(parser: argparse.ArgumentParser) -> None:
+    """Arguments of commands that make one session file of another."""
+    parser.add_argument("session", type=Path, help="session file or folder of segments")
+    parser.add_argument("target", type=Path, help="the new session file (.mcap)")
+
+
+def add_span(parser: argparse.ArgumentParser) -> None:
+    """Options `--start` and `--end`."""
+    kind = "seconds from the first sample, or ISO time (UTC where it names no zone)"
+    parser.add_argument("--start", metavar="TIME", help=f"first time that is kept: {kind}")
+    parser.add_argument("--end", metavar="TIME", help="first time that is not kept any more")
+
+
+def span_of(arguments: argparse.Namespace, session: "Session") -> tuple[int | None, int | None]:
+    """What `--start` and `--end` say [ns], None where they are not given.
+
+    Raises:
+        SessionError: one of them is no time.
+    """
+    start, end = arguments.start, arguments.end
+    return (
+        None if start is None else point_in_time(start, session, "--start"),
+        None if end is None else point_in_time(end, session, "--end"),
+    )
+
+
+def point_in_time(text: str, session: "Session", option: str) -> int:
+    """Unix time [ns] of `text`: seconds from the session's first sample, or an ISO time.
+
+    Raises:
+        SessionError: it is neither.
+    """
+    from rigwatch.wire.session import first_time
+
+    try:
+        return first_time(session) + round(float(text) * 1e9)
+    except (ValueError, OverflowError):
+        pass
+    return unix_time(text, option, "seconds from the start, or ")
+
+
+def unix_time(text: str, option: str, alternative: str = "") -> int:
+    """Unix time [ns] of an ISO time; UTC where it names no zone.
+
+    Raises:
+        SessionError: it is none; `alternative` is what would have been right, too.
+    """
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        expected = f"{alternative}a time such as 2026-05-01T12:00:00Z"
+        raise SessionError(f"{option}: found {text!r}, expected {expected}") from None
+    moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    return round(moment.timestamp() * 1e6) * 1000
+
+
+def damage_lines(lost: "Iterable[LostSpan]") -> list[str]:
+    """One line a lost span, for people."""
+    return [
+        f"lost: {span.size} bytes at {span.offset} of {span.file.name}, "
+        f"{_between(span.after_ns, span.before_ns)}: {span.reason}"
+        for span in lost
+    ]
+
+
+def _between(after_ns: int | None, before_ns: int | None) -> str:
+    from rigwatch.wire.session import iso_time
+
+    after = "the start" if after_ns is None else iso_time(after_ns)
+    before = "the end" if before_ns is None else iso_time(before_ns)
+    return f"between {after} and {before}"
+
+
+def report_written(written: "Written", as_json: bool) -> None:
+    """What came into a new file, and what of the old one did not."""
+    if as_json:
+        print_json(written)
+        return
+    counts = ", ".join(f"{count} {name}" for name, count in sorted(written.messages.items()))
+    print(f"{written.path}: {written.samples} samples in messages {counts}")
+    for line in damage_lines(written.lost):
+        print(line)
+    if written.notes:
+        print(written.notes)

@@ -1,0 +1,97 @@
+"""A session's messages for the screen: as recorded, or computed by the monitor."""
+
+import heapq
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.wire.errors import SessionError
+
+if TYPE_CHECKING:
+    from rigwatch.wire.messages import Message
+    from rigwatch.wire.session import Session
+
+Span = tuple[int | None, int | None]
+_OTHERS = ["run", "gaps", "health", "events"]
+_BLOCK = 64
+"""Short blocks, so that words and drawings stand side by side at the right times [samples]."""
+
+
+def messages_of(session: "Session", span: Span, model: Path | None) -> "Iterator[Message]":
+    """What the screen shows of a session.
+
+    Args:
+        session: the recording.
+        span: the part of it [ns].
+        model: compute estimates and alarms with it; None takes what was recorded.
+
+    Raises:
+        ConfigError: the model cannot be read.
+    """
+    from rigwatch.wire.session import message_time
+
+    topics = _OTHERS if model is not None else [*_OTHERS, "alarms"]
+    others = (item.message for item in session.messages(topics, *span))
+    watched = _recorded(session, span) if model is None else [_monitored(session, span, model)]
+    return heapq.merge(others, *watched, key=message_time)
+
+
+def model_for(session: "Session", span: Span, given: Path | None) -> tuple[Path | None, bool]:
+    """The model that explains a session, and whether estimates have to be computed with it.
+
+    It is the one that was given, else the one that the recorded configuration names, where that is
+    still there.
+    """
+    if given is not None:
+        return given, True
+    recorded = next(session.estimates(None, *span, size=1), None) is not None
+    found = _configured_model(session)
+    return found, found is not None and not recorded
+
+
+def length_of(session: "Session", span: Span) -> float:
+    """Time from the first to the last sample of the span [s]; 0 without samples."""
+    first = last = 0
+    for block in session.samples(None, *span):
+        first, last = first or int(block.t_ns[0]), int(block.t_ns[-1])
+    return (last - first) / 1e9
+
+
+def rig_of(session: "Session") -> str:
+    """The rig's id, else the session's name."""
+    try:
+        return session.info.rig
+    except SessionError:
+        return session.path.stem
+
+
+def _configured_model(session: "Session") -> Path | None:
+    try:
+        name = tomllib.loads(session.info.configuration).get("monitor", {}).get("model", "")
+    except (SessionError, tomllib.TOMLDecodeError):
+        return None
+    return Path(name) if name and Path(name).is_file() else None
+
+
+def _recorded(session: "Session", span: Span) -> "list[Iterator[Message]]":
+    """Samples and estimates in short blocks: a recorder writes long ones."""
+    from rigwatch.wire.messages import pieces
+
+    samples = (part for whole in session.samples(None, *span) for part in pieces(whole, _BLOCK))
+    estimates = (part for whole in session.estimates(None, *span) for part in pieces(whole, _BLOCK))
+    return [samples, estimates]
+
+
+def _monitored(session: "Session", span: Span, path: Path) -> "Iterator[Message]":
+    from monitor.model import load_model
+    from monitor.pipeline import RigMonitor
+    from rigwatch.wire.messages import pieces
+
+    monitor = RigMonitor(load_model(path))
+    for whole in session.samples(None, *span):
+        for block in pieces(whole, _BLOCK):
+            yield block
+            if watched := monitor.update(block):
+                yield watched.estimates
+                yield from watched.announcements

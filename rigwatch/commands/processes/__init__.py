@@ -1,0 +1,1 @@
+"""Commands that start or prepare the processes of a rig."""

@@ -1,0 +1,105 @@
+"""`rigwatch commission`: recordings in, one model file out."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rigwatch.commands.common import print_json, say
+
+if TYPE_CHECKING:
+    from monitor.model import RigModel
+    from monitor.signals import Recording, Role
+
+HELP = "make a model file from commissioning recordings"
+EXAMPLE = (
+    "  rigwatch commission --chirp sessions/chirp --healthy sessions/healthy "
+    "--friction sessions/known-friction --output configs/bench1-model.toml"
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    roles = (
+        ("chirp", "chirp or multisine without friction"),
+        ("healthy", "healthy reference under a running excitation, may be given several times"),
+        (
+            "friction",
+            "a healthy beginning, then a known friction fault, may be given several times",
+        ),
+    )
+    for role, text in roles:
+        parser.add_argument(
+            f"--{role}", type=Path, action="append", default=[], metavar="SESSION", help=text
+        )
+    parser.add_argument("--output", type=Path, default=Path("model.toml"), help="the model file")
+    parser.add_argument(
+        "--plant",
+        choices=("transfer-function", "inertia"),
+        default="transfer-function",
+        help="inertia: force and position only, M q'' = force + offset, from one --healthy",
+    )
+    parser.add_argument(
+        "--band", type=float, nargs=2, default=(1.0, 14.0), metavar=("LOW", "HIGH"),
+        help="frequencies the transfer function is fitted to [Hz]",
+    )  # fmt: skip
+    parser.add_argument("--window", type=int, help="window of the estimates [samples]")
+    parser.add_argument("--hop", type=int, default=1, help="samples between estimates")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the model file is written."""
+    from monitor.commissioning import CommissionSettings, commission
+    from monitor.model import model_text
+    from monitor.signals import commission_inertia
+
+    recordings = _recordings(arguments)
+    if arguments.plant == "inertia":
+        model = commission_inertia(recordings, window=arguments.window, hop=arguments.hop)
+    else:
+        settings = CommissionSettings(
+            band=tuple(arguments.band), window=arguments.window or 32, hop=arguments.hop
+        )
+        model = commission(recordings, settings)
+    _write(arguments.output, model_text(model))
+    if arguments.json:
+        print_json(_summary(model, arguments.output))
+    else:
+        print(
+            "\n".join(f"{key}: {value}" for key, value in _summary(model, arguments.output).items())
+        )
+    return 0
+
+
+def _recordings(arguments: argparse.Namespace) -> "list[Recording]":
+    roles: tuple[Role, ...] = ("chirp", "healthy", "friction")
+    return [_read(role, path) for role in roles for path in getattr(arguments, role)]
+
+
+def _read(role: "Role", path: Path) -> "Recording":
+    from monitor.signals import joined
+    from rigwatch.wire.session import open_session
+
+    say(f"reading {path} ({role})")
+    session = open_session(path)
+    return joined(role, path.name, session.samples(), session.info.sample_rate_hz)
+
+
+def _write(path: Path, text: str) -> None:
+    from rigwatch.wire.errors import ModelError
+
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ModelError(f"{path}: found {error.strerror}, expected a file to write") from error
+
+
+def _summary(model: "RigModel", output: Path) -> dict[str, Any]:
+    return {
+        "model": str(output),
+        "plant": type(model.plant).__struct_config__.tag,
+        "signature": list(model.signature),
+        "friction_explained": model.friction.explained,
+        "residual_noise": model.noise.residual,
+        "settle_samples": model.decision.settle,
+        "references": len(model.reference),
+    }

@@ -1,0 +1,74 @@
+"""`rigwatch dashboard`: the live view of a rig."""
+
+import argparse
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.wire.errors import ConfigError
+
+if TYPE_CHECKING:
+    from rigwatch.dashboard.board import Facts
+
+HELP = "show a rig live: signals, residual, friction estimates, alarms and what to do"
+EXAMPLE = """  rigwatch dashboard configs/demo.toml
+  rigwatch dashboard configs/demo.toml --viewer web"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("config", type=Path, help="configuration of the rig (TOML)")
+    parser.add_argument(
+        "--viewer",
+        choices=("auto", "native", "web", "connect", "headless"),
+        help="how it is shown; default: dashboard.viewer of the configuration",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when stopped or when the window was closed."""
+    from rigwatch.dashboard import require_rerun
+    from rigwatch.wire.rig_config import DashboardSection, load_rig
+
+    config = load_rig(arguments.config)
+    require_rerun()
+    # Rerun's own lines about a viewer that went are said here in plain words instead.
+    os.environ.setdefault("RUST_LOG", "off")
+    from rigwatch.dashboard.process import LiveDashboard
+    from rigwatch.wire.bus import connect
+
+    settings = config.dashboard or DashboardSection()
+    bus = connect(config, "dashboard")
+    choice = arguments.viewer or settings.viewer
+    live = LiveDashboard(bus, settings, choice, _say_json if arguments.json else _say)
+    if config.monitor is not None:
+        _know_model(live.facts, config.monitor.model)
+    for ending in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(ending, lambda *_: live.stop.set())
+    try:
+        live.run()
+    finally:
+        bus.close()
+    return 0
+
+
+def _know_model(facts: "Facts", path: str) -> None:
+    """Take signature and limits from the model; a screen without them is better than none."""
+    from rigwatch.commands.common import marks_of
+
+    facts.model = Path(path).name
+    try:
+        facts.marks = marks_of(path)
+    except ConfigError as error:
+        _say(f"signature and limits are not shown: {error}")
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _say_json(text: str) -> None:
+    print(json.dumps({"remark": text}), flush=True)

@@ -1,0 +1,74 @@
+"""`rigwatch doctor`: checks the installation, this machine and a configuration."""
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+
+from rigwatch.doctor import Finding, check_machine, check_rig, check_viewer
+from rigwatch.supervisor import PROCESSES
+from rigwatch.wire.errors import ConfigError, RigwatchError
+from rigwatch.wire.rig_config import load_rig
+
+HELP = "check the installation, ports, devices and a configuration"
+EXAMPLE = """  rigwatch doctor
+  rigwatch doctor configs/demo.toml
+  rigwatch doctor configs/demo.toml --alive daq"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "config", type=Path, nargs="?", metavar="CONFIG", help="configuration to check as well"
+    )
+    parser.add_argument(
+        "--alive",
+        choices=PROCESSES,
+        metavar="PROCESS",
+        help=f"only ask this running process how it is: {', '.join(PROCESSES)}",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print every finding; 1 where one of them keeps rigwatch from running."""
+    findings = []
+    for finding in _asked(arguments):
+        findings.append(finding)
+        if not arguments.json:
+            print(_line(finding), flush=True)
+    if arguments.json:
+        print(json.dumps([asdict(finding) for finding in findings], indent=1))
+    return 1 if any(finding.level == "fail" for finding in findings) else 0
+
+
+def _asked(arguments: argparse.Namespace) -> Iterator[Finding]:
+    if arguments.alive is None:
+        yield from _findings(arguments.config)
+        return
+    if arguments.config is None:
+        raise ConfigError("rigwatch doctor", "--alive", "no CONFIG", "the rig's configuration")
+    from rigwatch.doctor import check_alive  # the bus is not needed otherwise
+
+    yield check_alive(load_rig(arguments.config), arguments.alive)
+
+
+def _findings(config: Path | None) -> Iterator[Finding]:
+    yield from check_machine(_recordings(config))
+    yield from check_viewer()
+    if config is not None:
+        yield from check_rig(config)
+
+
+def _recordings(config: Path | None) -> Path:
+    """Where recordings go; a configuration that is wrong is told of by its own check."""
+    try:
+        recorder = load_rig(config).recorder if config is not None else None
+    except RigwatchError:
+        recorder = None
+    return Path(recorder.folder if recorder is not None else "sessions")
+
+
+def _line(finding: Finding) -> str:
+    remedy = f" -> {finding.remedy}" if finding.remedy else ""
+    return f"{finding.level:4} {finding.what:24} {finding.text}{remedy}"

@@ -1,0 +1,33 @@
+"""`rigwatch record`: keeps everything that a rig says in session files."""
+
+import argparse
+import signal
+import threading
+from pathlib import Path
+
+from rigwatch.commands.common import print_json
+
+HELP = "record what a rig says: samples, estimates, alarms, events"
+EXAMPLE = """  rigwatch record configs/demo.toml
+  rigwatch record configs/demo.toml --notes 'bearing at 300 kPa'"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
+    parser.add_argument("--notes", default="", help="remark kept in the session")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Record until a signal ends it, then say where."""
+    from rigwatch.recorder import run as record
+
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    folder = record(arguments.config, stop, arguments.notes)
+    if arguments.json:
+        print_json({"session": folder})
+    else:
+        print(folder)
+    return 0

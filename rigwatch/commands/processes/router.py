@@ -1,0 +1,38 @@
+"""`rigwatch router`: the bus that the processes of a rig meet on."""
+
+import argparse
+import signal
+import threading
+from pathlib import Path
+
+HELP = "run the router of a rig's bus"
+EXAMPLE = "  rigwatch router configs/demo.toml"
+TURN = 0.25
+"""Time between two words to the supervisor [s]."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Route until a signal ends it."""
+    from rigwatch.wire.bus import open_router
+    from rigwatch.wire.host import ROUTER, Heartbeat, raise_priority
+    from rigwatch.wire.rig_config import load_rig
+
+    bus = load_rig(arguments.config).bus
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+    heartbeat = Heartbeat("router")
+    raise_priority(ROUTER)
+    close = open_router(bus.listen, bus.lease)
+    heartbeat.ready(f"listens at {bus.listen}")
+    # Samples do not go through this loop: it only says that it turns.
+    while not stop.wait(TURN):
+        heartbeat.advance(0)
+    heartbeat.stopping()
+    close()
+    return 0

@@ -1,0 +1,69 @@
+"""`rigwatch up`: starts and supervises the processes of a rig."""
+
+import argparse
+import time
+from pathlib import Path
+
+from rigwatch.supervisor import PROCESSES, Console, Flow, Supervisor, plan
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.host import Heartbeat, endpoint_address, is_free
+from rigwatch.wire.rig_config import RigConfig, load_rig
+
+HELP = "start and supervise all processes of a rig"
+EXAMPLE = """  rigwatch up configs/demo.toml
+  rigwatch up configs/demo.toml --without dashboard --json"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
+    parser.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        choices=PROCESSES,
+        metavar="PROCESS",
+        help=f"leave out one of {', '.join(PROCESSES)}; may be given more than once",
+    )
+    parser.add_argument(
+        "--seconds", type=float, default=float("inf"), metavar="N", help="stop after this long"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run until a signal or for the time asked; 0 after an orderly stop."""
+    config = load_rig(arguments.config)
+    _refuse_second_start(config, arguments.without)
+    console = Console(config.rig.id, arguments.json)
+    plans = plan(config, arguments.config, arguments.without)
+    supervisor = Supervisor(plans, console.event)
+    supervisor.stop_on_signals()
+    flow, heartbeat = Flow(supervisor), Heartbeat("up")
+    stop_at = time.monotonic() + arguments.seconds
+    is_ready = False
+
+    def each_turn() -> None:
+        nonlocal is_ready
+        flow.look()
+        console.status(supervisor, flow)
+        if not is_ready and all(w.was_ready for w in supervisor.processes.values()):
+            is_ready = True
+            heartbeat.ready("all processes run")
+        # Whoever watches this supervisor is told what it watches for: samples advance.
+        heartbeat.advance(flow.totals.get("daq", 0))
+        if time.monotonic() >= stop_at:
+            supervisor.stop()
+
+    supervisor.run(each_turn)
+    heartbeat.stopping()
+    return 0
+
+
+def _refuse_second_start(config: RigConfig, without: list[str]) -> None:
+    """A second `up` on one bus would give two sources of one rig's samples."""
+    address = endpoint_address(config.bus.listen)
+    if "router" not in without and address is not None and not is_free(*address):
+        raise BusError(
+            f"bus.listen: {config.bus.listen} is in use: is this rig up already? "
+            "Stop it, or name another port in [bus]"
+        )

@@ -1,0 +1,44 @@
+"""`rigwatch export`: writes a session as CSV, MAT or Parquet."""
+
+import argparse
+from pathlib import Path
+
+from rigwatch.commands.common import add_span, damage_lines, print_json, say, span_of
+
+HELP = "write a session as CSV, MAT or Parquet, units in the titles"
+EXAMPLE = """\
+  rigwatch export run.mcap run.csv
+  rigwatch export run.mcap estimates.parquet --estimates --start 10 --end 20"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("session", type=Path, help="session file or folder of segments")
+    parser.add_argument("target", type=Path, help="the new file, .csv, .mat or .parquet")
+    parser.add_argument("--estimates", action="store_true", help="estimates in place of samples")
+    parser.add_argument("--device", help="whose, where the session has several devices")
+    add_span(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the file was written, also where damage in the session left holes in it."""
+    from rigwatch.wire.exchange import export_session
+    from rigwatch.wire.session import open_session
+
+    session = open_session(arguments.session)
+    start, end = span_of(arguments, session)
+    made = export_session(
+        session,
+        arguments.target,
+        estimates=arguments.estimates,
+        device=arguments.device,
+        start=start,
+        end=end,
+    )
+    for line in damage_lines(session.lost):
+        say(line)
+    if arguments.json:
+        print_json(made)
+    else:
+        print(f"{made.path}: {made.rows} rows of {', '.join(made.columns)}")
+    return 0

@@ -1,0 +1,21 @@
+"""`rigwatch recover`: saves what is intact of a killed, truncated or damaged session."""
+
+import argparse
+
+from rigwatch.commands.common import add_session_and_target, report_written
+
+HELP = "save what is intact of a damaged session in a new file"
+EXAMPLE = "  rigwatch recover broken.mcap saved.mcap"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_session_and_target(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 whether or not there was damage: what was lost is in the report."""
+    from rigwatch.wire.session import open_session, recover
+
+    report_written(recover(open_session(arguments.session), arguments.target), arguments.json)
+    return 0

@@ -1,0 +1,94 @@
+"""`rigwatch replay`: the monitor over a recording."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.commands.common import add_span, damage_lines, print_json, say, span_of
+
+if TYPE_CHECKING:
+    from rigwatch.replay import Replay
+    from rigwatch.wire.messages import Alarm
+
+HELP = "run the monitor over a recording, as fast as it goes or at a given speed"
+EXAMPLE = """\
+  rigwatch replay run.mcap --model model.toml
+  rigwatch replay sessions/bench1-20260501T120000Z --speed 1 --start 60
+  rigwatch replay run.mcap --model model.toml --out judged.mcap --json"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("session", type=Path, help="session file or folder of segments")
+    parser.add_argument("--model", type=Path, help="model file; default: the configuration's")
+    parser.add_argument(
+        "--config", type=Path, help="configuration of the rig; default: the one recorded with it"
+    )
+    parser.add_argument("--speed", type=_speed, default=0.0, metavar="X", help="times real time")
+    parser.add_argument(
+        "--out", type=Path, metavar="SESSION", help="new session of samples, estimates and alarms"
+    )
+    add_span(parser)
+
+
+def _speed(text: str) -> float:
+    speed = float(text)
+    if not (math.isfinite(speed) and speed > 0):
+        raise ValueError
+    return speed
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the whole recording was judged, alarms or not."""
+    from rigwatch.replay import monitor_for, replay
+    from rigwatch.wire.session import open_session
+
+    session = open_session(arguments.session)
+    monitor = monitor_for(session, arguments.model, arguments.config)
+    span = span_of(arguments, session)
+    announce = _ignore if arguments.json else _Announcer()
+    done = replay(session, monitor, span, speed=arguments.speed, out=arguments.out, say=announce)
+    for line in damage_lines(done.lost):
+        say(line)
+    if arguments.json:
+        print_json(_as_data(done, arguments.out))
+    else:
+        print(_summary(done))
+    return 0
+
+
+def _ignore(_: "Alarm") -> None:
+    """Nothing: with --json everything is told at the end."""
+
+
+class _Announcer:
+    """Prints each alarm as it comes."""
+
+    def __call__(self, alarm: "Alarm") -> None:
+        from rigwatch.wire.session import iso_time
+
+        first = ", first" if alarm.first_out else ""
+        state = alarm.state.replace("_", " ")
+        head = f"{iso_time(alarm.t_ns)}  {alarm.severity:8}  {alarm.name}: {state}{first}"
+        print(f"{head} ({alarm.cause})", flush=True)
+
+
+def _summary(done: "Replay") -> str:
+    raised = [alarm.name for alarm in done.alarms if alarm.state == "unacknowledged"]
+    alarms = f"alarms raised: {', '.join(raised)}" if raised else "no alarm was raised"
+    speed = f"{done.elapsed_s:.2f} s ({done.times_real_time:,.0f} × real time)"
+    return f"{done.samples} samples, {done.duration_s:.1f} s in {speed}; {alarms}"
+
+
+def _as_data(done: "Replay", out: Path | None) -> dict[str, object]:
+    return {
+        "samples": done.samples,
+        "duration_s": done.duration_s,
+        "elapsed_s": done.elapsed_s,
+        "times_real_time": done.times_real_time,
+        "alarms": done.alarms,
+        "events": done.events,
+        "lost": done.lost,
+        "out": out,
+    }

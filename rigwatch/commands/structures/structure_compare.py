@@ -1,0 +1,66 @@
+"""`rigwatch structure compare`: every method of identification on the same record."""
+
+import argparse
+
+from rigwatch.commands.common import print_json
+from rigwatch.commands.structures.structure_files import (
+    add_problem,
+    add_report,
+    figures,
+    plain,
+    problem_asked,
+    write_report,
+)
+from rigwatch.commands.structures.structure_view import add_views, draw_methods, wanted
+
+HELP = "run every method of identification on the same record"
+EXAMPLE = """\
+  rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv
+  rigwatch structure compare antenna.toml antenna.csv --report methods.html
+  rigwatch structure compare antenna.toml antenna.csv --save methods.rrd"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    add_problem(parser)
+    add_report(parser)
+    add_views(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when at least one method converged, 1 when none did."""
+    from rigwatch.structures.identification import METHODS, Identification, solved
+    from rigwatch.wire.errors import ModelError
+
+    drawn = wanted(arguments)
+    problem = problem_asked(arguments)
+    results: dict[str, Identification | str] = {}
+    for method in METHODS:
+        try:
+            results[method] = solved(method, problem)
+        except ModelError as error:
+            results[method] = str(error)
+    if arguments.report:
+        write_report(arguments, problem, results)
+    if drawn:
+        draw_methods(arguments, problem, results)
+    if arguments.json:
+        print_json(
+            {m: {"error": r} if isinstance(r, str) else plain(r) for m, r in results.items()}
+        )
+    else:
+        for method, result in results.items():
+            _print(method, result)
+    good = any(not isinstance(r, str) and r.converged for r in results.values())
+    return 0 if good else 1
+
+
+def _print(method: str, result: object) -> None:
+    from rigwatch.structures.identification import Identification
+
+    if not isinstance(result, Identification):
+        print(f"{method}: {result}")
+        return
+    state = "converged" if result.converged else "did not converge"
+    print(f"{method}: {state} in {len(result.iterations)} iterations, {result.seconds:.2f} s")
+    print("\n".join([*figures(result), *(f"  note: {remark}" for remark in result.remarks)]))

@@ -1,0 +1,177 @@
+"""What the actions of `rigwatch structure` share: files, unknowns, figures for people."""
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.commands.common import say
+from rigwatch.wire.errors import ModelError
+
+if TYPE_CHECKING:
+    from rigwatch.physics.engine.equations import Model
+    from rigwatch.structures.identification import Identification, Problem
+    from rigwatch.structures.model import Structure
+
+
+def add_problem(parser: argparse.ArgumentParser) -> None:
+    """Arguments that say what is identified from what."""
+    parser.add_argument("structure", type=Path, help="structure or model file (.toml)")
+    add_record(parser)
+    parser.add_argument(
+        "--unknown",
+        action="append",
+        metavar="NAME[=GUESS]",
+        help="an unknown with its guess, such as k1_6=1300, m4 or v6(0); instead of the file's",
+    )
+    parser.add_argument(
+        "--weighting", default="uniform", help="uniform, exponential:SECONDS or jacobi:A,B"
+    )
+    parser.add_argument(
+        "--first", type=int, default=0, metavar="SAMPLE", help="first sample that counts"
+    )
+
+
+def add_test(parser: argparse.ArgumentParser, within: str, settle: str) -> None:
+    """How damage is looked for: `within` is what a false alarm is counted in."""
+    parser.add_argument(
+        "--false-alarms", type=float, default=0.01, metavar="P",
+        help=f"probability of any false alarm {within}, default 0.01",
+    )  # fmt: skip
+    parser.add_argument("--settle", type=float, default=2.0, metavar="SECONDS", help=settle)
+    parser.add_argument(
+        "--known", action="store_true", help="take the file's values as true, even unknown ones"
+    )
+
+
+def add_report(parser: argparse.ArgumentParser) -> None:
+    """Where a web page is written."""
+    parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a web page")
+
+
+def write_page(path: Path, text: str) -> None:
+    """Write a web page and say so.
+
+    Raises:
+        ModelError: it cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ModelError(f"{path}: {error.strerror or error}, cannot be written") from error
+    say(f"report: {path}")
+
+
+def add_record(parser: argparse.ArgumentParser) -> None:
+    """The record: a table or a session."""
+    parser.add_argument(
+        "record",
+        type=Path,
+        help="record with columns t, x6, ... (.csv or .npz), or a session (.mcap or its folder)",
+    )
+
+
+def problem_asked(arguments: argparse.Namespace) -> "Problem":
+    """The identification that the arguments of `add_problem` ask for.
+
+    Raises:
+        ModelError: of `problem_of`, or a guess is no number.
+    """
+    from rigwatch.structures.identification import problem_of
+    from rigwatch.structures.records import read_any
+
+    names, guesses = unknowns_of(arguments)
+    return problem_of(
+        subject_of(arguments.structure),
+        read_any(arguments.record),
+        names,
+        guesses,
+        weighting=arguments.weighting,
+        first=arguments.first,
+    )
+
+
+def unknowns_of(arguments: argparse.Namespace) -> tuple[list[str] | None, dict[str, float]]:
+    """Names and guesses of `--unknown`; None where the file's are taken.
+
+    Raises:
+        ModelError: a guess is no number.
+    """
+    if not arguments.unknown:
+        return None, {}
+    names, guesses = [], {}
+    for text in arguments.unknown:
+        name, equals, number = text.partition("=")
+        names.append(name)
+        if equals:
+            try:
+                guesses[name] = float(number)
+            except ValueError:
+                raise ModelError(f"--unknown {name}: found {number!r}, expected a number") from None
+    return names, guesses
+
+
+def subject_of(path: Path) -> "Structure | Model":
+    """The structure in the file, or the model where it has equations of its own.
+
+    Raises:
+        ConfigError: it is neither.
+    """
+    import tomllib
+
+    from rigwatch.physics.engine.equations import load_model
+    from rigwatch.structures.model import load_structure
+
+    try:
+        has_equations = "states" in tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        has_equations = False
+    return load_model(path) if has_equations else load_structure(path)
+
+
+def figures(found: "Identification") -> list[str]:
+    """One line an unknown: estimate and 95 % interval."""
+    width = max(len(name) for name in found.names)
+    lines = []
+    for name in found.names:
+        low, high = found.intervals[name]
+        vague = "  not determined by this record" if name in found.undetermined else ""
+        lines.append(
+            f"  {name:<{width}}  {found.parameters[name]:>13.6g}   [{low:.6g}, {high:.6g}]{vague}"
+        )
+    return lines
+
+
+def plain(found: "Identification") -> dict[str, object]:
+    """The identification as plain data, for JSON."""
+    return {
+        "method": found.method,
+        "converged": found.converged,
+        "seconds": found.seconds,
+        "iterations": [
+            dict(zip(found.names, row.tolist(), strict=True)) for row in found.iterations
+        ],
+        "parameters": {
+            name: {"value": found.parameters[name], "interval": list(found.intervals[name])}
+            for name in found.names
+        },
+        "undetermined": list(found.undetermined),
+        "remarks": list(found.remarks),
+    }
+
+
+def write_report(
+    arguments: argparse.Namespace, problem: "Problem", results: "Mapping[str, Identification | str]"
+) -> None:
+    """The page of `--report`; a result is a method's, or the message of why there is none.
+
+    Raises:
+        ModelError: it cannot be written.
+    """
+    from rigwatch.structures.report import Findings, report_html
+
+    found = {method: result for method, result in results.items() if not isinstance(result, str)}
+    failed = {method: result for method, result in results.items() if isinstance(result, str)}
+    write_page(
+        arguments.report, report_html(Findings(problem, arguments.record.name, found, failed))
+    )

@@ -1,0 +1,71 @@
+"""`rigwatch structure identify`: unknown masses, springs and dampers from a record of motion."""
+
+import argparse
+
+from rigwatch.commands.common import print_json
+from rigwatch.commands.structures.structure_files import (
+    add_problem,
+    add_report,
+    figures,
+    plain,
+    problem_asked,
+    write_report,
+)
+from rigwatch.commands.structures.structure_view import add_views, draw_methods, wanted
+
+HELP = "identify what is unknown of a structure from a record"
+EXAMPLE = """\
+  rigwatch structure identify configs/structures/kabe_antenna.toml antenna.csv
+  rigwatch structure identify antenna.toml antenna.csv --method direct --report antenna.html
+  rigwatch structure identify antenna.toml antenna.csv --unknown k1_6=1300 --unknown m4=0.8"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    add_problem(parser)
+    parser.add_argument(
+        "--method",
+        default="shooting",
+        help="shooting (default), quasilinearization, gauss-newton, kalman or direct",
+    )
+    parser.add_argument(
+        "--integrator",
+        choices=("dormand-prince", "runge-kutta"),
+        help="of quasilinearization: dormand-prince (the thesis's) or runge-kutta",
+    )
+    add_report(parser)
+    add_views(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the method converged, 1 when it did not."""
+    from rigwatch.structures.identification import solved
+
+    drawn = wanted(arguments)
+    problem = problem_asked(arguments)
+    found = solved(arguments.method, problem, **_options(arguments))
+    if arguments.report:
+        write_report(arguments, problem, {found.method: found})
+    if drawn:
+        draw_methods(arguments, problem, {found.method: found})
+    if arguments.json:
+        print_json(plain(found))
+    else:
+        state = "converged" if found.converged else "did not converge"
+        print(
+            f"{found.method}: {state} in {len(found.iterations)} iterations, {found.seconds:.2f} s"
+        )
+        print("\n".join([*figures(found), *(f"  note: {remark}" for remark in found.remarks)]))
+    return 0 if found.converged else 1
+
+
+def _options(arguments: argparse.Namespace) -> dict[str, str]:
+    from rigwatch.wire.errors import ModelError
+
+    if arguments.integrator is None:
+        return {}
+    if arguments.method != "quasilinearization":
+        raise ModelError(
+            f"--integrator: found the method {arguments.method}, expected quasilinearization"
+        )
+    return {"integrator": arguments.integrator}

@@ -1,0 +1,69 @@
+"""`rigwatch structure simulate`: a record of a structure that does not exist."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.commands.common import say
+from rigwatch.wire.errors import ModelError
+
+if TYPE_CHECKING:
+    from sim_plant.structure import Damage
+
+HELP = "make a record by simulation, to try the other actions on"
+EXAMPLE = """\
+  rigwatch structure simulate configs/structures/kabe_antenna.toml antenna.csv
+  rigwatch structure simulate kabe.toml damaged.csv --damage 5 springs.k4_46.stiffness=50
+  rigwatch structure simulate configs/structures/shear_frame.toml frame.csv --noise 0.05"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    parser.add_argument("structure", type=Path, help="structure file (.toml)")
+    parser.add_argument("record", type=Path, help="the new record (.csv or .npz)")
+    parser.add_argument("--dt", type=float, default=0.01, help="time between samples [s]")
+    parser.add_argument("--duration", type=float, default=10.0, help="length [s]")
+    parser.add_argument("--noise", type=float, default=0.0, help="share of each signal's peak")
+    parser.add_argument("--seed", type=int, default=0, help="of noise and earthquake")
+    parser.add_argument(
+        "--damage", nargs=2, action="append", metavar=("SECONDS", "PLACE=VALUE"),
+        help="from then on a number of the file is another",
+    )  # fmt: skip
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the record was written."""
+    from rigwatch.structures.model import load_structure
+    from rigwatch.structures.records import record_of, write_record
+    from sim_plant.earthquake import accelerogram
+    from sim_plant.structure import simulate, with_noise
+
+    if not (arguments.dt > 0 and arguments.duration >= 2 * arguments.dt):
+        raise ModelError("--dt, --duration: expected a step above 0 and at least three samples")
+    structure = load_structure(arguments.structure)
+    recorded = {
+        load.channel: accelerogram(arguments.dt, arguments.duration, arguments.seed)
+        for load in structure.loads.values()
+        if load.channel
+    }
+    made = simulate(
+        arguments.structure, arguments.dt, arguments.duration, recorded=recorded,
+        damages=[_damage(*pair) for pair in arguments.damage or ()],
+    )  # fmt: skip
+    if arguments.noise:
+        made = with_noise(made, dict.fromkeys(structure.signals, arguments.noise), arguments.seed)
+    kept = {name: made.columns[name] for name in (*structure.signals, *recorded)}
+    write_record(record_of(made.time, kept), arguments.record)
+    say(f"{arguments.record}: {len(made.time)} samples of {', '.join(kept)}")
+    return 0
+
+
+def _damage(seconds: str, change: str) -> "Damage":
+    from sim_plant.structure import Damage
+
+    place, _, value = change.partition("=")
+    try:
+        return Damage(float(seconds), {place: float(value)})
+    except ValueError:
+        found = f"{seconds} {change}"
+        raise ModelError(f"--damage: found {found!r}, expected 5 springs.k1.stiffness=50") from None

@@ -1,0 +1,54 @@
+"""`rigwatch add`: puts an effect into a study's model, if the held-out recordings speak for it."""
+
+import argparse
+from pathlib import Path
+
+from rigwatch.commands.common import print_json
+
+HELP = "add an effect to the model of a study, refit, compare; refused where held-out error rises"
+EXAMPLE = """\
+  rigwatch add emps coulomb
+  rigwatch add emps offset --port force_sensor
+  rigwatch add emps --effect-file my_effects.toml"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("study", type=Path, help="the study's folder")
+    parser.add_argument("effect", nargs="?", help="name of the effect")
+    parser.add_argument("--port", help="where it enters, if several places are possible")
+    parser.add_argument(
+        "--anyway", action="store_true", help="add it even though the held-out error does not fall"
+    )
+    parser.add_argument(
+        "--effect-file",
+        type=Path,
+        metavar="TOML",
+        help="own effects: they are copied into the study and ranked beside the others",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 where the effect was added, 1 where it was refused."""
+    from rigwatch.wire.errors import ModelError
+    from rigwatch.workbench.report import change_lines
+    from rigwatch.workbench.steps import add, learn
+    from rigwatch.workbench.study import open_study
+
+    study = open_study(arguments.study)
+    if arguments.effect_file is not None:
+        study, names = learn(study, arguments.effect_file)
+        if arguments.effect is None:
+            if arguments.json:
+                print_json({"step": "effect-file", "effects": names})
+            else:
+                print(f"{study.folder}: will be ranked beside the others: {', '.join(names)}")
+            return 0
+    if arguments.effect is None:
+        raise ModelError("add: found no effect, expected its name, or --effect-file")
+    change = add(study, arguments.effect, arguments.port, anyway=arguments.anyway)
+    if arguments.json:
+        print_json(change)
+    else:
+        print("\n".join(change_lines(change)))
+    return 1 if change.step == "refused" else 0

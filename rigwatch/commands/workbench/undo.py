@@ -1,0 +1,28 @@
+"""`rigwatch undo`: takes the last effect of a study away again."""
+
+import argparse
+from pathlib import Path
+
+from rigwatch.commands.common import print_json
+
+HELP = "take the effect that was added last out of the model of a study"
+EXAMPLE = "  rigwatch undo emps"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("study", type=Path, help="the study's folder")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 where an effect was taken away."""
+    from rigwatch.workbench.report import change_lines
+    from rigwatch.workbench.steps import undo
+    from rigwatch.workbench.study import open_study
+
+    change = undo(open_study(arguments.study))
+    if arguments.json:
+        print_json(change)
+    else:
+        print("\n".join(change_lines(change)))
+    return 0

@@ -1,0 +1,18 @@
+"""What the dashboard shows: plots, lanes of alarms, status text, layout."""
+
+from rigwatch.dashboard.board import entities, palette
+from rigwatch.dashboard.board.alarm_book import NAMED_FAULTS, is_active
+from rigwatch.dashboard.board.board import APPLICATION, Dashboard
+from rigwatch.dashboard.board.facts import Facts
+from rigwatch.dashboard.board.layout import Windows
+
+__all__ = [
+    "APPLICATION",
+    "NAMED_FAULTS",
+    "Dashboard",
+    "Facts",
+    "Windows",
+    "entities",
+    "is_active",
+    "palette",
+]

@@ -1,0 +1,103 @@
+"""What is known of the rig now, as far as people are told: no drawing, no bus, no clock."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigwatch.dashboard.board.alarm_book import LANES, AlarmBook
+from rigwatch.dashboard.board.palette import VERDICTS
+from rigwatch.wire.messages import EstimateBlock, Health, SampleBlock
+
+SILENCE = 2.0
+"""Time without samples after which the screen says so [s]."""
+_FORGET = 0.02
+
+
+@dataclass(slots=True)
+class Age:
+    """Of the newest sample on the screen: now, mean and worst [ms]."""
+
+    now: float = 0.0
+    mean: float = 0.0
+    worst: float = 0.0
+    known: bool = False
+
+    def add(self, age_ms: float) -> None:
+        """Take the age at one update."""
+        self.mean = age_ms + (1 - _FORGET) * (self.mean - age_ms) if self.known else age_ms
+        self.now, self.worst, self.known = age_ms, max(self.worst, age_ms), True
+
+
+@dataclass(slots=True)
+class Facts:
+    """What the words on the screen are made of.
+
+    Attributes:
+        rig: the rig's id.
+        book: states of the alarms.
+        health: last health message of each process, by source.
+        figures: last value of each estimated figure, by column name.
+        age: of the newest sample drawn; known only live.
+        marks: figures of the model that stay the same, such as "theta1_signature".
+        model: the model's name.
+        silent_s: time without samples [s], 0 while they come.
+        skipped: messages that the dashboard left out because it was slow.
+        samples: samples drawn.
+    """
+
+    rig: str
+    book: AlarmBook = field(default_factory=AlarmBook)
+    health: dict[str, Health] = field(default_factory=dict)
+    figures: dict[str, float] = field(default_factory=dict)
+    age: Age = field(default_factory=Age)
+    marks: Mapping[str, float] = field(default_factory=dict)
+    model: str = ""
+    silent_s: float = 0.0
+    skipped: int = 0
+    samples: int = 0
+    _newest_ns: int = 0
+    _fresh_ns: int = 0
+    _drawn: int = 0
+
+    def see_samples(self, block: SampleBlock) -> None:
+        """Take notice of samples that are drawn."""
+        self.samples += len(block)
+        if len(block):
+            self._newest_ns = int(block.t_ns[-1])
+
+    def see_estimates(self, block: EstimateBlock) -> None:
+        """Take notice of the last of the estimates."""
+        for column in block.columns if len(block) else ():
+            if np.isfinite(value := column.values[-1]):
+                self.figures[column.name] = float(value)
+
+    def tell_time(self, now_ns: int | None) -> None:
+        """How old the newest sample is, and whether samples still come."""
+        if now_ns is None or not self.samples:
+            return
+        if self.samples > self._drawn:
+            self._drawn, self._fresh_ns = self.samples, now_ns
+            self.age.add((now_ns - self._newest_ns) / 1e6)
+        silent = (now_ns - self._fresh_ns) / 1e9
+        self.silent_s = silent if silent > SILENCE else 0.0
+
+    def verdict(self) -> str:
+        """The verdict as one of `palette.VERDICTS`."""
+        if faults := self.book.faults():
+            name = faults[0].name.partition(".")[0]
+            return name if name in VERDICTS else "fault"
+        if self.silent_s:
+            return "stale"
+        if any(alarm.name in LANES for alarm in self.book.unseen()):
+            return "over"
+        if self.book.remarks():
+            return "no_verdict"
+        return self._calm()
+
+    def _calm(self) -> str:
+        if not self.figures:
+            return "waiting"
+        if not self.figures.get("armed", 1.0):
+            return "learning"
+        return "healthy" if self.figures.get("observable", 1.0) else "no_verdict"

@@ -1,0 +1,15 @@
+"""The Rerun viewer: started, found, served as a page, photographed."""
+
+from rigwatch.dashboard.viewer.opening import Choice, open_viewer
+from rigwatch.dashboard.viewer.picture import save_picture
+from rigwatch.dashboard.viewer.viewer import RECORDING_MEMORY, ForeignViewer, Viewer, ViewerError
+
+__all__ = [
+    "RECORDING_MEMORY",
+    "Choice",
+    "ForeignViewer",
+    "Viewer",
+    "ViewerError",
+    "open_viewer",
+    "save_picture",
+]

@@ -1,0 +1,200 @@
+"""Rerun's viewer as a process of its own: started, asked whether it lives, ended.
+
+It listens on 127.0.0.1 only, drops its oldest data at a memory limit, ends with the process that
+started it, and neither reports its use nor looks for examples on the network.
+"""
+
+import importlib.util
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Literal, Self
+
+from rigwatch.dashboard.viewer.viewer_page import HOST, Page
+from rigwatch.wire.errors import RigwatchError
+
+_PICTURE = "1600x1000"
+_START_TIMEOUT = 30.0
+_STOP_TIMEOUT = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """How much may be kept before the oldest data go, in words of the viewer.
+
+    Attributes:
+        viewer: by the viewer.
+        server: for browsers that come later.
+    """
+
+    viewer: str
+    server: str
+
+
+LIVE_MEMORY = Memory("1GiB", "256MiB")
+RECORDING_MEMORY = Memory("75%", "1GiB")
+Kind = Literal["native", "web", "headless"]
+
+
+class ViewerError(RigwatchError):
+    """The viewer cannot be started or does not answer."""
+
+
+class Viewer:
+    """One viewer process.
+
+    Args:
+        kind: a window, a web page, or drawn into memory for pictures and tests.
+        port: where it takes data; 0 for any that is free.
+        web_port: where a browser finds it; 0 for any that is free.
+        memory: how much it may keep.
+
+    Raises:
+        ViewerError: a port is taken.
+    """
+
+    def __init__(
+        self, kind: Kind, port: int = 0, web_port: int = 0, memory: Memory = LIVE_MEMORY
+    ) -> None:
+        self.kind, self._memory = kind, memory
+        self.port = port or free_port()
+        self.web_port = (web_port or free_port()) if kind == "web" else 0
+        for taken in filter(answers, filter(None, (self.port, self.web_port))):
+            raise ViewerError(f"port {taken} is taken: end what listens there or configure another")
+        self._page_source = free_port() if kind == "web" else 0
+        self._page: Page | None = None
+        self._words: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
+        self._process = subprocess.Popen(
+            [*_dying_with_parent(), str(_binary()), *self._options()],
+            env=_environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=self._words,
+            stderr=self._words,
+        )
+
+    @property
+    def url(self) -> str:
+        """Where data are sent to."""
+        return f"rerun+http://{HOST}:{self.port}/proxy"
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
+    def web_url(self) -> str:
+        """What a browser opens."""
+        return f"http://{HOST}:{self.web_port}/"
+
+    def await_answer(self, tick: Callable[[], None] = lambda: None) -> Self:
+        """Wait until it takes data, calling `tick` meanwhile; returns itself.
+
+        Raises:
+            ViewerError: it ended, or did not answer in time.
+        """
+        deadline = time.monotonic() + _START_TIMEOUT
+        while not answers(self.port):
+            if self.exit_code() is not None or time.monotonic() > deadline:
+                self.stop()
+                raise ViewerError(f"the viewer did not start: {self.last_words()}")
+            tick()
+            time.sleep(0.05)
+        if self.kind == "web":
+            self._page = Page(self.web_port, self._page_source, self.port)
+        return self
+
+    def exit_code(self) -> int | None:
+        """None while it runs; 0 where a person closed the window."""
+        return self._process.poll()
+
+    def stop(self) -> None:
+        """End the process, with force where it does not listen."""
+        if self._page is not None:
+            self._page.close()
+        self._process.terminate()
+        try:
+            self._process.wait(_STOP_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def last_words(self) -> str:
+        """The last line that it said."""
+        self._words.seek(0)
+        lines = self._words.read().decode(errors="replace").strip().splitlines()
+        return lines[-1] if lines else "it said nothing"
+
+    def _options(self) -> list[str]:
+        options = ["--bind", HOST, "--port", str(self.port), "--hide-welcome-screen"]
+        options += ["--memory-limit", self._memory.viewer]
+        options += ["--server-memory-limit", self._memory.server]
+        kind = {
+            "native": ["--expect-data-soon"],
+            "headless": ["--headless", "--window-size", _PICTURE],
+            "web": ["--serve-web", "--web-viewer-port", str(self._page_source)],
+        }
+        return options + kind[self.kind]
+
+
+class ForeignViewer:
+    """A viewer that somebody else has started on this machine.
+
+    Args:
+        port: where it takes data.
+    """
+
+    def __init__(self, port: int) -> None:
+        self.port = port
+        self.url = f"rerun+http://{HOST}:{port}/proxy"
+
+    def exit_code(self) -> int | None:
+        """None while it answers, 1 after."""
+        return None if answers(self.port) else 1
+
+    def stop(self) -> None:
+        """Leave it to its owner."""
+
+
+def has_display() -> bool:
+    """Whether a window can be opened."""
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def answers(port: int) -> bool:
+    """Whether somebody listens at a port of this machine."""
+    with socket.socket() as probe:
+        probe.settimeout(0.5)
+        return probe.connect_ex((HOST, port)) == 0
+
+
+def free_port() -> int:
+    """A port of this machine at which nobody listens."""
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])
+
+
+def _binary() -> Path:
+    """The viewer itself rather than its Python starter, which would survive in its place."""
+    found = importlib.util.find_spec("rerun_cli")
+    if found is None or found.origin is None:
+        raise ViewerError("the package rerun-sdk is incomplete: its viewer is missing")
+    return Path(found.origin).with_name("rerun")
+
+
+def _environment() -> dict[str, str]:
+    """The environment of the viewer: CI is what switches its usage reports off for one process."""
+    return {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true", "RUST_LOG": "warn"}
+
+
+def _dying_with_parent() -> list[str]:
+    """What lets the viewer end when its starter is killed; nothing where there is no such tool."""
+    tool = shutil.which("setpriv")
+    return [tool, "--pdeathsig", "TERM", "--"] if tool else []

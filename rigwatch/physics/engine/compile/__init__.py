@@ -1,0 +1,36 @@
+"""From equations to machine code: exact derivatives, LLVM kernels, integration steps.
+
+    System ──derivatives──▶ llvm ──▶ kernel: simulate, linearise (integrator)
+
+`CompiledSystem` is what the rest of the engine calls; `step_size` says how fine each interval
+is stepped.
+"""
+
+from rigwatch.physics.engine.compile.compiled_system import (
+    BoolArray,
+    CompiledSystem,
+    FloatArray,
+    IntArray,
+    Linearisation,
+    compile_system,
+    load_source,
+    numba_module,
+)
+from rigwatch.physics.engine.compile.derivatives import derivative
+from rigwatch.physics.engine.compile.stability import even_substeps
+from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
+
+__all__ = [
+    "BoolArray",
+    "CompiledSystem",
+    "FloatArray",
+    "IntArray",
+    "Linearisation",
+    "compile_system",
+    "derivative",
+    "evaluated",
+    "even_substeps",
+    "load_source",
+    "numba_module",
+    "numpy_function",
+]

@@ -1,0 +1,229 @@
+"""A system that can be simulated, and sources of numba kernels that are kept on disk.
+
+The source of a numba kernel is written to the cache folder under a name made from its own hash;
+numba keeps the machine code beside it. A system's own kernel is not kept: it is made anew in
+milliseconds.
+"""
+
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.physics.engine.compile.derivatives import source
+from rigwatch.physics.engine.compile.kernel import native_kernel
+from rigwatch.physics.engine.compile.static_kernel import StaticKernel
+from rigwatch.physics.engine.compile.step_size import FINEST
+from rigwatch.physics.engine.equations import System
+from rigwatch.wire.errors import ModelError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """Outputs over windows of one length.
+
+    Attributes:
+        outputs: shape (windows, samples, outputs), in the outputs' units.
+        slopes: shape (windows, samples, outputs, free parameters + states): ∂outputs by the free
+            parameters, then by the window's initial states.
+        last: states at each window's last sample, shape (windows, states).
+    """
+
+    outputs: FloatArray
+    slopes: FloatArray
+    last: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """A trajectory with the Jacobians along it, at the nodes of the integration.
+
+    With m free parameters, n states and q probes, the last axis of the slopes is (m, n, q).
+
+    Attributes:
+        spacing: time between nodes [s].
+        substeps: nodes from one sample to the next.
+        states: shape (windows, nodes, n).
+        rate_slopes: shape (windows, nodes, n, m + n + q): ∂rates.
+        read_slopes: at the samples, shape (windows, samples, outputs, m + n + q): ∂outputs.
+        outputs: at the samples, shape (windows, samples, outputs).
+    """
+
+    spacing: float
+    substeps: int
+    states: FloatArray
+    rate_slopes: FloatArray
+    read_slopes: FloatArray
+    outputs: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledSystem:
+    """A system that can be simulated."""
+
+    system: System
+    kernel: Any
+
+    @property
+    def parameters(self) -> FloatArray:
+        """Values of all parameters as the model gives them, shape (n_p,)."""
+        return np.array([p.value for p in self.system.parameters.values()])
+
+    def simulate(
+        self,
+        inputs: FloatArray,
+        dt: float,
+        starts: IntArray,
+        length: int,
+        *,
+        initial: FloatArray,
+        parameters: FloatArray,
+        substeps: int = 4,
+        finest: int = FINEST,
+        rows: int = 1,
+    ) -> Simulation:
+        """Simulate windows of the inputs, each from its own initial state.
+
+        Args:
+            inputs: shape (samples, inputs).
+            dt: time between samples [s].
+            starts: first sample of each window, shape (windows,).
+            length: samples in each window.
+            initial: shape (windows, states).
+            parameters: all of them, shape (n_p,).
+            substeps: Runge-Kutta steps between samples.
+            finest: steps at most between two samples, where effects are stiff, see `pace`.
+            rows: of the inputs, after which those that are kept change; for inputs at finer nodes.
+
+        Raises:
+            ModelError: a window reaches beyond the inputs, or a shape does not fit.
+        """
+        outputs = np.empty((len(starts), length, len(self.system.outputs)))
+        slopes = np.empty((*outputs.shape, self.columns))
+        arguments = self._arguments(inputs, dt, starts, length, initial, parameters, substeps)
+        last = np.empty((len(starts), len(self.system.states)))
+        self.kernel.simulate(*arguments, outputs, slopes, last, rows, finest)
+        return Simulation(outputs, slopes, last)
+
+    @property
+    def columns(self) -> int:
+        """Free parameters and states: what outputs are differentiated by."""
+        return len(self.system.free) + len(self.system.states)
+
+    def linearise(
+        self,
+        inputs: FloatArray,
+        dt: float,
+        starts: IntArray,
+        length: int,
+        *,
+        initial: FloatArray,
+        parameters: FloatArray,
+        substeps: int = 4,
+    ) -> Linearisation:
+        """The trajectory of `simulate` with its Jacobians; arguments and errors are the same."""
+        arguments = self._arguments(inputs, dt, starts, length, initial, parameters, substeps)
+        n, wide = len(self.system.states), self.columns + len(self.system.probes)
+        nodes = (len(starts), (length - 1) * substeps + 1)
+        samples = (len(starts), length, len(self.system.outputs))
+        states, rates = np.empty((*nodes, n)), np.zeros((*nodes, n, wide))
+        outputs, reads = np.empty(samples), np.zeros((*samples, wide))
+        self.kernel.linearise(*arguments, states, rates, outputs, reads)
+        return Linearisation(dt / substeps, substeps, states, rates, reads, outputs)
+
+    def _arguments(  # noqa: PLR0917 -- they stand in the order of the kernel's
+        self,
+        inputs: FloatArray,
+        dt: float,
+        starts: IntArray,
+        length: int,
+        initial: FloatArray,
+        parameters: FloatArray,
+        substeps: int,
+    ) -> tuple[Any, ...]:
+        model = self.system.model
+        if inputs.ndim != 2 or inputs.shape[1] != len(model.inputs):
+            raise ModelError(
+                f"{model.name}: found inputs of shape {inputs.shape}, expected"
+                f" {len(model.inputs)} columns: {', '.join(model.inputs)}"
+            )
+        if len(starts) and (starts.min() < 0 or starts.max() + length > len(inputs)):
+            raise ModelError(f"{model.name}: found a window beyond the recording's end")
+        hold = np.array([float(model.held(name) == "linear") for name in model.inputs])
+        first = np.ascontiguousarray(initial, np.float64).reshape(len(starts), -1)
+        values = np.ascontiguousarray(parameters, np.float64)
+        driven = np.ascontiguousarray(inputs, np.float64)
+        return (driven, dt, substeps, hold, starts, first, values)
+
+    def vector(self, values: Mapping[str, float]) -> FloatArray:
+        """All parameters, those in `values` replaced; shape (n_p,).
+
+        Raises:
+            ModelError: a name is no parameter of the system.
+        """
+        names = list(self.system.parameters)
+        vector = self.parameters
+        for name, value in values.items():
+            if name not in names:
+                raise ModelError(
+                    f"{self.system.model.name}: found parameter {name!r}, expected one of"
+                    f" {', '.join(names)}"
+                )
+            vector[names.index(name)] = value
+        return vector
+
+
+def compile_system(system: System) -> CompiledSystem:
+    """`system` with its kernel; one without states is evaluated by NumPy."""
+    kernel = native_kernel(system) if system.states else StaticKernel(system)
+    return CompiledSystem(system, kernel)
+
+
+def numba_module(system: System) -> ModuleType:
+    """`rates`, `read` and `advance` of `system` as numba functions, for kernels of one's own."""
+    return load_source(source(system))
+
+
+def cache_folder() -> Path:
+    """Where kernels are kept: below $RIGWATCH_CACHE, else the user's cache folder."""
+    base = os.environ.get("RIGWATCH_CACHE") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    return Path(base).expanduser() / "rigwatch" / "kernels"
+
+
+def load_source(text: str) -> ModuleType:
+    """The text of a kernel module, imported from the cache folder where it is kept."""
+    name = f"kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    path = cache_folder() / f"{name}.py"
+    if not path.exists():
+        _write_whole(path, text)
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ModelError(f"{path}: cannot be loaded as a kernel")
+    module = importlib.util.module_from_spec(spec)
+    # numba looks the module up by its name when it loads the machine code.
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write under another name first, so that a reader never sees half a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False) as file:
+        file.write(text)
+    Path(file.name).replace(path)

@@ -1,0 +1,199 @@
+"""The machine code of one system, and its kernel: the equations with the loops of `driver`.
+
+Functions of a system, each void(double t, double* a, u, p, out, slopes), with n states, m columns
+of sensitivities and q probes; behind the inputs in u is the time until they change, where kept:
+
+    rates        a = [x | S], out = [dx/dt | dS/dt]
+    read         a = [x | S], out = y, slopes = ∂y of shape (outputs, m)
+    plain        a = x, out = dx/dt
+    pace         a = x, out = steps a second that are needed
+    rate_slopes  a = x, out = dx/dt, slopes = ∂(dx/dt) by parameters, states, probes: (n, m + q)
+    read_slopes  a = x, out = y, slopes = ∂y of shape (outputs, m + q)
+"""
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+import sympy
+
+from rigwatch.physics.engine.compile import integrator as driver
+from rigwatch.physics.engine.compile.derivatives import Differentiated, differentiated
+from rigwatch.physics.engine.compile.llvm import Function, literal, machine_code
+from rigwatch.physics.engine.compile.step_size import Pace, pace
+from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
+
+LARGE = 5_000_000
+"""Steps times numbers that are integrated, from where all cores share a simulation."""
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+
+
+@dataclass(frozen=True)
+class Equations:
+    """What a kernel depends on: no values, bounds or units.
+
+    Attributes:
+        states, inputs, parameters, free, probes: names; `free` are those of the parameters by which
+            outputs are differentiated.
+        rates, reads: of the states, and of the outputs.
+        pace: what the steps must follow.
+    """
+
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    free: tuple[str, ...]
+    probes: tuple[str, ...]
+    rates: tuple[sympy.Expr, ...]
+    reads: tuple[sympy.Expr, ...]
+    pace: Pace
+
+
+def native_kernel(system: System) -> "NativeKernel":
+    """The kernel of `system`; one for all systems of the same equations."""
+    return _kernel(
+        Equations(
+            tuple(system.states), tuple(system.model.inputs), tuple(system.parameters),
+            system.free, system.probes, tuple(system.derivatives.values()),
+            tuple(system.outputs.values()), pace(system),
+        )
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=256)
+def _kernel(equations: Equations) -> "NativeKernel":
+    return NativeKernel(equations)
+
+
+class NativeKernel:
+    """A system's equations in machine code; the linearisation's only once it is asked for."""
+
+    def __init__(self, system: Equations) -> None:
+        self._system, self._columns = system, len(system.free) + len(system.states)
+        by = (system.states, system.free, system.probes)
+        self._rates = differentiated(system.rates, *by)
+        self._reads = differentiated(system.reads, *by)
+        self._kept, self._along, self._slopes = list[Any](), (0, 0, 0, 0), (0, 0, 0)
+        self._crossing = np.array(system.pace.crossing, np.int64)
+
+    def _compiled(self, functions: Sequence[Function]) -> Any:
+        kept, address = machine_code(functions)
+        self._kept.append(kept)
+        return address
+
+    def simulate(  # noqa: PLR0917 -- they stand in the order of the driver's
+        self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, y: Any,
+        dy: Any, last: Any, rows: int, finest: int,
+    ) -> None:  # fmt: skip
+        """Fill outputs (windows, samples, outputs), their slopes (…, m) and the last states."""
+        asked = self._system.pace.asked
+        if not all(self._along):
+            address = self._compiled([
+                _with_sensitivities(self._system, "rates", self._rates, behind=True),
+                _with_sensitivities(self._system, "read", self._reads, behind=False),
+                _plain(self._system, "plain", self._rates.values),
+                _plain(self._system, "pace", asked),
+            ])  # fmt: skip
+            self._along = tuple(address(name) for name in ("rates", "read", "plain", "pace"))
+        kernel = partial(
+            driver.simulate, *self._along, len(asked), self._crossing, self._columns, rows, u, dt,
+            substeps, finest, hold,
+        )  # fmt: skip
+        numbers = x0.shape[1] * (1 + self._columns)
+        if starts.size * y.shape[1] * substeps * numbers < LARGE:
+            kernel(starts, x0, p, y, dy, last)
+            return
+        parts = np.array_split(np.arange(starts.size), min(cores(), starts.size))
+        cuts = [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
+        # Windows know nothing of each other, so that every cut gives the same numbers.
+        with ThreadPoolExecutor(len(cuts)) as pool:
+            running = [pool.submit(kernel, starts[c], x0[c], p, y[c], dy[c], last[c]) for c in cuts]
+            for each in running:
+                each.result()
+
+    def linearise(  # noqa: PLR0917 -- they stand in the order of the driver's
+        self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, nodes: Any,
+        slopes: Any, y: Any, dy: Any,
+    ) -> None:  # fmt: skip
+        """Fill the states at the nodes, the slopes of rates there, outputs and their slopes."""
+        if not all(self._slopes):
+            address = self._compiled([
+                _plain(self._system, "plain", self._rates.values),
+                _jacobian(self._system, "read_slopes", self._reads),
+                _jacobian(self._system, "rate_slopes", self._rates),
+            ])  # fmt: skip
+            self._slopes = (address("plain"), address("read_slopes"), address("rate_slopes"))
+        driver.linearise(*self._slopes, u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy)
+
+
+def _function(system: Equations, name: str) -> Function:
+    places: dict[sympy.Symbol, tuple[str, int] | None] = {symbol(TIME): None}
+    for array, names in (
+        ("a", system.states),
+        ("u", system.inputs),
+        ("p", system.parameters),
+    ):
+        places |= {symbol(each): (array, index) for index, each in enumerate(names)}
+    places[symbol(UNTIL)] = ("u", len(system.inputs))
+    return Function(name, places, {symbol(probe): 0.0 for probe in system.probes})
+
+
+def _values(function: Function, expressions: Sequence[sympy.Expr]) -> Iterator[str | None]:
+    """Registers of the expressions, what they share computed once; None for zero."""
+    shared, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("cse_"), order="none")
+    for name, expression in shared:
+        function.let(name, expression)
+    return (None if e == 0 else function.value(e) for e in reduced)
+
+
+def _with_sensitivities(
+    system: Equations, name: str, found: Differentiated, *, behind: bool
+) -> Function:
+    """Values, and J·S + ∂/∂p; the latter behind the values in `out`, or in `slopes`."""
+    function, n = _function(system, name), len(system.states)
+    m, k = len(system.free) + n, len(found.values)
+    flat = [*found.values, *(e for r in found.by_state for e in r)]
+    flat += [e for r in found.by_parameter for e in r]
+    values = _values(function, flat)
+    plain = [next(values) for _ in range(k)]
+    by_state = [[next(values) for _ in range(n)] for _ in range(k)]
+    explicit = [[next(values) for _ in system.free] for _ in range(k)]
+    into, first = ("out", k) if behind else ("slopes", 0)
+    moved = [function.load_row("a", n + i * m, m) for i in range(n)]
+    for i in range(k):
+        function.store("out", i, plain[i] or literal(0.0))
+        row = function.row(explicit[i], m)
+        for slope, of_state in zip(by_state[i], moved, strict=True):
+            if slope is not None:
+                row = function.add_scaled(row, slope, of_state, m)
+        function.store_row(into, first + i * m, row, m)
+    return function
+
+
+def _plain(system: Equations, name: str, expressions: Sequence[sympy.Expr]) -> Function:
+    function = _function(system, name)
+    for index, value in enumerate(list(_values(function, expressions))):
+        function.store("out", index, value or literal(0.0))
+    return function
+
+
+def _jacobian(system: Equations, name: str, found: Differentiated) -> Function:
+    """Values in `out`; derivatives by free parameters, states and probes in `slopes`."""
+    function, k = _function(system, name), len(found.values)
+    groups = zip(found.by_parameter, found.by_state, found.by_probe, strict=True)
+    flat = [e for group in groups for row in group for e in row]
+    values = [value or literal(0.0) for value in _values(function, [*found.values, *flat])]
+    for index, value in enumerate(values):
+        if index < k:
+            function.store("out", index, value)
+        else:
+            function.store("slopes", index - k, value)
+    return function

@@ -1,0 +1,44 @@
+"""How fine steps must be that are the same everywhere, as those of a linearisation are."""
+
+import numpy as np
+
+from rigwatch.physics.engine.compile.compiled_system import FloatArray
+from rigwatch.physics.engine.compile.static_kernel import numpy_function
+from rigwatch.physics.engine.compile.step_size import pace
+from rigwatch.physics.engine.equations import TIME, UNTIL, System
+
+MOST_SUBSTEPS = 64
+FINER = 2.0
+"""Steps over those that keep a memory stable: directions go by Heun's method, which must follow."""
+COARSER = 3.0
+"""Steps about standstill over these: directions need no more than to see that it is steep."""
+
+
+def even_substeps(
+    system: System, inputs: FloatArray, states: FloatArray, parameters: FloatArray, spacing: float
+) -> int:
+    """Substeps that follow what is stiff anywhere on a recording.
+
+    Args:
+        system: the equations.
+        inputs: shape (n, inputs).
+        states: shape (n, states).
+        parameters: all of them, shape (n_p,).
+        spacing: time between the inputs' samples [s].
+    """
+    wanted = pace(system)
+    if not wanted.asked:
+        return 1
+    names = (TIME, UNTIL, *system.states, *system.model.inputs, *system.parameters, *system.probes)
+    function = numpy_function(names, wanted.asked)
+    standing = states.copy()
+    standing[:, wanted.crossing] = 0.0
+    fastest = 0.0
+    for at in (states, standing):
+        asked = function(0.0, 0.0, *at.T, *inputs.T, *parameters, *[0.0] * len(system.probes))
+        sizes = [float(np.nanmax(np.abs(rate))) for rate in asked]
+        steep, memory = sizes[: len(wanted.crossing)], sizes[len(wanted.crossing) :]
+        fastest = max(
+            fastest, *(size / COARSER for size in steep), *(FINER * size for size in memory)
+        )
+    return int(min(MOST_SUBSTEPS, max(1, np.ceil(fastest * spacing))))

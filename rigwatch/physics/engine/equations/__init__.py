@@ -1,0 +1,62 @@
+"""Models and effects as equations with units.
+
+    model.toml + effects at ports ──compose──▶ System: states, parameters, derivatives, outputs
+
+`expression` parses, `dimension` checks units, `scope` holds the names that an equation may use,
+`plugins` finds the effects that other packages offer.
+"""
+
+from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, library, load_effects
+from rigwatch.physics.engine.equations.expression import parse
+from rigwatch.physics.engine.equations.model import (
+    Hold,
+    Input,
+    Model,
+    Output,
+    Parameter,
+    Port,
+    State,
+    Variable,
+    load_model,
+    shipped_models,
+)
+from rigwatch.physics.engine.equations.plugins import offered
+from rigwatch.physics.engine.equations.scope import symbol
+from rigwatch.physics.engine.equations.system import (
+    LEFT,
+    PROBE,
+    RATE,
+    TIME,
+    UNTIL,
+    Placement,
+    System,
+    compose,
+)
+
+__all__ = [
+    "LEFT",
+    "PROBE",
+    "RATE",
+    "TIME",
+    "UNTIL",
+    "Effect",
+    "EffectParameter",
+    "Hold",
+    "Input",
+    "Model",
+    "Output",
+    "Parameter",
+    "Placement",
+    "Port",
+    "State",
+    "System",
+    "Variable",
+    "compose",
+    "library",
+    "load_effects",
+    "load_model",
+    "offered",
+    "parse",
+    "shipped_models",
+    "symbol",
+]

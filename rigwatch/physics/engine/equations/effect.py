@@ -1,0 +1,157 @@
+"""An effect: physics that a model may be missing, as an expression at a port.
+
+Each is a short declaration in a TOML file. At a force port the expression is the force that is
+added, in the port's `x` and `v`; at an actuator or sensor it is the signal that leaves, in the
+signal `u` that arrives. The parameter with role "strength" makes the effect vanish at its neutral
+value.
+
+Values are numbers, or shares of the `scale` that a signal has in the recording at hand. Units are
+written with the port's own: `{F}`, `{x}`, `{v}` at a force, `{u}` at a signal, so that
+one declaration serves a mass on a table and an electronic oscillator.
+"""
+
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+import sympy
+from msgspec import Meta, field
+from msgspec.structs import replace
+
+from rigwatch.physics.engine.equations.expression import parse as parse_expression
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files import Section, load, parse
+
+Text = Annotated[str, Meta(min_length=1)]
+
+
+class EffectParameter(Section, frozen=True, kw_only=True):
+    """A number of an effect."""
+
+    unit: Annotated[str, Meta(description="its unit, may name the port's units in braces")]
+    value: Annotated[float, Meta(description="where a fit starts, as a share of `scale`")] = 0.0
+    low: Annotated[float, Meta(description="lower bound")] = float("-inf")
+    high: Annotated[float, Meta(description="upper bound")] = float("inf")
+    role: Annotated[
+        Literal["strength", "switch", "shape", "constant"],
+        Meta(
+            description="a strength vanishes with the effect; a switch does, too, and is 1 in a"
+            " fit; a constant is never fitted"
+        ),
+    ] = "shape"
+    neutral: Annotated[float, Meta(description="strength at which the effect is absent")] = 0.0
+    tried: Annotated[
+        tuple[float, ...], Meta(description="shape values that the score test tries")
+    ] = ()
+    scale: Annotated[
+        str,
+        Meta(description="what values and bounds are shares of: x, v, u, dt or a ratio of them"),
+    ] = ""
+
+
+class EffectState(Section, frozen=True, kw_only=True):
+    """Memory of an effect."""
+
+    unit: Annotated[str, Meta(description="its unit")]
+    derivative: Annotated[Text, Meta(description="its rate of change")]
+    start: Annotated[float, Meta(description="value to start from")] = 0.0
+    low: Annotated[float, Meta(description="least that it can hold")] = float("-inf")
+    high: Annotated[float, Meta(description="most that it can hold")] = float("inf")
+
+
+class Effect(Section, frozen=True, kw_only=True):
+    """One effect of the library."""
+
+    port: Annotated[Literal["force", "actuator", "sensor", "signal"], Meta(description="where")]
+    expression: Annotated[Text, Meta(description="force added, or signal that leaves")]
+    direction: Annotated[
+        str, Meta(description="derivative by the strength at neutral, where it is no expression")
+    ] = ""
+    physics: Annotated[Text, Meta(description="the physics in a sentence")]
+    source: Annotated[Text, Meta(description="where it is from")]
+    family: Annotated[
+        str,
+        Meta(description="effects of one family say the same in other words; its name if empty"),
+    ] = ""
+    refines: Annotated[
+        str, Meta(description="effect of lower order, tried first where it does most of the same")
+    ] = ""
+    parameters: dict[str, EffectParameter]
+    states: dict[str, EffectState] = field(default_factory=dict)
+
+    def fits(self, kind: str) -> bool:
+        """Whether it may stand at a port of this kind."""
+        return self.port == kind or (self.port == "signal" and kind in ("actuator", "sensor"))
+
+    @property
+    def strength(self) -> str:
+        """Name of the strength."""
+        roles = ("strength", "switch")
+        return next(name for name, p in self.parameters.items() if p.role in roles)
+
+    @property
+    def free(self) -> int:
+        """Parameters that a fit moves."""
+        return sum(p.role in ("strength", "shape") for p in self.parameters.values())
+
+    def scaled(self, sizes: Mapping[str, float]) -> "Effect":
+        """The effect with its shares turned into numbers for signals of these sizes.
+
+        Raises:
+            ModelError: a scale names a size that is not given.
+        """
+        found = {name: _scaled(name, p, sizes) for name, p in self.parameters.items()}
+        return replace(self, parameters=found)
+
+
+def _scaled(name: str, p: EffectParameter, sizes: Mapping[str, float]) -> EffectParameter:
+    if not p.scale:
+        return p
+    numbers = {key: sympy.Float(size) for key, size in sizes.items()}
+    size = float(parse_expression(p.scale, numbers, f"scale of {name}"))
+    tried = tuple(value * size for value in p.tried)
+    return replace(
+        p, value=p.value * size, low=p.low * size, high=p.high * size, tried=tried, scale=""
+    )
+
+
+class EffectFile(Section, frozen=True, kw_only=True):
+    """A file of effects."""
+
+    effects: dict[str, Effect]
+
+
+def usable(name: str, effect: Effect, file: Path | str) -> Effect:
+    """The effect, if its declaration makes sense.
+
+    Raises:
+        ConfigError: it has no strength, or more than one.
+    """
+    strengths = [key for key, p in effect.parameters.items() if p.role in ("strength", "switch")]
+    if len(strengths) != 1:
+        found = f"{len(strengths)} parameters with role strength or switch"
+        raise ConfigError(file, f"effects.{name}.parameters", found, "one")
+    return effect
+
+
+def load_effects(path: Path | str) -> dict[str, Effect]:
+    """The effects of the file at `path`, by name.
+
+    Raises:
+        ConfigError: the file does not fit.
+    """
+    found = load(path, EffectFile).effects
+    return {name: usable(name, effect, path) for name, effect in found.items()}
+
+
+@cache
+def library() -> dict[str, Effect]:
+    """The effects that ship with rigwatch, by name."""
+    found: dict[str, Effect] = {}
+    folder = resources.files("rigwatch.physics") / "effects"
+    for file in sorted(folder.iterdir(), key=lambda entry: entry.name):
+        if file.name.endswith(".toml"):
+            found |= parse(file.read_text("utf-8"), EffectFile, file.name).effects
+    return found

@@ -1,0 +1,192 @@
+"""Expressions as users write them, read safely into SymPy and checked for their units.
+
+The language is Python's arithmetic with the functions of `FUNCTIONS`; `where(condition, a, b)`
+chooses. Nothing else of Python is understood, so a file of equations cannot run code.
+"""
+
+import ast
+import difflib
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+import sympy
+
+from rigwatch.physics.engine.equations.dimension import NONE, Dimension, describe, times
+from rigwatch.wire.errors import ModelError
+
+FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "abs": sympy.Abs,
+    "atan": sympy.atan,
+    "cos": sympy.cos,
+    "exp": sympy.exp,
+    "floor": sympy.floor,
+    "log": sympy.log,
+    "max": sympy.Max,
+    "min": sympy.Min,
+    "sign": sympy.sign,
+    "sin": sympy.sin,
+    "sqrt": sympy.sqrt,
+    "tanh": sympy.tanh,
+    "where": lambda condition, a, b: sympy.Piecewise((a, condition), (b, True)),
+}
+_SAME_UNIT = {"max", "min", "abs"}
+_OPERATORS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
+    ast.Add: lambda a, b: a + b,
+    ast.Sub: lambda a, b: a - b,
+    ast.Mult: lambda a, b: a * b,
+    ast.Div: lambda a, b: a / b,
+    ast.Pow: lambda a, b: a**b,
+}
+_COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
+    ast.Lt: sympy.Lt,
+    ast.LtE: sympy.Le,
+    ast.Gt: sympy.Gt,
+    ast.GtE: sympy.Ge,
+}
+
+
+def parse(text: str, names: Mapping[str, sympy.Expr], where: str) -> sympy.Expr:
+    """The expression `text` in the symbols `names`.
+
+    Args:
+        text: what the user wrote.
+        names: the symbols that may stand in it, by name.
+        where: what is being defined, for errors.
+
+    Raises:
+        ModelError: it does not parse, or names something unknown.
+    """
+    return _parsed(text, tuple(names.items()), where)
+
+
+@lru_cache(maxsize=4096)
+def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) -> sympy.Expr:
+    """The same, kept: SymPy takes milliseconds to simplify choices and extremes."""
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except SyntaxError as error:
+        raise ModelError(
+            f"{where}: found {text!r}, which breaks off at character {error.offset}"
+        ) from None
+    return sympy.sympify(_Reader(dict(names), where).value(tree.body))
+
+
+class _Reader:
+    """Walks Python's syntax tree and builds the SymPy expression."""
+
+    def __init__(self, names: Mapping[str, sympy.Expr], where: str) -> None:
+        self._names, self._where = names, where
+
+    def value(self, node: ast.AST) -> Any:
+        match node:
+            case ast.Constant(value=bool()):
+                pass
+            case ast.Constant(value=int() | float() as number):
+                return sympy.Integer(number) if isinstance(number, int) else sympy.Float(number)
+            case ast.Name(id=name):
+                return self._named(name, self._names, "name")
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return -self.value(operand)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+                return _OPERATORS[type(op)](self.value(left), self.value(right))
+            case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARISONS:
+                return _COMPARISONS[type(op)](self.value(left), self.value(right))
+            case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
+                function = self._named(name, FUNCTIONS, "function")
+                return self._called(name, function, [self.value(arg) for arg in args])
+        raise ModelError(f"{self._where}: found {ast.unparse(node)!r}, which is no arithmetic")
+
+    def _named(self, name: str, known: Mapping[str, Any], kind: str) -> Any:
+        if name in known:
+            return known[name]
+        close = difflib.get_close_matches(name, known, 1)
+        expected = f"{close[0]!r}" if close else f"one of {', '.join(sorted(known))}"
+        raise ModelError(f"{self._where}: found the unknown {kind} {name!r}, expected {expected}")
+
+    def _called(self, name: str, function: Callable[..., Any], args: list[Any]) -> Any:
+        try:
+            return function(*args)
+        except TypeError:
+            raise ModelError(f"{self._where}: found {len(args)} arguments of {name}()") from None
+
+
+def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> Dimension | None:
+    """The dimension of the expression `text`; None for zero, which fits every unit.
+
+    Raises:
+        ModelError: it adds, compares or feeds to a function what does not have fitting units.
+    """
+    return _Measurer(dimensions, where).dim(ast.parse(text.strip(), mode="eval").body)
+
+
+class _Measurer:
+    """Walks the same tree and computes dimensions."""
+
+    def __init__(self, dimensions: Mapping[str, Dimension], where: str) -> None:
+        self._dimensions, self._where = dimensions, where
+
+    def dim(self, node: ast.AST) -> Dimension | None:  # noqa: PLR0911 -- one a kind of node
+        match node:
+            case ast.Constant(value=number):
+                return None if number == 0 else NONE
+            case ast.Name(id=name):
+                return self._dimensions[name]
+            case ast.UnaryOp(operand=operand):
+                return self.dim(operand)
+            case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):
+                return self._same(node, self.dim(left), self.dim(right))
+            case ast.BinOp(left=left, op=ast.Mult(), right=right):
+                return self._scaled(self.dim(left), self.dim(right), 1)
+            case ast.BinOp(left=left, op=ast.Div(), right=right):
+                return self._scaled(self.dim(left), self.dim(right), -1)
+            case ast.BinOp(left=left, op=ast.Pow(), right=right):
+                return self._power(node, self.dim(left), right)
+            case ast.Compare(left=left, comparators=[right]):
+                self._same(node, self.dim(left), self.dim(right))
+                return NONE
+            case ast.Call(func=ast.Name(id=name), args=args):
+                return self._function(node, name, args)
+        return NONE
+
+    def _same(
+        self, node: ast.AST, one: Dimension | None, other: Dimension | None
+    ) -> Dimension | None:
+        if one is not None and other is not None and one != other:
+            raise ModelError(
+                f"{self._where}: found {ast.unparse(node)!r} with units"
+                f" {describe(one)} and {describe(other)}, expected one unit"
+            )
+        return other if one is None else one
+
+    def _scaled(
+        self, one: Dimension | None, other: Dimension | None, power: int
+    ) -> Dimension | None:
+        return None if one is None else times(one, other or NONE, power)
+
+    def _power(self, node: ast.AST, base: Dimension | None, exponent: ast.AST) -> Dimension | None:
+        if base is None or base == NONE:
+            return base
+        try:
+            return times(NONE, base, Fraction(str(ast.literal_eval(ast.unparse(exponent)))))
+        except ValueError:
+            raise ModelError(
+                f"{self._where}: found {ast.unparse(node)!r}, expected a number as exponent of"
+                f" a quantity in {describe(base)}"
+            ) from None
+
+    def _function(self, node: ast.AST, name: str, args: list[ast.expr]) -> Dimension | None:
+        dims = [self.dim(arg) for arg in args]
+        if name == "where":
+            return self._same(node, dims[1], dims[2])
+        if name in _SAME_UNIT:
+            return dims[0] if len(dims) == 1 else self._same(node, dims[0], dims[1])
+        if name == "sqrt":
+            return None if dims[0] is None else times(NONE, dims[0], Fraction(1, 2))
+        if name != "sign" and dims[0] not in (None, NONE):
+            raise ModelError(
+                f"{self._where}: found {ast.unparse(node)!r} of a quantity in"
+                f" {describe(dims[0] or NONE)}, expected a pure number"
+            )
+        return NONE

@@ -1,0 +1,136 @@
+"""A model as a file of equations, with ports where effects may enter.
+
+    [states.v]
+    unit = "m/s"
+    derivative = "(force - k*x - c*v + load)/m"
+
+    [ports.load]
+    kind = "force"
+    unit = "N"
+    variables.x = { expression = "x", unit = "m" }
+    variables.v = { expression = "v", unit = "m/s" }
+
+A port's name stands in the equations. A force port is a sum that is 0 until an effect is put there;
+an actuator port is its input as it arrives, and a sensor port is an output as it is read.
+"""
+
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+from msgspec import Meta, field
+
+from rigwatch.wire.typed_files import Section, load, parse
+
+Text = Annotated[str, Meta(min_length=1)]
+
+
+Hold = Literal["linear", "zero"]
+
+
+class Input(Section, frozen=True, kw_only=True):
+    """A signal that drives the model."""
+
+    unit: Annotated[str, Meta(description="its unit")]
+    channel: Annotated[str, Meta(description="channel it is read from, its own name if empty")] = ""
+    hold: Annotated[
+        Hold | None, Meta(description="between samples, as the model's if not given")
+    ] = None
+
+
+class State(Section, frozen=True, kw_only=True):
+    """A state and its equation."""
+
+    unit: Annotated[str, Meta(description="its unit")]
+    derivative: Annotated[Text, Meta(description="its rate of change")]
+    start: Annotated[float, Meta(description="value to start from where nothing measures it")] = 0.0
+    measured: Annotated[str, Meta(description="channel that shows it")] = ""
+    rate_of: Annotated[str, Meta(description="channel whose rate of change it is")] = ""
+    low: Annotated[float, Meta(description="least initial value of a fit")] = float("-inf")
+    high: Annotated[float, Meta(description="largest initial value of a fit")] = float("inf")
+
+
+class Parameter(Section, frozen=True, kw_only=True):
+    """A number of the model, fitted unless it is fixed."""
+
+    value: Annotated[float, Meta(description="value, or where a fit starts")]
+    unit: Annotated[str, Meta(description="its unit")]
+    low: Annotated[float, Meta(description="lower bound of a fit")] = float("-inf")
+    high: Annotated[float, Meta(description="upper bound of a fit")] = float("inf")
+    fixed: Annotated[bool, Meta(description="whether it is known")] = False
+    kept: Annotated[
+        bool, Meta(description="fitted to a healthy recording where there is one, then fixed")
+    ] = False
+    meaning: Annotated[str, Meta(description="what it is, in words")] = ""
+
+
+class Output(Section, frozen=True, kw_only=True):
+    """A signal that the model predicts."""
+
+    unit: Annotated[str, Meta(description="its unit")]
+    expression: Annotated[Text, Meta(description="what it is, in states, inputs and parameters")]
+    channel: Annotated[str, Meta(description="channel it is held against, its name if empty")] = ""
+
+
+class Variable(Section, frozen=True, kw_only=True):
+    """A quantity that effects at a port may use."""
+
+    expression: Annotated[Text, Meta(description="what it is, in states, inputs and parameters")]
+    unit: Annotated[str, Meta(description="its unit")]
+
+
+class Port(Section, frozen=True, kw_only=True):
+    """A place where effects may enter."""
+
+    kind: Annotated[Literal["force", "actuator", "sensor"], Meta(description="how it enters")]
+    unit: Annotated[str, Meta(description="unit of what effects add or change here")] = ""
+    signal: Annotated[str, Meta(description="input or output that an actuator or sensor is at")] = (
+        ""
+    )
+    passive: Annotated[
+        bool, Meta(description="nothing enters but what its variables drive, as through a leak")
+    ] = False
+    variables: Annotated[
+        dict[str, Variable], Meta(description="what effects here call x, v and so on")
+    ] = field(default_factory=dict)
+
+
+class Model(Section, frozen=True, kw_only=True):
+    """The whole file."""
+
+    name: Text
+    summary: Annotated[Text, Meta(description="what it describes, in a sentence")]
+    source: Annotated[str, Meta(description="where its equations come from")] = ""
+    hold: Annotated[Hold, Meta(description="input between samples: a line, or kept")] = "linear"
+    rough: Annotated[
+        bool, Meta(description="leaves much unexplained on a healthy rig, too; see the workbench")
+    ] = False
+    inputs: dict[str, Input]
+    states: dict[str, State] = field(default_factory=dict)
+    parameters: dict[str, Parameter]
+    outputs: Annotated[dict[str, Output], Meta(min_length=1)]
+    ports: dict[str, Port] = field(default_factory=dict)
+
+    def held(self, name: str) -> Hold:
+        """What an input does between samples."""
+        return self.inputs[name].hold or self.hold
+
+
+def load_model(path: Path | str) -> Model:
+    """The model file at `path`.
+
+    Raises:
+        ConfigError: the file does not fit.
+    """
+    return load(path, Model)
+
+
+@cache
+def shipped_models() -> dict[str, Model]:
+    """The base models that ship with rigwatch, by name."""
+    folder = resources.files("rigwatch.physics") / "models"
+    files = sorted(folder.iterdir(), key=lambda entry: entry.name)
+    texts = {file.name: file.read_text("utf-8") for file in files if file.name.endswith(".toml")}
+    models = [parse(text, Model, name) for name, text in texts.items()]
+    return {model.name: model for model in models}

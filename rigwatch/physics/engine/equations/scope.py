@@ -1,0 +1,52 @@
+"""The names that an expression may use, each with its meaning and its dimension."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import sympy
+
+from rigwatch.physics.engine.equations.dimension import Dimension, describe, dimension
+from rigwatch.physics.engine.equations.expression import dimension_of, parse
+from rigwatch.wire.errors import ModelError
+
+
+def symbol(name: str) -> sympy.Symbol:
+    """The real symbol called `name`."""
+    return sympy.Symbol(name, real=True)
+
+
+@dataclass
+class Scope:
+    """Meanings and dimensions by name; an expression is read in a scope."""
+
+    meanings: dict[str, sympy.Expr] = field(default_factory=dict)
+    dimensions: dict[str, Dimension] = field(default_factory=dict)
+
+    def define(self, name: str, meaning: sympy.Expr, unit: str | Dimension) -> None:
+        """Let `name` stand for `meaning`, with its unit or dimension."""
+        self.meanings[name] = meaning
+        self.dimensions[name] = dimension(unit) if isinstance(unit, str) else unit
+
+    def define_all(self, units: Mapping[str, str], prefix: str = "") -> None:
+        """Let each name stand for a symbol of its own, called with `prefix` in front."""
+        for name, unit in units.items():
+            self.define(name, symbol(prefix + name), unit)
+
+    def copy(self) -> "Scope":
+        """A scope that can be added to without changing this one."""
+        return Scope(dict(self.meanings), dict(self.dimensions))
+
+    def read(self, text: str, unit: str | Dimension, where: str) -> sympy.Expr:
+        """The expression `text`, which must have the given unit or dimension.
+
+        Raises:
+            ModelError: it does not parse, names something unknown or has another unit.
+        """
+        expression = parse(text, self.meanings, where)
+        found = dimension_of(text, self.dimensions, where)
+        expected = dimension(unit) if isinstance(unit, str) else unit
+        if found is not None and found != expected:
+            raise ModelError(
+                f"{where}: found {text!r} in {describe(found)}, expected {describe(expected)}"
+            )
+        return expression

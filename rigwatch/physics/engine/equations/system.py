@@ -1,0 +1,235 @@
+"""A model with the effects that were put on its ports: equations ready for a kernel.
+
+Parameters and states of an effect carry its port and name, such as `load_coulomb_Fc`, so that the
+same effect may stand at two ports. Effects on one force port add up; on a signal they follow one
+another in the order in which they were placed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import sympy
+
+from rigwatch.physics.engine.equations.effect import Effect
+from rigwatch.physics.engine.equations.model import Model, Parameter, Port, State
+from rigwatch.physics.engine.equations.scope import Scope, symbol
+from rigwatch.wire.errors import ModelError
+
+TIME = "t"
+PROBE = "probe_"
+RATE = "rate"
+"""What an effect at a signal may call the signal's own rate of change."""
+UNTIL = "until_"
+LEFT = "left"
+"""What an effect at a signal may call the time until an input that is kept changes; 0 elsewhere.
+
+Its symbol in a system is `UNTIL`, so that a model may call something of its own `left`.
+"""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """The effect called `name`, at a port."""
+
+    name: str
+    effect: Effect
+    port: str
+
+    @property
+    def prefix(self) -> str:
+        """What its parameters and states are called with in front."""
+        return f"{self.port}_{self.name}_"
+
+    def __str__(self) -> str:
+        return f"effect {self.name} at {self.port}"
+
+
+@dataclass(frozen=True)
+class System:
+    """Equations of a model with its effects.
+
+    Attributes:
+        model: the model as it was written.
+        placements: the effects, in order.
+        states: by name, those of the model first.
+        parameters: by name, those of the model first.
+        derivatives: rates of the states, by name.
+        outputs: by name, as the sensors read them.
+        ports: what each port is: the force that is added, the signal that leaves.
+        probes: one a force or actuator port, added to what it is and always 0: derivatives by them
+            say what any further effect there would do.
+    """
+
+    model: Model
+    placements: tuple[Placement, ...]
+    states: Mapping[str, State]
+    parameters: Mapping[str, Parameter]
+    derivatives: Mapping[str, sympy.Expr]
+    outputs: Mapping[str, sympy.Expr]
+    ports: Mapping[str, sympy.Expr]
+    probes: tuple[str, ...]
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that a fit moves."""
+        return tuple(name for name, p in self.parameters.items() if not p.fixed)
+
+
+def compose(model: Model, placements: Sequence[Placement] = ()) -> System:
+    """The equations of `model` with `placements` on its ports.
+
+    Raises:
+        ModelError: a port is unknown or of another kind, an expression does not parse or has wrong
+            units.
+    """
+    for placement in placements:
+        _check_port(model, placement)
+    return _Composer(model, tuple(placements)).system()
+
+
+def _check_port(model: Model, placement: Placement) -> None:
+    port = model.ports.get(placement.port)
+    if port is None:
+        known = ", ".join(model.ports) or "a model with ports"
+        raise ModelError(
+            f"effect {placement.name}: found port {placement.port!r}, expected one of {known}"
+        )
+    if not placement.effect.fits(port.kind):
+        raise ModelError(
+            f"effect {placement.name}: found port {placement.port!r} of kind {port.kind},"
+            f" expected kind {placement.effect.port}"
+        )
+
+
+class _Composer:
+    """Builds the scope in the order in which things depend on each other.
+
+    Inputs and states come first, then actuators, then forces, then the equations and outputs, then
+    the sensors: each is read in a scope where all that it may use is already known.
+    """
+
+    def __init__(self, model: Model, placements: tuple[Placement, ...]) -> None:
+        self._model, self._placements = model, placements
+        self._states, self._parameters = dict(model.states), dict(model.parameters)
+        self._rates: dict[str, sympy.Expr] = {}
+        self._scope = Scope()
+        self._scope.define(TIME, symbol(TIME), "s")
+        for table in (model.inputs, model.states, model.parameters):
+            self._scope.define_all({name: item.unit for name, item in table.items()})
+
+    def system(self) -> System:
+        ports = self._entered("actuator") | self._entered("force")
+        model_rates = {
+            name: self._scope.read(state.derivative, f"({state.unit})/s", f"state {name}")
+            for name, state in self._model.states.items()
+        }
+        self._rates = model_rates | self._rates
+        outputs = {
+            name: self._scope.read(output.expression, output.unit, f"output {name}")
+            for name, output in self._model.outputs.items()
+        }
+        for name, output in outputs.items():
+            self._scope.define(name, output, self._model.outputs[name].unit)
+        sensors = self._entered("sensor")
+        outputs |= {self._model.ports[name].signal: value for name, value in sensors.items()}
+        return System(
+            self._model,
+            self._placements,
+            self._states,
+            self._parameters,
+            self._rates,
+            outputs,
+            ports | sensors,
+            tuple(PROBE + name for name in ports),
+        )
+
+    def _entered(self, kind: str) -> dict[str, sympy.Expr]:
+        """The ports of one kind with their effects; each is known to the scope from then on."""
+        values = {}
+        for name, port in self._model.ports.items():
+            if port.kind == kind:
+                probe = symbol(PROBE + name) if kind != "sensor" else sympy.Integer(0)
+                values[name] = self._port_value(name, port) + probe
+                self._scope.define(name, values[name], self._port_unit(name, port))
+        return values
+
+    def _port_unit(self, name: str, port: Port) -> str:
+        if port.kind == "force":
+            return port.unit
+        table = self._model.inputs if port.kind == "actuator" else self._model.outputs
+        if port.signal not in table:
+            raise ModelError(
+                f"port {name}: found signal {port.signal!r}, expected one of {', '.join(table)}"
+            )
+        return table[port.signal].unit
+
+    def _port_value(self, name: str, port: Port) -> sympy.Expr:
+        unit = self._port_unit(name, port)
+        signal = port.kind != "force"
+        value = self._scope.meanings[port.signal] if signal else sympy.Integer(0)
+        for placement in self._placements:
+            if placement.port == name:
+                change = self._effect_value(placement, port, value, unit)
+                value = change if signal else value + change
+        return value
+
+    def _effect_value(
+        self, placement: Placement, port: Port, arriving: sympy.Expr, unit: str
+    ) -> sympy.Expr:
+        """What one effect adds to a force port, or makes of the arriving signal."""
+        scope = self._local_scope(placement, port, arriving, unit)
+        for name, state in placement.effect.states.items():
+            rate_unit = f"({self._states[placement.prefix + name].unit})/s"
+            where = f"{placement}: state {name}"
+            self._rates[placement.prefix + name] = scope.read(state.derivative, rate_unit, where)
+        return scope.read(placement.effect.expression, unit, str(placement))
+
+    def _local_scope(
+        self, placement: Placement, port: Port, arriving: sympy.Expr, unit: str
+    ) -> Scope:
+        """Names as the effect sees them; its own parameters and states join the system."""
+        scope, units = Scope(), {"F" if port.kind == "force" else "u": unit}
+        scope.define(TIME, symbol(TIME), "s")
+        for name, variable in port.variables.items():
+            meaning = self._scope.read(variable.expression, variable.unit, f"port {placement.port}")
+            scope.define(name, meaning, variable.unit)
+            units[name] = variable.unit
+        if port.kind != "force":
+            scope.define("u", arriving, unit)
+            scope.define(LEFT, symbol(UNTIL), "s")
+        self._adopt(placement, units)
+        for name in (*placement.effect.parameters, *placement.effect.states):
+            label = placement.prefix + name
+            own = self._parameters.get(label) or self._states[label]
+            scope.define(name, symbol(label), own.unit)
+        return scope
+
+    def _adopt(self, placement: Placement, units: Mapping[str, str]) -> None:
+        for name, p in placement.effect.parameters.items():
+            self._parameters[placement.prefix + name] = Parameter(
+                value=1.0 if p.role == "switch" else p.value,
+                unit=_resolved(p.unit, units, placement),
+                low=p.low,
+                high=p.high,
+                fixed=p.role in ("constant", "switch"),
+                meaning=f"{placement.name}, {name}",
+            )
+        for name, s in placement.effect.states.items():
+            unit = _resolved(s.unit, units, placement)
+            self._states[placement.prefix + name] = State(
+                unit=unit, derivative=s.derivative, start=s.start, low=s.low, high=s.high
+            )
+
+
+def _resolved(unit: str, units: Mapping[str, str], placement: Placement) -> str:
+    """A unit of an effect with the port's own units in place of braces."""
+    try:
+        return unit.format_map({name: _bracketed(value) for name, value in units.items()})
+    except KeyError as missing:
+        raise ModelError(
+            f"{placement}: found a need for {missing}, which this port does not offer"
+        ) from None
+
+
+def _bracketed(unit: str) -> str:
+    return f"({unit})" if any(sign in unit for sign in " */") else unit

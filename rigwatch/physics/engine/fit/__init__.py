@@ -1,0 +1,22 @@
+"""Fits over short horizons, each window with an unknown initial state.
+
+Recording ──windows──▶ Problem (initial states projected out) ──▶ fit, evaluate ──▶ Fit
+"""
+
+from rigwatch.physics.engine.fit.decimation import Thinning
+from rigwatch.physics.engine.fit.effect_states import Memory, held_at, seen
+from rigwatch.physics.engine.fit.recording import Recording, initial_states, windows
+from rigwatch.physics.engine.fit.windowed_fit import Fit, evaluate, fit
+
+__all__ = [
+    "Fit",
+    "Memory",
+    "Recording",
+    "Thinning",
+    "evaluate",
+    "fit",
+    "held_at",
+    "initial_states",
+    "seen",
+    "windows",
+]

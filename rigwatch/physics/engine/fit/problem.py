@@ -1,0 +1,305 @@
+"""One recording cut into windows, with their unknown initial states taken out of the fit.
+
+For given parameters the initial states of every window are found by Gauss-Newton steps of their own
+and projected out of residuals and Jacobian (variable projection with Kaufman's gradient: G. Golub
+and V. Pereyra, Inverse Problems 19, 2003), so that a solver sees the parameters alone.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigwatch.physics.engine.compile import CompiledSystem, FloatArray, IntArray
+from rigwatch.physics.engine.fit.effect_states import Recall
+from rigwatch.physics.engine.fit.initial_state_projection import Tangent
+from rigwatch.physics.engine.fit.recording import Recording, initial_states, windows
+from rigwatch.wire.errors import ModelError
+
+START_STEPS = 2
+"""Simulations at most for the initial states at each evaluation; they start from the best ones."""
+
+ENOUGH = 1e-3
+"""Share of a window's squared error that a second one must promise."""
+
+ASTRAY = 2.0
+"""Squared error of a window over the median of all from which its initial state may be wrong."""
+
+BACK = 0.8
+"""Share of its squared error to which a window must fall to have come back."""
+
+SETTLED = 1e-6
+"""Share of a window's squared error below which a better initial state is not looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Started:
+    """Windows at their best initial states.
+
+    Attributes:
+        parameters: all of them, shape (n_p,).
+        initial: shape (windows, states).
+        error: scaled, shape (windows, k).
+        slopes: by free parameters and initial states, shape (windows, k, free + states).
+        came_back: whether a window that went astray came back.
+    """
+
+    parameters: FloatArray
+    initial: FloatArray
+    error: FloatArray
+    slopes: FloatArray
+    came_back: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Met:
+    """The evaluation with the smallest error that the solver has met.
+
+    Attributes:
+        size: squared error, initial states projected out.
+        parameters: all of them, shape (n_p,).
+        initial: states that windows were simulated from, shape (windows, states).
+    """
+
+    size: float
+    parameters: FloatArray
+    initial: FloatArray
+
+
+class Problem:
+    """One recording cut into windows, simulated at the parameters that the solver asks for."""
+
+    def __init__(
+        self,
+        compiled: CompiledSystem,
+        recording: Recording,
+        horizon: int,
+        *,
+        scale: FloatArray | None,
+        substeps: int,
+        initial: FloatArray | None,
+    ) -> None:
+        self.compiled, self.recording, self._substeps = compiled, recording, substeps
+        system = self.system = compiled.system
+        names = list(system.parameters)
+        self.free = np.array([names.index(name) for name in system.free], dtype=np.int64)
+        self._cut = windows(system, len(recording), horizon)
+        rows = self._cut.starts[:, None] + np.arange(self._cut.length)
+        self.measured = recording.outputs[rows]
+        self.scale = np.nanstd(recording.outputs, axis=0) if scale is None else scale
+        self.scale = np.where(self.scale > 0, self.scale, 1.0)
+        shown = initial_states(system, recording)
+        self._initial = shown[self._cut.starts]
+        self._offered = initial
+        self._memory = Recall(system, recording.inputs, shown, recording.dt, compiled.parameters)
+        known = self._memory.exact
+        self._every = np.arange(len(system.states))
+        self._unknown = np.array([i for i in self._every if i not in known], np.int64)
+        self._low, self._high = (
+            np.array([getattr(state, end) for state in system.states.values()])
+            for end in ("low", "high")
+        )
+        self._best: _Met | None = None
+        self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
+
+    def whole(self, begin: FloatArray, theta: FloatArray) -> FloatArray:
+        """All parameters, with the free ones replaced."""
+        parameters = begin.copy()
+        parameters[self.free] = theta
+        return parameters
+
+    def recall(self, parameters: FloatArray) -> None:
+        """Let the memory of effects begin where the measured signals have led it.
+
+        Windows begin as the channels show them or, where it is better, as they are offered.
+        """
+        self._remember(parameters, self._memory.columns)
+        if self._offered is None or len(self._offered) != len(self._initial):
+            return
+        rows, own = np.arange(len(self._initial)), len(self.system.model.states)
+        other = np.column_stack([self._offered[:, :own], self._initial[:, own:]])
+        shown, offered = (
+            np.sum(self._simulated(parameters, rows, each)[0] ** 2, axis=1)
+            for each in (self._initial, other)
+        )
+        self._initial = np.where((offered < shown)[:, None], other, self._initial)
+
+    def _follow_inputs(self, parameters: FloatArray) -> None:
+        """Let memory at actuators begin where the inputs lead it; what came first is fitted."""
+        self._remember(parameters, self._memory.exact, since=1)
+
+    def _remember(self, parameters: FloatArray, columns: list[int], since: int = 0) -> None:
+        if columns:
+            led = self._memory.at(parameters)
+            self._initial = self._initial.copy()
+            for column in columns:
+                self._initial[since:, column] = led[column][self._cut.starts[since:]]
+
+    def _simulated(
+        self, parameters: FloatArray, rows: IntArray, initial: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Scaled residuals (rows, k), slopes (rows, k, free + states); 0 if unmeasured."""
+        r = self.recording
+        run = self.compiled.simulate(
+            r.inputs, r.dt, self._cut.starts[rows], self._cut.length, initial=initial,
+            parameters=parameters, substeps=self._substeps,
+        )  # fmt: skip
+        error = (self.measured[rows] - run.outputs) / self.scale
+        slopes = run.slopes / self.scale[:, None]
+        missing = np.isnan(self.measured[rows])
+        if missing.any():
+            error, slopes = np.where(missing, 0.0, error), np.where(missing[..., None], 0.0, slopes)
+        if r.thinning:
+            error, slopes = r.thinning.apply(error), r.thinning.apply(slopes)
+        flat = error.reshape(len(error), -1)
+        return flat, slopes.reshape(*flat.shape, slopes.shape[-1])
+
+    def start_windows(self, parameters: FloatArray) -> Started:
+        """Settle, and let windows that went astray begin where the one before has ended.
+
+        Initial states have local minima of their own.
+        """
+        if self._best is not None and np.array_equal(self._best.parameters, parameters):
+            self._initial = self._best.initial
+        error, slopes = self.settle(parameters)
+        found, rows = Started(parameters, self._initial, error, slopes), _astray(error)
+        if not (self.system.states and len(rows)):
+            return found
+        self._initial = self._initial.copy()
+        self._initial[rows] = self._ends_before(parameters, rows)
+        try:
+            again, again_slopes = self.settle(parameters, rows=rows)
+        except ModelError:
+            self._initial = found.initial
+            return found
+        back = np.sum(again**2, axis=1) < BACK * np.sum(error[rows] ** 2, axis=1)
+        error[rows[back]], slopes[rows[back]] = again[back], again_slopes[back]
+        self._initial[rows[~back]] = found.initial[rows[~back]]
+        self._best = self._last = None
+        return Started(parameters, self._initial, error, slopes, bool(back.any()))
+
+    def _ends_before(self, parameters: FloatArray, rows: IntArray) -> FloatArray:
+        """States in which the windows before some have ended, shape (rows, states)."""
+        r, before = self.recording, rows - 1
+        run = self.compiled.simulate(
+            r.inputs, r.dt, self._cut.starts[before], self._cut.length + 1,
+            initial=self._initial[before], parameters=parameters, substeps=self._substeps,
+        )  # fmt: skip
+        ended = np.clip(run.last, self._low, self._high)
+        return np.where(np.isfinite(ended), ended, self._initial[rows])
+
+    def settle(
+        self,
+        parameters: FloatArray,
+        steps: int = 6,
+        *,
+        worth: float = SETTLED,
+        rows: IntArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Move the initial states to where they fit best; scaled residuals and slopes there.
+
+        Each window takes Gauss-Newton steps of its own until they are worth nothing. A step that
+        makes its error larger, as one that leaves the play of a valve does, is tried again at a
+        quarter of its length.
+
+        Args:
+            parameters: all of them, shape (n_p,).
+            steps: simulations at most.
+            worth: share of a window's squared error that a step must promise.
+            rows: windows that are settled, all if None.
+        """
+        self._follow_inputs(parameters)
+        rows = np.arange(len(self._initial)) if rows is None else rows
+        best = self._initial[rows]
+        error, slopes = self._simulated(parameters, rows, best)
+        if not (np.isfinite(slopes).all() and np.isfinite(error).all()):
+            raise ModelError(
+                f"{self.system.model.name}: the simulation leaves the finite numbers;"
+                " try other starting values or more substeps"
+            )
+        if not self.system.states:
+            return error, slopes
+        step = self._steps(error, slopes, rows)
+        for further in reversed(range(steps - 1)):
+            size = np.sum(error**2, axis=1)
+            (going,) = np.nonzero(self._promise(step, slopes) > worth * size)
+            if not len(going):
+                break
+            there = np.clip(best[going] + step[going], self._low, self._high)
+            tried, tried_slopes = self._simulated(parameters, rows[going], there)
+            better = np.sum(tried**2, axis=1) < size[going]
+            took = going[better]
+            best[took], error[took], slopes[took] = (
+                there[better],
+                tried[better],
+                tried_slopes[better],
+            )
+            if further:
+                step[took] = self._steps(error[took], slopes[took], rows[took])
+                step[going[~better]] /= 4
+        self._initial = self._initial.copy()
+        self._initial[rows] = best
+        return error, slopes
+
+    def _promise(self, step: FloatArray, slopes: FloatArray) -> FloatArray:
+        """What a step takes away of each window's squared error to first order."""
+        moved = slopes[..., len(self.free) :] @ step[..., None]
+        return np.asarray(np.sum(moved[..., 0] ** 2, axis=1))
+
+    def _steps(self, error: FloatArray, slopes: FloatArray, rows: IntArray) -> FloatArray:
+        """Gauss-Newton step of each window's initial state, shape (rows, states)."""
+        return np.asarray(self._tangent(slopes, rows).solve(error[..., None])[..., 0])
+
+    def _tangent(self, slopes: FloatArray, rows: IntArray) -> Tangent:
+        """What an input led to is known, but at the recording's beginning."""
+        first = np.nonzero(rows == 0)[0], np.nonzero(rows > 0)[0]
+        groups = list(zip(first, (self._every, self._unknown), strict=True))
+        if len(self._unknown) == len(self._every):
+            groups = [(np.arange(len(rows)), self._every)]
+        return Tangent(slopes[..., len(self.free) :], groups)
+
+    def projected(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residuals and Jacobian by the free parameters, initial states projected out."""
+        key = parameters.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = (key, self._project(parameters))
+        return self._last[1]
+
+    def tried(self, parameters: FloatArray) -> FloatArray:
+        """Residuals for the solver; NaN where the simulation blows up, and it steps back."""
+        before = self._initial
+        try:
+            return self.projected(parameters)[0]
+        except ModelError:
+            self._initial = before
+            return np.full(self.count, np.nan)
+
+    @property
+    def count(self) -> int:
+        """Residuals that the solver sees."""
+        shape = (self.measured.shape[0], self.measured.shape[1], 1)
+        thinning = self.recording.thinning
+        thinned = thinning.apply(np.zeros(shape)).shape if thinning else shape
+        return math.prod(thinned) * int(self.measured.shape[2])
+
+    def _project(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if self._best is not None:
+            self._initial = self._best.initial
+        found = self.cleaned(*self.settle(parameters, START_STEPS, worth=ENOUGH))
+        size = float(found[0] @ found[0])
+        if self._best is None or size < self._best.size:
+            self._best = _Met(size, parameters.copy(), self._initial)
+        return found
+
+    def cleaned(self, error: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residual and Jacobian without what the initial states could have made."""
+        m = len(self.free)
+        tangent = self._tangent(slopes, np.arange(len(slopes)))
+        both = tangent.without(np.concatenate([error[..., None], slopes[..., :m]], axis=-1))
+        return -both[..., 0].ravel(), both[..., 1:].reshape(error.size, m)
+
+
+def _astray(error: FloatArray) -> IntArray:
+    """Windows, but the first, whose squared error is beyond that of most."""
+    size = np.sum(error**2, axis=1)
+    return np.nonzero(size[1:] > ASTRAY * np.median(size))[0] + 1

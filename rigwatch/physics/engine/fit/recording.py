@@ -1,0 +1,84 @@
+"""What was measured, how it is cut into windows, and where their states seem to begin."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from rigwatch.physics.engine.compile import FloatArray, IntArray
+from rigwatch.physics.engine.equations import System
+from rigwatch.physics.engine.fit.decimation import Thinning
+from rigwatch.wire.errors import ModelError
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What was measured, for one model.
+
+    Attributes:
+        dt: time between samples [s].
+        inputs: in the order of the model's inputs, shape (n, n_u).
+        outputs: in the order of its outputs, shape (n, n_y); NaN where nothing valid was measured.
+        thinning: how residuals and sensitivities are filtered and thinned, None where they are not.
+    """
+
+    dt: float
+    inputs: FloatArray
+    outputs: FloatArray
+    thinning: Thinning | None = None
+
+    def __len__(self) -> int:
+        return len(self.inputs)
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """How a recording is cut.
+
+    Attributes:
+        starts: first sample of each window, shape (windows,).
+        length: samples in each.
+    """
+
+    starts: IntArray
+    length: int
+
+
+def windows(system: System, samples: int, horizon: int) -> Windows:
+    """Consecutive windows of `horizon` samples; without states the recording is one window.
+
+    Raises:
+        ModelError: the recording is shorter than one window.
+    """
+    length = samples if not system.states else min(horizon, samples)
+    if length < 2:
+        raise ModelError(f"{system.model.name}: found {samples} samples, expected at least 2")
+    return Windows(np.arange(0, samples - length + 1, length, dtype=np.int64), length)
+
+
+def initial_states(system: System, recording: Recording) -> FloatArray:
+    """States as the channels show them at every sample, shape (n, states): a start for the fit."""
+    channels = {
+        output.channel or name: recording.outputs[:, index]
+        for index, (name, output) in enumerate(system.model.outputs.items())
+    }
+    found = np.empty((len(recording), len(system.states)))
+    for index, state in enumerate(system.states.values()):
+        found[:, index] = state.start
+        if state.measured in channels:
+            found[:, index] = _filled(channels[state.measured])
+        elif state.rate_of in channels:
+            signal = _filled(channels[state.rate_of])
+            width = min(11, len(signal) - 1 + len(signal) % 2)
+            if width >= 5:
+                found[:, index] = savgol_filter(signal, width, 3, deriv=1, delta=recording.dt)
+    return found
+
+
+def _filled(signal: FloatArray) -> FloatArray:
+    """The signal with gaps bridged by straight lines; zeros where there is nothing at all."""
+    good = np.isfinite(signal)
+    if not good.any():
+        return np.zeros_like(signal)
+    at = np.arange(len(signal))
+    return np.interp(at, at[good], signal[good])

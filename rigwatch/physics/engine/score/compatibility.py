@@ -1,0 +1,52 @@
+"""Which effects can stand where, and which strengths of them make sense."""
+
+import ast
+
+from rigwatch.physics.engine.equations import LEFT, RATE, Effect, Model, Port
+from rigwatch.physics.engine.score.effect_sensitivities import Candidate
+
+
+def suits(effect: Effect, port: Port, model: Model) -> bool:
+    """Whether the effect can stand at the port and finds all that its equations name there."""
+    if not effect.fits(port.kind):
+        return False
+    if effect.states and port.kind != "force" and not model.states:
+        return False
+    if port.passive and not _named(effect) & set(port.variables):
+        return False
+    return knows(effect, port)
+
+
+def knows(effect: Effect, port: Port) -> bool:
+    """Whether the effect finds all that its equations name among what the port offers."""
+    own = {
+        *effect.parameters,
+        *effect.states,
+        "t",
+        RATE,
+        LEFT,
+        *({"u"} if port.kind != "force" else ()),
+    }
+    return _named(effect) - own <= set(port.variables)
+
+
+def _named(effect: Effect) -> set[str]:
+    """Every name in an effect's equations that is no function."""
+    texts = [effect.expression, *(s.derivative for s in effect.states.values())]
+    used = {n.id for text in texts for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)}
+    functions = {
+        n.func.id
+        for text in texts
+        for n in ast.walk(ast.parse(text))
+        if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
+    }
+    return used - functions
+
+
+def possible(candidate: Candidate, strength: float) -> bool:
+    """Whether the strength that a score suggests lies on the right side of its bounds."""
+    p = candidate.effect.parameters[candidate.effect.strength]
+    if p.role == "switch":
+        return strength > 0
+    value = p.neutral + strength
+    return min(p.low, p.neutral) <= value <= max(p.high, p.neutral)

@@ -1,0 +1,302 @@
+"""What a missing effect would do to the outputs, to first order in its strength.
+
+Along the trajectory of a fitted model an effect at strength zero adds e(t) = ∂effect/∂strength to
+its port. The outputs then move by
+
+    dR/dt = (∂f/∂x)·R + (∂f/∂port)·e,   ∂y/∂strength = (∂g/∂x)·R + (∂g/∂port)·e,   R(0) = 0
+
+which is one linear equation for all candidates together and needs nothing compiled for the model.
+At a sensor the effect moves its own output alone.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+import sympy
+from numba import njit
+
+from rigwatch.physics.engine.compile import (
+    BoolArray,
+    CompiledSystem,
+    FloatArray,
+    IntArray,
+    Linearisation,
+    derivative,
+    numpy_function,
+)
+from rigwatch.physics.engine.equations import (
+    LEFT,
+    PROBE,
+    RATE,
+    TIME,
+    UNTIL,
+    Effect,
+    System,
+    parse,
+    symbol,
+)
+from rigwatch.physics.engine.fit import Memory, held_at
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that may be missing at a port, with values for its shape parameters."""
+
+    name: str
+    effect: Effect
+    port: str
+    shape: dict[str, float] = field(default_factory=dict, hash=False)
+
+
+def shaped(name: str, effect: Effect, port: str) -> list[Candidate]:
+    """The candidates of one effect at one port: one a combination of the shapes that are tried."""
+    grids = [
+        [(key, value) for value in (p.tried or (p.value,))]
+        for key, p in effect.parameters.items()
+        if p.role not in ("strength", "switch")
+    ]
+    combinations: list[list[tuple[str, float]]] = [[]]
+    for grid in grids:
+        combinations = [[*c, choice] for c in combinations for choice in grid]
+    return [Candidate(name, effect, port, dict(c)) for c in combinations]
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A linearised run with the signals that effects at its ports see.
+
+    Attributes:
+        compiled: the model.
+        run: its linearisation.
+        inputs: at the nodes, shape (windows, nodes, inputs).
+        time: at the nodes, shape (windows, nodes) [s].
+        parameters: all of them, shape (n_p,).
+    """
+
+    compiled: CompiledSystem
+    run: Linearisation
+    inputs: FloatArray
+    time: FloatArray
+    parameters: FloatArray
+
+
+def trajectory(
+    compiled: CompiledSystem,
+    inputs: FloatArray,
+    dt: float,
+    starts: IntArray,
+    length: int,
+    *,
+    initial: FloatArray,
+    parameters: FloatArray,
+    substeps: int = 4,
+) -> Trajectory:
+    """The run of `CompiledSystem.linearise` with inputs and time at its nodes."""
+    run = compiled.linearise(
+        inputs, dt, starts, length, initial=initial, parameters=parameters, substeps=substeps
+    )
+    nodes = np.arange(run.states.shape[1])
+    row, place = nodes // substeps, (nodes % substeps) / substeps
+    rows = starts[:, None] + row
+    following = np.minimum(rows + 1, len(inputs) - 1)
+    model = compiled.system.model
+    share = np.outer(place, [model.held(name) == "linear" for name in model.inputs])
+    at_nodes = inputs[rows] + share * (inputs[following] - inputs[rows])
+    return Trajectory(compiled, run, at_nodes, (rows + place) * dt, parameters)
+
+
+def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
+    """∂outputs/∂strength of every candidate, shape (windows, samples, outputs, candidates)."""
+    system, run = at.compiled.system, at.run
+    kinds = {name: port.kind for name, port in system.model.ports.items()}
+    inner = [c for c in candidates if kinds[c.port] != "sensor"]
+    seen = {port: _signals(at, port) for port in {c.port for c in candidates}}
+    found = np.zeros((*run.outputs.shape, len(candidates)))
+    if inner:
+        pushes = np.stack([_push(at, c, seen[c.port]) for c in inner], axis=-1)
+        columns = np.array([_probe_column(system, c.port) for c in inner])
+        places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
+        held = np.array([held_at(system.model, c.port) == "zero" for c in inner])
+        found[..., places] = _propagated(run, len(system.free), pushes, columns, held)
+    for index, candidate in enumerate(candidates):
+        if kinds[candidate.port] == "sensor":
+            signal = list(system.outputs).index(system.model.ports[candidate.port].signal)
+            found[..., signal, index] = _push(at, candidate, seen[candidate.port])[
+                :, :: run.substeps
+            ]
+    return found
+
+
+def _probe_column(system: System, port: str) -> int:
+    return len(system.free) + len(system.states) + system.probes.index(PROBE + port)
+
+
+def _push(at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]) -> FloatArray:
+    """e(t) of one candidate at the nodes, shape (windows, nodes)."""
+    names = {name: symbol(name) for name in (*signals, *candidate.effect.states)}
+    names |= {name: symbol(name) for name in candidate.effect.parameters}
+    effect, values = candidate.effect, _neutral_values(candidate)
+    text = (effect.expression, effect.direction, effect.strength)
+    function, used = _push_function(*text, tuple(names))
+    if used & set(effect.states):
+        signals = signals | _memory(at, candidate, signals)
+    known = {**dict.fromkeys(names, 0.0), **signals, **values}
+    pushed = function(*(known[name] for name in names))
+    return np.broadcast_to(np.asarray(pushed, np.float64), at.time.shape)
+
+
+@cache
+def _push_function(
+    expression: str, direction: str, strength: str, names: tuple[str, ...]
+) -> tuple[Callable[..., Any], frozenset[str]]:
+    """∂effect/∂strength as a function of everything it may name, and what it does name."""
+    symbols = {name: symbol(name) for name in names}
+    if direction:
+        found = parse(direction, symbols, "direction")
+    else:
+        found = derivative(parse(expression, symbols, "effect"), symbols[strength])
+    used = frozenset(s.name for s in found.free_symbols)
+    return numpy_function(names, found), used
+
+
+def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
+    """What an effect at a port sees, at the nodes, each of shape (windows, nodes)."""
+    system = at.compiled.system
+    port = system.model.ports[port_name]
+    signals = {TIME: at.time}
+    for name, variable in port.variables.items():
+        expression = parse(variable.expression, _symbols(system), f"port {port_name}")
+        signals[name] = _along(at, expression)
+    if port.kind != "force":
+        signals["u"] = _along(at, system.ports[port_name])
+        signals[RATE] = np.gradient(signals["u"], at.run.spacing, axis=1)
+        signals[LEFT] = _left(at)
+    return signals
+
+
+def _symbols(system: System) -> dict[str, sympy.Expr]:
+    names = (*system.states, *system.parameters, *system.model.inputs, TIME)
+    return {name: symbol(name) for name in names} | dict(system.ports)
+
+
+def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
+    """An expression in all that a system has, along the trajectory."""
+    system = at.compiled.system
+    values: dict[str, Any] = dict(zip(system.parameters, at.parameters.tolist(), strict=True))
+    values |= dict.fromkeys(system.probes, 0.0) | {TIME: at.time, UNTIL: _left(at)}
+    values |= dict(zip(system.states, np.moveaxis(at.run.states, -1, 0), strict=True))
+    values |= dict(zip(system.model.inputs, np.moveaxis(at.inputs, -1, 0), strict=True))
+    found = numpy_function(list(values), expression)(*values.values())
+    return np.broadcast_to(np.asarray(found, np.float64), at.time.shape)
+
+
+def _left(at: Trajectory) -> FloatArray:
+    """Time until inputs that are kept change, at the nodes, shape (windows, nodes) [s]."""
+    model = at.compiled.system.model
+    kept = any(model.held(name) == "zero" for name in model.inputs)
+    substep = np.arange(at.time.shape[1]) % at.run.substeps
+    return np.broadcast_to(kept * at.run.spacing * (at.run.substeps - substep), at.time.shape)
+
+
+def _memory(
+    at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """The effect's own states at strength zero, driven by what it sees.
+
+    It runs through all windows in one go: what one window left is what the next begins with, after
+    the last sample of the first has been kept for as long as the others.
+    """
+    more = ((0, 0), (0, at.run.substeps - 1))
+    along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
+    hold = held_at(at.compiled.system.model, candidate.port)
+    memory = Memory(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
+    found = memory.run(_neutral_values(candidate))
+    windows, nodes = at.time.shape
+    return {name: state.reshape(windows, -1)[:, :nodes] for name, state in found.items()}
+
+
+def _neutral_values(candidate: Candidate) -> dict[str, float]:
+    strength = candidate.effect.strength
+    neutral = candidate.effect.parameters[strength].neutral
+    return {**candidate.shape, strength: neutral}
+
+
+def _propagated(
+    run: Linearisation, free: int, pushes: FloatArray, columns: IntArray, held: BoolArray
+) -> FloatArray:
+    """Outputs moved by pushes at probes, shape (windows, samples, outputs, candidates).
+
+    A push that is `held` jumps at samples alone: up to there it is what it was a step before.
+    """
+    n = run.states.shape[2]
+    if n == 0:
+        direct = run.read_slopes[..., columns]
+        return np.asarray(direct * pushes[:, :: run.substeps, None, :])
+    along = np.ascontiguousarray(run.rate_slopes[..., free : free + n])
+    across = np.ascontiguousarray(run.rate_slopes[..., columns])
+    reads = np.ascontiguousarray(run.read_slopes[..., free : free + n])
+    direct = np.ascontiguousarray(run.read_slopes[..., columns])
+    moved = np.empty((*run.outputs.shape, len(columns)))
+    ending = pushes.copy()
+    at = np.arange(run.substeps, pushes.shape[1], run.substeps)
+    ending[:, at] = np.where(held, pushes[:, at - 1], pushes[:, at])
+    _propagate(along, across, reads, direct, pushes, ending, run.spacing, run.substeps, moved)
+    return moved
+
+
+@njit(cache=True)
+def _propagate(  # noqa: C901, PLR0917 -- a kernel
+    along: FloatArray,
+    across: FloatArray,
+    reads: FloatArray,
+    direct: FloatArray,
+    pushes: FloatArray,
+    ending: FloatArray,
+    h: float,
+    substeps: int,
+    moved: FloatArray,
+) -> None:
+    """Heun's method over the nodes; the outputs are read at the samples."""
+    windows, nodes, n, candidates = across.shape
+    response, ahead = np.empty((n, candidates)), np.empty((n, candidates))
+    slope, next_slope = np.empty((n, candidates)), np.empty((n, candidates))
+    for w in range(windows):
+        response[:] = 0.0
+        for node in range(nodes):
+            if node % substeps == 0:
+                k = node // substeps
+                for o in range(moved.shape[2]):
+                    for c in range(candidates):
+                        value = direct[w, k, o, c] * pushes[w, node, c]
+                        for j in range(n):
+                            value += reads[w, k, o, j] * response[j, c]
+                        moved[w, k, o, c] = value
+            if node + 1 < nodes:
+                _slopes(along[w, node], across[w, node], pushes[w, node], response, slope)
+                for i in range(n):
+                    for c in range(candidates):
+                        ahead[i, c] = response[i, c] + h * slope[i, c]
+                following = node + 1
+                _slopes(
+                    along[w, following], across[w, following], ending[w, following], ahead,
+                    next_slope,
+                )  # fmt: skip
+                for i in range(n):
+                    for c in range(candidates):
+                        response[i, c] += 0.5 * h * (slope[i, c] + next_slope[i, c])
+
+
+@njit(cache=True)
+def _slopes(
+    along: FloatArray, across: FloatArray, push: FloatArray, at: FloatArray, out: FloatArray
+) -> None:
+    n, candidates = at.shape
+    for i in range(n):
+        for c in range(candidates):
+            value = across[i, c] * push[c]
+            for j in range(n):
+                value += along[i, j] * at[j, c]
+            out[i, c] = value

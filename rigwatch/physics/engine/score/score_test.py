@@ -1,0 +1,103 @@
+"""Score test of candidates: which missing effect would explain the residual, and which look alike.
+
+With scaled residuals r, the sensitivities J of all that is already fitted (parameters and initial
+states) and a candidate's direction d, both made free of J (J's column space projected out),
+
+    strength ≈ d·r / d·d,    score = (d·r)² / (d·d · s²)  ~ χ²(1) where the effect is absent
+
+(C. R. Rao, 1948). The best of K candidates is compared with what the best of K would reach by
+chance (Z. Šidák, 1967). Candidates whose projected directions are nearly parallel cannot be told
+apart by this recording and form a class.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from rigwatch.physics.engine.compile import FloatArray
+
+ALIKE = 0.95
+"""Cosine above which two candidates form a class."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """One row a candidate.
+
+    Attributes:
+        score: shape (k,); 0 where the direction vanishes in what is already fitted.
+        p_value: of one candidate alone, shape (k,).
+        corrected: of the best of all of them, shape (k,).
+        strength: first-order estimate, shape (k,).
+        explained: share of the residual's energy, shape (k,).
+        cosines: between projected directions, absolute, shape (k, k).
+        units: the projected directions, of unit length, shape (windows·samples, k).
+    """
+
+    score: FloatArray
+    p_value: FloatArray
+    corrected: FloatArray
+    strength: FloatArray
+    explained: FloatArray
+    cosines: FloatArray
+    units: FloatArray
+
+    def classes(self, alike: float = ALIKE) -> list[list[int]]:
+        """For each candidate the candidates that it cannot be told from, itself first."""
+        return [
+            [i, *(j for j in np.flatnonzero(row > alike).tolist() if j != i)]
+            for i, row in enumerate(self.cosines)
+        ]
+
+
+class Projector:
+    """Takes out of signals what the fitted parameters and initial states could have made.
+
+    Args:
+        by_parameter: scaled sensitivities, shape (windows, k, m).
+        by_start: by each window's own initial states, shape (windows, k, n).
+    """
+
+    def __init__(self, by_parameter: FloatArray, by_start: FloatArray) -> None:
+        self._starts = np.linalg.qr(by_start).Q
+        clean = self._without_starts(by_parameter)
+        self._parameters = np.linalg.qr(np.concatenate(clean)).Q
+
+    def _without_starts(self, signals: FloatArray) -> FloatArray:
+        along = np.einsum("wki,wkc->wic", self._starts, signals)
+        return np.asarray(signals - np.einsum("wki,wic->wkc", self._starts, along))
+
+    def clean(self, signals: FloatArray) -> FloatArray:
+        """What is left of `signals` (windows, k, c), windows below one another: (windows·k, c)."""
+        flat = self._without_starts(signals).reshape(-1, signals.shape[-1])
+        return np.asarray(flat - self._parameters @ (self._parameters.T @ flat))
+
+
+def score(
+    residuals: FloatArray, candidates: FloatArray, fitted: Projector, variance: float
+) -> Scores:
+    """Scores of candidates against the residual of a fit.
+
+    Args:
+        residuals: scaled, shape (windows, k).
+        candidates: scaled directions, shape (windows, k, candidates).
+        fitted: what has been fitted already.
+        variance: of the scaled residuals where nothing is missing (the noise floor's).
+    """
+    left, r = fitted.clean(candidates), fitted.clean(residuals[..., None])[:, 0]
+    energy = np.einsum("kc,kc->c", left, left)
+    seen = energy > 1e-10 * np.einsum("wkc,wkc->c", candidates, candidates)
+    size = np.sqrt(np.where(seen, energy, 1.0))
+    unit = np.where(seen, left / size, 0.0)
+    along = unit.T @ r
+    alone = chi2.sf(along**2 / variance, 1)
+    return Scores(
+        along**2 / variance,
+        alone,
+        -np.expm1(max(int(seen.sum()), 1) * np.log1p(-np.minimum(alone, 1 - 1e-16))),
+        along / size,
+        along**2 / max(float(r @ r), 1e-300),
+        np.abs(unit.T @ unit),
+        unit,
+    )

@@ -1,0 +1,48 @@
+"""How likely chance alone would make a candidate look as good as it does.
+
+Residuals hang together from sample to sample where a model is wrong, and the best of many
+candidates looks good without being so: the p-values of the score test allow for both.
+"""
+
+import numpy as np
+from scipy.stats import chi2
+
+from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.physics.engine.score.score_test import Scores
+
+
+def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> FloatArray:
+    """p-values of the scores where residuals hang together, corrected for all candidates.
+
+    The variance of a sum of products of two series is larger than that of white noise by
+    Σ_k ρr(k)·ρd(k) (M. S. Bartlett, 1946), with the autocorrelations ρ of the direction and of
+    the residual that is left without the candidate.
+
+    Args:
+        scores: of the candidates.
+        residual: scaled, what the scores are of, shape (samples,).
+        windows_: windows that the samples come from.
+    """
+    shape = (windows_, -1, scores.units.shape[1])
+    along = scores.units.T @ residual
+    left = residual[:, None] - scores.units * along
+    own, other = (
+        _autocorrelation(left.reshape(shape)),
+        _autocorrelation(scores.units.reshape(shape)),
+    )
+    swollen = np.maximum(1.0, own[0] * other[0] + 2 * np.sum(own[1:] * other[1:], axis=0))
+    spread = np.maximum(np.sum(left**2, axis=0), 1e-300) / max(len(residual) - 1, 1)
+    alone = chi2.sf(along**2 / (spread * swollen), 1)
+    tests = max(int(np.sum(scores.score > 0)), 1)
+    return np.asarray(-np.expm1(tests * np.log1p(-np.minimum(alone, 1 - 1e-16))))
+
+
+def _autocorrelation(signals: FloatArray) -> FloatArray:
+    """Over the windows of (windows, samples, k), tapered, up to a quarter of a window."""
+    count = signals.shape[1]
+    spectrum = np.fft.rfft(signals, 2 * count, axis=1)
+    power = np.mean(np.abs(spectrum) ** 2, axis=0)
+    together = np.fft.irfft(power, axis=0)[: max(min(count // 4, 200), 1)]
+    taper = 1 - np.arange(len(together)) / len(together)
+    start = np.where(together[0] > 0, together[0], 1.0)
+    return np.asarray(together / start * taper[:, None])

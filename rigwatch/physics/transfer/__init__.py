@@ -1,0 +1,28 @@
+"""Linear models of the rig: transfer functions, their frequency responses and their fits.
+
+The thesis's friction-free model is `fit_transfer_function` over a measured frequency response
+(5.19); its friction filter is the output-error model (5.29).
+"""
+
+from rigwatch.physics.transfer.frequency_fit import fit_transfer_function
+from rigwatch.physics.transfer.frequency_response import FrequencyResponse, frequency_response
+from rigwatch.physics.transfer.output_error import (
+    OutputErrorFit,
+    OutputErrorOrders,
+    fit_output_error,
+)
+from rigwatch.physics.transfer.transfer_function import FloatArray, TransferFunction, filter_sample
+from rigwatch.physics.transfer.velocity import velocity_filter
+
+__all__ = [
+    "FloatArray",
+    "FrequencyResponse",
+    "OutputErrorFit",
+    "OutputErrorOrders",
+    "TransferFunction",
+    "filter_sample",
+    "fit_output_error",
+    "fit_transfer_function",
+    "frequency_response",
+    "velocity_filter",
+]

@@ -1,0 +1,195 @@
+"""The residual on line: model less observed, sample by sample, and when it is no noise any more.
+
+    r_j = x_j(model) − x_j(observed)                                                  (4.34)
+
+Two ways to judge it: a fixed limit as in the thesis (±0.001), or `damage_threshold.CumulativeSum`,
+whose false-alarm rate is calculated.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.structures.damage.spring_model import SpringModel
+from rigwatch.structures.damage.threshold import CumulativeSum, threshold_for
+
+FloatArray = NDArray[np.float64]
+
+FLOOR = 1e-4
+"""Share of a signal's rms below which its residual is taken for an error of the integration."""
+RATE = 0.01
+"""Probability of any false alarm in a whole record."""
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """The moment at which the residual became too large.
+
+    Attributes:
+        sample: at which it was noticed.
+        onset: first sample of the surplus that led to it.
+    """
+
+    sample: int
+    onset: int
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """What watching a record gave.
+
+    Attributes:
+        first: the sample that it began with.
+        residual: model less observed, shape (samples, m).
+        states: of the model, shape (samples, n).
+        statistic: cumulative sum, or the largest residual over the limit, shape (samples,).
+        threshold: that it is compared with.
+        alarm: None where there was none.
+    """
+
+    first: int
+    residual: FloatArray
+    states: FloatArray
+    statistic: FloatArray
+    threshold: float
+    alarm: Alarm | None
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """How residuals are judged.
+
+    Attributes:
+        sigma: standard deviation of each signal's residual, shape (m,).
+        calibration: undamaged samples that it comes from.
+        rate: probability of a false alarm over a whole record.
+        limit: fixed limit instead [the signals' units], None for the cumulative sum.
+    """
+
+    sigma: FloatArray
+    calibration: int
+    rate: float = RATE
+    limit: float | None = None
+
+    def watch(
+        self,
+        model: SpringModel,
+        parameters: FloatArray,
+        state: FloatArray,
+        first: int,
+        last: int,
+        *,
+        spread: FloatArray | None = None,
+    ) -> Watch:
+        """Run the model beside the record.
+
+        Args:
+            model: structure and record.
+            parameters: that it has now, shape (n_p,).
+            state: at sample `first`, shape (n,).
+            first, last: the stretch [samples].
+            spread: covariance of the springs' coefficients and the state, shape (c + n, c + n);
+                None where they are known.
+        """
+        run = model.run(parameters, state, first, last)
+        residual = run.outputs - model.observed[first:last]
+        scaled = residual / self.sigma
+        if spread is not None and np.any(spread) and self.limit is None:
+            scaled = innovations(scaled, run.slopes / self.sigma[:, None], spread)
+        statistic, threshold, alarm = self.judge(residual, scaled, first)
+        return Watch(first, residual, run.states, statistic, threshold, alarm)
+
+    def judge(
+        self, residual: FloatArray, scaled: FloatArray, first: int = 0
+    ) -> tuple[FloatArray, float, Alarm | None]:
+        """Statistic (samples,), threshold and first alarm of residuals (samples, m).
+
+        `scaled` are those of standard deviation 1 where only noise is there, same shape.
+        """
+        if self.limit is not None:
+            return _by_limit(residual, self.limit, first)
+        samples, signals = residual.shape
+        threshold = threshold_for(self.rate, signals, rounded(samples), self.calibration)
+        adding = CumulativeSum(signals, threshold)
+        statistic, alarm = np.zeros(samples), None
+        for k in range(samples):
+            if adding.update(scaled[k]) and alarm is None:
+                alarm = Alarm(first + k, first + k + 1 - adding.zero)
+            statistic[k] = adding.value
+        return statistic, threshold, alarm
+
+
+def innovations(scaled: FloatArray, slopes: FloatArray, spread: FloatArray) -> FloatArray:
+    """What of the residuals the past and the uncertainty of the figures do not explain.
+
+    An error θ of the figures moves all residuals together, slopes·θ, so that they are no
+    independent noise. Updating what is known of θ sample by sample leaves innovations that are
+    (R. E. Kalman, 1960); each is divided by the root of its covariance.
+
+    Args:
+        scaled: residuals over the noise's deviation, NaN where missing, shape (samples, m).
+        slopes: scaled alike, by θ, shape (samples, m, p).
+        spread: covariance of θ, shape (p, p).
+
+    Returns:
+        Shape (samples, m), standard deviation 1 and independent where only noise is there.
+    """
+    filtered, found = Innovations(spread), np.empty(scaled.shape)
+    for k, row in enumerate(scaled):
+        found[k] = filtered.update(row, slopes[k])
+    return found
+
+
+class Innovations:
+    """`innovations` one sample at a time.
+
+    Args:
+        spread: covariance of the figures' errors θ, shape (p, p).
+    """
+
+    def __init__(self, spread: FloatArray) -> None:
+        self._used = np.flatnonzero(np.diag(spread) > 0)
+        # In units of their own deviations: stiffnesses and positions differ by many orders.
+        self._size = np.sqrt(np.diag(spread)[self._used])
+        self._covariance = spread[np.ix_(self._used, self._used)] / np.outer(self._size, self._size)
+        self._theta = np.zeros(len(self._used))
+
+    def update(self, scaled: FloatArray, slopes: FloatArray) -> FloatArray:
+        """One sample's innovations (m,) from scaled residuals (m,) and slopes (m, p)."""
+        found, seen = np.full(scaled.shape, np.nan), np.isfinite(scaled)
+        if not seen.any():
+            return found
+        if not len(self._used):
+            return scaled
+        along = slopes[np.ix_(seen, self._used)] * self._size
+        across = self._covariance @ along.T
+        root = np.linalg.cholesky(along @ across + np.eye(int(seen.sum())))
+        new = np.linalg.solve(root, scaled[seen] - along @ self._theta)
+        gain = np.linalg.solve(root, across.T)
+        self._theta = self._theta + gain.T @ new
+        left = self._covariance - gain.T @ gain
+        self._covariance = 0.5 * (left + left.T)
+        found[seen] = new
+        return found
+
+
+def _by_limit(
+    residual: FloatArray, limit: float, first: int
+) -> tuple[FloatArray, float, Alarm | None]:
+    statistic = np.nanmax(np.abs(np.nan_to_num(residual)), axis=1) / limit
+    over = np.flatnonzero(statistic > 1.0)
+    alarm = Alarm(first + int(over[0]), first + int(over[0])) if len(over) else None
+    return statistic, 1.0, alarm
+
+
+def rounded(samples: int) -> int:
+    """Up to the next of a few lengths, so that few thresholds have to be computed."""
+    return int(100 * np.ceil(samples / 100))
+
+
+def noise(residual: FloatArray, observed: FloatArray) -> FloatArray:
+    """Standard deviation of undamaged residuals, not below the integration's errors, shape (m,)."""
+    size = np.sqrt(np.nanmean(observed**2, axis=0))
+    found = np.sqrt(np.nanmean(residual**2, axis=0))
+    return np.asarray(np.maximum(np.nan_to_num(found), FLOOR * np.nan_to_num(size)) + 1e-300)

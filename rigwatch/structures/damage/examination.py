@@ -1,0 +1,327 @@
+"""Damage of a structure found in a record: when, where, how much, and what comes after it.
+
+The undamaged structure's model runs beside the record. Where the residual is no noise any more,
+only data from there on are used (a fit to the whole record mixes two structures, thesis 4.6.1): the
+springs are ranked, the best is identified with unknown first states, and watching goes on with the
+changed model until the next damage.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.structures.damage.detector import RATE, Alarm, Judge, Watch
+from rigwatch.structures.damage.location import Ranking, locate, unexplained
+from rigwatch.structures.damage.onset import Instant, instant
+from rigwatch.structures.damage.pair_location import locate_pair
+from rigwatch.structures.damage.refit import Refit, Stretch
+from rigwatch.structures.damage.spring_model import SpringModel
+from rigwatch.structures.damage.undamaged_reference import Figure, Reference, reference
+from rigwatch.structures.identification import CONFIDENCE
+from rigwatch.structures.model import Structure
+from rigwatch.structures.records import Record
+from rigwatch.wire.errors import ModelError
+
+FloatArray = NDArray[np.float64]
+
+LATE = 0.1
+"""Share of the data after an alarm that the way from onset to alarm may cost."""
+STARTS = 5
+"""Starts before the onset, and from onset to alarm, that are tried where an alarm came late."""
+CLEAR = 0.01
+"""Probability below which a candidate's score is taken for more than chance."""
+SHORTEST = 50
+"""Samples without which nothing is identified."""
+MOST = 20
+"""Damages after which a record is given up."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a record is examined.
+
+    Attributes:
+        undamaged: length of its start that is taken as undamaged [s], a fifth of it if None.
+        rate: probability of any false alarm over the record.
+        limit: fixed limit of the residual instead, in the signals' units.
+        settle: data from which a damage is identified at first [s]; damages that follow one another
+            faster are taken for one.
+        known: take the file's values as true where it marks them as unknown.
+    """
+
+    undamaged: float | None = None
+    rate: float = RATE
+    limit: float | None = None
+    settle: float = 2.0
+    known: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Damage:
+    """One damage.
+
+    Attributes:
+        alarm: time at which it was noticed [s].
+        instant: when it happened.
+        ranking: of its places, best first.
+        figures: coefficients after it: those that the file marks and the one that changed.
+        before: the same before it.
+        explained: whether the change, or the two at once, explain the data until the next damage.
+        until: end of the data that it was identified from [s].
+    """
+
+    alarm: float
+    instant: Instant
+    ranking: Ranking
+    figures: Mapping[str, Figure]
+    before: Mapping[str, Figure]
+    explained: bool
+    until: float
+
+
+@dataclass(frozen=True, eq=False)
+class Examination:
+    """What a record showed.
+
+    Attributes:
+        reference: the undamaged structure.
+        settings: how it was examined.
+        watches: the first beside the undamaged model, one more after each damage.
+        damages: in the order of time.
+    """
+
+    reference: Reference
+    settings: Settings
+    watches: tuple[Watch, ...]
+    damages: tuple[Damage, ...]
+
+
+def examine(
+    structure: Structure,
+    record: Record,
+    settings: Settings | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+    model: SpringModel | None = None,
+) -> Examination:
+    """Look for damages in a record.
+
+    Args:
+        structure: the undamaged structure.
+        record: what was measured, undamaged at first.
+        settings: how.
+        progress: is told what is being done.
+        model: of an earlier examination of the same structure, whose kernel may serve again.
+
+    Raises:
+        ModelError: structure and record do not fit, its undamaged start does not suffice, or a
+            setting is out of range.
+    """
+    chosen = settings or Settings()
+    _check(chosen)
+    undamaged = chosen.undamaged or 0.2 * len(record) * record.dt
+    progress(f"undamaged structure from the first {undamaged:g} s")
+    base = reference(structure, record, undamaged, known=chosen.known, model=model)
+    judge = Judge(base.sigma, base.samples, chosen.rate, chosen.limit)
+    work = _Work(base, judge, chosen, progress)
+    work.through()
+    return Examination(base, chosen, tuple(work.watches), tuple(work.damages))
+
+
+def _check(settings: Settings) -> None:
+    for name, value, good, expected in (
+        ("false alarms", settings.rate, 0 < settings.rate < 1, "a probability between 0 and 1"),
+        ("limit", settings.limit, settings.limit is None or settings.limit > 0, "one above 0"),
+        ("settle", settings.settle, settings.settle > 0, "seconds above 0"),
+    ):
+        if not good:
+            raise ModelError(f"{name}: found {value:g}, expected {expected}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Now:
+    """The structure as it is believed to be from a sample on."""
+
+    parameters: FloatArray
+    state: FloatArray
+    first: int
+    spread: FloatArray
+    figures: Mapping[str, Figure]
+
+
+@dataclass(eq=False)
+class _Work:
+    base: Reference
+    judge: Judge
+    settings: Settings
+    progress: Callable[[str], None]
+    watches: list[Watch] = field(default_factory=list)
+    damages: list[Damage] = field(default_factory=list)
+
+    def through(self) -> None:
+        """Watch, identify, watch again, to the record's end."""
+        base = self.base
+        now = _Now(base.parameters, base.model.start(), 0, base.spread, base.figures)
+        while len(self.damages) < MOST:
+            watch = self._watched(now)
+            self.watches.append(watch)
+            if watch.alarm is None or len(base.model) - watch.alarm.sample < SHORTEST:
+                return
+            now = self._identified(now, watch, watch.alarm)
+            if not self.damages[-1].explained:
+                # Beside a model that is known to be wrong, every sample would be an alarm.
+                return
+
+    def _watched(self, now: _Now) -> Watch:
+        model = self.base.model
+        return self.judge.watch(
+            model, now.parameters, now.state, now.first, len(model), spread=now.spread
+        )
+
+    def _identified(self, now: _Now, watch: Watch, alarm: Alarm) -> _Now:
+        model, dt = self.base.model, self.base.model.dt
+        self.progress(f"residual beyond its threshold at {alarm.sample * dt:g} s")
+        path = np.concatenate([np.tile(now.state, (now.first, 1)), watch.states])
+        begin = self._begin(now, path, watch, alarm)
+        ranking, explained = self._located(now, path, begin)
+        best = ranking.best
+        places = [f"{c.name}: {c.before:g} -> {c.after:g}" for c in ranking.changed]
+        self.progress(f"most likely {' and '.join(places)}")
+        when = instant(model, self._changed(now, best.refit), watch, alarm, self.base.sigma)
+        refit = self._refitted(now, path, ranking, when.sample)
+        figures = _figures(refit)
+        before = {n: now.figures.get(n, self._taken(now, n)) for n in figures}
+        self.damages.append(
+            Damage(alarm.sample * dt, when, ranking, figures, before, explained, ranking.last * dt)
+        )
+        follow = max(ranking.first, min(when.sample, ranking.last - SHORTEST))
+        return _Now(
+            self._changed(now, refit), refit.state, follow, self._spread(refit),
+            {**now.figures, **figures},
+        )  # fmt: skip
+
+    def _begin(self, now: _Now, path: FloatArray, watch: Watch, alarm: Alarm) -> int:
+        """First sample of the data to identify from.
+
+        Where the alarm came late the change is small, and the onset is only known to lie before.
+        Taken is the start from which a changed spring explains more of the undamaged model's
+        residual than from any other: too early mixes two structures, too late leaves some of it.
+        """
+        end = len(self.base.model)
+        if alarm.sample - alarm.onset <= LATE * (end - alarm.sample):
+            return alarm.sample
+        earliest = min(alarm.onset, max(now.first, self.base.samples))
+        before = np.linspace(earliest, alarm.onset, STARTS)
+        within = np.linspace(alarm.onset, alarm.sample, STARTS)
+        starts = np.unique(np.concatenate([before, within]).astype(int)).tolist()
+        squares = np.nansum((watch.residual / self.base.sigma) ** 2, axis=1)
+        gains = [
+            float(squares[first - watch.first :].sum())
+            - unexplained(self._stretch(now, first, end), path)
+            for first in starts
+        ]
+        return int(starts[int(np.argmax(gains))])
+
+    def _stretch(self, now: _Now, first: int, last: int) -> Stretch:
+        return Stretch(self.base.model, now.parameters, first, last, self.base.sigma)
+
+    def _located(self, now: _Now, path: FloatArray, begin: int) -> tuple[Ranking, bool]:
+        """Rank with ever more data as long as a change explains them, with less where not.
+
+        Two changes at once are only thought of where a single one does not do.
+        """
+        end = len(self.base.model)
+        length = max(SHORTEST, round(self.settings.settle / self.base.model.dt))
+        shortest = min(length, end - begin) // 4
+        kept: Ranking | None = None
+        while True:
+            # A rest too short to stand for itself goes with the data before it.
+            last = end if begin + 1.5 * length > end else begin + length
+            ranking, holds = self._ranked(now, path, begin, last)
+            if not holds:
+                if kept is not None:
+                    return self._extended(now, path, kept), True
+                if length // 2 < max(SHORTEST, shortest):
+                    return ranking, False
+                length //= 2
+                continue
+            kept = ranking
+            if last == end:
+                return ranking, True
+            length *= 2
+
+    def _ranked(self, now: _Now, path: FloatArray, begin: int, last: int) -> tuple[Ranking, bool]:
+        """One change, or else two at once; and whether they explain the data."""
+        stretch = self._stretch(now, begin, last)
+        single = locate(stretch, path)
+        if self._holds(now, single):
+            return single, True
+        pair = locate_pair(stretch, path, single)
+        return (pair, True) if pair.second and self._holds(now, pair) else (single, False)
+
+    def _extended(self, now: _Now, path: FloatArray, kept: Ranking) -> Ranking:
+        """The ranking from all data until the next damage, where it holds there."""
+        refit, end = kept.best.refit, len(self.base.model)
+        if refit is None:
+            return kept
+        parameters, spread = self._changed(now, refit), self._spread(refit)
+        watch = self.judge.watch(
+            self.base.model, parameters, refit.state, kept.first, end, spread=spread
+        )
+        if watch.alarm is None or watch.alarm.onset <= kept.last:
+            return kept
+        ranking, holds = self._ranked(now, path, kept.first, watch.alarm.onset)
+        return ranking if holds else kept
+
+    def _holds(self, now: _Now, ranking: Ranking) -> bool:
+        """Whether what changed says something, and leaves nothing but noise."""
+        refit = ranking.best.refit
+        chance = max(candidate.p_value for candidate in ranking.changed)
+        if refit is None or not np.isfinite(refit.chi2) or chance > CLEAR:
+            return False
+        parameters = self._changed(now, refit)
+        watch = self.judge.watch(
+            self.base.model, parameters, refit.state, ranking.first, ranking.last
+        )
+        return watch.alarm is None
+
+    def _refitted(self, now: _Now, path: FloatArray, ranking: Ranking, onset: int) -> Refit:
+        """The changed coefficient with those that the file marks, from the instant on."""
+        best, known = ranking.best, self.base.model.candidates
+        first = max(ranking.first, min(onset, ranking.last - SHORTEST))
+        marked = {n: f.value for n, f in now.figures.items() if n in known}
+        state = path[first] if best.refit is None or first != ranking.first else best.refit.state
+        stretch = self._stretch(now, first, ranking.last)
+        return stretch.refit({**marked, **{c.name: c.after for c in ranking.changed}}, state)
+
+    def _changed(self, now: _Now, refit: Refit | None) -> FloatArray:
+        parameters = now.parameters.copy()
+        names = list(self.base.model.problem.sweeper.compiled.system.parameters)
+        for name, value in (refit.values if refit else {}).items():
+            parameters[names.index(name)] = value
+        return parameters
+
+    def _taken(self, now: _Now, name: str) -> Figure:
+        names = list(self.base.model.problem.sweeper.compiled.system.parameters)
+        return Figure(float(now.parameters[names.index(name)]), float("nan"), float("nan"))
+
+    def _spread(self, refit: Refit) -> FloatArray:
+        """The refit's covariance in the places of all coefficients and states."""
+        known = self.base.model.candidates
+        n = len(refit.state)
+        spread = np.zeros((len(known) + n, len(known) + n))
+        at = [*(known.index(name) for name in refit.names), *range(len(known), len(known) + n)]
+        spread[np.ix_(at, at)] = refit.covariance
+        return spread
+
+
+def _figures(refit: Refit) -> dict[str, Figure]:
+    return {
+        name: Figure(
+            value,
+            value - CONFIDENCE * refit.deviations[name],
+            value + CONFIDENCE * refit.deviations[name],
+        )
+        for name, value in refit.values.items()
+    }

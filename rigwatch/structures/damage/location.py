@@ -1,0 +1,232 @@
+"""Which spring changed: every coefficient of every spring tried against what was observed.
+
+First pass: one linear sweep along the observed trajectory gives the residual and its derivative by
+every candidate and every unknown first state at once (thesis 4.13, 4.14); the engine's score test
+ranks the candidates. Second pass: the best few are refitted with unknown first states and ranked by
+what they leave unexplained. Candidates form a class that the record cannot tell apart where their
+directions, freed of the first states, have a cosine above 0.95 and the data do not prefer the best
+of them: what it explains beyond another is no more than chance would give.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
+from rigwatch.structures.damage.refit import STEPS, Refit, Stretch
+from rigwatch.structures.damage.spring_model import SpringModel, split
+
+FloatArray = NDArray[np.float64]
+
+REFITTED = 4
+"""Candidates of the first pass that are refitted."""
+WORTH = 0.4
+"""Share of the best candidate's score that one must reach to be refitted."""
+CHANCE = float(chi2.isf(0.01, 1))
+"""χ² by which the best may be better than another of its class."""
+SCREENING = 6
+"""Gauss-Newton steps that candidates get; the best goes on from there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One coefficient as the place of the damage.
+
+    Attributes:
+        name: of the coefficient.
+        spring: where it is.
+        kind: stiffness, quadratic or cubic.
+        score: χ²(1) of the first pass.
+        p_value: of this score as the best of all candidates by chance.
+        before: its value in the undamaged structure.
+        after: its value now, refitted where it was, else to first order.
+        deviation: standard deviation of `after`, NaN where it was not refitted.
+        chi2: what the refit leaves per degree of freedom, NaN where there was none.
+        alike: other candidates that the record cannot tell from it.
+        refit: the whole refit.
+    """
+
+    name: str
+    spring: str
+    kind: str
+    score: float
+    p_value: float
+    before: float
+    after: float
+    deviation: float
+    chi2: float
+    alike: tuple[str, ...]
+    refit: Refit | None
+
+    @property
+    def words(self) -> str:
+        """What happened to the spring."""
+        up = self.after > self.before
+        return {
+            "stiffness": "stiffer" if up else "softer",
+            "quadratic": "one-sided",
+            "cubic": "hardening" if up else "softening",
+        }[self.kind]
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """Candidates, the most likely first.
+
+    Attributes:
+        candidates: all of them.
+        first, last: samples that were used, the last excluded.
+        unseen: coefficients that hardly move the record, whatever becomes of them.
+        second: what changed together with the best, None where one change is enough.
+    """
+
+    candidates: tuple[Candidate, ...]
+    first: int
+    last: int
+    unseen: tuple[str, ...]
+    second: Candidate | None = None
+
+    @property
+    def best(self) -> Candidate:
+        """The most likely one."""
+        return self.candidates[0]
+
+    @property
+    def changed(self) -> tuple[Candidate, ...]:
+        """The best, and what changed together with it."""
+        return (self.best,) if self.second is None else (self.best, self.second)
+
+
+def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Ranking:
+    """Rank every coefficient of every spring as the place of the damage.
+
+    Args:
+        stretch: data after the damage, with the undamaged parameters.
+        path: the undamaged model's states over the whole record, shape (samples, n).
+        refitted: how many candidates the second pass takes.
+    """
+    model, count = stretch.model, len(stretch.model.candidates)
+    residual, rows, fitted, scores = scored(stretch, path)
+    shifts = first_states(residual, rows, np.diag(scores.strength))
+    state = model.shown_state(path, stretch.first)
+    listed = [_first_pass(stretch, scores, i) for i in np.argsort(-scores.score).tolist()]
+    chosen = [c for c in listed[:refitted] if c.score >= WORTH * listed[0].score]
+    places = {name: i for i, name in enumerate(model.candidates)}
+    done = [_refitted(stretch, c, state + shifts[places[c.name]], SCREENING) for c in chosen]
+    done.sort(key=lambda c: c.chi2)
+    if done[0].refit is not None:
+        done[0] = _refitted(stretch, done[0], done[0].refit.state)
+    left = {c.name: c.refit.chi2 for c in done if c.refit is not None}
+    best = _with_class(done[0], model, left)
+    weak = _unseen(model, stretch, rows, fitted, count)
+    return Ranking((best, *done[1:], *listed[len(chosen) :]), stretch.first, stretch.last, weak)
+
+
+def unexplained(stretch: Stretch, path: FloatArray) -> float:
+    """χ² that the best candidate leaves to first order; arguments as of `locate`."""
+    scores = scored(stretch, path)[3]
+    best = int(np.argmax(scores.score))
+    return float(scores.score[best] * (1.0 / max(scores.explained[best], 1e-12) - 1.0))
+
+
+def scored(stretch: Stretch, path: FloatArray) -> tuple[FloatArray, FloatArray, Projector, Scores]:
+    """Scaled residual (k,), slopes (k, c + n), what the first states explain, and the scores."""
+    model = stretch.model
+    errors, slopes = model.along_record(stretch.parameters, path, stretch.first, stretch.last)
+    use, count = np.isfinite(errors), len(model.candidates)
+    residual = (errors / stretch.sigma)[use]
+    rows = (slopes / stretch.sigma[:, None])[use]
+    fitted = Projector(np.zeros((1, len(rows), 0)), rows[None, :, count:])
+    scores = score(residual[None], rows[None, :, :count], fitted, 1.0)
+    return residual, rows, fitted, scores
+
+
+def first_states(residual: FloatArray, rows: FloatArray, changes: FloatArray) -> FloatArray:
+    """First-order change of the first states that goes with each column of changes, shape (k, n).
+
+    Args:
+        residual: scaled, shape (samples,).
+        rows: scaled slopes by candidates and states, shape (samples, c + n).
+        changes: of the candidates, shape (c, k).
+    """
+    count = len(changes)
+    left = residual[:, None] - rows[:, :count] @ changes
+    return np.asarray(np.linalg.lstsq(rows[:, count:], left, rcond=1e-10)[0].T)
+
+
+def _first_pass(stretch: Stretch, scores: Scores, index: int) -> Candidate:
+    model = stretch.model
+    name = model.candidates[index]
+    names = list(model.problem.sweeper.compiled.system.parameters)
+    before = float(stretch.parameters[names.index(name)])
+    after = before + float(scores.strength[index])
+    spring, kind = split(name, model.structure)
+    numbers = float(scores.score[index]), float(scores.corrected[index])
+    nan = float("nan")
+    return Candidate(name, spring, kind, *numbers, before, after, nan, nan, (), None)
+
+
+def _refitted(
+    stretch: Stretch, candidate: Candidate, state: FloatArray, steps: int = STEPS
+) -> Candidate:
+    begin = max(candidate.after, 0.0) if candidate.kind == "stiffness" else candidate.after
+    found = stretch.refit({candidate.name: begin}, state, steps)
+    return replace(
+        candidate,
+        after=found.values[candidate.name],
+        deviation=found.deviations[candidate.name],
+        chi2=found.chi2 / max(found.freedom, 1),
+        refit=found,
+    )
+
+
+def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) -> Candidate:
+    """The best with what looks like it along its own refitted trajectory.
+
+    Args:
+        best: refitted.
+        model: structure and record.
+        left: χ² after their refits, by name.
+    """
+    if best.refit is None or not len(best.refit.slopes):
+        return best
+    count, place = len(model.candidates), model.candidates.index(best.name)
+    slopes = best.refit.slopes
+    unit = freed(slopes[:, :count], slopes[:, count:])
+    cosines = np.minimum(np.abs(unit.T @ unit[:, place]), 1.0)
+    # What is lost, to first order, where the best's direction is replaced by another.
+    shares = (1.0 - cosines**2) * ((best.after - best.before) / max(best.deviation, 1e-300)) ** 2
+    alike = []
+    for i in np.argsort(-cosines).tolist():
+        name = model.candidates[i]
+        worse = left[name] - best.refit.chi2 if name in left else shares[i]
+        if i != place and cosines[i] > ALIKE and worse < CHANCE:
+            alike.append(name)
+    return replace(best, alike=tuple(alike))
+
+
+def freed(candidates: FloatArray, states: FloatArray) -> FloatArray:
+    """Unit directions without what the first states could have made."""
+    basis = np.linalg.qr(states).Q
+    rest = candidates - basis @ (basis.T @ candidates)
+    length = np.linalg.norm(rest, axis=0)
+    return np.asarray(rest / np.where(length > 0, length, 1.0))
+
+
+def _unseen(
+    model: SpringModel, stretch: Stretch, rows: FloatArray, fitted: Projector, count: int
+) -> tuple[str, ...]:
+    """Springs of which the record would not show that they lost a tenth of their stiffness."""
+    names = list(model.problem.sweeper.compiled.system.parameters)
+    left = fitted.clean(rows[None, :, :count])
+    size = np.linalg.norm(left, axis=0)
+    limit = np.sqrt(chi2.isf(0.01 / count, 1))
+    weak = []
+    for index, name in enumerate(model.candidates):
+        value = stretch.parameters[names.index(name)]
+        if name in model.structure.springs and 0.1 * abs(value) * size[index] < limit:
+            weak.append(name)
+    return tuple(weak)

@@ -1,0 +1,136 @@
+"""The undamaged structure: what is unknown of it identified from the record's undamaged start.
+
+Also how large its residual is there (noise), and how well the identified figures are known: both
+say which residual is to be expected later.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.structures.damage.detector import noise
+from rigwatch.structures.damage.spring_model import SpringModel, beside, spring_model
+from rigwatch.structures.identification import CONFIDENCE, problem_of, solver
+from rigwatch.structures.model import Structure, coefficients
+from rigwatch.structures.records import Record
+from rigwatch.wire.errors import ModelError
+
+FloatArray = NDArray[np.float64]
+
+NEAR = 0.1
+"""Change of an iteration, in standard deviations, that will do."""
+LEAST = 20
+"""Undamaged samples without which nothing is said about noise."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A coefficient with its 95 % interval; both ends NaN where it was taken as known."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The undamaged structure.
+
+    Attributes:
+        model: structure and record.
+        parameters: all of them, shape (n_p,).
+        figures: the coefficients that the file marks as unknown, as identified.
+        spread: covariance of the springs' coefficients and the first state, shape (c + n, c + n).
+        sigma: standard deviation of each signal's residual, shape (m,).
+        samples: undamaged samples that all of this comes from.
+    """
+
+    model: SpringModel
+    parameters: FloatArray
+    figures: Mapping[str, Figure]
+    spread: FloatArray
+    sigma: FloatArray
+    samples: int
+
+
+def reference(
+    structure: Structure,
+    record: Record,
+    undamaged: float,
+    *,
+    known: bool = False,
+    model: SpringModel | None = None,
+) -> Reference:
+    """The structure as the first `undamaged` seconds of the record show it.
+
+    Args:
+        structure: as described; what it marks as unknown is identified.
+        record: the whole record.
+        undamaged: length of its start that is taken as undamaged [s].
+        known: take the file's values as true instead of identifying.
+        model: the structure with another record, whose kernel may serve where `known` is set.
+
+    Raises:
+        ModelError: the undamaged start is too short, or does not determine what is unknown.
+    """
+    samples = round(undamaged / record.dt)
+    if not LEAST <= samples <= len(record):
+        raise ModelError(
+            f"{structure.name}: found {undamaged:g} s of undamaged record, expected between"
+            f" {LEAST * record.dt:g} and {len(record) * record.dt:g} s"
+        )
+    names, values, covariance = _identified(structure, record, samples, known=known)
+    if known and model is not None:
+        model = beside(model, record)
+    else:
+        model = spring_model(structure, record, dict(zip(names, values.tolist(), strict=True)))
+    parameters = model.problem.start
+    run = model.run(parameters, model.start(), 0, samples)
+    observed = model.observed[:samples]
+    sigma = noise(run.outputs - observed, observed)
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    half = (CONFIDENCE * deviations).tolist()
+    figures = {
+        name: Figure(value, value - width, value + width)
+        for name, value, width in zip(names, values.tolist(), half, strict=True)
+    }
+    return Reference(model, parameters, figures, _spread(model, names, covariance), sigma, samples)
+
+
+def _identified(
+    structure: Structure, record: Record, samples: int, *, known: bool
+) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
+    """Names, values and covariance of what is unknown."""
+    if known or not any(number.unknown for number in coefficients(structure).values()):
+        return (), np.zeros(0), np.zeros((0, 0))
+    start = Record(record.dt, {name: column[:samples] for name, column in record.columns.items()})
+    problem = problem_of(structure, start)
+    outcome = solver("shooting")(problem)
+    covariance, turns = outcome.covariance, outcome.iterations
+    if covariance is None or not (outcome.converged or _settled(turns, covariance)):
+        raise ModelError(
+            f"{structure.name}: found no figures that explain the undamaged"
+            f" {samples * record.dt:g} s, expected other guesses or a longer undamaged start"
+        )
+    return problem.names, turns[-1], covariance
+
+
+def _settled(turns: Sequence[FloatArray], covariance: FloatArray) -> bool:
+    """Whether the last iteration changed less than the figures are known to."""
+    if len(turns) < 2:
+        return False
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return bool(np.all(np.abs(turns[-1] - turns[-2]) <= NEAR * deviations))
+
+
+def _spread(model: SpringModel, names: tuple[str, ...], covariance: FloatArray) -> FloatArray:
+    """The covariance in the places of the springs' coefficients and the states."""
+    states = [f"{state}(0)" for state in model.problem.sweeper.compiled.system.states]
+    places = {name: index for index, name in enumerate((*model.candidates, *states))}
+    spread = np.zeros((len(places), len(places)))
+    kept = [index for index, name in enumerate(names) if name in places]
+    at = [places[names[index]] for index in kept]
+    spread[np.ix_(at, at)] = covariance[np.ix_(kept, kept)]
+    return spread

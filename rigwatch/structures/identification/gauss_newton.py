@@ -1,0 +1,100 @@
+"""Gauss-Newton with sensitivity equations over the whole record (Distefano and Rath; thesis 2.1).
+
+The augmented state u = {x, ẋ, a} starts at c, of which some is known. About an estimate of c
+
+    du_c/dt = g_u·u_c,   A·Δc = b,   A = ∫ u_cᵀ·Γᵀ·Γ·u_c dt + Λ                     (2.21)-(2.24)
+
+with the model's own trajectory as the nominal one. It takes full steps, as published: from a guess
+too far off the trajectories part from the record and it fails.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.structures.identification.identify import Outcome, settled
+from rigwatch.structures.identification.least_squares import require_determined
+from rigwatch.structures.identification.least_squares import solve as least_squares
+from rigwatch.structures.identification.problem import Problem
+
+FloatArray = NDArray[np.float64]
+
+
+SMALL = 0.02
+"""Share of the signals up to which errors may be the model's own faults."""
+LASTING = 0.4
+"""Correlation of consecutive errors from which they are no noise."""
+
+
+def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outcome:
+    """Iterate until four digits stay the same.
+
+    Args:
+        problem: what is unknown.
+        iterations: most of them.
+        trust: Λ of the guess, as samples' worth of one standard deviation of every signal for a
+            guess that is off by its own size; 0 for none.
+
+    Raises:
+        ModelError: the record does not determine the unknowns.
+    """
+    found, covariance = [problem.guess], None
+    scale = np.nanstd(problem.observed, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    for turn in range(iterations):
+        outputs, slopes = problem.simulate(found[-1], problem.substeps)
+        if not np.isfinite(slopes).all():
+            break
+        errors, slopes, weight = _with_prior(
+            problem, problem.observed - outputs, slopes, found[-1], trust, scale
+        )
+        step = least_squares(errors, slopes, weight, scale)
+        if not turn:
+            name = problem.sweeper.compiled.system.model.name
+            require_determined(problem.names, step.blind, name)
+        found.append(found[-1] + step.change)
+        covariance = step.covariance
+        if turn and settled(found[-2], found[-1]):
+            remarks = _doubts(problem.observed - outputs, scale)
+            return Outcome(found[1:], covariance, not remarks, remarks)
+    remark = "the model's trajectory parted from the record"
+    return Outcome(found[1:] or found, covariance, False, (remark,))
+
+
+def _doubts(errors: FloatArray, scale: FloatArray) -> tuple[str, ...]:
+    """Why it settled at a wrong minimum, empty where it did not: what it leaves is no noise.
+
+    Errors of consecutive samples are independent where only noise is left. Where the model's
+    trajectory is another than the record's they go on from sample to sample, however large.
+    """
+    share = float(np.sqrt(np.nanmean((errors / scale) ** 2)))
+    along = np.nan_to_num(errors / scale)
+    lasting = float((along[1:] * along[:-1]).sum() / max(float((along**2).sum()), 1e-300))
+    if share < SMALL or lasting < LASTING:
+        return ()
+    return (
+        f"a wrong minimum: it settled where errors are {100 * share:.2g} % of the signals, and go"
+        " on from sample to sample as noise does not",
+    )
+
+
+def _with_prior(  # noqa: PLR0917 -- a step's rows with what belongs to them
+    problem: Problem,
+    errors: FloatArray,
+    slopes: FloatArray,
+    now: FloatArray,
+    trust: float,
+    scale: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The rows with those of (u(0) − u0, Λ·(u(0) − u0)) below them."""
+    if trust <= 0:
+        return errors, slopes, problem.weight
+    count, width = len(now), errors.shape[1]
+    size = np.where(problem.guess == 0, 1.0, np.abs(problem.guess))
+    more, steep = np.full((count, width), np.nan), np.zeros((count, width, count))
+    more[:, 0] = (problem.guess - now) / size * np.sqrt(trust) * scale[0]
+    steep[:, 0] = np.diag(np.sqrt(trust) * scale[0] / size)
+    return (
+        np.concatenate([errors, more]),
+        np.concatenate([slopes, steep]),
+        np.concatenate([problem.weight, np.ones(count)]),
+    )

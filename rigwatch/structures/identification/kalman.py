@@ -1,0 +1,133 @@
+"""Extended Kalman filter with weighted global iteration (Hoshiya and Saito 1984; Imai; thesis 2.1).
+
+The augmented state X = {x, a} is predicted and corrected sample by sample,
+
+    X(k+1/k) by integration,   P(k+1/k) = Φ·P·Φᵀ + W                                 (2.37), (2.38)
+    K = P·Hᵀ·(H·P·Hᵀ + V)⁻¹,   P ← (I − K·H)·P·(I − K·H)ᵀ + K·V·Kᵀ                   (2.40)-(2.42)
+
+and the record is gone through again and again: the parameters start from what the last pass found,
+with their covariance enlarged by a weight. Φ is exact here, not I + Δt·∂g/∂X. The filter has to be
+told the noise, as published; nothing else gives it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.structures.identification.identify import Outcome, settled
+from rigwatch.structures.identification.problem import Problem
+
+FloatArray = NDArray[np.float64]
+
+REMARK = "the filter was told the noise; its intervals are no wider than that makes them"
+
+
+def solve(
+    problem: Problem,
+    *,
+    iterations: int = 25,
+    noise: FloatArray | float = 0.01,
+    spread: float = 0.5,
+    weight: float = 100.0,
+    drift: float = 1e-6,
+) -> Outcome:
+    """Pass over the record until four digits stay the same.
+
+    Args:
+        problem: what is unknown.
+        iterations: most passes.
+        noise: standard deviation of each output's noise, shape (outputs,); or one number, as a
+            share of each output's rms.
+        spread: standard deviation of the guess, as a share of it.
+        weight: what the parameters' covariance is multiplied by from one pass to the next.
+        drift: standard deviation of the system noise a sample, as a share of each state's rms.
+    """
+    run = _Filter(problem, noise, drift)
+    found, covariance = [problem.guess], run.prior(problem.guess, spread)
+    for turn in range(iterations):
+        unknowns, after = run.through(found[-1], covariance)
+        if unknowns is None:
+            return Outcome(found[1:] or found, None, False, ("the filter diverged", REMARK))
+        found.append(unknowns)
+        if turn and settled(found[-2], found[-1]):
+            return Outcome(found[1:], after, True, (REMARK,))
+        covariance = after * weight
+    return Outcome(found[1:], covariance / weight, False, (REMARK,))
+
+
+@dataclass
+class _Filter:
+    """One pass over the record."""
+
+    problem: Problem
+    noise: FloatArray | float
+    drift: float
+
+    def __post_init__(self) -> None:
+        problem = self.problem
+        size = np.sqrt(np.nanmean(problem.observed**2, axis=0))
+        self.variance = (
+            self.noise * np.ones_like(size) * (size if np.isscalar(self.noise) else 1)
+        ) ** 2
+        self.size = np.sqrt(np.mean(problem.shown[problem.first :] ** 2, axis=0))
+
+    def prior(self, guess: FloatArray, spread: float) -> FloatArray:
+        """Covariance of the unknowns before the first pass."""
+        count = len(self.problem.free)
+        deviation = spread * np.where(guess == 0, 1.0, np.abs(guess))
+        deviation[count:] = self.size[self.problem.loose]
+        return np.diag(deviation**2)
+
+    def through(
+        self, unknowns: FloatArray, covariance: FloatArray
+    ) -> tuple[FloatArray | None, FloatArray]:
+        """Unknowns and their covariance after the pass; None where it diverged.
+
+        Initial states are smoothed only through the parameters; they keep what they started from.
+        """
+        problem, kernel = self.problem, self.problem.sweeper.kernel
+        parameters, x = problem.split(unknowns)
+        m, n = len(problem.free), len(x)
+        whole = self._joined(covariance, m, n)
+        slopes, steps = np.empty((n, m + n)), np.eye(m + n)
+        width = problem.observed.shape[1]
+        y, read = np.empty(width), np.empty((width, m + n))
+        system_noise = np.concatenate([np.zeros(m), (self.drift * self.size) ** 2])
+        for k in range(len(problem.observed)):
+            row = problem.first + k
+            kernel.observe(
+                problem.recording.inputs, problem.recording.dt, row, x, parameters, y, read
+            )
+            change, whole = self._corrected(whole, problem.observed[k] - y, read)
+            parameters[problem.free] += change[:m]
+            x += change[m:]
+            if not np.isfinite(change).all() or not np.isfinite(whole).all():
+                return None, covariance
+            if k + 1 < len(problem.observed):
+                kernel.forward(
+                    problem.recording.inputs, problem.recording.dt, row, problem.substeps,
+                    problem.sweeper.hold, x, parameters, slopes,
+                )  # fmt: skip
+                steps[m:] = slopes
+                whole = steps @ whole @ steps.T
+                whole[np.diag_indices(m + n)] += system_noise
+        after = covariance.copy()
+        after[:m, :m] = whole[:m, :m]
+        return np.concatenate([parameters[problem.free], unknowns[m:]]), after
+
+    def _joined(self, covariance: FloatArray, m: int, n: int) -> FloatArray:
+        """Covariance of {a, x} at the first sample; known initial states have none."""
+        whole = np.zeros((m + n, m + n))
+        places = np.concatenate([np.arange(m), m + self.problem.loose])
+        whole[np.ix_(places, places)] = covariance
+        return whole
+
+    def _corrected(
+        self, whole: FloatArray, innovation: FloatArray, read: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        use = np.isfinite(innovation)
+        h, v = read[use], np.diag(self.variance[use])
+        gain = np.linalg.solve(h @ whole @ h.T + v, h @ whole).T
+        left = np.eye(len(whole)) - gain @ h
+        return gain @ innovation[use], left @ whole @ left.T + gain @ v @ gain.T

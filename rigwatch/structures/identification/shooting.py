@@ -1,0 +1,207 @@
+"""Multiple shooting with exact sensitivities: short windows first, the whole record last.
+
+Over a short window a trajectory cannot part from the record, whatever the guess: there the fit is
+almost linear in the unknowns. Each window's initial states are free and projected out. What is
+found serves as the guess for windows four times as long, and so on. Last comes one window over the
+whole record (`whole_record.py`).
+
+A longer window is believed as long as its errors stay what they were over shorter ones. Where they
+do not, disturbances grow along the way (a plant that runs away, a strongly nonlinear structure that
+is chaotic), and the longest windows that could be followed have the last word.
+
+Where nodes have no signal, `prolonged.py` follows one trajectory from the record's start instead.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.structures.identification.direct import solve as regression
+from rigwatch.structures.identification.identify import Outcome, settled
+from rigwatch.structures.identification.least_squares import FOUR_DIGITS, Step, require_determined
+from rigwatch.structures.identification.problem import Problem
+from rigwatch.structures.identification.progressive_fit import followed
+from rigwatch.structures.identification.whole_record import WholeRecord
+from rigwatch.structures.identification.windows import Windows
+from rigwatch.wire.errors import ModelError
+
+FloatArray = NDArray[np.float64]
+
+SHORTEST = 4
+"""Samples of the shortest windows; a period of the guess's fastest motion if longer."""
+GROWTH = 4
+STEPS = 12
+"""Most Gauss-Newton steps at each horizon but the last."""
+WORSE = 1.25
+"""How much larger errors may be over longer windows: noise alone leaves them as they are."""
+SMALL = 2.0 * FOUR_DIGITS
+"""Share of the signals up to which errors are always small enough."""
+MOST_GROWTH = 4.0
+"""Natural logarithm of what a disturbance may grow by within a window."""
+UNCERTAIN = 0.5
+"""Share of an unknown's size that its standard deviation may reach before it is named."""
+FINEST = 1e-6
+"""Relative change of the parameters at which windows that have the last word are done."""
+FOLLOWED = "longer trajectories part from the record: fitted over windows of {samples} samples"
+
+
+def solve(
+    problem: Problem,
+    *,
+    iterations: int = 30,
+    partial: bool = False,
+    scale: FloatArray | None = None,
+) -> Outcome:
+    """Grow the horizon to the whole record.
+
+    Args:
+        problem: what is unknown.
+        iterations: most over the whole record.
+        partial: name unknowns that the record does not determine instead of refusing.
+        scale: standard deviation of each output's noise; from the residuals if None.
+
+    Raises:
+        ModelError: the record does not determine the unknowns, and `partial` is not set.
+    """
+    with np.errstate(all="ignore"):
+        outcome, step = _solved(problem, iterations, scale)
+    if not partial:
+        name = problem.sweeper.compiled.system.model.name
+        require_determined(problem.names, step.blind, name)
+    return replace(outcome, undetermined=_uncertain(problem, outcome.iterations[-1], step))
+
+
+def _solved(problem: Problem, iterations: int, scale: FloatArray | None) -> tuple[Outcome, Step]:
+    """Over the whole record where that can be followed, else over windows."""
+    tame = not _runs_away(problem)
+    if tame and problem.hidden.any() and (found := _followed(problem, iterations, scale)):
+        return found
+    grown = _grown(problem)
+    ended = None
+    if tame and (grown.accepted or grown.windows is None):
+        ended = _over_the_whole(problem, grown, iterations, scale)
+    if ended is None and tame and not problem.hidden.any():
+        # Heavy noise can look like a trajectory that parts from the record.
+        ended = _followed(problem, iterations, scale)
+    return ended or _over_windows(problem, grown, iterations)
+
+
+def _followed(
+    problem: Problem, iterations: int, scale: FloatArray | None
+) -> tuple[Outcome, Step] | None:
+    """The end along one trajectory from the record's start; None where none settled."""
+    found = followed(problem, iterations, scale)
+    return (Outcome(found.turns, found.step.covariance, True), found.step) if found else None
+
+
+@dataclass(eq=False)
+class _Grown:
+    """How far the windows have grown.
+
+    Attributes:
+        found: unknowns after each horizon.
+        windows: the longest that could be followed, with all parameters that it found.
+        accepted: whether every horizon could be followed.
+    """
+
+    found: list[FloatArray]
+    windows: Windows | None
+    parameters: FloatArray
+    accepted: bool = True
+
+
+def _grown(problem: Problem) -> _Grown:
+    """Windows grown as far as they can be followed."""
+    grown, count = _Grown([problem.guess], None, problem.start), len(problem.free)
+    if not count:
+        return grown
+    starts = [problem.start, *_regressed(problem)]
+    for horizon in _horizons(problem):
+        tried = [Windows(problem, horizon) for _ in starts]
+        ends = [one.refined(start, STEPS) for one, start in zip(tried, starts, strict=True)]
+        best = int(np.argmin([one.cost for one in tried]))
+        if grown.windows and tried[best].rms > max(WORSE * grown.windows.rms, SMALL):
+            grown.accepted = False
+            return grown
+        grown.windows, grown.parameters, starts = tried[best], ends[best], [ends[best]]
+        unknowns = grown.found[-1].copy()
+        unknowns[:count] = ends[best][problem.free]
+        grown.found.append(unknowns)
+    return grown
+
+
+def _over_the_whole(
+    problem: Problem, grown: _Grown, iterations: int, scale: FloatArray | None
+) -> tuple[Outcome, Step] | None:
+    """The end over the whole record; None where windows can do better."""
+    expected = np.inf
+    if grown.windows and not len(problem.loose):
+        expected = max(WORSE * grown.windows.rms, SMALL)
+    whole = WholeRecord(problem, scale, expected)
+    try:
+        turns, step, good = whole.refined(grown.found[-1], iterations)
+    except ModelError:
+        if grown.windows is None:
+            raise
+        return None
+    if not good and grown.windows and not len(problem.loose):
+        return None
+    return Outcome([*grown.found, *turns], step.covariance, good), step
+
+
+def _over_windows(problem: Problem, grown: _Grown, iterations: int) -> tuple[Outcome, Step]:
+    """The end over the longest windows that could be followed."""
+    if len(problem.loose) or grown.windows is None:
+        raise ModelError(
+            f"{problem.sweeper.compiled.system.model.name}: found trajectories that part from the"
+            " record, which do not determine initial states; expected known ones"
+        )
+    near = grown.windows.refined(grown.parameters, iterations, FINEST)
+    grown.windows.weigh(near)
+    last = grown.windows.refined(near, iterations, FINEST)
+    step = grown.windows.judged(last)
+    found = last[problem.free]
+    good = settled(found, found + step.change)
+    remark = FOLLOWED.format(samples=grown.windows.length)
+    return Outcome([*grown.found, found], step.covariance, good, (remark,)), step
+
+
+def _runs_away(problem: Problem) -> bool:
+    """Whether a disturbance would grow beyond use over the whole record."""
+    duration = (len(problem.recording) - problem.first) * problem.recording.dt
+    return problem.speed.growing * duration > MOST_GROWTH
+
+
+def _uncertain(problem: Problem, found: FloatArray, step: Step) -> tuple[str, ...]:
+    deviation = np.sqrt(np.maximum(np.diag(step.covariance), 0.0))
+    vague = step.blind | (deviation > UNCERTAIN * np.maximum(np.abs(found), 1e-300))
+    return tuple(name for name, flag in zip(problem.names, vague, strict=True) if flag)
+
+
+def _regressed(problem: Problem) -> list[FloatArray]:
+    """All parameters as the direct approach finds them, where it finds any: a rival of the guess.
+
+    Nothing is simulated there, so that no guess is too far off for it.
+    """
+    try:
+        found = regression(replace(problem, loose=problem.loose[:0]))
+    except (ModelError, np.linalg.LinAlgError):
+        return []
+    parameters = problem.start.copy()
+    parameters[problem.free] = found.iterations[-1]
+    return [parameters] if np.isfinite(parameters).all() else []
+
+
+def _horizons(problem: Problem) -> list[int]:
+    samples = len(problem.recording) - problem.first
+    speed, dt = problem.speed, problem.recording.dt
+    longest = samples / 2
+    if speed.growing > 0:
+        longest = min(longest, MOST_GROWTH / speed.growing / dt)
+    period = 2 * np.pi / max(speed.whole, 1e-9) / dt
+    horizon = int(max(min(np.ceil(period), longest), min(SHORTEST, samples)))
+    found = [horizon]
+    while found[-1] * GROWTH <= longest:
+        found.append(found[-1] * GROWTH)
+    return found

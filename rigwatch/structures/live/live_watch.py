@@ -1,0 +1,255 @@
+"""Damage of a structure on line: sample blocks in; residuals, an alarm and the damage's place out.
+
+    learning ──undamaged seconds──▶ watching ──alarm──▶ gathering ──settle──▶ told
+
+The undamaged structure is identified from the first seconds, then its model runs beside the samples
+(4.34) and the residual is judged as `damage.examine` judges a record. Some seconds after an alarm
+the record so far is examined, which names the place. A device that restarts begins a new record.
+
+Nothing here reads a clock, bus or file, and every sample is dealt with by itself: the messages are
+bit for bit the same however the samples are cut into blocks, live or from a recording.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.structures.damage import (
+    FINER,
+    LEAST,
+    CumulativeSum,
+    Innovations,
+    Reference,
+    Settings,
+    examine,
+    reference,
+    rounded,
+    threshold_for,
+)
+from rigwatch.structures.model import Structure
+from rigwatch.structures.records import GrowingRecord
+from rigwatch.structures.report import verdict
+from rigwatch.wire.errors import ModelError
+from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Event, SampleBlock, cut
+
+FloatArray = NDArray[np.float64]
+Said = EstimateBlock | Alarm | Event
+
+ALARM, SOURCE = "structure_damage", "structure"
+CAUSE = "the structure does not move as the undamaged one would"
+GUIDANCE = "unload the structure and inspect it; its place follows as an event"
+
+
+@dataclass(frozen=True)
+class LiveSettings:
+    """How a structure is watched.
+
+    Attributes:
+        undamaged: seconds from the first sample on that are taken as undamaged.
+        rate: probability of any false alarm within `span`.
+        span: [s].
+        settle: data after an alarm from which its place is found [s].
+        known: take the file's values as true where it marks them as unknown.
+    """
+
+    undamaged: float = 2.0
+    rate: float = 0.01
+    span: float = 60.0
+    settle: float = 2.0
+    known: bool = False
+
+
+class LiveDamage:
+    """A structure watched on line.
+
+    Args:
+        structure: the undamaged one; at its first sample it is as the file has it.
+        dt: time between samples [s].
+        settings: how.
+
+    Raises:
+        ModelError: a setting is out of range.
+    """
+
+    def __init__(self, structure: Structure, dt: float, settings: LiveSettings) -> None:
+        _check(settings)
+        self._structure, self._dt, self._settings = structure, dt, settings
+        self._learnt = max(1, round(settings.undamaged / dt))
+        self._loads = [load.channel for load in structure.loads.values() if load.channel]
+        self._boot: int | None = None
+
+    def prepare(self) -> None:
+        """Compile now what the first samples will need; nothing is remembered."""
+        settings = replace(self._settings, known=True, undamaged=LEAST * self._dt)
+        trial, count = LiveDamage(self._structure, self._dt, settings), LEAST + 2
+        names = (*self._structure.signals, *self._loads)
+        still = [Column(name, "", np.zeros(count)) for name in names]
+        numbers = np.arange(count)
+        trial.update(SampleBlock("", 0, 0, numbers, numbers, tuple(still)))
+
+    def update(self, block: SampleBlock) -> list[Said]:
+        """What there is to say about the next samples.
+
+        Raises:
+            ModelError: the block lacks a channel of the structure.
+        """
+        if block.boot != self._boot:
+            self._begin(block)
+        lost = block.seq - self._first - len(self._record)
+        if lost < 0:
+            return self.update(cut(block, -lost, len(block))) if len(block) > -lost else []
+        try:
+            self._record.take(block, lost)
+        except KeyError as error:
+            name = self._structure.name
+            raise ModelError(f"{name}: found samples without the channel {error}") from None
+        return self._said()
+
+    def _begin(self, block: SampleBlock) -> None:
+        self._boot, self._first, self._device = block.boot, block.seq, block.device
+        self._record = GrowingRecord(self._dt, self._structure.signals, self._loads)
+        self._stage: Literal["learning", "watching", "gathering", "told"] = "learning"
+        self._done = 0
+
+    def _said(self) -> list[Said]:
+        said, rows, begin = list[Said](), list[FloatArray](), self._done
+        for row in range(self._done, len(self._record)):
+            if self._stage == "learning" and row + 1 == self._learnt:
+                said += self._learn(row)
+                begin = row + 1
+            elif self._stage in {"watching", "gathering"}:
+                residual, over = self._beside.step(self._record, row)
+                rows.append(residual)
+                said += self._judged(row, over=over)
+        self._done = len(self._record)
+        return [self._estimates(begin, rows), *said] if rows else said
+
+    def _learn(self, row: int) -> list[Said]:
+        """The undamaged structure, and the same samples judged by it."""
+        settings, head = self._settings, self._record.record(row + 1)
+        try:
+            base = reference(self._structure, head, self._learnt * self._dt, known=settings.known)
+        except ModelError as error:
+            self._stage = "told"
+            return [self._event(row, "error", "NOT WATCHED", str(error))]
+        self._beside = _Beside(base, settings, self._dt)
+        self._stage = "watching"
+        said: list[Said] = [self._event(row, "info", "WATCHED", _learnt(base))]
+        for past in range(row + 1):
+            over = self._beside.step(self._record, past)[1]
+            said += self._judged(past, over=over)
+        return said
+
+    def _judged(self, row: int, *, over: bool) -> list[Said]:
+        if self._stage == "watching" and over:
+            self._stage, self._alarm = "gathering", row
+            return [self._raised(row)]
+        if self._stage == "gathering" and (row - self._alarm) * self._dt >= self._settings.settle:
+            self._stage = "told"
+            return [self._event(row, "critical", "DAMAGE", self._place(row))]
+        return []
+
+    def _place(self, row: int) -> str:
+        """What the record up to a row shows, in words."""
+        chosen, head = self._settings, self._record.record(row + 1)
+        settings = Settings(
+            self._learnt * self._dt, chosen.rate, settle=chosen.settle, known=chosen.known
+        )
+        try:
+            return verdict(examine(self._structure, head, settings))
+        except ModelError as error:
+            return f"its place was not found: {error}"
+
+    def _raised(self, row: int) -> Alarm:
+        judge, at = self._beside.judge, int(self._record.t_ns[row])
+        return Alarm(
+            ALARM, "unacknowledged", "critical", CAUSE, GUIDANCE, self._device, self._boot or 0,
+            self._first + row, at, judge.value, float("nan"), judge.threshold,
+            first_out=True, user="", onset_seq=self._first + row + 1 - judge.zero,
+        )  # fmt: skip
+
+    def _event(self, row: int, severity: Literal["info", "error", "critical"], code: str,
+               text: str) -> Event:  # fmt: skip
+        return Event(SOURCE, int(self._record.t_ns[row]), severity, code, text)
+
+    def _estimates(self, begin: int, rows: list[FloatArray]) -> EstimateBlock:
+        """Residuals and the statistic over its threshold, from a row on."""
+        table, signals = np.array(rows), self._beside.model.signals
+        names = [(f"residual_{n}", u) for n, u in zip(signals, self._beside.units, strict=True)]
+        columns = tuple(
+            Column(name, unit, table[:, k].copy())
+            for k, (name, unit) in enumerate([*names, ("statistic", "")])
+        )
+        t_ns = self._record.t_ns[begin : begin + len(rows)].copy()
+        return EstimateBlock(self._device, self._boot or 0, self._first + begin, t_ns, columns)
+
+
+class _Beside:
+    """The undamaged model beside the samples, one step at a time."""
+
+    def __init__(self, base: Reference, settings: LiveSettings, dt: float) -> None:
+        self.model = base.model
+        system = base.model.problem.sweeper.compiled.system
+        self.units = [system.model.outputs[name].unit for name in base.model.signals]
+        self._parameters, self._sigma = base.parameters, base.sigma
+        self._state = base.model.start()
+        columns = len(base.model.candidates) + len(self._state)
+        self._slopes = np.zeros((len(self._state), columns))
+        self._slopes[:, len(base.model.candidates) :] = np.eye(len(self._state))
+        self._outputs = np.empty(len(system.outputs))
+        self._output_slopes = np.zeros((len(system.outputs), columns))
+        self._step = np.empty((len(self._state), columns))
+        self._innovations = Innovations(base.spread)
+        samples = rounded(round(settings.span / dt))
+        threshold = threshold_for(settings.rate, len(base.sigma), samples, base.samples)
+        self.judge = CumulativeSum(len(base.sigma), threshold)
+
+    def step(self, record: GrowingRecord, row: int) -> tuple[FloatArray, bool]:
+        """Residuals, then the statistic over its threshold, shape (m + 1,); and whether it is over.
+
+        Rows have to come one after the other.
+        """
+        if row:
+            self._advance(record, row - 1)
+        kernel, count = self.model.problem.sweeper.kernel, len(self.model.signals)
+        kernel.observe(
+            record.inputs, record.dt, row, self._state, self._parameters, self._outputs,
+            self._output_slopes,
+        )  # fmt: skip
+        residual = self._outputs[:count] - record.observed[row]
+        scaled = self._innovations.update(residual / self._sigma, self._seen(count))
+        over = self.judge.update(scaled)
+        return np.append(residual, self.judge.value / self.judge.threshold), over
+
+    def _seen(self, count: int) -> FloatArray:
+        """Slopes of the scaled signals by coefficients and first state, shape (m, c + n)."""
+        free = len(self.model.candidates)
+        direct, by_state = self._output_slopes[:count, :free], self._output_slopes[:count, free:]
+        slopes = by_state @ self._slopes
+        slopes[:, :free] += direct
+        return np.asarray(slopes / self._sigma[:, None])
+
+    def _advance(self, record: GrowingRecord, row: int) -> None:
+        problem, free = self.model.problem, len(self.model.candidates)
+        problem.sweeper.kernel.forward(
+            record.inputs, record.dt, row, FINER * problem.substeps, problem.sweeper.hold,
+            self._state, self._parameters, self._step,
+        )  # fmt: skip
+        moved = self._step[:, free:] @ self._slopes
+        moved[:, :free] += self._step[:, :free]
+        self._slopes = moved
+
+
+def _check(settings: LiveSettings) -> None:
+    if not 0 < settings.rate < 1:
+        raise ModelError(f"false alarms: found {settings.rate:g}, expected a number from 0 to 1")
+    for name in ("undamaged", "span", "settle"):
+        if not (value := getattr(settings, name)) > 0:
+            raise ModelError(f"{name}: found {value:g}, expected seconds above 0")
+
+
+def _learnt(base: Reference) -> str:
+    found = ", ".join(f"{name} = {figure.value:.6g}" for name, figure in base.figures.items())
+    return f"undamaged structure learnt from {base.samples} samples" + (found and f": {found}")

@@ -1,0 +1,93 @@
+"""A structure watched on a rig's bus: the loop around `live.LiveDamage`."""
+
+import signal
+import threading
+import time
+
+from rigwatch.structures.live.live_watch import LiveDamage
+from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.delivery import SampleReader
+from rigwatch.wire.errors import ModelError
+from rigwatch.wire.messages import (
+    ALARMS,
+    ESTIMATES,
+    EVENTS,
+    HEALTH,
+    Alarm,
+    EstimateBlock,
+    Health,
+    SampleBlock,
+)
+from rigwatch.wire.rig_config import RigConfig
+
+TURN = 0.1
+"""Longest wait for samples [s]."""
+HEALTH_EVERY = 1.0
+PROCESS = "structure"
+
+
+class StructureProcess:
+    """What one run has open.
+
+    Args:
+        bus: where samples come from and results go.
+        watched: the structure.
+        history: samples before the first one heard that are wanted too, as far as the ring has
+            them: a structure's record begins with its device.
+    """
+
+    def __init__(self, bus: Bus, watched: LiveDamage, history: int) -> None:
+        self._bus, self._watched = bus, watched
+        self._told, self._unsuitable = 0.0, ""
+        self.reader = SampleReader(bus, history=history)
+
+    def turn(self, timeout: float = TURN) -> None:
+        """Deal with what has come, waiting for at most `timeout` [s]."""
+        for item in self.reader.read(timeout):
+            if isinstance(item, SampleBlock):
+                self._take(item)
+        if time.monotonic() - self._told >= HEALTH_EVERY:
+            self._told = time.monotonic()
+            self._bus.publish(HEALTH, self._health())
+
+    def close(self) -> None:
+        """Leave the bus in order."""
+        self.reader.close()
+
+    def _take(self, block: SampleBlock) -> None:
+        try:
+            said = self._watched.update(block)
+        except ModelError as error:
+            self._unsuitable = str(error)
+            return
+        self._unsuitable = ""
+        for message in said:
+            if isinstance(message, EstimateBlock):
+                self._bus.publish(ESTIMATES, message)
+            else:
+                self._bus.publish(ALARMS if isinstance(message, Alarm) else EVENTS, message)
+
+    def _health(self) -> Health:
+        counters = {"delivered": float(self.reader.counters.delivered)}
+        state = "unsuitable" if self._unsuitable else "running"
+        return Health(PROCESS, time.time_ns(), state, self._unsuitable, counters)
+
+
+def watch_rig(config: RigConfig, watched: LiveDamage) -> None:
+    """Watch the rig until a signal ends it.
+
+    Raises:
+        BusError: the bus cannot be joined.
+    """
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    watched.prepare()
+    bus = connect(config, PROCESS)
+    try:
+        process = StructureProcess(bus, watched, config.daq.ring)
+        while not stop.is_set():
+            process.turn()
+        process.close()
+    finally:
+        bus.close()

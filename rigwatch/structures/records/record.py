@@ -1,0 +1,142 @@
+"""A record: what the sensors of a structure showed, sample by sample.
+
+A file is CSV with a header, or NPZ; the column `t` [s] is the time, equally spaced from 0 on, and
+the others are called after the signals they hold: x6, v6, a6 and the channels of recorded loads. An
+empty cell or NaN is a sample that is missing.
+"""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.physics.engine.equations import Model
+from rigwatch.physics.engine.fit import Recording
+from rigwatch.wire.errors import ImportDataError, ModelError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Columns sampled together, the first sample at t = 0.
+
+    Attributes:
+        dt: time between samples [s].
+        columns: by name, each of shape (n,); NaN where nothing valid was measured.
+    """
+
+    dt: float
+    columns: Mapping[str, FloatArray]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def recording(self, model: Model) -> Recording:
+        """The columns that belong to the model; NaN for an output that was not recorded.
+
+        Raises:
+            ModelError: an input is missing or has gaps, or no output was recorded at all.
+        """
+        inputs = [self._input(i.channel or name, model.name) for name, i in model.inputs.items()]
+        missing = np.full(len(self), np.nan)
+        channels = {name: o.channel or name for name, o in model.outputs.items()}
+        if not set(channels.values()) & set(self.columns):
+            raise ModelError(
+                f"{model.name}: found a record of {', '.join(self.columns)}, expected at least one"
+                f" of {', '.join(channels.values())}"
+            )
+        outputs = [self.columns.get(channel, missing) for channel in channels.values()]
+        driven = np.stack(inputs, axis=1) if inputs else np.zeros((len(self), 0))
+        return Recording(self.dt, driven, np.stack(outputs, axis=1))
+
+    def _input(self, channel: str, model: str) -> FloatArray:
+        if channel not in self.columns:
+            found = ", ".join(self.columns)
+            raise ModelError(f"{model}: found a record of {found}, expected its load {channel!r}")
+        column = self.columns[channel]
+        if not np.isfinite(column).all():
+            raise ModelError(f"{model}: found gaps in the load {channel!r}, expected every sample")
+        return column
+
+
+def record_of(time: FloatArray, columns: Mapping[str, FloatArray], where: str = "record") -> Record:
+    """A record of arrays.
+
+    Raises:
+        ImportDataError: the time is not equally spaced from 0 on, or a column has another length.
+    """
+    steps = np.diff(time)
+    if len(time) < 2 or not np.all(np.isfinite(time)) or not steps.min() > 0:
+        raise ImportDataError(f"{where}: t: found no rising time, expected at least two samples")
+    dt = float(time[-1] - time[0]) / (len(time) - 1)
+    if np.abs(steps - dt).max() > 1e-3 * dt or abs(time[0]) > 1e-6 * dt:
+        span = f"{steps.min():g} to {steps.max():g} s from {time[0]:g} s on"
+        raise ImportDataError(f"{where}: t: found steps of {span}, expected equal ones from 0 on")
+    for name, column in columns.items():
+        if len(column) != len(time):
+            raise ImportDataError(
+                f"{where}: {name}: found {len(column)} samples, expected {len(time)} as in t"
+            )
+    arrays = {name: np.asarray(column, np.float64) for name, column in columns.items()}
+    return Record(dt, arrays)
+
+
+def read_record(path: Path | str) -> Record:
+    """The record file at `path` (.csv or .npz).
+
+    Raises:
+        ImportDataError: it cannot be read, or its columns do not fit.
+    """
+    file = Path(path)
+    try:
+        table = _from_npz(file) if file.suffix == ".npz" else _from_csv(file)
+    except (OSError, ValueError, csv.Error) as error:
+        raise ImportDataError(f"{file}: found {error}, expected columns of numbers") from error
+    if "t" not in table:
+        raise ImportDataError(f"{file}: found columns {', '.join(table)}, expected one called t")
+    time = table.pop("t")
+    if not table:
+        raise ImportDataError(f"{file}: found no column but t, expected signals")
+    return record_of(time, table, str(file))
+
+
+def write_record(record: Record, path: Path | str) -> None:
+    """Write a record as CSV, or NPZ where the path ends so; every digit is kept.
+
+    Raises:
+        ImportDataError: the file cannot be written.
+    """
+    file, time = Path(path), np.arange(len(record)) * record.dt
+    try:
+        if file.suffix == ".npz":
+            arrays: dict[str, Any] = {"t": time, **record.columns}
+            np.savez_compressed(file, **arrays)
+            return
+        with file.open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(["t", *record.columns])
+            table = np.column_stack([time, *record.columns.values()])
+            writer.writerows([[repr(cell) for cell in row] for row in table.tolist()])
+    except OSError as error:
+        raise ImportDataError(f"{file}: {error.strerror or error}, cannot be written") from error
+
+
+def _from_npz(file: Path) -> dict[str, FloatArray]:
+    with np.load(file) as archive:
+        return {name: np.asarray(archive[name], np.float64) for name in archive.files}
+
+
+def _from_csv(file: Path) -> dict[str, FloatArray]:
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = csv.reader(stream)
+        header = [name.strip() for name in next(rows, [])]
+        table = [[float(cell) if cell.strip() else np.nan for cell in row] for row in rows if row]
+    if not header or any(len(row) != len(header) for row in table):
+        raise ValueError("rows of another length than the header")
+    values = np.array(table, np.float64).reshape(-1, len(header))
+    return {name: values[:, index].copy() for index, name in enumerate(header)}

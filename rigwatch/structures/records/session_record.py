@@ -1,0 +1,58 @@
+"""A recorded session as the record of a structure: its channels are the signals and loads.
+
+Samples stand where their numbers say; lost ones, and ones that the device or the monitor declared
+invalid, are NaN.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.structures.records.record import FloatArray, Record, read_record, record_of
+from rigwatch.wire.errors import ImportDataError
+from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.session import SUFFIX, open_session
+
+TABLES = {".csv", ".npz"}
+
+
+def read_any(path: Path | str) -> Record:
+    """The record in a table (.csv, .npz), or in a session: a file (.mcap) or folder of segments.
+
+    Raises:
+        SessionError: no such session.
+        ImportDataError: the file cannot be read, or its samples are no single even series.
+    """
+    file = Path(path)
+    return read_record(file) if file.suffix in TABLES else record_of_session(file)
+
+
+def record_of_session(path: Path) -> Record:
+    """The samples of a session, the first at t = 0; errors as of `read_any`."""
+    blocks = list(open_session(path).samples())
+    if not blocks:
+        raise ImportDataError(f"{path}: found no samples, expected a recorded structure ({SUFFIX})")
+    first = blocks[0]
+    if any((b.device, b.boot) != (first.device, first.boot) for b in blocks):
+        devices = ", ".join(dict.fromkeys(b.device for b in blocks))
+        raise ImportDataError(
+            f"{path}: found several devices or restarts ({devices}), expected one unbroken series;"
+            " see `rigwatch trim`"
+        )
+    count = max(block.seq + len(block) for block in blocks) - first.seq
+    names = {column.name for block in blocks for column in block.channels}
+    columns = {name: np.full(count, np.nan) for name in sorted(names)}
+    clock = np.full(count, np.nan)
+    for block in blocks:
+        _place(block, block.seq - first.seq, columns, clock)
+    known = np.isfinite(clock)
+    rows = np.arange(count)
+    time = np.interp(rows, rows[known], clock[known])
+    return record_of(time - time[0], columns, str(path))
+
+
+def _place(block: SampleBlock, at: int, columns: dict[str, FloatArray], clock: FloatArray) -> None:
+    rows = slice(at, at + len(block))
+    clock[rows] = np.asarray(block.device_us, np.float64) * 1e-6
+    for column in block.channels:
+        columns[column.name][rows] = column.usable()

@@ -1,0 +1,240 @@
+"""What one method or several found of a structure, as one web page that needs no network."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.page import Plot, exact, figure, key, limits, page, table
+from rigwatch.structures.identification import (
+    SETTLED,
+    Identification,
+    Problem,
+    modelled,
+    seconds_of,
+)
+
+FloatArray = NDArray[np.float64]
+Series = Mapping[str, FloatArray]
+
+COLOURS = ("held", "before", "model", "rest", "good")
+"""Of the methods, as the page's style names them; there are five methods."""
+SMALLEST = 1e-8
+"""Relative change that is drawn for all that are smaller."""
+MOST = 1e6
+FOLLOWS = 0.5
+"""Share of the signals up to which a trajectory follows them."""
+MARKED = 60
+"""Iterations up to which each has its mark."""
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What is reported.
+
+    Attributes:
+        problem: what was asked.
+        record: name of the record.
+        found: by method, in the order in which they are shown.
+        failed: message of each method that gave nothing.
+    """
+
+    problem: Problem
+    record: str
+    found: Mapping[str, Identification]
+    failed: Mapping[str, str]
+
+    @cached_property
+    def modelled(self) -> dict[str, FloatArray]:
+        """Outputs by method, each of shape (samples, outputs)."""
+        return {method: modelled(self.problem, one) for method, one in self.found.items()}
+
+    @property
+    def legend(self) -> list[tuple[str, str]]:
+        """Colour and name of each method."""
+        return list(zip(COLOURS, self.found, strict=False))
+
+
+def report_html(findings: Findings) -> str:
+    """The page."""
+    name = findings.problem.sweeper.compiled.system.model.name
+    return page(
+        f"{name}: identification",
+        _header(findings, name),
+        [
+            ("parameters", "Parameters", _parameters(findings)),
+            ("methods", "Methods", _methods(findings)),
+            ("iterations", "Iterations", _iterations(findings)),
+            ("signals", "Measured against modelled", "".join(_signals(findings))),
+        ],
+    )
+
+
+def _header(f: Findings, name: str) -> str:
+    problem, dt = f.problem, f.problem.recording.dt
+    good = [method for method, one in f.found.items() if one.converged]
+    shares = {method: np.nan_to_num(_share(f, method), nan=np.inf) for method in good}
+    words = _best(f, shares) if shares else "no method converged"
+    settled = f" Converged: {', '.join(good)}." if good else ""
+    span = f"{len(problem.observed) * dt:g} s every {dt:g} s, {len(problem.names)} unknowns"
+    return (
+        f'<p class="kicker">{escape(name)}</p><h1>{escape(words)}</h1>'
+        f'<p class="sub">Record {escape(f.record)}: {escape(span)}.{escape(settled)}</p>'
+    )
+
+
+def _best(f: Findings, shares: Mapping[str, float]) -> str:
+    """The method that explains most, where one explains anything."""
+    best = min(shares, key=lambda method: shares[method])
+    if shares[best] > FOLLOWS:
+        return "converged, but no trajectory follows the whole record"
+    return f"{best} leaves {_left(f, best)} of the signals"
+
+
+def _parameters(f: Findings) -> str:
+    """Each unknown by every method, with its interval."""
+    guesses = f.problem.guess.tolist()
+    rows = [
+        [
+            f"<code>{escape(name)}</code>",
+            exact(guess),
+            *(_figure(one, name) for one in f.found.values()),
+        ]
+        for name, guess in zip(f.problem.names, guesses, strict=True)
+    ]
+    head = ["unknown", "guess", *f.found]
+    words = "In brackets 95 % intervals, for white noise of the size that the residuals show."
+    return f'<p class="note">{words}</p>{table(head, rows, range(1, len(head)))}'
+
+
+def _figure(one: Identification, name: str) -> str:
+    low, high = one.intervals[name]
+    ends = f"<br>[{low:.5g}, {high:.5g}]" if isfinite(low) else ""
+    vague = '<br><span class="warn">not determined</span>' if name in one.undetermined else ""
+    return f"{exact(one.parameters[name], f'{one.method}:{name}')}{ends}{vague}"
+
+
+def _methods(f: Findings) -> str:
+    """How each went."""
+    rows = [
+        [escape(method), _state(one), str(len(one.iterations)), f"{one.seconds:.2f}",
+         _left(f, method), escape("; ".join(one.remarks))]
+        for method, one in f.found.items()
+    ]  # fmt: skip
+    rows += [
+        [escape(method), '<span class="no">failed</span>', "", "", "", escape(why)]
+        for method, why in f.failed.items()
+    ]
+    head = ["method", "", "iterations", "time [s]", "left of the signals", "remarks"]
+    words = (
+        "Left: rms of the residual over rms of the signals, along one trajectory from the first"
+        " sample on. Where motion is chaotic or runs away, right figures part from the record too."
+    )
+    return f'<p class="note">{words}</p>{table(head, rows, (2, 3, 4))}'
+
+
+def _state(one: Identification) -> str:
+    kind, words = ("good", "converged") if one.converged else ("no", "did not converge")
+    return f'<span class="{kind}">{words}</span>'
+
+
+def _left(f: Findings, method: str) -> str:
+    share = _share(f, method)
+    return f"{100 * share:.3g} %" if isfinite(share) else "all"
+
+
+def _share(f: Findings, method: str) -> float:
+    """Part of the signals that is not explained, each signal over its own rms."""
+    observed = f.problem.observed
+    seen = np.isfinite(observed).any(axis=0)
+    with np.errstate(all="ignore"):
+        left = np.nanmean((f.modelled[method] - observed)[:, seen] ** 2, axis=0)
+        return float(np.sqrt(np.mean(left / np.nanmean(observed[:, seen] ** 2, axis=0))))
+
+
+def _iterations(f: Findings) -> str:
+    """How fast each method settled, and its figures on the way."""
+    changes = {method: _changes(f.problem, one) for method, one in f.found.items()}
+    longest = max((len(c) for c in changes.values()), default=1)
+    high = max((float(c.max()) for c in changes.values() if len(c)), default=1.0)
+    words = "largest relative change"
+    ends = (SMALLEST, max(10.0 * high, 1.0))
+    plot = Plot(words, (0.5, longest + 0.5), ends, "iteration", words, height=280, y_log=True)
+    plot.line(np.array([0.5, longest + 0.5]), np.full(2, SETTLED), "soft", dash="6 5")
+    plot.text(longest + 0.45, SETTLED, "settled to four digits", anchor="end", up=-14)
+    for colour, method in f.legend:
+        drawn = changes[method]
+        moved = np.flatnonzero(drawn)  # some methods count the guess as their first iteration
+        plot.line(
+            moved + np.float64(1.0), drawn[moved], colour, marks=longest <= MARKED, name=method
+        )
+    return f"{key(*f.legend)}{figure(plot.drawn())}{''.join(_turns(f))}"
+
+
+def _changes(problem: Problem, one: Identification) -> FloatArray:
+    """Largest relative change at each iteration, the first from the guess; shape (iterations,).
+
+    0 where nothing changed.
+    """
+    path = np.vstack([problem.guess, one.iterations])
+    size = np.maximum(np.abs(path[1:]), 1e-9 * np.abs(path[1:]).max(initial=1e-300))
+    change = (np.abs(np.diff(path, axis=0)) / size).max(axis=1)
+    seen = np.clip(np.nan_to_num(change, nan=MOST), SMALLEST, MOST)
+    return np.where(change == 0, 0.0, seen)
+
+
+def _turns(f: Findings) -> Iterator[str]:
+    for method, one in f.found.items():
+        rows = [
+            [str(number), *(exact(value) for value in row)]
+            for number, row in enumerate([f.problem.guess.tolist(), *one.iterations.tolist()])
+        ]
+        head = ["", *one.names]
+        yield f"<details><summary>{escape(method)}: unknowns after each iteration</summary>"
+        yield f"{table(head, rows, range(1, len(head)))}</details>"
+
+
+def _signals(f: Findings) -> Iterator[str]:
+    yield key(("measured", "measured"), *f.legend)
+    seconds, outputs = seconds_of(f.problem), f.problem.sweeper.compiled.system.model.outputs
+    for k, (name, output) in enumerate(outputs.items()):
+        measured = f.problem.observed[:, k]
+        if np.isfinite(measured).any():
+            made = {method: values[:, k] for method, values in f.modelled.items()}
+            yield f"<h3>{escape(name)}</h3>"
+            yield figure(_signal(f, seconds, measured, made, f"{name} [{output.unit}]"))
+            yield figure(_residual(f, seconds, measured, made, f"residual [{output.unit}]"))
+
+
+def _signal(
+    f: Findings, seconds: FloatArray, measured: FloatArray, made: Series, words: str
+) -> str:
+    span = (float(seconds[0]), float(seconds[-1]))
+    plot = Plot(f"{words}, measured and modelled", span, limits(measured), "", words, height=190)
+    plot.line(seconds, measured, "measured", width=4)
+    for colour, method in f.legend:
+        plot.line(seconds, made[method], colour, name=method)
+    return plot.drawn()
+
+
+def _residual(
+    f: Findings, seconds: FloatArray, measured: FloatArray, made: Series, words: str
+) -> str:
+    left = {method: measured - values for method, values in made.items()}
+    span = (float(seconds[0]), float(seconds[-1]))
+    plot = Plot(
+        "what is left", span, _usual(list(left.values()), measured), "time [s]", words, height=150
+    )
+    for colour, method in f.legend:
+        plot.line(seconds, left[method], colour, width=1.2, name=method)
+    return plot.drawn()
+
+
+def _usual(residuals: Sequence[FloatArray], measured: FloatArray) -> tuple[float, float]:
+    """Ends of the axis, which a method that runs away does not stretch."""
+    most = 1.5 * float(np.nanmax(np.abs(measured)))
+    return limits(np.zeros(1), *(np.clip(r, -most, most) for r in residuals))

@@ -1,0 +1,39 @@
+"""The bus between the processes of a rig: messages, queries and liveliness.
+
+    Bus             what processes use: messages are encoded and checked here
+     └ Transport    what carries the bytes: Zenoh, or memory in tests
+
+`connect` joins the bus of a rig. `alarm_list` and `model_change` are the two queries that the
+monitor answers.
+"""
+
+from rigwatch.wire.bus.alarm_list import ask_alarm_list, serve_alarm_list
+from rigwatch.wire.bus.bus import (
+    MAX_PAYLOAD,
+    QUEUE_CAPACITY,
+    Bus,
+    Close,
+    Subscription,
+    connect,
+    unique_process,
+)
+from rigwatch.wire.bus.model_change import KEY, PATIENCE, Granted, Wish, ask_for_model
+from rigwatch.wire.bus.zenoh_transport import open_router
+
+__all__ = [
+    "KEY",
+    "MAX_PAYLOAD",
+    "PATIENCE",
+    "QUEUE_CAPACITY",
+    "Bus",
+    "Close",
+    "Granted",
+    "Subscription",
+    "Wish",
+    "ask_alarm_list",
+    "ask_for_model",
+    "connect",
+    "open_router",
+    "serve_alarm_list",
+    "unique_process",
+]

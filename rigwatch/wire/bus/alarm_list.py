@@ -1,0 +1,33 @@
+"""The list of alarms that stand now, served by the monitor to whoever asks."""
+
+import contextlib
+from collections.abc import Callable, Sequence
+
+from rigwatch.wire.bus.bus import Bus, Close
+from rigwatch.wire.errors import BusError, MessageError
+from rigwatch.wire.messages import Alarm, decode, encode
+
+KEY = "monitor/standing"
+_MARK = b"alarms"
+"""Begins every list, so that an empty one differs from no answer."""
+
+
+def serve_alarm_list(bus: Bus, standing: Callable[[], Sequence[Alarm]]) -> Close:
+    """Answer with what `standing()` returns; called in a thread of the bus."""
+    return bus.serve(KEY, lambda _: [_MARK, *(encode(alarm) for alarm in standing())])
+
+
+def ask_alarm_list(bus: Bus, timeout: float = 1.0) -> list[Alarm]:
+    """The alarms that stand now, first-out first.
+
+    Raises:
+        BusError: no monitor answers.
+    """
+    replies = bus.query(KEY, timeout=timeout)
+    if _MARK not in replies:
+        raise BusError(f"no monitor of rig {bus.rig} answers: start `rigwatch monitor`")
+    alarms = []
+    for reply in replies:
+        with contextlib.suppress(MessageError):
+            alarms += [decode(Alarm, reply)] if reply != _MARK else []
+    return sorted(alarms, key=lambda alarm: (not alarm.first_out, alarm.t_ns))

@@ -1,0 +1,128 @@
+"""The bus within one process: the same bytes, queues and refusals as over Zenoh.
+
+All transports made from one `MemoryNetwork` hear each other. Payloads arrive in the thread that
+puts them.
+"""
+
+import fnmatch
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+from rigwatch.wire.bus.bus import MAX_PAYLOAD, Answer, Bus, Close, answered
+
+T = TypeVar("T")
+
+
+class MemoryNetwork:
+    """What the router is to Zenoh: everything put by one transport is heard by all."""
+
+    def __init__(self) -> None:
+        self.lock = threading.RLock()
+        self.listeners: dict[str, list[Callable[[bytes], None]]] = {}
+        self.servers: dict[str, list[Answer]] = {}
+        self.tokens: list[str] = []
+        self.watchers: list[tuple[str, Callable[[str, bool], None]]] = []
+        self.up = True
+
+    def bus(self, rig: str, process: str) -> Bus:
+        """A process's place on this network."""
+        return Bus(MemoryTransport(self), rig, process)
+
+    def deliver(self, key: str, payload: bytes) -> None:
+        """Hand a payload to all who listen, unless it is too large or the network is down."""
+        with self.lock:
+            receivers = tuple(self.listeners.get(key, ()))
+        if self.up and len(payload) <= MAX_PAYLOAD:
+            for receive in receivers:
+                receive(payload)
+
+    def tell(self, key: str, alive: bool) -> None:
+        """Tell the watchers of a token that it came or went."""
+        for pattern, changed in tuple(self.watchers):
+            if matches(key, pattern):
+                changed(key, alive)
+
+
+class MemoryTransport:
+    """One process's link to a `MemoryNetwork`."""
+
+    def __init__(self, network: MemoryNetwork) -> None:
+        self._network = network
+        self._closers: list[Close] = []
+
+    def put(self, key: str, payload: bytes) -> None:
+        """Send to all who listen."""
+        self._network.deliver(key, payload)
+
+    def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
+        """Call `receive` with each payload put to `key`."""
+        return self._register(self._network.listeners.setdefault(key, []), receive)
+
+    def serve(self, key: str, answer: Answer) -> Close:
+        """Answer questions to `key`."""
+        return self._register(self._network.servers.setdefault(key, []), answer)
+
+    def ask(self, key: str, question: bytes, timeout: float) -> list[bytes]:  # noqa: ARG002
+        """The replies of all that serve `key`; one that fails does not reply."""
+        with self._network.lock:
+            servers = tuple(self._network.servers.get(key, ()))
+        replies: list[bytes] = []
+        for answer in servers if self._network.up else ():
+            replies += answered(answer, question)
+        return replies
+
+    def declare_token(self, key: str) -> Close:
+        """Show a token until closed."""
+        with self._network.lock:
+            self._network.tokens.append(key)
+        self._network.tell(key, True)
+        return self._closing(lambda: self._withdraw(key))
+
+    def _withdraw(self, key: str) -> None:
+        with self._network.lock:
+            self._network.tokens.remove(key)
+        self._network.tell(key, False)
+
+    def tokens(self, pattern: str, timeout: float) -> list[str]:  # noqa: ARG002
+        """Keys of the tokens alive now."""
+        with self._network.lock:
+            return [key for key in self._network.tokens if matches(key, pattern)]
+
+    def watch_tokens(self, pattern: str, changed: Callable[[str, bool], None]) -> Close:
+        """Call `changed(key, alive)` for tokens that match, first for those there already."""
+        close = self._register(self._network.watchers, (pattern, changed))
+        for key in self.tokens(pattern, 0.0):
+            changed(key, True)
+        return close
+
+    def connected(self) -> bool:
+        """Whether the network is up."""
+        return self._network.up
+
+    def close(self) -> None:
+        """Take back all that was registered through this link."""
+        for close in reversed(tuple(self._closers)):
+            close()
+
+    def _register(self, place: list[T], thing: T) -> Close:
+        with self._network.lock:
+            place.append(thing)
+        return self._closing(lambda: place.remove(thing))
+
+    def _closing(self, undo: Close) -> Close:
+        """`undo`, done once however often it is called, and at the latest by `close`."""
+
+        def close() -> None:
+            if close in self._closers:
+                self._closers.remove(close)
+                undo()
+
+        self._closers.append(close)
+        return close
+
+
+def matches(key: str, pattern: str) -> bool:
+    """Whether a key matches a pattern in which `*` stands for one part of the key."""
+    parts, wanted = key.split("/"), pattern.split("/")
+    return len(parts) == len(wanted) and all(map(fnmatch.fnmatchcase, parts, wanted))

@@ -1,0 +1,234 @@
+"""The bus over Zenoh: every process a client of one router, which is a Python session too.
+
+What the settings are for:
+
+* clients with an endpoint and no scouting: two peers behind one router exchange nothing, silently;
+* retries after 100 to 200 ms, for ever: a restarted router is found again within that time;
+* congestion control DROP: with BLOCK one frozen reader stops the publisher for seconds;
+* `express` stays off: with it, Zenoh lost a quarter of the messages at high rates;
+* a filter on payload size in the router: what is larger than any message of ours goes no further;
+* one who connects to the router and says nothing is shown out after a second, so that a flood of
+  such connections keeps nobody waiting for long.
+"""
+
+import contextlib
+import json
+import logging
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+from zenoh.handlers import Callback
+
+from rigwatch.wire.bus.bus import MAX_PAYLOAD, Answer, Close, answered
+from rigwatch.wire.errors import BusError
+
+RETRY_MS = (100, 200)
+LEASE = 10.0
+"""Silence after which a link counts as broken [s]."""
+ACCEPT_MS, MOST_PENDING = 1000, 1000
+"""How long the router waits for one who connects to say who he is, and for how many at a time."""
+ATTEMPT_MS = 300
+"""One attempt at reaching the router; short, since a signal is only seen between attempts [ms]."""
+_log = logging.getLogger(__name__)
+
+
+def _common_settings(lease: float) -> dict[str, Any]:
+    first, longest = RETRY_MS
+    retry = {
+        "period_init_ms": first,
+        "period_max_ms": longest,
+        "period_increase_factor": 2,
+    }
+    return {
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "connect/timeout_ms": ATTEMPT_MS,
+        "connect/exit_on_failure": False,
+        "connect/retry": retry,
+        "transport/link/tx/lease": round(lease * 1e3),
+    }
+
+
+def _client_settings(endpoint: str, lease: float) -> dict[str, Any]:
+    return _common_settings(lease) | {
+        "mode": "client",
+        "listen/endpoints": [],
+        "connect/endpoints": [endpoint],
+    }
+
+
+def _router_settings(endpoint: str, lease: float) -> dict[str, Any]:
+    size_filter = {
+        "id": "largest-message",
+        "flows": ["ingress", "egress"],
+        "messages": ["put", "delete", "query", "reply"],
+        "key_exprs": ["**"],
+        "size_limit": MAX_PAYLOAD,
+    }
+    return _common_settings(lease) | {
+        "mode": "router",
+        "listen/endpoints": [endpoint],
+        "connect/endpoints": [],
+        "low_pass_filter": [size_filter],
+        "transport/unicast/accept_timeout": ACCEPT_MS,
+        "transport/unicast/accept_pending": MOST_PENDING,
+    }
+
+
+def _configured(settings: dict[str, Any], endpoint: str) -> Any:
+    config = zenoh.Config()
+    try:
+        for key, value in settings.items():
+            config.insert_json5(key, json.dumps(value))
+    except zenoh.ZError:
+        expected = "expected an endpoint such as tcp/127.0.0.1:7447"
+        raise BusError(f"bus: found {endpoint!r}, {expected}") from None
+    return config
+
+
+def open_router(endpoint: str, lease: float = LEASE) -> Close:
+    """Run a router that listens at `endpoint`, until the returned function is called.
+
+    Args:
+        endpoint: such as tcp/127.0.0.1:7447.
+        lease: silence after which a link counts as broken [s].
+
+    Raises:
+        BusError: the endpoint is not well formed or already taken.
+    """
+    config = _configured(_router_settings(endpoint, lease), endpoint)
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError:
+        taken = "is the address this machine's own, and free?"
+        raise BusError(f"no router can listen at {endpoint}: {taken}") from None
+    close: Close = session.close
+    return close
+
+
+def _reach(endpoint: str, timeout: float | None, lease: float) -> Any:
+    """A session with the router at `endpoint`, tried again and again."""
+    started, told = time.monotonic(), False
+    while True:
+        try:
+            return zenoh.open(_configured(_client_settings(endpoint, lease), endpoint))
+        except zenoh.ZError:
+            waited = time.monotonic() - started
+        if timeout is not None and waited >= timeout:
+            remedy = "start `rigwatch router` or correct bus.router"
+            raise BusError(f"no router answers at {endpoint}: {remedy}")
+        if timeout is None and waited > 2.0 and not told:
+            _log.warning("waiting for the router at %s", endpoint)
+            told = True
+
+
+class ZenohTransport:
+    """One process's Zenoh session."""
+
+    def __init__(self, session: Any) -> None:
+        self._session = session
+        self._publishers: dict[str, Any] = {}
+        self._lock = threading.Lock()
+        self._kept: list[Any] = []
+
+    @classmethod
+    def client(
+        cls, endpoint: str, timeout: float | None = None, lease: float = LEASE
+    ) -> "ZenohTransport":
+        """A client of the router at `endpoint`, awaited for `timeout` [s], None for ever.
+
+        A link that has been silent for `lease` [s] counts as broken.
+
+        Raises:
+            BusError: the endpoint is not well formed, or no router answers there.
+        """
+        return cls(_reach(endpoint, timeout, lease))
+
+    def put(self, key: str, payload: bytes) -> None:
+        """Send without waiting; dropped where the link is full or down."""
+        publisher = self._publishers.get(key) or self._declare_publisher(key)
+        with contextlib.suppress(zenoh.ZError):
+            publisher.put(payload)
+
+    def _declare_publisher(self, key: str) -> Any:
+        with self._lock:
+            if key not in self._publishers:
+                self._publishers[key] = self._session.declare_publisher(
+                    key,
+                    congestion_control=zenoh.CongestionControl.DROP,
+                    reliability=zenoh.Reliability.RELIABLE,
+                )
+            return self._publishers[key]
+
+    def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
+        """Call `receive` with each payload put to `key`, in Zenoh's own thread."""
+        take = _direct(lambda sample: receive(sample.payload.to_bytes()))
+        return self._keep(self._session.declare_subscriber(key, take))
+
+    def serve(self, key: str, answer: Answer) -> Close:
+        """Answer questions to `key`, in a thread beside Zenoh's."""
+
+        def reply(query: Any) -> None:
+            with query:
+                for payload in answered(answer, bytes(query.payload or b"")):
+                    query.reply(query.key_expr, payload)
+
+        return self._keep(self._session.declare_queryable(key, reply))
+
+    def ask(self, key: str, question: bytes, timeout: float) -> list[bytes]:
+        """The replies of all that serve `key`, as many as came within `timeout` [s]."""
+        try:
+            replies = self._session.get(
+                key,
+                payload=question,
+                timeout=timeout,
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                congestion_control=zenoh.CongestionControl.DROP,
+            )
+        except zenoh.ZError:
+            return []  # closed meanwhile
+        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+
+    def declare_token(self, key: str) -> Close:
+        """Show a token at `key` until closed or until this process dies."""
+        return self._keep(self._session.liveliness().declare_token(key))
+
+    def tokens(self, pattern: str, timeout: float) -> list[str]:
+        """Keys of the tokens that are alive now."""
+        replies = self._session.liveliness().get(pattern, timeout=timeout)
+        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+
+    def watch_tokens(self, pattern: str, changed: Callable[[str, bool], None]) -> Close:
+        """Call `changed(key, alive)` for tokens that match, first for those there already."""
+        tell = _direct(lambda s: changed(str(s.key_expr), s.kind == zenoh.SampleKind.PUT))
+        liveliness = self._session.liveliness()
+        return self._keep(liveliness.declare_subscriber(pattern, tell, history=True))
+
+    def connected(self) -> bool:
+        """Whether there is a link to the router now."""
+        return not self._session.is_closed() and bool(self._session.info.routers_zid())
+
+    def close(self) -> None:
+        """Close the session and all that was declared in it."""
+        self._session.close()
+
+    def _keep(self, entity: Any) -> Close:
+        # Zenoh undeclares an entity as soon as Python forgets it.
+        self._kept.append(entity)
+
+        def close() -> None:
+            if entity in self._kept:
+                self._kept.remove(entity)
+                with contextlib.suppress(zenoh.ZError):
+                    entity.undeclare()
+
+        return close
+
+
+def _direct(callback: Callable[[Any], None]) -> Any:
+    """A callback run in Zenoh's receiving thread itself: one thread switch less a message."""
+    return Callback(callback, indirect=False)

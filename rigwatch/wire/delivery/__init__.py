@@ -1,0 +1,12 @@
+"""Every sample is delivered, recovered or reported as lost.
+
+    publisher ──▶ Ring ◀──asks── SampleReader ──▶ SampleOrder ──▶ samples in order, losses counted
+
+`source_arbitration` decides which of several sources of samples has control of a rig.
+"""
+
+from rigwatch.wire.delivery.ring import SampleRing
+from rigwatch.wire.delivery.sample_order import Counters
+from rigwatch.wire.delivery.sample_reader import SampleReader
+
+__all__ = ["Counters", "SampleReader", "SampleRing"]

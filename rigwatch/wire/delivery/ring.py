@@ -1,0 +1,145 @@
+"""The adapter's ring: the last samples, kept for readers that missed some.
+
+`RingStore` keeps the samples of one boot in arrays, sample `seq` in row `seq` modulo the ring's
+length, so that holes stay holes. `SampleRing` serves the present boot and the one before it on the
+bus, whose readers may still miss its end, and shows by a liveliness token which boot has
+control of the rig.
+"""
+
+import threading
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.wire.bus import Bus, Close
+from rigwatch.wire.delivery.ring_protocol import UNKNOWN, Ask, RingReply
+from rigwatch.wire.messages import RING_KEY, Column, SampleBlock
+
+SOURCE_KEY = "source"
+"""Tokens of sources stand at `source/<boot>/<Unix time in ns since when>`."""
+SAMPLES_PER_REPLY = 1024
+RUNS_PER_REPLY = 64
+"""A reply is bounded so that answering one never holds up the publishing of samples."""
+
+
+class RingStore:
+    """The last samples of one boot.
+
+    Args:
+        head: a block of that boot, whose columns all others have too.
+        capacity: samples kept.
+    """
+
+    def __init__(self, head: SampleBlock, capacity: int) -> None:
+        n = len(head.channels)
+        self.device, self.boot, self.capacity = head.device, head.boot, capacity
+        self.layout = _layout(head)
+        self.newest = -1
+        self._seq = np.full(capacity, -1, np.int64)
+        self._device_us = np.zeros(capacity, np.int64)
+        self._t_ns = np.zeros(capacity, np.int64)
+        self._values = np.zeros((n, capacity))
+        self._quality = np.zeros((n, capacity), np.uint8)
+
+    def add(self, block: SampleBlock) -> None:
+        """Keep the samples of a block, in place of those `capacity` before them."""
+        keep = slice(max(0, len(block) - self.capacity), len(block))
+        seq = np.arange(block.seq, block.seq + len(block))[keep]
+        rows = seq % self.capacity
+        self._seq[rows] = seq
+        self._device_us[rows] = block.device_us[keep]
+        self._t_ns[rows] = block.t_ns[keep]
+        for values, quality, channel in zip(
+            self._values, self._quality, block.channels, strict=True
+        ):
+            values[rows] = channel.values[keep]
+            if len(channel.quality):
+                quality[rows] = channel.quality[keep]
+        self.newest = max(self.newest, block.seq + len(block) - 1)
+
+    def reply(self, ask: Ask) -> RingReply:
+        """What is kept of the samples asked for, as far as one reply goes."""
+        last = min(ask.last, self.newest)
+        first = min(max(ask.first, self.newest - self.capacity + 1, 0), last + 1)
+        # Where the request reaches back further than the ring, what is too old is settled as well.
+        last = min(last, first + SAMPLES_PER_REPLY - 1)
+        seq = np.arange(first, last + 1)
+        runs = _runs(seq[self._seq[seq % self.capacity] == seq])
+        if len(runs) > RUNS_PER_REPLY:
+            runs = runs[:RUNS_PER_REPLY]
+            last = int(runs[-1][-1])
+        return RingReply(self.boot, last, tuple(self._block(run) for run in runs))
+
+    def _block(self, seq: NDArray[np.int64]) -> SampleBlock:
+        rows = seq % self.capacity
+        channels = tuple(
+            Column(
+                name,
+                unit,
+                self._values[i, rows],
+                self._quality[i, rows] if judged else np.zeros(0, np.uint8),
+            )
+            for i, (name, unit, judged) in enumerate(self.layout)
+        )
+        first = int(seq[0])
+        return SampleBlock(
+            self.device, self.boot, first, self._device_us[rows], self._t_ns[rows], channels
+        )
+
+
+def _layout(block: SampleBlock) -> tuple[tuple[str, str, bool], ...]:
+    return tuple((c.name, c.unit, bool(len(c.quality))) for c in block.channels)
+
+
+def _runs(seq: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Stretches of consecutive numbers."""
+    if not len(seq):
+        return []
+    return np.split(seq, np.flatnonzero(np.diff(seq) != 1) + 1)
+
+
+class SampleRing:
+    """The rings of the present boot and of the one before, served on the bus.
+
+    Args:
+        bus: where readers ask.
+        capacity: samples kept of each boot.
+    """
+
+    def __init__(self, bus: Bus, capacity: int) -> None:
+        self._bus = bus
+        self._capacity = capacity
+        self._stores: list[RingStore] = []
+        self._lock = threading.Lock()
+        self._withdraw: Close = lambda: None
+        self._close = bus.serve(RING_KEY, self._answer)
+
+    def add(self, block: SampleBlock) -> None:
+        """Keep a block; to be called before the block is published."""
+        if not len(block):
+            return
+        if not self._stores or self._stores[-1].boot != block.boot:
+            self._start(block)
+        with self._lock:
+            if self._stores[-1].layout != _layout(block):
+                self._stores[-1] = RingStore(block, self._capacity)
+            self._stores[-1].add(block)
+
+    def _start(self, head: SampleBlock) -> None:
+        self._withdraw()
+        with self._lock:
+            self._stores = [*self._stores[-1:], RingStore(head, self._capacity)]
+        self._withdraw = self._bus.declare_token(f"{SOURCE_KEY}/{head.boot}/{time.time_ns()}")
+
+    def _answer(self, question: bytes) -> list[bytes]:
+        ask = Ask.from_bytes(question)
+        with self._lock:
+            known = [store for store in self._stores if store.boot == ask.boot]
+            reply = known[-1].reply(ask) if known else RingReply(ask.boot, UNKNOWN, ())
+        return [reply.to_bytes()]
+
+    def close(self) -> None:
+        """Serve no more and give up control."""
+        self._withdraw()
+        self._close()

@@ -1,0 +1,346 @@
+"""Samples in order, none twice, none silently missing: the logic of a reader, without clock or bus.
+
+Blocks may come late, twice, in any order, or not at all; replies of the ring fill the holes. Each
+sample of the source in control leaves as exactly one of
+
+    SampleBlock    delivered, in the order of `seq`, boot after boot
+    Loss           known to be gone for ever
+
+beside which the logic asks for what it misses (`Ask`) and remarks on what happened (`Remark`). A
+block that comes in order leaves in the same call: only those wait that stand behind a hole.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+from rigwatch.wire.delivery.ring_protocol import OPEN, UNKNOWN, Ask, RingReply
+from rigwatch.wire.delivery.source_arbitration import Sources
+from rigwatch.wire.messages import SampleBlock, Severity, cut, unseen
+
+TRIES = 5
+"""Questions left unanswered, while newer samples come, before a hole is given up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """Samples `first` to `last` of a boot will never come; `last` below `first`: unknown number."""
+
+    boot: int
+    first: int
+    last: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """Something worth a line in the log."""
+
+    severity: Severity
+    code: str
+    text: str
+
+
+Outcome = SampleBlock | Loss | Ask | Remark
+
+
+@dataclass(slots=True)
+class Counters:
+    """What became of the samples so far.
+
+    Attributes:
+        delivered: samples delivered, recovered ones among them.
+        recovered: samples that the ring had to give.
+        lost: samples known to be gone.
+        duplicates: samples dropped because they had been delivered or given up before.
+        foreign: samples dropped because their source has no control.
+    """
+
+    delivered: int = 0
+    recovered: int = 0
+    lost: int = 0
+    duplicates: int = 0
+    foreign: int = 0
+
+
+class Stream:
+    """The samples of one boot: what comes next, and blocks that wait for those before them.
+
+    Attributes:
+        next: number of the sample that is due.
+        promised_from: a sample before this one that is missing is no loss, the reader only tried.
+        ended: another boot has control, so that this one only has an end to be asked for.
+    """
+
+    def __init__(self, boot: int, next_seq: int, promised_from: int = 0) -> None:
+        self.boot = boot
+        self.next = next_seq
+        self.promised_from = promised_from
+        self.ended = False
+        self.waiting: dict[int, SampleBlock] = {}
+        self.samples_waiting = 0
+
+    def hold(self, block: SampleBlock) -> None:
+        """Keep a block until its turn; of two with the same start the longer."""
+        known = self.waiting.get(block.seq)
+        if known is None or len(known) < len(block):
+            self.samples_waiting += len(block) - (len(known) if known else 0)
+            self.waiting[block.seq] = block
+
+    def first_waiting(self) -> int:
+        """The lowest number among the waiting blocks; OPEN where none waits."""
+        return min(self.waiting, default=OPEN)
+
+    def take(self) -> SampleBlock:
+        """The waiting block with the lowest number."""
+        block = self.waiting.pop(min(self.waiting))
+        self.samples_waiting -= len(block)
+        return block
+
+
+class SampleOrder:
+    """Turns what arrives into samples in order and reported losses.
+
+    Args:
+        resume_after: (boot, seq) of the last sample that an earlier run has dealt with: everything
+            after it is delivered, recovered or reported.
+        history: samples before those that are asked for too, as many of them as the ring still has;
+            on joining without `resume_after`, samples before the first one heard.
+        capacity: samples that may wait behind a hole before it is given up.
+    """
+
+    def __init__(
+        self,
+        resume_after: tuple[int, int] | None = None,
+        history: int = 0,
+        capacity: int = 65536,
+    ) -> None:
+        self.counters = Counters()
+        self.sources = Sources()
+        self._history = history
+        self._capacity = capacity
+        self._line: deque[Stream] = deque()
+        self._settled_boots: dict[int, int] = {}
+        self._asked: Ask | None = None
+        self._unanswered = 0
+        self._heard_since_ask = False
+        self._out: list[Outcome] = []
+        if resume_after is not None:
+            # Taken for alive until the tokens that are there have been listed.
+            self.sources.appeared(resume_after[0], 0)
+            boot, seq = resume_after[0], resume_after[1] + 1
+            self._control(Stream(boot, max(0, seq - history), promised_from=seq))
+
+    def on_block(self, block: SampleBlock) -> list[Outcome]:
+        """A block was received from the bus."""
+        if len(block):
+            self._admit(block)
+        return self._outcomes()
+
+    def on_reply(self, ask: Ask, reply: RingReply | None) -> list[Outcome]:
+        """The ring replied to `ask`, or nobody did (None)."""
+        if ask == self._asked:
+            self._asked = None
+            if reply is None:
+                self._nobody_replied(ask)
+            else:
+                self._settle(ask, reply)
+        return self._outcomes()
+
+    def on_token(self, boot: int, since_ns: int, alive: bool) -> list[Outcome]:
+        """A source's liveliness token came or went."""
+        if alive:
+            self.sources.appeared(boot, since_ns)
+        else:
+            self._vanished(boot, since_ns)
+        return self._outcomes()
+
+    def on_silence(self) -> list[Outcome]:
+        """Nothing has come for a while: what was missed at the end has no successor to show it."""
+        self._change_control(self.sources.fell_silent())
+        if self._line and self._asked is None and not self._line[0].ended:
+            self._ask(Ask(self._line[0].boot, self._line[0].next, OPEN))
+        return self._outcomes()
+
+    @property
+    def position(self) -> tuple[int, int] | None:
+        """(boot, seq) of the last sample dealt with; None before the first."""
+        return (self._line[0].boot, self._line[0].next - 1) if self._line else None
+
+    # ---- which source -------------------------------------------------------------------
+
+    def _admit(self, block: SampleBlock) -> None:
+        verdict = self.sources.judge(block)
+        if verdict.remark:
+            self._out.append(Remark("error", "DUPLICATE SOURCE", verdict.remark))
+        if verdict.control_from is not None:
+            self._change_control((block.boot, verdict.control_from))
+        stream = self._stream(block.boot)
+        if stream is None:
+            self._drop(block)
+            return
+        self._heard_since_ask = True
+        self._store(stream, block)
+
+    def _drop(self, block: SampleBlock) -> None:
+        if block.seq + len(block) <= self._settled_boots.get(block.boot, 0):
+            self.counters.duplicates += len(block)
+        else:
+            self.counters.foreign += len(block)
+
+    def _vanished(self, boot: int, since_ns: int) -> None:
+        skipped = self.sources.vanished(boot, since_ns)
+        if skipped is not None:
+            self._lose(boot, *skipped, "another source had control")
+        self._change_control(self.sources.successor())
+
+    def _change_control(self, successor: tuple[int, int] | None) -> None:
+        if successor is None:
+            return
+        boot, seq = successor
+        if not self._line:
+            self._join(boot, seq)
+            return
+        self._line[-1].ended = True
+        self._out.append(Remark("warning", "SOURCE RESTARTED", f"boot {boot} has control now"))
+        resumed = self._resumed_at(boot)
+        skipped_from = self.sources.skipped_from(boot, resumed)
+        if skipped_from < seq:
+            self._lose(boot, skipped_from, seq - 1, "another source had control")
+        self._control(Stream(boot, max(seq, resumed)))
+
+    def _resumed_at(self, boot: int) -> int:
+        """Where a boot that had control before left off; 0 for a new one."""
+        stream = self._stream(boot)
+        if stream is None:
+            return self._settled_boots.pop(boot, 0)
+        if stream is self._line[0]:
+            self._asked = None
+        self._line.remove(stream)
+        return stream.next
+
+    def _join(self, boot: int, seq: int) -> None:
+        self._control(Stream(boot, max(0, seq - self._history), promised_from=seq))
+        self._out.append(Remark("info", "JOINED", f"joined boot {boot} at seq {seq}"))
+
+    def _control(self, stream: Stream) -> None:
+        self._line.append(stream)
+        self.sources.take_control(stream.boot)
+
+    def _stream(self, boot: int) -> Stream | None:
+        return next((stream for stream in self._line if stream.boot == boot), None)
+
+    # ---- order within the sources in line -----------------------------------------------
+
+    def _store(self, stream: Stream, block: SampleBlock) -> None:
+        fresh = unseen(block, stream.next)
+        self.counters.duplicates += len(block) - (len(fresh) if fresh else 0)
+        if fresh is None:
+            return
+        if fresh.seq == stream.next and stream is self._line[0] and not stream.waiting:
+            self._deliver(stream, fresh)
+        else:
+            stream.hold(fresh)
+
+    def _deliver(self, stream: Stream, block: SampleBlock) -> None:
+        fresh = unseen(block, stream.next)
+        if fresh is not None:
+            stream.next = fresh.seq + len(fresh)
+            self.counters.delivered += len(fresh)
+            self._out.append(fresh)
+
+    def _lose(self, boot: int, first: int, last: int, reason: str) -> None:
+        self.counters.lost += max(0, last - first + 1)
+        self._out.append(Loss(boot, first, last, reason))
+
+    def _outcomes(self) -> list[Outcome]:
+        self._advance()
+        done, self._out = self._out, []
+        return done
+
+    def _advance(self) -> None:
+        while self._line:
+            front = self._line[0]
+            self._release(front)
+            if self._asked is not None:
+                return
+            if front.waiting:
+                self._ask(Ask(front.boot, front.next, front.first_waiting() - 1))
+            elif front.ended:
+                self._ask(Ask(front.boot, front.next, OPEN))
+            else:
+                return
+
+    def _release(self, front: Stream) -> None:
+        """Deliver the waiting blocks whose turn it is, or that have become too many."""
+        while front.waiting:
+            if front.samples_waiting > self._capacity:
+                self._skip(front, front.first_waiting() - 1, "too many samples waited behind them")
+                self._asked = None
+            if front.first_waiting() > front.next:
+                return
+            self._deliver(front, front.take())
+
+    # ---- the ring -----------------------------------------------------------------------
+
+    def _ask(self, ask: Ask) -> None:
+        self._asked = ask
+        self._heard_since_ask = False
+        self._out.append(ask)
+
+    def _settle(self, ask: Ask, reply: RingReply) -> None:
+        front = self._line[0]
+        self._unanswered = 0
+        if reply.settled == UNKNOWN or (reply.settled < ask.first and ask.last != OPEN):
+            self._give_up(front, ask, "the source has restarted since")
+            return
+        for block in reply.blocks:
+            before = self.counters.delivered
+            self._skip(front, min(block.seq, ask.last + 1) - 1, "the ring no longer has them")
+            self._take_recovered(front, block, ask.last)
+            self.counters.recovered += self.counters.delivered - before
+        self._skip(front, min(reply.settled, ask.last), "the ring no longer has them")
+        if ask.last == OPEN and front.ended and not self._progressed(ask, front):
+            self._leave(front)
+
+    def _take_recovered(self, front: Stream, block: SampleBlock, last: int) -> None:
+        wanted = cut(block, 0, max(0, min(len(block), last + 1 - block.seq)))
+        if len(wanted) and block.seq <= front.next:
+            self._deliver(front, wanted)
+
+    def _progressed(self, ask: Ask, front: Stream) -> bool:
+        return front.next > ask.first or bool(front.waiting)
+
+    def _skip(self, front: Stream, last: int, reason: str) -> None:
+        """Everything up to `last` that does not wait here is lost."""
+        while front.next <= last:
+            hole_end = min(last, front.first_waiting() - 1)
+            if front.next <= hole_end:
+                self._miss(front, hole_end, reason)
+            elif front.waiting:
+                self._deliver(front, front.take())
+
+    def _miss(self, front: Stream, last: int, reason: str) -> None:
+        if last >= front.promised_from:
+            self._lose(front.boot, max(front.next, front.promised_from), last, reason)
+        front.next = last + 1
+
+    def _nobody_replied(self, ask: Ask) -> None:
+        # Silence all round is a broken link: the ring is still there when it heals.
+        alone = not self._heard_since_ask and self.sources.is_alive(ask.boot)
+        self._unanswered += 0 if alone else 1
+        if self._unanswered < TRIES and (ask.last != OPEN or self._line[0].ended):
+            self._ask(ask)
+            return
+        self._unanswered = 0
+        self._give_up(self._line[0], ask, "nobody could be asked for them")
+
+    def _give_up(self, front: Stream, ask: Ask, reason: str) -> None:
+        if ask.last != OPEN:
+            self._skip(front, ask.last, reason)
+        elif front.ended:
+            self._lose(front.boot, front.next, front.next - 1, reason)
+            self._leave(front)
+
+    def _leave(self, front: Stream) -> None:
+        self._settled_boots[front.boot] = front.next
+        self._line.popleft()

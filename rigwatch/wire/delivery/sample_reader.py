@@ -1,0 +1,253 @@
+"""Reads a rig's samples from the bus: each is delivered, recovered or reported as a gap.
+
+    bus ──blocks, tokens──▶ inbox ──▶ SampleOrder ──▶ blocks and gaps in order
+                              ▲            │ Ask
+                              └──replies── questions, asked in a thread of their own
+
+All logic is in `sample_order.py`; a block in order goes straight through, in the thread that reads.
+"""
+
+import contextlib
+import threading
+import time
+from queue import Empty, SimpleQueue
+
+from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus
+from rigwatch.wire.delivery.ring import SOURCE_KEY
+from rigwatch.wire.delivery.ring_protocol import Ask, RingReply
+from rigwatch.wire.delivery.sample_order import Counters, Loss, Outcome, Remark, SampleOrder
+from rigwatch.wire.errors import BusError, MessageError
+from rigwatch.wire.messages import (
+    EVENTS,
+    GAPS,
+    RING_KEY,
+    SAMPLES,
+    Event,
+    Gap,
+    SampleBlock,
+    concatenate,
+    continues,
+    decode,
+)
+
+SILENCE = 1.0
+"""Time without a sample after which the ring is asked whether it has more [s]."""
+REPLY_TIMEOUT = 1.0
+PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
+"""Waits before a question that nobody answered goes out again [s]."""
+
+Item = SampleBlock | Gap | Event
+_Incoming = bytes | tuple[int, int, bool] | tuple[Ask, RingReply | None]
+
+
+class SampleReader:
+    """One reader of the samples; not to be shared between threads.
+
+    Gaps and events are returned by `read` in their place among the samples, and published too.
+
+    Args:
+        bus: where the samples are; `bus.process` is named in gaps and events.
+        resume_after: (boot, seq) of the last sample that an earlier run of this process has dealt
+            with, so that none after it goes missing.
+        history: samples before those (or before the first one heard) that are wanted too, as far as
+            the ring has them; that some are missing there is no gap.
+        capacity: messages that wait for a slow reader before further ones are left to the ring.
+
+    Attributes:
+        heard: whether a sample block was ever received.
+        rejected: payloads that were no sample blocks.
+        dropped: payloads left to the ring because the inbox was full.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        resume_after: tuple[int, int] | None = None,
+        history: int = 0,
+        capacity: int = QUEUE_CAPACITY,
+    ) -> None:
+        self.heard = False
+        self.rejected = 0
+        self.dropped = 0
+        self._bus = bus
+        self._order = SampleOrder(resume_after, history)
+        self._capacity = capacity
+        self._inbox: SimpleQueue[_Incoming] = SimpleQueue()
+        self._questions: SimpleQueue[Ask | None] = SimpleQueue()
+        self._heard_at = self._silence_told_at = time.monotonic()
+        self._latest_ns = 0
+        self._device = ""
+        self._closed = False
+        self._ready: list[Item] = []
+        self._start(resume_after)
+
+    def _start(self, resume_after: tuple[int, int] | None) -> None:
+        for key in self._bus.tokens(f"{SOURCE_KEY}/*/*"):
+            self._token(key, True)
+        if resume_after is not None:
+            self._inbox.put((resume_after[0], 0, False))
+        self._closers = [
+            self._bus.watch_tokens(f"{SOURCE_KEY}/*/*", self._token),
+            self._bus.transport.listen(self._bus.key(SAMPLES.key), self._receive),
+        ]
+        threading.Thread(target=self._ask_on, name="ring-questions", daemon=True).start()
+
+    def __len__(self) -> int:
+        return self._inbox.qsize()
+
+    @property
+    def counters(self) -> Counters:
+        """What became of the samples so far."""
+        return self._order.counters
+
+    @property
+    def position(self) -> tuple[int, int] | None:
+        """(boot, seq) of the last sample returned or reported; None before the first."""
+        return self._order.position
+
+    @property
+    def contested(self) -> bool:
+        """Whether a second source sends samples beside the one that is read."""
+        return self._order.sources.contested
+
+    def silent_for(self) -> float:
+        """Time since a sample was received, or since the start [s]."""
+        return time.monotonic() - self._heard_at
+
+    def read(self, timeout: float) -> list[Item]:
+        """What has come since the last call, in order; waits up to `timeout` [s] for something.
+
+        Consecutive blocks are joined: one that is behind gets fewer and longer blocks.
+        """
+        deadline = time.monotonic() + timeout
+        while not self._ready:
+            left = deadline - time.monotonic()
+            try:
+                self._take(self._inbox.get(block=left > 0, timeout=max(left, 0)))
+            except Empty:
+                break
+        for _ in range(self._inbox.qsize()):
+            self._take(self._inbox.get_nowait())
+        self._check_silence()
+        items, self._ready = self._ready, []
+        return joined(items)
+
+    def close(self) -> None:
+        """Read no more."""
+        self._closed = True
+        for close in self._closers:
+            close()
+        self._questions.put(None)
+
+    # ---- called in the bus's threads ----------------------------------------------------
+
+    def _receive(self, payload: bytes) -> None:
+        if len(payload) > MAX_PAYLOAD:
+            self.rejected += 1
+        elif self._inbox.qsize() >= self._capacity:
+            self.dropped += 1
+        else:
+            self._inbox.put(payload)
+
+    def _token(self, key: str, alive: bool) -> None:
+        with contextlib.suppress(ValueError):
+            _, boot, since_ns = key.split("/")
+            self._inbox.put((int(boot), int(since_ns), alive))
+
+    # ---- called in the reader's thread --------------------------------------------------
+
+    def _take(self, incoming: _Incoming) -> None:
+        if isinstance(incoming, bytes):
+            self._take_block(incoming)
+        elif len(incoming) == 3:
+            self._handle(self._order.on_token(*incoming))
+        else:
+            self._handle(self._order.on_reply(*incoming))
+
+    def _take_block(self, payload: bytes) -> None:
+        try:
+            block = decode(SampleBlock, payload)
+        except MessageError:
+            self.rejected += 1
+            return
+        self.heard = True
+        self._heard_at = self._silence_told_at = time.monotonic()
+        self._handle(self._order.on_block(block))
+
+    def _check_silence(self) -> None:
+        now = time.monotonic()
+        if now - max(self._heard_at, self._silence_told_at) > SILENCE:
+            self._silence_told_at = now
+            self._handle(self._order.on_silence())
+
+    def _handle(self, outcomes: list[Outcome]) -> None:
+        for outcome in outcomes:
+            if isinstance(outcome, SampleBlock):
+                self._device, self._latest_ns = outcome.device, int(outcome.t_ns[-1])
+                self._ready.append(outcome)
+            elif isinstance(outcome, Ask):
+                self._questions.put(outcome)
+            elif isinstance(outcome, Loss):
+                self._report_gap(outcome)
+            else:
+                self._report_event(outcome)
+
+    def _report_event(self, remark: Remark) -> None:
+        name, now_ns = self._bus.process, time.time_ns()
+        self._report(Event(name, now_ns, remark.severity, remark.code, remark.text))
+
+    def _report_gap(self, loss: Loss) -> None:
+        gap = Gap(
+            self._device,
+            loss.boot,
+            loss.first,
+            loss.last,
+            self._latest_ns or time.time_ns(),
+            self._bus.process,
+            loss.reason,
+        )
+        self._report(gap)
+
+    def _report(self, item: Gap | Event) -> None:
+        self._ready.append(item)
+        self._bus.publish(GAPS if isinstance(item, Gap) else EVENTS, item)
+
+    # ---- the thread that asks -----------------------------------------------------------
+
+    def _ask_on(self) -> None:
+        last: Ask | None = None
+        repeats = 0
+        while (ask := self._questions.get()) is not None:
+            repeats = repeats + 1 if ask == last else 0
+            last = ask
+            if repeats:
+                time.sleep(PAUSES[min(repeats, len(PAUSES)) - 1])
+            self._inbox.put((ask, self._asked(ask)))
+
+    def _asked(self, ask: Ask) -> RingReply | None:
+        """The reply of the ring that knows most; None where none replied."""
+        while not (self._bus.connected() or self._closed):
+            time.sleep(0.1)
+        replies = []
+        with contextlib.suppress(BusError):
+            for data in self._bus.query(RING_KEY, ask.to_bytes(), REPLY_TIMEOUT):
+                with contextlib.suppress(MessageError):
+                    replies.append(RingReply.from_bytes(data))
+        own = [reply for reply in replies if reply.boot == ask.boot]
+        return max(own, key=lambda reply: reply.settled, default=None)
+
+
+def joined(items: list[Item]) -> list[Item]:
+    """The same items with consecutive sample blocks joined."""
+    done: list[Item] = []
+    run: list[SampleBlock] = []
+    for item in items:
+        if isinstance(item, SampleBlock) and (not run or continues(run[-1], item)):
+            run.append(item)
+            continue
+        if run:
+            done.append(concatenate(run))
+        run = [item] if isinstance(item, SampleBlock) else []
+        if not isinstance(item, SampleBlock):
+            done.append(item)
+    return [*done, concatenate(run)] if run else done

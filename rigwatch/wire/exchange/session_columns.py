@@ -1,0 +1,93 @@
+"""Our own tables: one row a sample, in columns whose titles carry names and units.
+
+    boot, seq, t_ns [ns], device_us [us], voltage [V], voltage quality, …
+
+`device_us` stands in tables of samples only. `export` writes them, and reading one back gives the
+same blocks.
+"""
+
+import re
+from typing import Any
+
+import numpy as np
+
+from rigwatch.wire.exchange.tables import Table
+from rigwatch.wire.messages import Block, Column, EstimateBlock, SampleBlock, columns_of
+
+BOOT, SEQ, T_NS, DEVICE_US = "boot", "seq", "t_ns [ns]", "device_us [us]"
+QUALITY = " quality"
+_TITLE = re.compile(r"^(?P<name>.*) \[(?P<unit>[^\[\]]*)\]$", re.DOTALL)
+Array = np.ndarray[Any, Any]
+
+
+def title(column: Column) -> str:
+    """The column's title, with its unit."""
+    return f"{column.name} [{column.unit}]"
+
+
+def table_columns(block: Block) -> dict[str, Array]:
+    """The block as columns of a table, by title; all of its length."""
+    count = len(block)
+    found: dict[str, Array] = {
+        BOOT: np.full(count, block.boot, np.int64),
+        SEQ: np.arange(block.seq, block.seq + count, dtype=np.int64),
+        T_NS: block.t_ns,
+    }
+    if isinstance(block, SampleBlock):
+        found[DEVICE_US] = block.device_us
+    for column in columns_of(block):
+        found[title(column)] = column.values
+        if len(column.quality):
+            found[column.name + QUALITY] = column.quality
+    return found
+
+
+def is_native(table: Table) -> bool:
+    """Whether the table has the columns that only ours has."""
+    return {BOOT, SEQ, T_NS} <= set(table.names)
+
+
+def native_blocks(table: Table, device: str) -> list[SampleBlock] | list[EstimateBlock]:
+    """The blocks of a table of ours: one for each run of consecutive samples.
+
+    Raises:
+        ImportDataError: a cell is not what its column holds; file, line and column are named.
+    """
+    boot, seq, t_ns = (table.integers(name) for name in (BOOT, SEQ, T_NS))
+    columns = tuple(_columns(table))
+    breaks = np.flatnonzero((np.diff(seq) != 1) | (np.diff(boot) != 0)) + 1
+    spans = [slice(a, b) for a, b in zip([0, *breaks], [*breaks, len(seq)], strict=True)]
+    if DEVICE_US not in table.names:
+        return [
+            EstimateBlock(device, int(boot[s.start]), int(seq[s.start]), t_ns[s], _cut(columns, s))
+            for s in spans
+        ]
+    device_us = table.integers(DEVICE_US)
+    return [
+        SampleBlock(
+            device, int(boot[s.start]), int(seq[s.start]), device_us[s], t_ns[s], _cut(columns, s)
+        )
+        for s in spans
+    ]
+
+
+def _columns(table: Table) -> list[Column]:
+    found = []
+    for name in table.names:
+        match = _TITLE.match(name)
+        if match is None or name in (T_NS, DEVICE_US):
+            continue
+        values = table.numbers(name, allow_missing=True)
+        flags = match["name"] + QUALITY
+        marks = (
+            table.integers(flags).astype(np.uint8) if flags in table.names else np.zeros(0, "u1")
+        )
+        found.append(Column(match["name"], match["unit"], values, marks))
+    return found
+
+
+def _cut(columns: tuple[Column, ...], part: slice) -> tuple[Column, ...]:
+    return tuple(
+        Column(column.name, column.unit, column.values[part], column.quality[part])
+        for column in columns
+    )

@@ -1,0 +1,17 @@
+"""What a process asks of its machine: heartbeat to systemd, real-time priority, ports."""
+
+from rigwatch.wire.host.heartbeat import Heartbeat
+from rigwatch.wire.host.ports import endpoint_address, free_port, is_free
+from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
+
+__all__ = [
+    "DAQ",
+    "MONITOR",
+    "ROUTER",
+    "Heartbeat",
+    "endpoint_address",
+    "free_port",
+    "is_free",
+    "prepare_for_real_time",
+    "raise_priority",
+]

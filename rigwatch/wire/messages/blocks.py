@@ -1,0 +1,150 @@
+"""Blocks of samples or estimates cut, joined and put in order, without touching a single value.
+
+A block holds consecutive samples `seq`, `seq + 1`, … of one boot of one device. Two blocks are
+joined only where the second goes on where the first ended and has the same columns; everything else
+stays apart.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
+
+Block = SampleBlock | EstimateBlock
+B = TypeVar("B", SampleBlock, EstimateBlock)
+
+
+def columns_of(block: Block) -> tuple[Column, ...]:
+    """The block's columns, whichever kind of block it is."""
+    return block.channels if isinstance(block, SampleBlock) else block.columns
+
+
+def continues(first: Block, second: Block) -> bool:
+    """Whether `second` begins with the sample after `first`, with the same columns."""
+    return (
+        second.seq == first.seq + len(first)
+        and second.boot == first.boot
+        and second.device == first.device
+        and type(second) is type(first)
+        and _same_layout(columns_of(first), columns_of(second))
+    )
+
+
+def _same_layout(first: Sequence[Column], second: Sequence[Column]) -> bool:
+    return len(first) == len(second) and all(
+        a.name == b.name and a.unit == b.unit and bool(len(a.quality)) == bool(len(b.quality))
+        for a, b in zip(first, second, strict=True)
+    )
+
+
+def concatenate(blocks: Sequence[B]) -> B:
+    """One block of all samples of `blocks`, each of which continues the one before.
+
+    Raises:
+        ValueError: there is no block, or one does not continue the one before.
+    """
+    if not blocks:
+        raise ValueError("no block to concatenate")
+    for first, second in pairwise(blocks):
+        if not continues(first, second):
+            raise ValueError(f"the block at seq {second.seq} does not continue the one before it")
+    return blocks[0] if len(blocks) == 1 else _joined(blocks)
+
+
+def _joined(blocks: Sequence[B]) -> B:
+    parts = zip(*(columns_of(block) for block in blocks), strict=True)
+    columns = tuple(_joined_column(part) for part in parts)
+    head, t_ns = blocks[0], np.concatenate([block.t_ns for block in blocks])
+    if isinstance(head, SampleBlock):
+        device_us = np.concatenate([block.device_us for block in blocks])
+        return SampleBlock(head.device, head.boot, head.seq, device_us, t_ns, columns)
+    return EstimateBlock(head.device, head.boot, head.seq, t_ns, columns)
+
+
+def _joined_column(parts: Sequence[Column]) -> Column:
+    values = np.concatenate([part.values for part in parts])
+    quality = np.concatenate([part.quality for part in parts])
+    return Column(parts[0].name, parts[0].unit, values, quality)
+
+
+def cut(block: B, first: int, last: int) -> B:
+    """Samples `first` to `last - 1` of the block, counted from 0; views, no copies."""
+    part = slice(first, last)
+    columns = tuple(
+        Column(column.name, column.unit, column.values[part], column.quality[part])
+        for column in columns_of(block)
+    )
+    seq, t_ns = block.seq + first, block.t_ns[part]
+    if isinstance(block, SampleBlock):
+        return SampleBlock(block.device, block.boot, seq, block.device_us[part], t_ns, columns)
+    return EstimateBlock(block.device, block.boot, seq, t_ns, columns)
+
+
+def pieces(block: B, size: int) -> Iterator[B]:
+    """The block in pieces of at most `size` samples."""
+    if len(block) <= size:
+        yield block
+        return
+    for first in range(0, len(block), size):
+        yield cut(block, first, min(first + size, len(block)))
+
+
+def between(block: B, start: int | None, end: int | None) -> B | None:
+    """The part of the block whose time stamps lie in [start, end) [ns], None where it is empty.
+
+    Where the clock stepped inside the block, samples between two that belong to the part are kept.
+    """
+    if not len(block):
+        return None
+    inside = _inside(block.t_ns, start, end)
+    if inside.all():
+        return block
+    chosen = np.flatnonzero(inside)
+    return cut(block, int(chosen[0]), int(chosen[-1]) + 1) if len(chosen) else None
+
+
+def _inside(t_ns: NDArray[np.int64], start: int | None, end: int | None) -> NDArray[np.bool_]:
+    inside = np.ones(len(t_ns), bool)
+    if start is not None:
+        inside &= t_ns >= start
+    if end is not None:
+        inside &= t_ns < end
+    return inside
+
+
+def merged(blocks: Iterable[B], size: int) -> Iterator[B]:
+    """Blocks of `size` samples and a little more, in which no gap is bridged.
+
+    A block that does not continue the one before starts a new one, so that every gap, restart of
+    the device and change of columns falls between two blocks. Memory is that of one merged block,
+    whose arrays are its own.
+    """
+    run: list[B] = []
+    length = 0
+    for block in blocks:
+        if not len(block):
+            continue
+        if run and (length >= size or not continues(run[-1], block)):
+            yield _joined(run)
+            run, length = [], 0
+        run.append(block)
+        length += len(block)
+    if run:
+        yield _joined(run)
+
+
+def unseen(block: B, next_seq: int | None) -> B | None:
+    """The part of the block from `next_seq` on; None where all was seen before."""
+    if next_seq is None or block.seq >= next_seq:
+        return block
+    known = next_seq - block.seq
+    return cut(block, known, len(block)) if known < len(block) else None
+
+
+def owned(block: B) -> B:
+    """The same block with arrays of its own: aligned and writable."""
+    return _joined([block])

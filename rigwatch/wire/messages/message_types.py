@@ -1,0 +1,280 @@
+"""What the processes say to each other, and what a session file keeps: one declaration a message.
+
+Every message is a frozen dataclass. Its protobuf schema is built from the annotations
+(`schema.py`), so that the bus and the session files carry the same bytes and any protobuf or MCAP
+tool can read them. A field's number on the wire is its place in the class: new fields go to the
+end, none is removed or moved.
+
+Time stamps `t_ns` are Unix time in nanoseconds, taken from the device's clock mapped to host time.
+Samples and everything computed from them carry `(boot, seq)`: `boot` is drawn anew by the device at
+each start, `seq` counts its samples from 0.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.wire.messages.quality_flags import valid
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+ByteArray = NDArray[np.uint8]
+
+Severity = Literal["info", "warning", "error", "critical"]
+AlarmState = Literal["normal", "unacknowledged", "acknowledged", "cleared_unacknowledged"]
+"""States of ISA-18.2: active and not yet seen, active and seen, gone before it was seen."""
+AlarmAction = Literal["acknowledge", "reset", "shelve", "unshelve"]
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One signal over the samples of a block.
+
+    Attributes:
+        name: channel or signal name, such as "voltage".
+        unit: SI unit, "" for a pure number.
+        values: shape (n,).
+        quality: shape (n,), flags of `quality.py`; empty where the signal has none.
+    """
+
+    name: str
+    unit: str
+    values: FloatArray
+    quality: ByteArray = field(default_factory=lambda: np.zeros(0, np.uint8))
+
+    def usable(self) -> FloatArray:
+        """The values, NaN where they are invalid or no numbers; shape (n,)."""
+        good = np.isfinite(self.values)
+        if len(self.quality):
+            good &= valid(self.quality)
+        return np.where(good, self.values, np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class SampleBlock:
+    """Consecutive samples of one device: `seq`, `seq + 1`, … `seq + n - 1`.
+
+    Attributes:
+        device: the device's name in the configuration.
+        boot: drawn by the device at its start.
+        seq: number of the first sample.
+        device_us: shape (n,), device clock, unwrapped [µs].
+        t_ns: shape (n,), Unix time [ns].
+        channels: calibrated signals in SI units, each of length n.
+    """
+
+    device: str
+    boot: int
+    seq: int
+    device_us: IntArray
+    t_ns: IntArray
+    channels: tuple[Column, ...]
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+    def channel(self, name: str) -> Column:
+        """The channel called `name`; KeyError where the device has none."""
+        for column in self.channels:
+            if column.name == name:
+                return column
+        raise KeyError(name)
+
+
+@dataclass(frozen=True, slots=True)
+class EstimateBlock:
+    """What the monitor computed for consecutive samples.
+
+    Attributes:
+        device: the device whose samples these were.
+        boot: boot of those samples.
+        seq: number of the first sample.
+        t_ns: shape (n,), time of the samples [ns].
+        columns: one column a published field, each of length n.
+    """
+
+    device: str
+    boot: int
+    seq: int
+    t_ns: IntArray
+    columns: tuple[Column, ...]
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+    def column(self, name: str) -> Column:
+        """The field called `name`; KeyError where there is none."""
+        for column in self.columns:
+            if column.name == name:
+                return column
+        raise KeyError(name)
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Samples that a reader knows it will never get: `first` to `last`, both lost.
+
+    `last` below `first` says that the number is unknown (the device restarted meanwhile).
+    """
+
+    device: str
+    boot: int
+    first: int
+    last: int
+    t_ns: int
+    reporter: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """How a process is doing, published about once a second.
+
+    Attributes:
+        source: the process, such as "daq/rig1".
+        t_ns: when this was said [ns].
+        state: one word for people: "running", "stale", "reconnecting", "stopped", …
+        text: one plain line, empty where all is well.
+        counters: figures by name, unit in the name (`rate_hz`, `lost_samples`, `crc_errors`).
+    """
+
+    source: str
+    t_ns: int
+    state: str
+    text: str
+    counters: Mapping[str, float]
+
+
+PROBABLY_MISSING = "PROBABLY MISSING"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened once and is worth a line in the log.
+
+    With the code `PROBABLY_MISSING` its text is an alarm's name, ": ", and what the ranking found.
+    """
+
+    source: str
+    t_ns: int
+    severity: Severity
+    code: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """One transition of one alarm.
+
+    Attributes:
+        name: the alarm, such as "dry_friction" or "link".
+        state: the state it is in from now on.
+        severity: how bad.
+        cause: what is probably wrong, in words.
+        guidance: what to do now, in words.
+        device, boot, seq, t_ns: the sample that decided; seq -1 where no sample did.
+        value, low, high: the figure and the limits it left; NaN where there are none.
+        first_out: it was the first of the flood it stands in.
+        user: who acted, for transitions by an operator.
+        onset_seq: the first sample at which the condition held; persistence lies between.
+    """
+
+    name: str
+    state: AlarmState
+    severity: Severity
+    cause: str
+    guidance: str
+    device: str
+    boot: int
+    seq: int
+    t_ns: int
+    value: float
+    low: float
+    high: float
+    first_out: bool
+    user: str
+    onset_seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmCommand:
+    """What an operator asks of an alarm; `name` "*" means all."""
+
+    name: str
+    action: AlarmAction
+    user: str
+    t_ns: int
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RunInfo:
+    """What a run was made with; written at the head of every session segment.
+
+    Attributes:
+        rig: the rig's id.
+        t_ns: start of the run [ns].
+        sample_rate_hz: nominal rate [Hz].
+        configuration: text of the configuration file.
+        configuration_sha256: its hash.
+        software: name and version of the writer.
+        notes: free text, such as where imported data came from and what was done to them.
+    """
+
+    rig: str
+    t_ns: int
+    sample_rate_hz: float
+    configuration: str
+    configuration_sha256: str
+    software: str
+    notes: str
+
+
+@dataclass(frozen=True, slots=True)
+class ModelChange:
+    """The monitor goes on with another model.
+
+    Attributes:
+        device, boot, seq: the first sample that is judged with it; seq 0 before any sample.
+        t_ns: later than the last sample before, not later than that one [ns].
+        user: who wanted it.
+        text: why, in words.
+        model: the model file's text.
+        previous: the text of the one before.
+    """
+
+    device: str
+    boot: int
+    seq: int
+    t_ns: int
+    user: str
+    text: str
+    model: str
+    previous: str
+
+
+Message = (
+    SampleBlock
+    | EstimateBlock
+    | Gap
+    | Health
+    | Event
+    | Alarm
+    | AlarmCommand
+    | RunInfo
+    | ModelChange
+)
+MESSAGE_TYPES: tuple[type[Message], ...] = (
+    SampleBlock,
+    EstimateBlock,
+    Gap,
+    Health,
+    Event,
+    Alarm,
+    AlarmCommand,
+    RunInfo,
+    ModelChange,
+)

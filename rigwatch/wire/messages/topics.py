@@ -1,0 +1,78 @@
+"""The one table of topics: name, key, message, publisher, rate, recorded or not."""
+
+from dataclasses import dataclass
+
+from rigwatch.wire.messages.message_types import (
+    Alarm,
+    AlarmCommand,
+    EstimateBlock,
+    Event,
+    Gap,
+    Health,
+    Message,
+    ModelChange,
+    RunInfo,
+    SampleBlock,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One line of the table.
+
+    Attributes:
+        name: what code and session files call it.
+        key: key on the bus below `rig/<id>/`, the same for every publisher of the topic.
+        message: class of its messages.
+        publisher: the process that says it.
+        rate_hz: messages a second at most in normal running [Hz]; 0 for now and then.
+        recorded: whether the recorder keeps it.
+    """
+
+    name: str
+    key: str
+    message: type[Message]
+    publisher: str
+    rate_hz: float
+    recorded: bool
+
+
+SAMPLES = Topic("samples", "daq/samples", SampleBlock, "daq", 256.0, recorded=True)
+ESTIMATES = Topic("estimates", "monitor/estimates", EstimateBlock, "monitor", 256.0, recorded=True)
+ALARMS = Topic("alarms", "monitor/alarms", Alarm, "monitor", 0.0, recorded=True)
+COMMANDS = Topic("commands", "monitor/commands", AlarmCommand, "operator", 0.0, recorded=True)
+GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True)
+HEALTH = Topic("health", "health", Health, "any", 1.0, recorded=True)
+EVENTS = Topic("events", "events", Event, "any", 0.0, recorded=True)
+RUN = Topic("run", "run", RunInfo, "recorder", 0.0, recorded=True)
+MODELS = Topic("models", "monitor/models", ModelChange, "monitor", 0.0, recorded=True)
+
+TOPICS: tuple[Topic, ...] = (
+    SAMPLES,
+    ESTIMATES,
+    ALARMS,
+    COMMANDS,
+    GAPS,
+    HEALTH,
+    EVENTS,
+    RUN,
+    MODELS,
+)
+
+RING_KEY = "daq/ring"
+"""Key of the adapter's ring of recent samples, asked by readers that miss some."""
+ALIVE_KEY = "alive"
+"""Liveliness tokens stand at `alive/<process>`."""
+
+
+def topic(name: str) -> Topic:
+    """The topic called `name`; KeyError where there is none."""
+    for line in TOPICS:
+        if line.name == name:
+            return line
+    raise KeyError(name)
+
+
+def bus_key(rig: str, key: str) -> str:
+    """The whole key on the bus, such as "rig/bench1/daq/samples"."""
+    return f"rig/{rig}/{key}"

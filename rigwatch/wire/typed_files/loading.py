@@ -1,0 +1,55 @@
+"""Typed TOML files: configuration, scenarios and models are structs.
+
+`load` reads a file into a msgspec struct. A key that is misspelt, missing, of the wrong type or out
+of range becomes a `ConfigError`: one line with file, line, key, what was found and what was
+expected.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files.explanation import explained
+
+S = TypeVar("S", bound="Section")
+
+
+class Section(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
+    """Base of every struct that is read from a TOML file: frozen, and unknown keys are errors."""
+
+
+def load(path: Path | str, kind: type[S]) -> S:
+    """The file at `path` as a struct of class `kind`.
+
+    Raises:
+        ConfigError: the file cannot be read, is not TOML, or does not fit `kind`.
+    """
+    return parse(_read(Path(path)), kind, path)
+
+
+def parse(text: str, kind: type[S], file: Path | str) -> S:
+    """The TOML `text` as a struct of class `kind`; `file` is named in errors.
+
+    Raises:
+        ConfigError: the text is not TOML or does not fit `kind`.
+    """
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(file, "", str(error), "TOML") from error
+    try:
+        return msgspec.convert(raw, kind)
+    except msgspec.ValidationError as error:
+        raise explained(str(error), raw, kind, text, file) from None
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(path, "", error.strerror or str(error), "a readable file") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(path, "", "bytes that are not UTF-8", "a TOML file") from error

@@ -1,0 +1,136 @@
+"""How small the error can become: what is noise, and how that is known.
+
+Best are repeated periods of the excitation: what differs from one to the next is noise. Next best
+is a recording with nothing wrong, which counts the model's own faults as well. Else the quietest
+band of the residual, taken for white noise, gives a lower limit.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import welch
+
+from rigwatch.physics.engine.compile import BoolArray, FloatArray
+from rigwatch.physics.engine.fit import Fit, Recording
+
+METHODS = {
+    "periods": "what differs between repeated periods of the excitation",
+    "healthy": "the error of the model on a recording with nothing wrong",
+    "quiet band": "the quietest band of the residual, taken for white noise: a lower limit",
+}
+ALLOWED = {"periods": 1.1, "healthy": 1.1, "quiet band": 1.25}
+"""Error over noise floor up to which nothing is left to explain, by how the floor is known."""
+BANDS = 8
+FEWEST_PERIODS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseFloor:
+    """Noise of each channel.
+
+    Attributes:
+        rms: in the channels' units, shape (outputs,).
+        method: key of `METHODS`.
+    """
+
+    rms: FloatArray
+    method: str
+
+    def ratio(self, fitted: Fit, at: BoolArray | None = None) -> float:
+        """Error over the floor, over all channels; `at` some samples, shape (windows, length)."""
+        rms = fitted.rms if at is None else fitted.rms_at(at)
+        return float(np.sqrt(np.mean((rms / self.rms) ** 2)))
+
+    def above(self, fitted: Fit) -> float:
+        """Share of the error's energy that is above the floor."""
+        return max(1 - self.ratio(fitted) ** -2, 0.0)
+
+    def reached(self, fitted: Fit) -> bool:
+        """Whether the error is as small as noise makes it."""
+        return self.ratio(fitted) <= ALLOWED[self.method]
+
+    def left_over(
+        self, before: Fit, after: Fit, at: BoolArray | None = None, *, tolerant: bool = False
+    ) -> float:
+        """Share of the energy above the floor that is left from one fit to a better one.
+
+        Args:
+            before, after: the fits.
+            at: samples that count, shape (windows, length); all if None.
+            tolerant: whether an error that counts as small as noise makes it leaves nothing.
+        """
+        least = ALLOWED[self.method] ** 2 if tolerant else 1.0
+        above = self.ratio(before, at) ** 2 - 1
+        return max(self.ratio(after, at) ** 2 - least, 0.0) / max(above, 1e-12)
+
+
+def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int) -> NoiseFloor:
+    """The floor from repeated periods where there are enough, else from the quietest band.
+
+    Args:
+        fitted: the residuals.
+        recording: what they are of.
+        period: of the excitation [s]; 0 to look for one in the inputs.
+        horizon: samples between re-initialisations; a period must hold a whole number of them.
+    """
+    factor = recording.thinning.factor if recording.thinning else 1
+    samples = round(period / recording.dt) if period else find_period(recording)
+    series = fitted.residuals.reshape(-1, fitted.residuals.shape[-1])
+    if samples and (samples % horizon == 0 or len(fitted.residuals) == 1) and samples % factor == 0:
+        count = len(series) // (samples // factor)
+        if count >= FEWEST_PERIODS:
+            return NoiseFloor(_between(series, samples // factor, count), "periods")
+    rate = 1 / (recording.dt * factor)
+    top = 0.38 if factor > 1 else 0.5
+    return NoiseFloor(np.array([_quiet(c, rate, top) for c in series.T]), "quiet band")
+
+
+def find_period(recording: Recording) -> int:
+    """Samples after which the first input repeats itself to 1 %, 0 where it does not."""
+    if recording.inputs.shape[1] == 0:
+        return 0
+    signal = recording.inputs[:, 0] - recording.inputs[:, 0].mean()
+    n, energy = len(signal), float(signal @ signal)
+    if energy == 0 or n < 16:
+        return 0
+    spectrum = np.fft.rfft(signal, 2 * n)
+    together = np.fft.irfft(spectrum * spectrum.conj())[:n]
+    overlap = np.maximum(np.cumsum(signal[::-1] ** 2)[::-1], 1e-300)
+    alike = together[: n // 2] / overlap[: n // 2]
+    falls = np.flatnonzero(alike < 0.5)
+    if not falls.size:
+        return 0
+    for lag in falls[0] + np.argsort(-alike[falls[0] :])[:3]:
+        if _repeats(signal, lag):
+            # Two periods are alike, too: the shortest counts.
+            parts = (lag // count for count in range(8, 0, -1) if lag % count == 0)
+            return int(next(part for part in parts if _repeats(signal, part)))
+    return 0
+
+
+def _repeats(signal: FloatArray, lag: int) -> bool:
+    difference = signal[lag:] - signal[:-lag]
+    return bool(difference @ difference < 2e-4 * (signal[lag:] @ signal[lag:]))
+
+
+def _between(series: FloatArray, samples: int, count: int) -> FloatArray:
+    periods = series[: count * samples].reshape(count, samples, -1)
+    variance = np.nanvar(periods, axis=0, ddof=1)
+    return np.array([float(np.sqrt(np.nanmean(column))) for column in variance.T])
+
+
+def _quiet(series: FloatArray, rate: float, top: float) -> float:
+    clean = series[np.isfinite(series)]
+    frequencies, density = welch(clean, rate, nperseg=min(256, max(len(clean) // 4, 8)))
+    inside = density[(frequencies > 0) & (frequencies <= top * rate)]
+    levels = [float(np.mean(band)) for band in np.array_split(inside, BANDS) if band.size]
+    return math.sqrt(min(levels) * rate / 2)
+
+
+def quiet_scale(recording: Recording) -> FloatArray:
+    """Noise of each channel as its own quietest band shows it: how channels are weighed."""
+    sizes = np.nanstd(recording.outputs, axis=0)
+    quiet = np.array([_quiet(c, 1 / recording.dt, 0.5) for c in recording.outputs.T])
+    least: FloatArray = 1e-6 * np.where(sizes > 0, sizes, 1.0)
+    return np.asarray(np.maximum(quiet, least), np.float64)

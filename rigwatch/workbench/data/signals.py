@@ -1,0 +1,243 @@
+"""Recordings as a model needs them: sessions read, channels matched, velocities derived.
+
+Samples that are invalid or were lost are NaN. An input is bridged there by a straight line, as a
+simulation needs it everywhere, and the outputs beside it are not counted.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.physics.engine.equations import Model
+from rigwatch.physics.engine.fit import Recording, Thinning
+from rigwatch.wire.errors import ModelError
+from rigwatch.wire.session import open_session
+from rigwatch.workbench.study import Derive, Span, Study, StudyFile, nearest
+
+MOST_MISSING = 0.2
+"""Share of samples that may be missing from an input."""
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Channels over equally spaced samples.
+
+    Attributes:
+        dt: time between samples [s].
+        values: by channel, each of shape (n,); NaN where nothing valid was measured.
+    """
+
+    dt: float
+    values: Mapping[str, FloatArray]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.values.values())))
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """What a study is fitted to, and what decides.
+
+    Attributes:
+        train, held_out: recordings for the model of the study.
+        healthy: recording with nothing wrong, None where there is none.
+        horizon: samples from one re-initialisation to the next.
+        remarks: what was noticed on the way, for people.
+    """
+
+    train: Recording
+    held_out: Recording
+    healthy: Recording | None
+    horizon: int
+    remarks: tuple[str, ...]
+
+    @property
+    def of_healthy(self) -> "Data | None":
+        """The healthy recording to be fitted and judged by itself, None where there is none."""
+        if self.healthy is None:
+            return None
+        return Data(self.healthy, self.healthy, None, self.horizon, ())
+
+
+def read_columns(study: Study, span: Span) -> Columns:
+    """The channels of a session, or of a part of it.
+
+    Raises:
+        SessionError: it cannot be read.
+        ModelError: it holds no samples there.
+    """
+    blocks = list(open_session(study.folder / span.session).samples())
+    boots = {(b.device, b.boot) for b in blocks}
+    if not blocks or len(boots) > 1:
+        raise ModelError(f"{span.session}: found {len(boots)} runs of a device, expected one")
+    first, last = blocks[0], blocks[-1]
+    count = last.seq + len(last) - first.seq
+    dt = (last.t_ns[-1] - first.t_ns[0]) * 1e-9 / max(count - 1, 1)
+    values = {c.name: np.full(count, np.nan) for c in first.channels}
+    for block in blocks:
+        at = block.seq - first.seq
+        for column in block.channels:
+            into = values.setdefault(column.name, np.full(count, np.nan))
+            into[at : at + len(block)] = column.usable()
+    begin, end = round(span.start / dt), min(count, round(min(span.end, 1e9) / dt))
+    if end - begin < 2:
+        raise ModelError(
+            f"{span.session}: found {count * dt:g} s, expected samples from {span.start:g} s"
+            f" to {span.end:g} s"
+        )
+    return Columns(dt, {name: column[begin:end] for name, column in values.items()})
+
+
+def with_derived(columns: Columns, derive: Derive | None) -> Columns:
+    """The channels and the signals that are made from them.
+
+    Raises:
+        ModelError: a channel is not there, or the low-pass lies beyond half the rate.
+    """
+    if derive is None:
+        return columns
+    rate = 1 / columns.dt
+    if derive.low_pass >= rate / 2:
+        raise ModelError(
+            f"derive: found low_pass {derive.low_pass:g} Hz, expected less than half of {rate:g} Hz"
+        )
+    sections = butter(4, derive.low_pass, fs=rate, output="sos")
+    found = dict(columns.values)
+    for name, signal in derive.signals.items():
+        if signal.channel not in columns.values:
+            raise ModelError(
+                f"derive: found channel {signal.channel!r}, expected"
+                f" {nearest(signal.channel, columns.values)}"
+            )
+        raw = columns.values[signal.channel]
+        smooth = sosfiltfilt(sections, bridged(raw))
+        for _ in range(signal.order):
+            smooth = np.gradient(smooth, columns.dt)
+        found[name] = np.where(np.isfinite(raw), smooth, np.nan)
+    return Columns(columns.dt, found)
+
+
+def bridged(signal: FloatArray) -> FloatArray:
+    """The signal with straight lines over what is missing."""
+    good = np.isfinite(signal)
+    if good.all() or not good.any():
+        return signal
+    at = np.arange(len(signal))
+    return np.interp(at, at[good], signal[good])
+
+
+def prepare(study: Study) -> Data:
+    """The recordings of a study, ready to be fitted.
+
+    Raises:
+        ModelError: rates differ, a channel is missing, nothing excites the model, too much is lost.
+    """
+    file, remarks = study.file, list[str]()
+    tables = {
+        use: [with_derived(read_columns(study, span), file.derive) for span in spans]
+        for use, spans in (
+            ("train", file.train),
+            ("held_out", file.held_out),
+            ("healthy", file.healthy),
+        )
+    }
+    dt = tables["train"][0].dt
+    _check_rates(study, [c for group in tables.values() for c in group], dt)
+    horizon = max(round(file.horizon / dt), 2)
+    made = {
+        use: _recording(study, group, horizon, use, remarks) if group else None
+        for use, group in tables.items()
+    }
+    assert made["train"] is not None
+    assert made["held_out"] is not None
+    return Data(made["train"], made["held_out"], made["healthy"], horizon, tuple(remarks))
+
+
+def _check_rates(study: Study, tables: Sequence[Columns], dt: float) -> None:
+    spans = (*study.file.train, *study.file.held_out, *study.file.healthy)
+    for span, table in zip(spans, tables, strict=True):
+        if abs(table.dt / dt - 1) > 1e-3:
+            raise ModelError(
+                f"{span.session}: found {1 / table.dt:g} Hz, expected {1 / dt:g} Hz as in"
+                f" {spans[0].session}"
+            )
+
+
+def _recording(
+    study: Study, tables: Sequence[Columns], horizon: int, use: str, remarks: list[str]
+) -> Recording:
+    """Parts behind one another, each cut to whole windows so that no window bridges two of them."""
+    inputs, outputs = [], []
+    for table in tables:
+        length = len(table) // horizon * horizon if study.model.states else len(table)
+        if length == 0:
+            raise ModelError(
+                f"{use}: found {len(table)} samples, expected at least one horizon of {horizon}"
+            )
+        u, y = _matched(study, table)
+        inputs.append(u[:length])
+        outputs.append(y[:length])
+    thin = study.file.thin
+    parts = tuple(len(u) for u in inputs)
+    thinning = Thinning(thin.factor, thin.edge, parts) if thin else None
+    u, y = np.concatenate(inputs), np.concatenate(outputs)
+    u, y = _without_holes(study.model, u, y, use, remarks)
+    _check_excitation(study.model, u, use)
+    return Recording(tables[0].dt, u, y, thinning)
+
+
+def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:
+    model, file = study.model, study.file
+
+    def column(name: str, channel: str) -> FloatArray:
+        wanted = file.channels.get(name, channel or name)
+        if wanted not in table.values:
+            raise ModelError(
+                f"{model.name}: found no channel {wanted!r} for {name}, expected"
+                f" {nearest(wanted, table.values)}"
+            )
+        return table.values[wanted]
+
+    u = [column(name, signal.channel) for name, signal in model.inputs.items()]
+    y = [column(name, signal.channel) for name, signal in model.outputs.items()]
+    return np.stack(u, axis=1) if u else np.zeros((len(table), 0)), np.stack(y, axis=1)
+
+
+def _without_holes(
+    model: Model, u: FloatArray, y: FloatArray, use: str, remarks: list[str]
+) -> tuple[FloatArray, FloatArray]:
+    missing = np.asarray(~np.isfinite(u).all(axis=1))
+    for index, name in enumerate(model.inputs):
+        share = float(np.mean(~np.isfinite(u[:, index])))
+        if share > MOST_MISSING:
+            raise ModelError(
+                f"{use}: found {share:.0%} of input {name!r} missing or invalid, expected at most"
+                f" {MOST_MISSING:.0%}"
+            )
+    for index, name in enumerate(model.outputs):
+        if not np.isfinite(y[:, index]).any():
+            raise ModelError(f"{use}: found no valid sample of output {name!r}")
+    if missing.any():
+        remarks.append(f"{use}: {int(missing.sum())} samples without a valid input are not counted")
+    filled = np.stack([bridged(column) for column in u.T], axis=1) if u.size else u
+    return filled, np.where(missing[:, None], np.nan, y)
+
+
+def _check_excitation(model: Model, u: FloatArray, use: str) -> None:
+    if u.size and not np.any(np.ptp(u, axis=0) > 1e-12 * np.maximum(np.abs(u).max(axis=0), 1e-300)):
+        raise ModelError(
+            f"{use}: found inputs {', '.join(model.inputs)} that never change, expected a recording"
+            " with excitation"
+        )
+
+
+def parameters_of(file: StudyFile) -> dict[str, float]:
+    """Values to start from, by the system's names: the model's and the accepted effects'."""
+    found = dict(file.start)
+    for accepted in file.effects:
+        prefix = f"{accepted.port}_{accepted.effect}_"
+        found |= {prefix + name: value for name, value in accepted.parameters.items()}
+    return found

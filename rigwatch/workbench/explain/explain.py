@@ -1,0 +1,148 @@
+"""Explains the gap: ranks what may be missing, gives a verdict and says what to do next."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from rigwatch.workbench.compare import Bench, Comparison, beyond, comparison, open_bench
+from rigwatch.workbench.explain.next_experiment import Experiment, propose
+from rigwatch.workbench.explain.pairs import two_effects
+from rigwatch.workbench.explain.verdict import Verdict, judge
+from rigwatch.workbench.explain.verdict_calibration import seen
+from rigwatch.workbench.fit import Value, values
+from rigwatch.workbench.ranking import Progress, Ranked, rank, unheard
+from rigwatch.workbench.study import Study
+
+
+@dataclass(frozen=True)
+class Row:
+    """One effect of the ranking.
+
+    Attributes:
+        effect, port: which one.
+        train_error, held_out_error: with it in the model, None where it was not fitted.
+        p_value: corrected for the number of candidates.
+        class_: effects that it cannot be told from on this recording, as "effect@port".
+        parameters: its own, by name.
+        accepted: whether the held-out error falls beyond chance.
+        reason: in words.
+    """
+
+    effect: str
+    port: str
+    train_error: float | None
+    held_out_error: float | None
+    p_value: float
+    class_: list[str]
+    parameters: dict[str, Value]
+    accepted: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What a study learns from its recordings.
+
+    Attributes:
+        verdict: nothing_missing, missing_effect, undetermined or unknown_effect.
+        text: the verdict in a sentence.
+        comparison: the model as it is.
+        ranking: best first.
+        also: what is missing as well, where two effects hide at once.
+        rivals: of different physics that the recording cannot tell from the best.
+        next_experiment: what would tell them apart, None where nothing needs to be told.
+        wrong_probability: of the verdict, calibrated on simulated cases.
+        like_this: simulated cases with such a verdict, and how many of them were wrong.
+    """
+
+    verdict: str
+    text: str
+    comparison: Comparison
+    ranking: list[Row]
+    rivals: list[str] = field(default_factory=list)
+    also: list[str] = field(default_factory=list)
+    next_experiment: Experiment | None = None
+    wrong_probability: float = 0.5
+    like_this: tuple[int, int] = (0, 0)
+
+
+def explain(study: Study, progress: Progress = unheard) -> Explanation:
+    """Rank every effect at every port and judge.
+
+    Args:
+        study: the study.
+        progress: told what begins.
+
+    Raises:
+        ModelError: data have changed, or do not suit the model.
+    """
+    progress("fitting the model as it is")
+    bench = open_bench(study)
+    rows, verdict = ranking(bench, progress)
+    return explanation(bench, rows, verdict)
+
+
+def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], Verdict]:
+    """The ranking, what the verdict names in front, and the verdict."""
+    rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
+    verdict = judge(bench.base, rows, bench.floor)
+    if verdict.word == "unknown_effect" and verdict.best is not None:
+        progress(f"{verdict.best.label} leaves much: trying two effects at once")
+        verdict = two_effects(bench, rows, verdict, progress)
+    if verdict.best is not None:
+        rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
+    return rows, verdict
+
+
+def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
+    """The same for people and programs."""
+    members, rivals = [*verdict.members, *verdict.rivals], list(verdict.rivals)
+    experiment = None
+    if verdict.best is not None and rivals:
+        experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
+    more: dict[str, float] = {}
+    if verdict.best is not None and verdict.best.fitted is not None:
+        more = beyond(bench.study, bench.data, bench.bare, verdict.best.fitted)
+    told = [
+        _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
+    ]
+    return Explanation(
+        verdict.word,
+        verdict.text,
+        comparison(bench),
+        told,
+        rivals,
+        list(verdict.second),
+        experiment,
+        verdict.doubt,
+        seen(verdict.word, verdict.evidence),
+    )
+
+
+def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None) -> Row:
+    found: dict[str, Value] = {}
+    if row.fitted is not None:
+        prefix = row.placement.prefix
+        every = values(row.fitted.train, more)
+        found = {n[len(prefix) :]: v for n, v in every.items() if n.startswith(prefix)}
+    others = [label for label in alike if label != row.label]
+    return Row(
+        row.effect,
+        row.port,
+        row.fitted.train_error if row.fitted else None,
+        row.fitted.held_out_error if row.fitted else None,
+        row.p_value,
+        others,
+        found,
+        row.accepted,
+        row.reason,
+    )
+
+
+def as_data(found: Explanation) -> dict[str, object]:
+    """What `rigwatch explain --json` prints."""
+    ranking = [
+        {name.rstrip("_"): getattr(row, name) for name in row.__dataclass_fields__}
+        for row in found.ranking
+    ]
+    whole = {name: getattr(found, name) for name in found.__dataclass_fields__}
+    return whole | {"ranking": ranking}

@@ -1,0 +1,236 @@
+"""What to try next: the excitation under which rivals would differ most, predicted by simulation.
+
+Rivals look alike where the recording moves them alike. For each excitation within what the rig has
+been driven with so far, the fitted model is run, the rivals' directions are computed along it, and
+what the model's own parameters could make of the difference is taken out. What is left,
+
+    separation = strength · ‖d_best − (d_best·d_rival) d_rival/‖d_rival‖²‖ / √samples,
+
+is the difference [channel's unit] that the new recording would show between the best and a rival.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.physics.engine.fit import initial_states
+from rigwatch.physics.engine.score import Candidate, Projector, directions, trajectory
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.fit import nodes
+from rigwatch.workbench.ranking import Ranked
+from rigwatch.workbench.study import Derived
+
+DURATION = 20.0
+"""Length of the recordings that are predicted [s]."""
+MOST_SAMPLES = 8000
+Shape = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A recording that would tell the best from its rivals.
+
+    Attributes:
+        shape: of the excitation, in words.
+        signal: which input is driven.
+        amplitude: of it, in `unit`.
+        unit: the input's unit.
+        duration: [s].
+        separation: rms difference that the recording would show, by rival, in noise floors.
+        now: the same for the recording at hand.
+        text: in a sentence.
+    """
+
+    shape: str
+    signal: str
+    amplitude: float
+    unit: str
+    duration: float
+    separation: dict[str, float]
+    now: dict[str, float]
+    text: str
+
+
+def propose(bench: Bench, best: Ranked, rivals: Sequence[Ranked]) -> Experiment | None:
+    """The best of the excitations that are tried; None where none would do better than now."""
+    rows = [best, *rivals]
+    train = bench.data.train
+    now = _separation(bench, rows, train.inputs[:MOST_SAMPLES], _first_states(bench))
+    found = [
+        (name, share, _separation(bench, rows, inputs, _rest(bench)))
+        for name, share, inputs in _excitations(bench)
+    ]
+    usable = [item for item in found if all(np.isfinite(v) for v in item[2].values())]
+    if not usable:
+        return None
+    name, share, separation = max(usable, key=lambda item: min(item[2].values()))
+    if min(separation.values()) <= min(now.values()):
+        return None
+    return _worded(bench, name, share, separation, now)
+
+
+def excitation(bench: Bench, experiment: Experiment) -> FloatArray:
+    """The inputs of a proposed experiment at the recording's rate, shape (samples, inputs)."""
+    share = experiment.amplitude / _amplitude(bench, experiment.signal)
+    for name, size, inputs in _excitations(bench):
+        if name == experiment.shape and np.isclose(size, share):
+            return inputs
+    raise ModelError(f"found experiment {experiment.shape!r}, expected one that was proposed here")
+
+
+def _worded(
+    bench: Bench, name: str, share: float, separation: dict[str, float], now: dict[str, float]
+) -> Experiment:
+    signal = _driven(bench)
+    unit = bench.study.model.inputs[signal].unit
+    amplitude = share * _amplitude(bench, signal)
+    rival, size = min(separation.items(), key=lambda item: item[1])
+    text = (
+        f"{name} of {signal}, amplitude {amplitude:.3g} {unit}, {DURATION:g} s:"
+        f" {rival} would differ by {size:.3g} noise floors (on this recording: {now[rival]:.3g})"
+    )
+    return Experiment(name, signal, amplitude, unit, DURATION, separation, now, text)
+
+
+def _driven(bench: Bench) -> str:
+    """The input that is varied: of an inverse model the one whose rates are the others."""
+    derive = bench.study.file.derive
+    if derive is not None:
+        for signal in derive.signals.values():
+            if signal.channel in bench.study.model.inputs:
+                return signal.channel
+    return next(iter(bench.study.model.inputs))
+
+
+def _amplitude(bench: Bench, signal: str) -> float:
+    column = bench.data.train.inputs[:, list(bench.study.model.inputs).index(signal)]
+    return float(np.ptp(column) / 2)
+
+
+def _excitations(bench: Bench) -> Iterator[tuple[str, float, FloatArray]]:
+    dt = bench.data.train.dt
+    count = int(min(DURATION / dt, MOST_SAMPLES))
+    count = count // bench.data.horizon * bench.data.horizon or count
+    time: FloatArray = np.arange(count, dtype=np.float64) * dt
+    for share in (1.0, 0.3):
+        for name, shape in _shapes(time[-1], dt).items():
+            inputs = _inputs(bench, shape(time), share)
+            if inputs is not None:
+                yield name, share, inputs
+
+
+def _shapes(length: float, dt: float) -> dict[str, Shape]:
+    """Excitations of amplitude 1."""
+    found: dict[str, Shape] = {}
+    for periods in (2, 8, 32):
+        rate = periods / length
+        if rate < 0.05 / dt:
+            found[f"sine of {rate:.2g} Hz"] = _sine(rate)
+            found[f"steps of {rate:.2g} Hz"] = _steps(rate)
+            found[f"triangle of {rate:.2g} Hz"] = _triangle(rate)
+    found["triangle of growing speed"] = lambda t: _triangle(1.0)(2 + 8 * (t / length) ** 2)
+    found["sines of many frequencies"] = _multisine(length, dt)
+    return found
+
+
+def _sine(rate: float) -> Shape:
+    return lambda t: np.asarray(np.sin(2 * np.pi * rate * t))
+
+
+def _steps(rate: float) -> Shape:
+    return lambda t: np.asarray(np.tanh(8 * np.sin(2 * np.pi * rate * t)))
+
+
+def _triangle(rate: float) -> Shape:
+    return lambda t: np.asarray(2 / np.pi * np.arcsin(np.sin(2 * np.pi * rate * t)))
+
+
+def _multisine(length: float, dt: float) -> Shape:
+    lines = np.arange(2, max(4, int(0.02 * length / dt)))
+    phases = -np.pi * lines * (lines - 1) / len(lines)
+
+    def shape(t: FloatArray) -> FloatArray:
+        waves = np.cos(2 * np.pi * np.outer(t, lines) / length + phases).sum(axis=1)
+        return np.asarray(waves / np.abs(waves).max())
+
+    return shape
+
+
+def _inputs(bench: Bench, shape: FloatArray, share: float) -> FloatArray | None:
+    """All inputs for a shape of the driven one; None beyond what the rig has done so far."""
+    recording, names = bench.data.train, list(bench.study.model.inputs)
+    driven = _driven(bench)
+    middle = recording.inputs.mean(axis=0)
+    inputs = np.tile(middle, (len(shape), 1))
+    at = names.index(driven)
+    low, high = recording.inputs[:, at].min(), recording.inputs[:, at].max()
+    inputs[:, at] = (low + high) / 2 + share * (high - low) / 2 * shape
+    derive = bench.study.file.derive
+    signals: Mapping[str, Derived] = derive.signals if derive else {}
+    for name, signal in signals.items():
+        if name in names and signal.channel == driven and signal.order:
+            rate = inputs[:, at]
+            for _ in range(signal.order):
+                rate = np.gradient(rate, recording.dt)
+            if np.abs(rate).max() > 1.2 * np.abs(recording.inputs[:, names.index(name)]).max():
+                return None
+            inputs[:, names.index(name)] = rate
+    return inputs
+
+
+def _rest(bench: Bench) -> FloatArray:
+    states = initial_states(bench.base.compiled.system, bench.data.train)
+    return np.where(np.arange(states.shape[1]) < 1, states.mean(axis=0), 0.0)
+
+
+def _first_states(bench: Bench) -> FloatArray:
+    return np.asarray(initial_states(bench.base.compiled.system, bench.data.train)[0])
+
+
+def _separation(
+    bench: Bench, rows: Sequence[Ranked], inputs: FloatArray, first: FloatArray
+) -> dict[str, float]:
+    base, dt = bench.base, bench.data.train.dt
+    starts, substeps = np.zeros(1, np.int64), nodes(base, bench.data.train)
+    run = base.compiled.simulate(
+        inputs, dt, starts, len(inputs), initial=first[None], parameters=base.train.parameters,
+        substeps=substeps,
+    )  # fmt: skip
+    at = trajectory(
+        base.compiled, inputs, dt, starts, len(inputs), initial=first[None],
+        parameters=base.train.parameters, substeps=substeps,
+    )  # fmt: skip
+    moved = directions(at, [_candidate(row) for row in rows]) / bench.floor.rms[:, None]
+    slopes = run.slopes / bench.floor.rms[:, None]
+    if not (np.isfinite(moved).all() and np.isfinite(slopes).all()):
+        return {row.label: np.nan for row in rows[1:]}
+    flat = (1, -1)
+    slopes = slopes.reshape(*flat, slopes.shape[-1])
+    m = len(base.compiled.system.free)
+    left = Projector(slopes[..., :m], slopes[..., m:]).clean(moved.reshape(*flat, len(rows)))
+    return {row.label: _apart(left, i, rows[0]) for i, row in enumerate(rows[1:], start=1)}
+
+
+def _apart(left: FloatArray, rival: int, best: Ranked) -> float:
+    one, other = left[:, 0], left[:, rival]
+    energy = max(float(other @ other), 1e-300)
+    apart = one - other * float(one @ other) / energy
+    return abs(_strength(best)) * float(np.sqrt(np.mean(apart**2)))
+
+
+def _strength(row: Ranked) -> float:
+    effect = row.placement.effect
+    if row.fitted is not None:
+        value = row.fitted.train.values()[row.placement.prefix + effect.strength]
+    else:
+        value = row.start[effect.strength]
+    return value - effect.parameters[effect.strength].neutral
+
+
+def _candidate(row: Ranked) -> Candidate:
+    effect = row.placement.effect
+    shape = {name: value for name, value in row.start.items() if name != effect.strength}
+    return Candidate(row.effect, effect, row.port, shape)

@@ -1,0 +1,190 @@
+"""Two effects at once: every pair is scored, and the likeliest are fitted.
+
+The best effect alone takes the place of one that is right only beside another, and a ranking beside
+it is led astray. But to first order all pairs are known from the ranking of single effects: with a
+and b the shares of the residual's amplitude that two directions explain alone, and c their cosine,
+
+    explained = (a² + b² - 2·a·b·c) / (1 - c²),   strengths ∝ (a - b·c), (b - a·c)
+
+Fits decide among the likeliest, on the recordings held out.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from rigwatch.physics.engine.score import ALIKE
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.explain.verdict import Verdict, Word, judge
+from rigwatch.workbench.fit import Fitted, fit_model
+from rigwatch.workbench.ranking import SIMILAR, Progress, Ranked, judge_fit, refit
+
+LIKELY = 0.7
+"""Share of the energy above the floor that a pair must explain to first order to be fitted."""
+MOST_PAIRS = 4
+ROUGHLY = 1.5
+"""Error over the noise floor that two effects may leave of a rough model."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two effects.
+
+    Attributes:
+        one, other: rows of the ranking, the one that explains more alone first.
+        explained: share of the residual's energy in training that both explain to first order.
+        start: values that their fit starts from, by the system's names.
+    """
+
+    one: Ranked
+    other: Ranked
+    explained: float
+    start: dict[str, float]
+
+    @property
+    def free(self) -> int:
+        """Parameters that a fit of both moves."""
+        return self.one.free + self.other.free
+
+
+def two_effects(
+    bench: Bench, rows: Sequence[Ranked], verdict: Verdict, progress: Progress
+) -> Verdict:
+    """The verdict once pairs have been tried; as it was where no pair explains the error.
+
+    Args:
+        bench: the study.
+        rows: the ranking of single effects.
+        verdict: that no known effect alone explains the error.
+        progress: told which pair is fitted.
+    """
+    fits = _fitted(bench, likely_pairs(bench, rows), progress)
+    good = _enough(bench, fits)
+    if not good:
+        return verdict
+    best, together = min(good, key=lambda found: found[1].held_out_error)
+    first = _beside(bench, rows, fits, best.other, best.one)
+    second = _beside(bench, rows, fits, best.one, best.other)
+    if first is None or second is None:
+        return verdict
+    found = _both(bench, first, second, together)
+    return dataclasses.replace(found, best=_row(rows, found.best))
+
+
+def likely_pairs(bench: Bench, rows: Sequence[Ranked]) -> list[Pair]:
+    """The pairs that explain most to first order, but for doubles of one another."""
+    least = LIKELY * bench.floor.above(bench.base.train)
+    every = [_pair(one, other) for one, other in combinations(rows, 2)]
+    likely = [pair for pair in every if pair is not None and pair.explained > least]
+    chosen: list[Pair] = []
+    for pair in sorted(likely, key=lambda pair: -pair.explained):
+        if len(chosen) < MOST_PAIRS and not any(_same(pair, other) for other in chosen):
+            chosen.append(pair)
+    return chosen
+
+
+def _pair(one: Ranked, other: Ranked) -> Pair | None:
+    """The pair, where its parts are not alike and each is as strong as its sign allows."""
+    if other.explained > one.explained:
+        one, other = other, one
+    cosine = one.turned.get(other.label, 0.0)
+    if abs(cosine) > SIMILAR:
+        return None
+    a, b = np.sqrt(one.explained), np.sqrt(other.explained)
+    # Over what each would be alone; what has another sign than alone is none of its kind.
+    shares = (a - b * cosine) / (1 - cosine**2), (b - a * cosine) / (1 - cosine**2)
+    if min(shares) <= 0:
+        return None
+    explained = a * shares[0] + b * shares[1]
+    start = one.begin(float(shares[0] / a)) | other.begin(float(shares[1] / max(b, 1e-12)))
+    return Pair(one, other, float(explained), start)
+
+
+def _same(pair: Pair, other: Pair) -> bool:
+    """Whether two pairs say the same, and the other with no more parameters."""
+    straight = _double(pair.one, other.one) and _double(pair.other, other.other)
+    crossed = _double(pair.one, other.other) and _double(pair.other, other.one)
+    return (straight or crossed) and other.free <= pair.free
+
+
+def _double(row: Ranked, other: Ranked) -> bool:
+    return row is other or row.cosines[other.label] > ALIKE
+
+
+def _fitted(bench: Bench, pairs: Sequence[Pair], progress: Progress) -> list[tuple[Pair, Fitted]]:
+    """The pairs that can be fitted, with their fits."""
+    base, found = bench.base, []
+    for pair in pairs:
+        progress(f"fitting {pair.one.label} and {pair.other.label} at once")
+        placements = (*base.placements, pair.one.placement, pair.other.placement)
+        start = base.train.values() | pair.start
+        try:
+            fitted = fit_model(
+                bench.study, bench.data, placements, start, base.train.scale, base=base
+            )
+        except ModelError:
+            continue
+        found.append((pair, fitted))
+    return found
+
+
+def _enough(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pair, Fitted]]:
+    """Pairs that leave so little that they are worth naming.
+
+    Nothing but noise, as two wrong ones together explain much. A rough model leaves more, since
+    what it leaves on a healthy rig changes with the fault.
+    """
+    rough, floor = bench.study.model.rough, bench.floor
+    return [
+        (pair, fitted)
+        for pair, fitted in fits
+        if floor.reached(fitted.held_out) or (rough and floor.ratio(fitted.held_out) < ROUGHLY)
+    ]
+
+
+def _beside(
+    bench: Bench,
+    rows: Sequence[Ranked],
+    fits: Sequence[tuple[Pair, Fitted]],
+    known: Ranked,
+    wanted: Ranked,
+) -> Verdict | None:
+    """The verdict on what is missing beside one effect of a pair, among what was fitted with it."""
+    known = dataclasses.replace(known)
+    if known.fitted is None:
+        refit(bench.study, bench.data, bench.base, known)
+    if known.fitted is None:
+        return None
+    among = []
+    for row in rows:
+        if row.label == known.label:
+            continue
+        both = {row.label, known.label}
+        together = (f for pair, f in fits if {pair.one.label, pair.other.label} == both)
+        beside = dataclasses.replace(row, fitted=next(together, None), accepted=False)
+        if beside.fitted is not None:
+            judge_fit(known.fitted, beside)
+        among.append(beside)
+    found = judge(known.fitted, among, bench.floor)
+    return found if wanted.label in (*found.members, *found.rivals) else None
+
+
+def _row(rows: Sequence[Ranked], found: Ranked | None) -> Ranked | None:
+    """What was found beside another, as it does alone."""
+    return next((row for row in rows if found is not None and row.label == found.label), None)
+
+
+def _both(bench: Bench, first: Verdict, second: Verdict, together: Fitted) -> Verdict:
+    """A verdict that names both."""
+    named = (*second.members, *second.rivals)
+    assert first.best is not None
+    reached = bench.floor.reached(together.held_out)
+    certain = reached and not (first.rivals or second.rivals)
+    word: Word = "missing_effect" if certain else "undetermined"
+    also = f"{named[0]} as well" if certain else f"probably {' or '.join(named)} as well"
+    text = f"{first.best.label} is missing, and {also}"
+    return dataclasses.replace(first, word=word, text=text, second=named)

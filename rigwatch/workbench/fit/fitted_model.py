@@ -1,0 +1,219 @@
+"""A model with some effects, fitted to the training recordings and judged on those held out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from rigwatch.physics.engine.compile import (
+    BoolArray,
+    CompiledSystem,
+    FloatArray,
+    compile_system,
+    even_substeps,
+)
+from rigwatch.physics.engine.equations import Placement, System, compose
+from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.data import Data, parameters_of, port_sizes
+from rigwatch.workbench.fit.discontinuities import between_jumps
+from rigwatch.workbench.study import Study
+
+LONG = 2000
+"""Samples of a horizon from which a fit goes by way of a shorter one."""
+SHORTER = 8
+"""The horizon over that one."""
+WELL_ABOVE = 1.5
+"""Error over the channels' noise from which a fit may have ended in a local minimum."""
+BLOCKS = 40
+"""Blocks that a recording of a model without states is cut into for statistics."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """One model, fitted and judged.
+
+    Attributes:
+        placements: its effects.
+        train, held_out: the fit, and the same parameters on the other recordings.
+        substeps: integration steps a sample, where nothing is stiff.
+        horizon: samples from one re-initialisation to the next.
+        calm: samples held out that are beside no jump of an effect, shape (windows, length); None
+            where nothing jumps.
+    """
+
+    placements: tuple[Placement, ...]
+    train: Fit
+    held_out: Fit
+    substeps: int
+    horizon: int
+    calm: BoolArray | None = None
+
+    @property
+    def compiled(self) -> CompiledSystem:
+        """The compiled system."""
+        return self.train.compiled
+
+    def errors(self, fitted: Fit) -> float:
+        """One number for all channels: in the channel's unit where there is one, else scaled."""
+        return overall(fitted)
+
+    @property
+    def train_error(self) -> float:
+        """Overall error on the training recordings."""
+        return overall(self.train)
+
+    @property
+    def held_out_error(self) -> float:
+        """Overall error on the recordings held out."""
+        return overall(self.held_out)
+
+
+def overall(fitted: Fit) -> float:
+    """Error over all channels: in the channel's unit where there is one, else in noise floors."""
+    if len(fitted.scale) == 1:
+        return float(fitted.rms[0])
+    return float(np.sqrt(np.mean((fitted.rms / fitted.scale) ** 2)))
+
+
+def block_errors(fitted: Fit) -> FloatArray:
+    """Mean squared error of each block, shape (blocks,): windows, or pieces of a long recording."""
+    scale = fitted.scale if len(fitted.scale) > 1 else 1.0
+    squared = (fitted.residuals / scale) ** 2
+    return np.array([np.nanmean(piece) for piece in blocks(squared) if np.isfinite(piece).any()])
+
+
+def blocks(windowed: FloatArray) -> list[FloatArray]:
+    """Windows (windows, samples, …) as blocks; few long windows are cut into pieces."""
+    pieces = max(1, -(-BLOCKS // len(windowed)))
+    cut = [np.array_split(window, min(pieces, len(window))) for window in windowed]
+    return [piece for window in cut for piece in window]
+
+
+def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
+    """The accepted effects, with their bounds in sizes of the recording."""
+    sizes = port_sizes(study.model, recording)
+    return tuple(
+        Placement(a.effect, study.effect(a.effect).scaled(sizes[a.port]), a.port)
+        if a.port in sizes
+        else Placement(a.effect, study.effect(a.effect), a.port)
+        for a in study.file.effects
+    )
+
+
+def fit_base(study: Study, data: Data, scale: FloatArray | None = None) -> Fitted:
+    """The model of a study with the effects accepted so far.
+
+    Where that cannot be simulated from the study's own starting values, it is fitted effect by
+    effect, as it was built.
+
+    Raises:
+        ModelError: it cannot be simulated that way either.
+    """
+    placements, start = placements_of(study, data.train), parameters_of(study.file)
+    try:
+        return fit_twice(study, data, placements, start, scale)
+    except ModelError:
+        if not placements:
+            raise
+    found = fit_model(study, data, (), start, scale)
+    for count in range(1, len(placements) + 1):
+        found = fit_twice(study, data, placements[:count], start | found.train.values(), scale)
+    return found
+
+
+def fit_twice(
+    study: Study,
+    data: Data,
+    placements: Sequence[Placement],
+    start: Mapping[str, float],
+    scale: FloatArray | None = None,
+    *,
+    base: Fitted | None = None,
+) -> Fitted:
+    """`fit_model`, and once more where it may have ended in a local minimum."""
+    found = fit_model(study, data, placements, start, scale, base=base)
+    if scale is None or not may_be_better(study, data, found, start):
+        return found
+    return fit_again(study, data, found, start)
+
+
+def fit_again(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> Fitted:
+    """The better of a fit and another by way of short horizons."""
+    try:
+        again = fit_model(
+            study, data, found.placements, start, found.train.scale, base=found,
+            by_way_of_short=True,
+        )  # fmt: skip
+    except ModelError:
+        return found
+    return min(found, again, key=lambda fitted: _size(fitted.train))
+
+
+def fit_model(
+    study: Study,
+    data: Data,
+    placements: Sequence[Placement],
+    start: Mapping[str, float],
+    scale: FloatArray | None = None,
+    *,
+    base: Fitted | None = None,
+    by_way_of_short: bool = False,
+) -> Fitted:
+    """The study's model with `placements`, fitted from `start`.
+
+    Args:
+        study, data: what is fitted to.
+        placements: effects in the model.
+        start: values by name, the model's own where there are none.
+        scale: divisor of each output's residuals, shape (outputs,).
+        base: a fit of less, whose initial states are a start for these.
+        by_way_of_short: whether the search begins where short horizons lead: over long ones what
+            sticks and slips has many local minima.
+
+    Raises:
+        ModelError: an effect does not fit its port, or the simulation leaves the finite numbers.
+    """
+    compiled = compile_system(compose(study.model, placements))
+    horizon = data.horizon if study.model.states else len(data.train)
+    begin, substeps = compiled.vector(start), study.file.substeps
+    fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
+    if study.model.states and (horizon >= LONG or by_way_of_short):
+        begin = fit_over(horizon // SHORTER, start=begin).parameters
+    first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
+    found = fit_over(horizon, start=begin, initial=first)
+    beside = data.horizon if study.model.states else len(data.held_out)
+    judged = evaluate(found, data.held_out, beside, substeps, later)
+    calm = between_jumps(found, data.held_out, beside)
+    return Fitted(tuple(placements), found, judged, substeps, horizon, calm)
+
+
+def may_be_better(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> bool:
+    """Whether a fit may have ended in a local minimum.
+
+    It leaves more than noise, and its last effect asks for finer steps than the model.
+    """
+    if not found.placements or _size(found.train) <= WELL_ABOVE**2:
+        return False
+    system = compose(study.model, found.placements[-1:])
+    values = {name: p.value for name, p in system.parameters.items()}
+    at = np.array([start.get(name, value) for name, value in values.items()])
+    return _even(system, data.train, at) > study.file.substeps
+
+
+def _size(fitted: Fit) -> float:
+    return float(np.mean((fitted.rms / fitted.scale) ** 2))
+
+
+def _even(system: System, recording: Recording, parameters: FloatArray) -> int:
+    states = initial_states(system, recording)
+    return even_substeps(system, recording.inputs, states, parameters, recording.dt)
+
+
+def nodes(fitted: Fitted, recording: Recording) -> int:
+    """Steps a sample that a linearisation takes, which are the same everywhere."""
+    system = fitted.compiled.system
+    if not system.states:
+        return 1
+    return max(fitted.substeps, _even(system, recording, fitted.train.parameters))

@@ -1,0 +1,26 @@
+"""The error of one long run from the measured start at rest, nothing re-initialised on the way.
+
+It is what benchmarks publish, and a bad judge of plants that integrate: a right effect alone may
+make it worse. It is shown, and decides nothing.
+"""
+
+import numpy as np
+
+from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.physics.engine.fit import Recording, initial_states
+from rigwatch.workbench.fit.fitted_model import Fitted
+
+
+def free_run(fitted: Fitted, recording: Recording) -> FloatArray:
+    """Root mean square error of each output over the whole recording, shape (outputs,)."""
+    compiled = fitted.compiled
+    first = initial_states(compiled.system, recording)[0].copy()
+    for index, state in enumerate(compiled.system.states.values()):
+        if state.rate_of and not state.measured:
+            first[index] = 0.0
+    run = compiled.simulate(
+        recording.inputs, recording.dt, np.zeros(1, np.int64), len(recording),
+        initial=first[None], parameters=fitted.train.parameters, substeps=fitted.substeps,
+    )  # fmt: skip
+    error = recording.outputs - run.outputs[0]
+    return np.asarray(np.sqrt(np.nanmean(error**2, axis=0)))

@@ -1,0 +1,157 @@
+"""What a rough model leaves on a healthy rig is not held against a recording.
+
+A linear black box leaves a tenth of the acceleration unexplained, and takes that for missing
+friction. Under the same excitation it leaves nearly the same on every run; so a healthy recording
+with this excitation tells what to add to the model's outputs, before a sensor reads them:
+
+    r(k) = mean over healthy periods of (y_h - model(u_h))(k mod T),   T: the period
+
+It enters the model as further inputs.
+
+The floor is what stays of each healthy period when the others are its reference, which counts the
+noise of the reference as well.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from msgspec import structs
+from scipy.signal import correlate
+
+from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.physics.engine.equations import Input, Model
+from rigwatch.physics.engine.fit import Recording, evaluate
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.data import Data, find_period
+from rigwatch.workbench.fit.fitted_model import Fitted, fit_model
+from rigwatch.workbench.study import Study
+
+UNLIKE = 0.2
+"""Rms by which an excitation may differ from the healthy one, over its own."""
+FEWEST = 2
+"""Healthy periods that are needed, so that each can be held against another."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Periods:
+    """Healthy periods that match a recording's first.
+
+    Attributes:
+        inputs: shape (periods, samples, inputs).
+        outputs, left: measured, and what the model leaves of it, shape (periods, samples, outputs).
+    """
+
+    inputs: FloatArray
+    outputs: FloatArray
+    left: FloatArray
+
+
+def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> tuple[Study, Data]:
+    """A rough model with what it leaves of the healthy recording added, and recordings of both.
+
+    Args:
+        study: with what the healthy recording told, see `commissioned`.
+        data: its recordings.
+        scale: divisor of each output's residuals, shape (outputs,).
+
+    Raises:
+        ModelError: there is no healthy recording, or none with this excitation.
+    """
+    if not study.model.rough:
+        return study, data
+    name = study.model.name
+    alone = data.of_healthy
+    if alone is None:
+        raise ModelError(
+            f"{name}: found no healthy recording, expected one with the same excitation,"
+            " as this model leaves much unexplained on a healthy rig, too"
+        )
+    # Without the effects accepted so far: nothing is wrong there that they could explain.
+    bare = fit_model(study, alone, (), study.file.start, scale)
+    periods = _matching(study, bare, data.train, data, "train")
+    beside = _matching(study, bare, data.held_out, data, "held_out")
+    remark = f"{name}: what it leaves of {len(beside.left)} healthy periods is added to it"
+    return replace(study, model=_with_inputs(study.model)), replace(
+        data,
+        train=_beside(data.train, np.nanmean(periods.left, axis=0)),
+        held_out=_beside(data.held_out, np.nanmean(beside.left, axis=0)),
+        healthy=_against_each_other(alone.train.dt, beside),
+        remarks=(*data.remarks, remark),
+    )
+
+
+def _matching(study: Study, bare: Fitted, recording: Recording, data: Data, use: str) -> _Periods:
+    healthy, horizon = data.healthy, data.horizon
+    assert healthy is not None
+    period = round(study.file.period / recording.dt) or find_period(recording) or len(recording)
+    if period % horizon:
+        raise ModelError(
+            f"{use}: found a period of {period} samples, expected a multiple of the horizon"
+            f" of {horizon}"
+        )
+    starts = _starts(recording.inputs[:period, 0], healthy.inputs[:, 0])
+    if len(starts) < FEWEST:
+        raise ModelError(
+            f"{use}: found its excitation {len(starts)} times in the healthy recording, expected"
+            f" at least {FEWEST}"
+        )
+    rows = starts[:, None] + np.arange(period)
+    left = [_left(bare, healthy, row, horizon) for row in rows]
+    return _Periods(healthy.inputs[rows], healthy.outputs[rows], np.array(left))
+
+
+def _starts(period: FloatArray, signal: FloatArray) -> FloatArray:
+    """Where in a longer signal a period begins, shape (times found,)."""
+    length = len(period)
+    if len(signal) < length:
+        return np.zeros(0, dtype=np.int64)
+    squares = np.concatenate([[0.0], np.cumsum(signal**2)])
+    energy = squares[length:] - squares[:-length]
+    own = float(period @ period)
+    unlike = energy + own - 2 * correlate(signal, period, mode="valid")
+    found: list[int] = []
+    for start in np.argsort(unlike):
+        if unlike[start] > UNLIKE**2 * own:
+            break
+        if all(abs(int(start) - other) >= length for other in found):
+            found.append(int(start))
+    return np.array(sorted(found), dtype=np.int64)
+
+
+def _left(bare: Fitted, healthy: Recording, row: FloatArray, horizon: int) -> FloatArray:
+    part = Recording(healthy.dt, healthy.inputs[row], healthy.outputs[row])
+    residuals = evaluate(bare.train, part, horizon, bare.substeps).residuals
+    return np.asarray(residuals.reshape(len(row), -1))
+
+
+def _with_inputs(model: Model) -> Model:
+    """The model with an input added to each output."""
+    inputs = {
+        f"unexplained_{name}": Input(unit=o.unit, hold="linear")
+        for name, o in model.outputs.items()
+    }
+    outputs = {
+        name: structs.replace(output, expression=f"({output.expression}) + {added}")
+        for (name, output), added in zip(model.outputs.items(), inputs, strict=True)
+    }
+    return structs.replace(model, inputs=model.inputs | inputs, outputs=outputs)
+
+
+def _beside(recording: Recording, reference: FloatArray) -> Recording:
+    """The recording with a periodic reference as further inputs."""
+    shown = reference[np.arange(len(recording)) % len(reference)]
+    return replace(
+        recording,
+        inputs=np.column_stack([recording.inputs, np.nan_to_num(shown)]),
+        outputs=np.where(np.isfinite(shown), recording.outputs, np.nan),
+    )
+
+
+def _against_each_other(dt: float, periods: _Periods) -> Recording:
+    """Each healthy period beside what the model leaves of the others."""
+    count = len(periods.left)
+    others = (np.sum(periods.left, axis=0) - periods.left) / (count - 1)
+    inputs, outputs, flat = (
+        a.reshape(-1, a.shape[-1]) for a in (periods.inputs, periods.outputs, others)
+    )
+    return _beside(Recording(dt, inputs, outputs), flat)

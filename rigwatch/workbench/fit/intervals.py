@@ -1,0 +1,115 @@
+"""Intervals of parameters that stay honest where residuals are not white.
+
+A model that is wrong leaves residuals that hang together over many samples, and the textbook
+covariance, which takes each for itself, promises too much. Here whole blocks are left out instead,
+one after the other (the delete-a-block jackknife: B. Efron, C. Stein, Annals of Statistics 9, 1981;
+as cluster-robust covariance "CR3": R. M. Bell, D. F. McCaffrey, Survey Methodology 28, 2002):
+
+    θ − θ₋b = (N − Nb)⁻¹·gb,   cov θ = (B − 1)/B · Σ_b (θ − θ₋b)(θ − θ₋b)ᵀ
+
+with N = JᵀJ, Nb = JbᵀJb and gb = Jbᵀrb of B blocks, and Student's t for B − m degrees of freedom
+and m parameters.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.physics.engine.fit import Fit
+from rigwatch.workbench.fit.fitted_model import blocks
+
+CONFIDENCE = 0.95
+ENOUGH = 12
+"""Windows from which they are blocks of their own."""
+TIED = 0.98
+"""Correlation from which two parameters count as tied to each other."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter with its interval.
+
+    Attributes:
+        value: in `unit`.
+        unit: its unit.
+        interval: 95 %, None where the parameter was not fitted.
+        note: what is wrong with it, in words; empty where nothing is.
+    """
+
+    value: float
+    unit: str
+    interval: tuple[float, float] | None
+    note: str = ""
+
+
+def covariance(fitted: Fit) -> tuple[FloatArray, int]:
+    """Covariance of the free parameters, shape (m, m), and degrees of freedom."""
+    m = fitted.jacobian.shape[-1]
+    whole = fitted.jacobian.reshape(-1, m)
+    # In units of the columns' sizes, so that what is tiny beside others is not taken for nothing.
+    size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
+    normal = (whole / size).T @ (whole / size)
+    pairs = zip(_apart(fitted.jacobian / size), _apart(fitted.error), strict=True)
+    moved = np.array([_moved(normal, j, r) for j, r in pairs]) / size
+    count = len(moved)
+    return np.asarray(moved.T @ moved * ((count - 1) / count)), max(count - m, 1)
+
+
+def _apart(windowed: FloatArray) -> list[FloatArray]:
+    """Windows as blocks where there are enough: pieces of one share its initial state."""
+    return list(windowed) if len(windowed) >= ENOUGH else blocks(windowed)
+
+
+def _moved(normal: FloatArray, jacobian: FloatArray, error: FloatArray) -> FloatArray:
+    """How far the parameters move when a block is left out, shape (m,)."""
+    return np.asarray(
+        np.linalg.pinv(normal - jacobian.T @ jacobian, rcond=1e-12) @ (jacobian.T @ error)
+    )
+
+
+def values(fitted: Fit, beyond: Mapping[str, float] | None = None) -> dict[str, Value]:
+    """Every parameter of the model with its interval.
+
+    Args:
+        fitted: the fit.
+        beyond: variances that the recording does not show, by name.
+    """
+    system = fitted.compiled.system
+    spread: dict[str, float] = {}
+    if system.free:
+        matrix, free = covariance(fitted)
+        more = np.array([(beyond or {}).get(name, 0.0) for name in system.free])
+        width = student.ppf(0.5 + CONFIDENCE / 2, free) * np.sqrt(np.diag(matrix) + more)
+        spread = dict(zip(system.free, width.tolist(), strict=True))
+    notes = identifiability(fitted)
+    found = {}
+    for name, value in fitted.values().items():
+        interval = (value - spread[name], value + spread[name]) if name in spread else None
+        parameter = system.parameters[name]
+        found[name] = Value(value, parameter.unit, interval, notes.get(name, ""))
+    return found
+
+
+def identifiability(fitted: Fit) -> dict[str, str]:
+    """What this recording cannot tell, in words, by parameter."""
+    names, m = fitted.compiled.system.free, fitted.jacobian.shape[-1]
+    jacobian = fitted.jacobian.reshape(-1, m)
+    sizes = np.linalg.norm(jacobian, axis=0)
+    notes = {
+        name: "has no influence on this recording"
+        for name, size in zip(names, sizes, strict=True)
+        if size < 1e-12 * max(sizes.max(initial=0.0), 1e-300)
+    }
+    unit = jacobian / np.where(sizes > 0, sizes, 1.0)
+    together = np.linalg.pinv(unit.T @ unit, rcond=1e-14)
+    root = np.sqrt(np.maximum(np.diag(together), 1e-300))
+    correlation = together / np.outer(root, root)
+    for i, name in enumerate(names):
+        others = np.abs(np.delete(correlation[i], i))
+        if name not in notes and others.size and others.max() > TIED:
+            partner = [n for n in names if n != name][int(np.argmax(others))]
+            notes[name] = f"tied to {partner} (correlation {others.max():.3f})"
+    return notes

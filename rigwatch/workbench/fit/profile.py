@@ -1,0 +1,94 @@
+"""Profile likelihood: intervals that need not be symmetric, for parameters that bend the model.
+
+A parameter is held away from its best value, everything else is fitted again, and the interval ends
+where the squared error has risen by more than chance allows,
+
+    Δ(Σ r²) = χ²(95 %, 1) · s² · swelling
+
+(D. Bates, D. Watts, Nonlinear Regression Analysis, 1988). The swelling is that of the jackknife's
+variance (`intervals.py`) over the textbook's, so that residuals may hang together here, too.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from msgspec.structs import replace as changed
+from scipy.stats import chi2
+
+from rigwatch.physics.engine.compile import CompiledSystem
+from rigwatch.physics.engine.fit import Fit, Recording, fit
+from rigwatch.workbench.fit.fitted_model import Fitted
+from rigwatch.workbench.fit.intervals import CONFIDENCE, Value, covariance, values
+
+STEPS = 6
+"""Fits to find one end of an interval."""
+CLOSE = 0.02
+"""Share of the allowed rise to which an end is found."""
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What the search for one end stands on."""
+
+    fitted: Fit
+    recording: Recording
+    horizon: int
+    substeps: int
+    allowed: float
+    best: float
+
+
+def profile(fitted: Fitted, recording: Recording) -> dict[str, Value]:
+    """Every parameter with its interval from the profile.
+
+    Args:
+        fitted: the model.
+        recording: what it was fitted to.
+    """
+    found, train = values(fitted.train), fitted.train
+    robust, _ = covariance(train)
+    for index, name in enumerate(train.compiled.system.free):
+        if found[name].note:
+            continue
+        width = float(np.sqrt(robust[index, index]))
+        swelling = robust[index, index] / max(train.covariance[index, index], 1e-300)
+        best = float(np.sum(train.error**2))
+        used = max(train.error.size - train.jacobian.shape[-1] - train.initial.size, 1)
+        allowed = float(chi2.ppf(CONFIDENCE, 1) * best / used * swelling)
+        search = _Search(train, recording, fitted.horizon, fitted.substeps, allowed, best)
+        ends = [_end(search, name, sign * 1.96 * width) for sign in (-1, 1)]
+        found[name] = replace(found[name], interval=(ends[0], ends[1]))
+    return found
+
+
+def _end(search: _Search, name: str, step: float) -> float:
+    """Where the error has risen by what is allowed; the parameter's bound if that comes first."""
+    value = search.fitted.values()[name]
+    parameter = search.fitted.compiled.system.parameters[name]
+    for _ in range(STEPS):
+        at = float(np.clip(value + step, parameter.low, parameter.high))
+        rise = max(_error(search, name, at) - search.best, 1e-12 * search.allowed)
+        if at != value + step and rise < search.allowed:
+            return at
+        if abs(rise / search.allowed - 1) < CLOSE:
+            break
+        step *= float(np.clip(np.sqrt(search.allowed / rise), 0.3, 3.0))
+    return value + step
+
+
+def _error(search: _Search, name: str, at: float) -> float:
+    """Sum of squares with one parameter held and the others fitted again."""
+    fitted = search.fitted
+    system = fitted.compiled.system
+    slack = 1e-9 * max(abs(at), 1e-12)
+    # Bounds that close on the value hold it, and the kernel stays the same.
+    held = changed(system.parameters[name], low=at - slack, high=at + slack)
+    parameters = {**system.parameters, name: held}
+    compiled = CompiledSystem(replace(system, parameters=parameters), fitted.compiled.kernel)
+    start = fitted.parameters.copy()
+    start[list(parameters).index(name)] = at
+    again = fit(
+        compiled, search.recording, search.horizon, start=start, scale=fitted.scale,
+        substeps=search.substeps,
+    )  # fmt: skip
+    return float(np.sum(again.error**2))

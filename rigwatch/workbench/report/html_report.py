@@ -1,0 +1,70 @@
+"""The report of a study: one HTML page that holds everything and asks the network for nothing.
+
+write_report(open_study("emps"), Path("emps.html"))
+
+Pictures are inline SVG in the page's own colours, light or dark as the reader's system is; numbers
+carry all their digits in `<data value="…">`, so that a program reads what `rigwatch compare --json`
+prints.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from rigwatch.page import page
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare import locate
+from rigwatch.workbench.explain import explanation, ranking
+from rigwatch.workbench.report import sections
+from rigwatch.workbench.steps import signals, stages
+from rigwatch.workbench.study import Study
+from rigwatch.workbench.study import ledger as book
+
+
+def gather(study: Study, progress: Callable[[str], None] = lambda _: None) -> sections.Material:
+    """Everything that the report shows.
+
+    Raises:
+        ModelError: data have changed, or do not suit the model.
+    """
+    progress("fitting every step")
+    found = stages(study)
+    progress("simulating")
+    shown = [signals(stage) for stage in found]
+    progress("ranking what may be missing")
+    last = found[-1].bench
+    rows, verdict = ranking(last, progress)
+    told = explanation(last, rows, verdict)
+    before, now = locate(found[0].bench), locate(last)
+    return sections.Material(study, found, shown, told, before, now, list(book.lines(study)))
+
+
+def report_html(m: sections.Material) -> str:
+    """The page."""
+    return page(
+        f"{m.study.folder.resolve().name}: what the model is missing",
+        sections.header(m),
+        [
+            ("errors", "The error, step by step", sections.errors(m)),
+            ("signals", "Measured against modelled", sections.measured(m)),
+            ("where", "Where the model fails", sections.where(m)),
+            ("ranking", "What may be missing still", sections.ranking(m)),
+            ("parameters", "Parameters", sections.parameters(m)),
+            ("ledger", "Ledger", sections.ledger(m)),
+        ],
+    )
+
+
+def write_report(
+    study: Study, path: Path, progress: Callable[[str], None] = lambda _: None
+) -> sections.Material:
+    """Write the report of a study; what it shows.
+
+    Raises:
+        ModelError: data have changed or do not suit the model, or the file cannot be written.
+    """
+    material = gather(study, progress)
+    try:
+        path.write_text(report_html(material), encoding="utf-8")
+    except OSError as error:
+        raise ModelError(f"{path}: {error.strerror}, expected a file to write") from error
+    return material

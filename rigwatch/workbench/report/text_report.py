@@ -1,0 +1,153 @@
+"""Results of the workbench as plain text: tables, and a sentence where a sentence does."""
+
+from collections.abc import Sequence
+
+from rigwatch.workbench.compare import Comparison, Region
+from rigwatch.workbench.explain import Explanation, Row
+from rigwatch.workbench.fit import Value
+from rigwatch.workbench.steps import Change
+
+VERDICTS = {
+    "nothing_missing": "nothing is missing",
+    "missing_effect": "an effect is missing",
+    "undetermined": "undetermined: this recording cannot tell rivals apart",
+    "unknown_effect": "something is missing that no known effect explains",
+}
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines with columns of equal width; numbers to the right."""
+    whole = [list(head), *map(list, rows)]
+    wide = [max(len(row[i]) for row in whole) for i in range(len(head))]
+    right = [all(_numeric(row[i]) for row in rows) for i in range(len(head))]
+    return [
+        "  "
+        + "  ".join(
+            cell.rjust(w) if r else cell.ljust(w)
+            for cell, w, r in zip(row, wide, right, strict=True)
+        ).rstrip()
+        for row in whole
+    ]
+
+
+def _numeric(text: str) -> bool:
+    return not text or text[0].isdigit() or text in ("-", "< 1e-6") or text[0] in "-+<"
+
+
+def number(value: float | None) -> str:
+    """Four digits."""
+    return "-" if value is None else f"{value:.4g}"
+
+
+def comparison_lines(found: Comparison) -> list[str]:
+    """What `rigwatch compare` prints."""
+    heading = "effects: " + (", ".join(found.effects) or "none yet")
+    rows = [
+        [name, c.unit, number(c.train_error), number(c.held_out_error), number(c.noise_floor)]
+        for name, c in found.channels.items()
+    ]
+    if len(rows) > 1:
+        total = (found.train_error, found.held_out_error, found.noise_floor)
+        rows.append(["all", found.unit, *map(number, total)])
+    lines = [heading, "", "error (root mean square)"]
+    lines += table(["channel", "unit", "training", "held out", "noise floor"], rows)
+    lines += [
+        f"  one free run over all that is held out: {name} {number(c.free_run_error)} {c.unit}"
+        for name, c in found.channels.items()
+        if c.free_run_error is not None
+    ]
+    lines += [f"  noise floor from {found.noise_from}", "", "parameters, 95 % interval"]
+    lines += table(["name", "value", "interval", "unit", ""], _parameters(found.parameters))
+    return lines + [f"note: {remark}" for remark in found.remarks]
+
+
+def _parameters(found: dict[str, Value]) -> list[list[str]]:
+    return [[name, number(v.value), _interval(v), v.unit, v.note] for name, v in found.items()]
+
+
+def _interval(value: Value) -> str:
+    if value.interval is None:
+        return "held"
+    return f"{value.interval[0]:.4g} … {value.interval[1]:.4g}"
+
+
+def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
+    """What `rigwatch explain` prints."""
+    base = found.comparison
+    lines = [
+        f"verdict: {VERDICTS[found.verdict]}",
+        f"  {found.text}",
+        f"  {doubt_of(found)}",
+        "",
+        f"now: training {base.train_error:.4g}, held out {base.held_out_error:.4g},"
+        f" noise floor {base.noise_floor:.4g} {base.unit}",
+        f"  noise floor from {base.noise_from}",
+        "",
+        f"ranking ({len(found.ranking)} effects at ports)",
+    ]
+    head = ["effect@port", "training", "held out", "p", "", "cannot be told from"]
+    lines += table(head, [_ranked(row) for row in found.ranking[:most]])
+    if found.next_experiment:
+        lines += ["", f"next experiment: {found.next_experiment.text}"]
+    return lines
+
+
+def doubt_of(found: Explanation) -> str:
+    """How often a verdict like this one was wrong where the truth was known, in a sentence."""
+    cases, wrong = found.like_this
+    if not cases:
+        return "no simulated case looked like this one: how often that is wrong is not known"
+    return (
+        f"probability of being wrong {found.wrong_probability:.1%}: of {cases} simulated cases"
+        f" with such a verdict {wrong} were wrong"
+    )
+
+
+def _ranked(row: Row) -> list[str]:
+    mark = "accepted" if row.accepted else row.reason
+    p = "< 1e-6" if row.p_value < 1e-6 else f"{row.p_value:.1g}"
+    errors = [number(row.train_error), number(row.held_out_error)]
+    return [f"{row.effect}@{row.port}", *errors, p, mark, ", ".join(row.class_[:3])]
+
+
+def change_lines(found: Change) -> list[str]:
+    """What `rigwatch add` and `undo` print."""
+    rows = [["before", number(found.before.train_error), number(found.before.held_out_error)]]
+    if found.tried and found.step == "refused":
+        rows.append([f"with {found.effect}", *map(number, found.tried)])
+    else:
+        after = found.after
+        rows.append(["after", number(after.train_error), number(after.held_out_error)])
+    lines = [found.text, ""]
+    lines += table([f"error [{found.after.unit}]", "training", "held out"], rows)
+    if found.step != "refused":
+        lines += ["", "parameters, 95 % interval"]
+        lines += table(
+            ["name", "value", "interval", "unit", ""], _parameters(found.after.parameters)
+        )
+    return lines
+
+
+def region_lines(found: Sequence[Region], most: int) -> list[str]:
+    """What `rigwatch locate` prints: of each view the regions with most of the energy."""
+    lines = []
+    for channel, view in dict.fromkeys((r.channel, r.view) for r in found):
+        regions = [r for r in found if (r.channel, r.view) == (channel, view)][:most]
+        rows = [
+            [r.name, number(r.rms), number(r.mean), f"{r.share:.0%}", _span(r)] for r in regions
+        ]
+        lines += [f"{channel}, by {view}"]
+        lines += [*table(["where", "rms", "mean", "share of energy", "samples"], rows), ""]
+    return lines[:-1]
+
+
+def _span(region: Region) -> str:
+    if not len(region.samples):
+        return ""
+    return f"{len(region.samples)}, first {region.samples[0]}, last {region.samples[-1]}"
+
+
+def region_data(found: Sequence[Region]) -> list[dict[str, object]]:
+    """What `rigwatch locate --json` prints."""
+    whole = [{name: getattr(r, name) for name in r.__dataclass_fields__} for r in found]
+    return [row | {"samples": r.samples.tolist()} for row, r in zip(whole, found, strict=True)]

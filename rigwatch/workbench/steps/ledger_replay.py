@@ -1,0 +1,57 @@
+"""Replays a ledger: every model that was ever compared is fitted again and its error compared."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from msgspec.structs import replace
+
+from rigwatch.workbench.compare import comparison, open_bench
+from rigwatch.workbench.study import Accepted, Study, lines
+
+SAME = 1e-6
+"""Share by which errors may differ between machines."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One step, done again."""
+
+    step: str
+    effects: list[str]
+    recorded: float
+    found: float
+    same: bool
+    text: str
+
+
+def replay(study: Study, progress: Callable[[str], None] = lambda _: None) -> list[Check]:
+    """Fit the models of all steps that changed the effects; the file itself is left alone."""
+    checks = []
+    accepted: dict[str, Accepted] = {}
+    for line in lines(study):
+        if line["step"] == "add":
+            accepted[f"{line['effect']}@{line['port']}"] = Accepted(
+                effect=line["effect"], port=line["port"], parameters=line["parameters"]
+            )
+        if line["step"] not in ("add", "undo"):
+            continue
+        progress(f"{line['step']} {line['effect']}@{line['port']}")
+        checks.append(_check(study, line, [accepted[label] for label in line["effects"]]))
+    return checks
+
+
+def _check(study: Study, line: dict[str, Any], effects: list[Accepted]) -> Check:
+    model = Study(
+        study.folder,
+        replace(study.file, effects=tuple(effects)),
+        study.model,
+        study.effects,
+        study.own,
+    )
+    found = comparison(open_bench(model)).held_out_error
+    recorded = float(line["held_out_error"])
+    same = abs(found / recorded - 1) < SAME
+    label = f"{line['step']} {line['effect']}@{line['port']}"
+    text = f"{label}: held-out error {recorded:.6g} in the ledger, {found:.6g} now"
+    return Check(line["step"], line["effects"], recorded, found, same, text)

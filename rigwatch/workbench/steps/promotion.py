@@ -1,0 +1,232 @@
+"""Hands what a study has learnt to the monitor: its accepted friction as part of the rig's model.
+
+For a rig that is an inertia the study's own numbers go over: mass, constant force and friction. For
+a rig with a transfer function, friction reaches the acceleration through the filter Ge only; its
+sizes are fitted through that filter on the training recordings. Either way the recordings held out
+decide: a model under which the monitor's residual does not fall there is not handed over.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec import structs
+
+from monitor.model import BandSection, InertiaPlant, PromotedSection, RigModel, model_text
+from monitor.pipeline import RigMonitor
+from monitor.signals import (
+    ACCELERATION,
+    G1,
+    G2,
+    GOOD,
+    MODELLED,
+    VELOCITY,
+    VOLTAGE,
+    Admission,
+    TransferResidual,
+)
+from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.physics.engine.fit import Recording
+from rigwatch.wire.errors import ModelError
+from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.session import open_session
+from rigwatch.workbench.compare import comparison, open_bench
+from rigwatch.workbench.data import find_period
+from rigwatch.workbench.study import Span, Study, model_hash
+
+TERMS = {
+    "coulomb": ("Fc", "coulomb"),
+    "viscous": ("d", "viscous"),
+    "coulomb_by_direction": ("dF", "coulomb_by_direction"),
+    "viscous_by_direction": ("dd", "viscous_by_direction"),
+    "constant_force": ("F0", "offset"),
+}
+"""Effects that a monitor's model has a place for: the effect's parameter and that place."""
+SMOOTH = 0.2
+"""Speed over which the promoted friction's sign turns, over the velocity's rms."""
+BASES = {"emps-force": ("M", "Fv"), "emps": ("M", "Fv")}
+"""Models that are an inertia: their mass and their own viscous friction."""
+
+
+@dataclass(frozen=True)
+class Promotion:
+    """A model for the monitor.
+
+    Attributes:
+        model: what is to be in force.
+        text: the model file's text.
+        before, after: the monitor's residual on the recordings held out, rms [m/s^2].
+        learnt: what was handed over, by name.
+    """
+
+    model: RigModel
+    text: str
+    before: float
+    after: float
+    learnt: dict[str, float]
+
+
+def promotion(study: Study, model: RigModel) -> Promotion:
+    """The monitor's model with what the study has learnt.
+
+    Raises:
+        ModelError: an effect has no place in the monitor's model, or the residual does not fall.
+    """
+    _check_effects(study)
+    bare = structs.replace(model, promoted=None)
+    if isinstance(model.plant, InertiaPlant):
+        learnt = _of_study(study)
+        new = _inertia(study, model, model.plant, learnt)
+    else:
+        new, learnt = _transfer(study, bare)
+    before, after = (_residual(study, m) for m in (model, new))
+    if not after < before:
+        raise ModelError(
+            f"{study.folder}: found a residual of {after:.4g} m/s^2 on the recordings held out with"
+            f" the new model, expected less than the {before:.4g} m/s^2 without it"
+        )
+    return Promotion(new, model_text(new), before, after, learnt)
+
+
+def _check_effects(study: Study) -> None:
+    if not study.file.effects:
+        raise ModelError(f"{study.folder}: found no accepted effect to promote")
+    for accepted in study.file.effects:
+        if accepted.effect not in TERMS or study.model.ports[accepted.port].kind != "force":
+            raise ModelError(
+                f"{accepted.effect}@{accepted.port}: has no place in a monitor's model, expected"
+                f" one of {', '.join(TERMS)} at a force port"
+            )
+
+
+def _of_study(study: Study) -> dict[str, float]:
+    """Mass, constant force and friction as fitted [SI units]."""
+    if study.model.name not in BASES:
+        raise ModelError(
+            f"{study.model.name}: found a model that is no inertia, expected one of"
+            f" {', '.join(BASES)} as the rig's model is one"
+        )
+    found = {name: v.value for name, v in comparison(open_bench(study)).parameters.items()}
+    mass, viscous = BASES[study.model.name]
+    learnt = {"mass": found[mass], "offset": 0.0, "viscous": found[viscous]}
+    for accepted in study.file.effects:
+        parameter, place = TERMS[accepted.effect]
+        value = found[f"{accepted.port}_{accepted.effect}_{parameter}"]
+        learnt[place] = learnt.get(place, 0.0) + value
+    return learnt
+
+
+def _inertia(
+    study: Study, model: RigModel, plant: InertiaPlant, learnt: Mapping[str, float]
+) -> RigModel:
+    section = _section(study, learnt)
+    old = model.promoted or PromotedSection()
+    moved = section.coulomb - old.coulomb, section.viscous - old.viscous
+    assert model.band is not None
+    band = BandSection(
+        low=(model.band.low[0] - moved[0], model.band.low[1] - moved[1]),
+        high=(model.band.high[0] - moved[0], model.band.high[1] - moved[1]),
+    )
+    plant = structs.replace(plant, mass=learnt["mass"], offset=learnt["offset"])
+    return structs.replace(model, plant=plant, band=band, promoted=section)
+
+
+def _section(study: Study, learnt: Mapping[str, float]) -> PromotedSection:
+    named = {name: learnt[name] for name in PromotedSection.__struct_fields__ if name in learnt}
+    folder = study.folder.resolve().name
+    return PromotedSection(study=folder, sha256=model_hash(study), **named)
+
+
+def _transfer(study: Study, model: RigModel) -> tuple[RigModel, dict[str, float]]:
+    """The rig's model with the accepted friction and the noise that it leaves."""
+    whole = [_columns(study, span, model) for span in study.file.train]
+    smooth = SMOOTH * _rms([columns[:, VELOCITY] for columns in whole])
+    for columns in whole:
+        columns[:, G1] = model.friction.function().simulate(np.tanh(columns[:, VELOCITY] / smooth))
+    settled = [columns[model.decision.settle :] for columns in whole]
+    learnt = _through_filter(study, np.concatenate(settled))
+    section = structs.replace(_section(study, learnt), smooth=smooth)
+    scatter = [_scatter(columns, section, model.sample_rate) for columns in settled]
+    noise = structs.replace(model.noise, residual=max(model.noise.residual, *scatter))
+    return structs.replace(model, promoted=section, noise=noise), learnt
+
+
+def _through_filter(study: Study, columns: FloatArray) -> dict[str, float]:
+    """Sizes of the accepted friction in units of θ: least squares over the training recordings."""
+    places = sorted({TERMS[a.effect][1] for a in study.file.effects})
+    known = {"coulomb": G1, "viscous": G2}
+    if strange := [place for place in places if place not in known]:
+        raise ModelError(
+            f"{study.folder}: found {', '.join(strange)}, expected coulomb or viscous alone as the"
+            " rig's model is a transfer function"
+        )
+    regressors = columns[:, [known[place] for place in places]]
+    wanted = columns[:, ACCELERATION] - columns[:, MODELLED]
+    sizes, *_ = np.linalg.lstsq(regressors, wanted, rcond=None)
+    return dict(zip(places, sizes.tolist(), strict=True))
+
+
+def _scatter(columns: FloatArray, known: PromotedSection, sample_rate: float) -> float:
+    """What the friction leaves from period to period, as the estimates feel it: rms [m/s^2].
+
+    The velocity's noise is slow, so that what it does to the friction hangs together over a window
+    and weighs more than white noise of its size. A few periods show it badly, hence the margin of
+    two standard errors. 0 where nothing repeats.
+    """
+    drive = Recording(1 / sample_rate, columns[:, [VOLTAGE]], columns[:, [ACCELERATION]])
+    period = find_period(drive)
+    if not period or len(columns) < 2 * period:
+        return 0.0
+    friction = known.coulomb * columns[:, G1] + known.viscous * columns[:, G2]
+    residual = columns[:, ACCELERATION] - columns[:, MODELLED] - friction
+    change = (residual[period:] - residual[:-period]) / np.sqrt(2)
+    felt = [_felt(change, columns[period:, g], period) for g in (G1, G2)]
+    margin = 1 + 2 / np.sqrt(len(change) / period)
+    return float(margin * max(np.std(change), *felt))
+
+
+def _felt(change: FloatArray, regressor: FloatArray, window: int) -> float:
+    """Noise that would move an estimate over a window as much if it were white."""
+    along = np.convolve(change * regressor, np.ones(window), "valid")
+    size = np.convolve(regressor**2, np.ones(window), "valid")
+    return float(np.sqrt(np.mean(along**2 / size)))
+
+
+def _columns(study: Study, span: Span, model: RigModel) -> FloatArray:
+    """What the residual stage makes of a recording's valid samples, shape (n, 7)."""
+    needed = (model.channels[0], model.channels[2])
+    admission = Admission(model.channels, needed, model.decision.longest_hold)
+    stage, kept = TransferResidual(model), []
+    for block in _blocks(study, span):
+        admitted = admission.admit(block)
+        if admitted is not None:
+            columns = stage.update(admitted.signals, admitted.code)
+            kept.append(columns[admitted.code == GOOD])
+    return np.concatenate(kept)
+
+
+def _residual(study: Study, model: RigModel) -> float:
+    """The monitor's residual over the recordings held out, rms [m/s^2]."""
+    parts: list[FloatArray] = []
+    for span in study.file.held_out:
+        monitor = RigMonitor(model)
+        watched = [monitor.update(block) for block in _blocks(study, span)]
+        found = [w.estimates.column("residual").values for w in watched if w is not None]
+        parts += [np.concatenate(found)[model.decision.settle :]] if found else []
+    return _rms(parts)
+
+
+def _rms(parts: Sequence[FloatArray]) -> float:
+    whole = np.concatenate(parts) if parts else np.zeros(0)
+    whole = whole[np.isfinite(whole)]
+    if not whole.size:
+        raise ModelError("the recordings held out give the monitor no residual")
+    return float(np.sqrt(np.mean(whole**2)))
+
+
+def _blocks(study: Study, span: Span) -> Iterator[SampleBlock]:
+    session = open_session(study.folder / span.session)
+    first = next(iter(session.samples())).t_ns[0]
+    start = int(first + span.start * 1e9)
+    end = int(first + span.end * 1e9) if np.isfinite(span.end) else None
+    return session.samples(None, start, end)

@@ -1,0 +1,283 @@
+"""A study: one readable file, `study.toml`, a ledger of every step, and nothing hidden.
+
+The file names a model, recordings to fit and recordings held out, and lists the effects that have
+been accepted, one `[[effects]]` table each at its end. Adding an effect writes a table there,
+undoing takes the last one away; the rest of the file, with its comments, stays as it was written.
+"""
+
+import difflib
+import os
+import shutil
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta, field, structs
+from numpy.typing import NDArray
+
+from rigwatch.physics.engine.equations import (
+    Effect,
+    Model,
+    library,
+    load_effects,
+    load_model,
+    offered,
+    shipped_models,
+)
+from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError
+from rigwatch.wire.typed_files import Section, load
+
+FILE = "study.toml"
+LEDGER = "ledger.jsonl"
+_TABLE = "\n[[effects]]\n"
+
+
+class Span(Section, frozen=True, kw_only=True):
+    """A recording, or a part of one."""
+
+    session: Annotated[str, Meta(description="session file, from the study's folder")]
+    start: Annotated[float, Meta(ge=0, description="seconds into it where the part begins")] = 0.0
+    end: Annotated[float, Meta(description="seconds into it where the part ends")] = float("inf")
+
+
+class Derived(Section, frozen=True, kw_only=True):
+    """A signal that is made from a channel: low-passed and differentiated."""
+
+    channel: Annotated[str, Meta(description="channel it is made from")]
+    order: Annotated[int, Meta(ge=0, le=2, description="how often it is differentiated")] = 0
+
+
+class Derive(Section, frozen=True, kw_only=True):
+    """How signals are made from channels."""
+
+    low_pass: Annotated[float, Meta(gt=0, description="zero-phase Butterworth of order 4 [Hz]")]
+    signals: Annotated[dict[str, Derived], Meta(description="the signals, by name")]
+
+
+class Thin(Section, frozen=True, kw_only=True):
+    """Residuals are low-passed and thinned before they are counted."""
+
+    factor: Annotated[int, Meta(ge=1, description="samples for one that stays")] = 1
+    edge: Annotated[int, Meta(ge=0, description="samples left out at both ends, after it")] = 0
+
+
+class Accepted(Section, frozen=True, kw_only=True):
+    """An effect that has been added."""
+
+    effect: Annotated[str, Meta(description="its name")]
+    port: Annotated[str, Meta(description="where it enters")]
+    parameters: Annotated[dict[str, float], Meta(description="where its fit starts")] = field(
+        default_factory=dict
+    )
+
+
+class StudyFile(Section, frozen=True, kw_only=True):
+    """The file `study.toml`."""
+
+    model: Annotated[str, Meta(description="a shipped model's name, or a model file")]
+    train: Annotated[tuple[Span, ...], Meta(min_length=1, description="what is fitted to")]
+    held_out: Annotated[tuple[Span, ...], Meta(min_length=1, description="what decides")]
+    healthy: Annotated[
+        tuple[Span, ...], Meta(description="recordings with nothing wrong, for the noise floor")
+    ] = ()
+    horizon: Annotated[float, Meta(gt=0, description="time between re-initialisations [s]")] = 0.5
+    substeps: Annotated[int, Meta(ge=1, description="integration steps a sample")] = 2
+    period: Annotated[float, Meta(ge=0, description="period of the excitation [s], 0: look")] = 0.0
+    channels: Annotated[
+        dict[str, str], Meta(description="channel of a model's signal, where named otherwise")
+    ] = field(default_factory=dict)
+    start: Annotated[
+        dict[str, float], Meta(description="values of the model's parameters to start from")
+    ] = field(default_factory=dict)
+    derive: Derive | None = None
+    thin: Thin | None = None
+    effect_files: Annotated[
+        tuple[str, ...], Meta(description="own effects, TOML files from the study's folder")
+    ] = ()
+    effects: Annotated[tuple[Accepted, ...], Meta(description="accepted so far, in order")] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """Parameters that the healthy recording told.
+
+    Attributes:
+        names: of the model's parameters.
+        covariance: of their values, shape (names, names).
+    """
+
+    names: tuple[str, ...]
+    covariance: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study that has been opened.
+
+    Attributes:
+        folder: where it is.
+        file: what its file says.
+        model: the base model.
+        effects: every effect that may be tried: shipped, from entry points, own; by name.
+        own: names of those that are not shipped.
+        kept: what the healthy recording told, None before it was asked.
+    """
+
+    folder: Path
+    file: StudyFile
+    model: Model
+    effects: Mapping[str, Effect]
+    own: frozenset[str]
+    kept: Kept | None = None
+
+    @property
+    def ledger(self) -> Path:
+        """The ledger's file."""
+        return self.folder / LEDGER
+
+    def sessions(self) -> dict[str, Path]:
+        """The recordings, by the name that the file gives them."""
+        spans = (*self.file.train, *self.file.held_out, *self.file.healthy)
+        return {span.session: self.folder / span.session for span in spans}
+
+    def with_effects(self, effects: Sequence[Accepted]) -> "Study":
+        """The same with these effects in its model, in memory alone."""
+        return replace(self, file=structs.replace(self.file, effects=tuple(effects)))
+
+    def effect(self, name: str) -> Effect:
+        """The effect called `name`.
+
+        Raises:
+            ModelError: there is none; near matches are named.
+        """
+        if name not in self.effects:
+            raise ModelError(f"found no effect {name!r}, expected {nearest(name, self.effects)}")
+        return self.effects[name]
+
+
+def nearest(name: str, known: Mapping[str, object]) -> str:
+    """Words for what `name` may have been meant to be."""
+    close = difflib.get_close_matches(name, known, 3, 0.5)
+    return f"perhaps {' or '.join(close)}" if close else f"one of {', '.join(sorted(known))}"
+
+
+def open_study(folder: Path | str) -> Study:
+    """The study in `folder`.
+
+    Raises:
+        ConfigError: there is none, or its file does not fit.
+        ModelError: its model or one of its effects is unknown.
+    """
+    folder = Path(folder)
+    path = folder / FILE
+    if not path.is_file():
+        raise ConfigError(path, "", "no such file", "a study; make one with `rigwatch study new`")
+    file = load(path, StudyFile)
+    given = offered(folder / name for name in file.effect_files)
+    effects = {**library(), **given}
+    study = Study(folder, file, _model(folder, file.model), effects, frozenset(given))
+    for accepted in file.effects:
+        study.effect(accepted.effect)
+    return study
+
+
+def _model(folder: Path, name: str) -> Model:
+    if name.endswith(".toml"):
+        return load_model(folder / name)
+    models = shipped_models()
+    if name not in models:
+        raise ModelError(f"{folder / FILE}: found model {name!r}, expected {nearest(name, models)}")
+    return models[name]
+
+
+def create(folder: Path | str, template: Path | str, sessions: Path | str | None = None) -> Study:
+    """A new study in `folder` after the study file `template`.
+
+    Args:
+        folder: is made where there is none.
+        template: its comments are kept.
+        sessions: folder of the template's sessions; the template's own folder if None.
+
+    Raises:
+        ConfigError: the folder holds a study already, the template does not fit, or a session or
+            effect file that it names is not there.
+    """
+    folder, template = Path(folder), Path(template)
+    if (folder / FILE).exists():
+        raise ConfigError(folder / FILE, "", "a study", "a folder without one")
+    file = load(template, StudyFile)
+    beside = template.parent if sessions is None else Path(sessions)
+    text = template.read_text(encoding="utf-8")
+    spans = {span.session: beside for span in (*file.train, *file.held_out, *file.healthy)}
+    files = spans | dict.fromkeys(file.effect_files, template.parent)
+    if file.model.endswith(".toml"):
+        files[file.model] = template.parent
+    for name, where in files.items():
+        path = where / name
+        if not path.exists():
+            raise ConfigError(template, name, "no such file or folder", f"it in {where}")
+        from_study = os.path.relpath(path.resolve(), folder.resolve())
+        text = text.replace(f'"{name}"', f'"{Path(from_study).as_posix()}"')
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / FILE).write_text(text, encoding="utf-8")
+    try:
+        return open_study(folder)
+    except RigwatchError:
+        (folder / FILE).unlink()
+        raise
+
+
+def append_effect(study: Study, accepted: Accepted) -> Study:
+    """The study with one more effect in its file."""
+    numbers = ", ".join(f"{name} = {value!r}" for name, value in accepted.parameters.items())
+    table = (
+        f'effect = "{accepted.effect}"\nport = "{accepted.port}"\nparameters = {{ {numbers} }}\n'
+    )
+    text = _text(study).rstrip() + "\n" + _TABLE + table
+    return _rewritten(study, text)
+
+
+def drop_effect(study: Study) -> Study:
+    """The study without the effect that its file lists last.
+
+    Raises:
+        ModelError: there is none, or the table does not stand at the end of the file.
+    """
+    text = _text(study)
+    at = text.rfind(_TABLE)
+    if not study.file.effects or at < 0:
+        raise ModelError(f"{study.folder}: found no effect to undo")
+    return _rewritten(study, text[:at].rstrip() + "\n")
+
+
+def use_effect_file(study: Study, path: Path) -> Study:
+    """The study with a copy of the user's effect file, whose effects join the others.
+
+    Raises:
+        ConfigError: the file does not fit.
+    """
+    load_effects(path)
+    target = study.folder / path.name
+    if path.resolve() != target.resolve():
+        shutil.copyfile(path, target)
+    names = [*dict.fromkeys([*study.file.effect_files, path.name])]
+    line = f"effect_files = [{', '.join(repr(n).replace(chr(39), chr(34)) for n in names)}]\n"
+    kept = [x for x in _text(study).splitlines(True) if not x.startswith("effect_files")]
+    return _rewritten(study, line + "".join(kept))
+
+
+def _text(study: Study) -> str:
+    return (study.folder / FILE).read_text(encoding="utf-8")
+
+
+def _rewritten(study: Study, text: str) -> Study:
+    """Write the file whole or not at all, after a look at whether it can be read back."""
+    tomllib.loads(text)
+    path = study.folder / FILE
+    beside = path.with_suffix(".new")
+    beside.write_text(text, encoding="utf-8")
+    beside.replace(path)
+    return open_study(study.folder)
