@@ -143,7 +143,7 @@ def _serve(server: "SerialServer", stop: threading.Event) -> None:
 
 def subscriber(config: Path, out: Path, stop: threading.Event) -> None:
     """Notes when each sample's estimate is there."""
-    from rigwatch.wire.bus.bus import connect
+    from rigwatch.wire.bus.connection import connect
     from rigwatch.wire.messages.topics import ESTIMATES
     from rigwatch.wire.rig_config import load_rig
 

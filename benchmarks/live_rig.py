@@ -14,7 +14,8 @@ from pathlib import Path
 
 from rigwatch.demo.commissioning import ensure_model
 from rigwatch.demo.rig_file import find_config, write_rig_file
-from rigwatch.wire.bus.bus import connect, wait_until
+from rigwatch.wire.bus.bus import wait_until
+from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.rig_config import RigConfig, load_rig
 
 ROOT = Path(__file__).parents[1]

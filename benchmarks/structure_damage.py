@@ -21,7 +21,8 @@ from rigwatch.structures.damage.examination import Examination, Settings, examin
 from rigwatch.structures.damage.spring_model import SpringModel, split
 from rigwatch.structures.damage.threshold import false_alarm, threshold_for
 from rigwatch.structures.identification.identify import identify
-from rigwatch.structures.model.description import Load, Structure, coefficients, load_structure
+from rigwatch.structures.model.checks import load_structure
+from rigwatch.structures.model.description import Load, Structure, coefficients
 from rigwatch.structures.records.record import FloatArray, Record
 from rigwatch.wire.errors import RigwatchError
 from sim_plant.structure import Damage, simulate, with_noise

@@ -20,7 +20,8 @@ from benchmarks.structures_thesis import thesis_record
 from benchmarks.table import Row
 from rigwatch.structures.identification.identify import Identification, identify, solved
 from rigwatch.structures.identification.problem import problem_of
-from rigwatch.structures.model.description import Load, Structure, coefficient, load_structure
+from rigwatch.structures.model.checks import load_structure
+from rigwatch.structures.model.description import Load, Structure, coefficient
 from rigwatch.structures.model.edit import with_values
 from rigwatch.structures.model.matrices import mass_matrix, stiffness_matrix
 from rigwatch.structures.records.record import Record

@@ -44,7 +44,7 @@ SHORT, LONG = 8, 64
 
 
 class Rules(NamedTuple):
-    """Everything a departure is judged by; see `limits.py` for where the figures come from."""
+    """Everything a departure is judged by; `decision_rules.py` derives the figures."""
 
     window: int
     hop: int

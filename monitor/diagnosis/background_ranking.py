@@ -1,6 +1,7 @@
 """What is probably missing when an alarm stands: asked in the background on recent samples.
 
-The ranking itself is in `suspects.py` and runs in a process of its own; here is what of the samples
+The ranking itself is in `fault_candidates.py` and runs in a process of its own; here is what of
+the samples
 is kept for it, when it is asked, and what becomes of the answer.
 """
 

@@ -1,4 +1,6 @@
-"""Ranks in a process of its own: `python -m monitor.suspect_job FOLDER`, started by the monitor.
+"""Ranks in a process of its own, started by the monitor.
+
+    python -m monitor.diagnosis.ranking_job FOLDER
 
 A thread would share the interpreter with the monitor's loop, and make samples wait while it imports
 and computes. The folder holds what is asked, and takes the answer.
@@ -20,6 +22,7 @@ from rigwatch.wire.errors import RigwatchError
 LONGEST = 300
 """A job that takes longer is given up [s]; the first on a machine compiles what effects need."""
 NICENESS = 10
+MODULE = "monitor.diagnosis.ranking_job"
 _EVIDENCE, _MODEL, _EFFECTS, _ANSWER = "evidence.npz", "model.toml", "effects.json", "answer.txt"
 
 
@@ -36,7 +39,7 @@ def ask(  # noqa: PLR0917 -- what is put into the folder
     (folder / _MODEL).write_text(model_text(model), encoding="utf-8")
     (folder / _EFFECTS).write_text(json.dumps(list(effect_files)), encoding="utf-8")
     child = os.posix_spawn(
-        sys.executable, [sys.executable, "-m", "monitor.suspect_job", str(folder)], os.environ,
+        sys.executable, [sys.executable, "-m", MODULE, str(folder)], os.environ,
         # The monitor's own real-time class would be handed on.
         scheduler=(os.SCHED_OTHER, os.sched_param(0)),
     )  # fmt: skip

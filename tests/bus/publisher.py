@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from rigwatch.wire.bus.bus import connect
+from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.messages.message_types import Column, SampleBlock
 from rigwatch.wire.messages.topics import SAMPLES

@@ -10,7 +10,8 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from rigwatch.wire.bus.bus import Bus, connect, wait_until
+from rigwatch.wire.bus.bus import Bus, wait_until
+from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.rig_config import RigConfig, load_rig
 
 ROOT = Path(__file__).parents[2]

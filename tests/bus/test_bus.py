@@ -9,8 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigwatch.wire.bus.bus import MAX_PAYLOAD, Bus, Subscription, connect
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.bus.subscription import Subscription
+from rigwatch.wire.bus.transport import MAX_PAYLOAD
 from rigwatch.wire.bus.zenoh_transport import open_router
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages.message_types import Event

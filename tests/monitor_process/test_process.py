@@ -12,8 +12,9 @@ from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
 from rigwatch.wire.bus.alarm_list import ask_alarm_list
-from rigwatch.wire.bus.bus import Subscription, wait_until
+from rigwatch.wire.bus.bus import wait_until
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.errors import BusError, ConfigError
 from rigwatch.wire.messages.blocks import concatenate

@@ -16,7 +16,8 @@ import pytest
 
 from rigwatch.recorder.folders import choose
 from rigwatch.recorder.process import Recorder, describe_run
-from rigwatch.wire.bus.bus import Bus, connect
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.zenoh_transport import open_router
 from rigwatch.wire.delivery.ring import SampleRing

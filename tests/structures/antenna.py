@@ -4,7 +4,8 @@ from pathlib import Path
 
 import msgspec
 
-from rigwatch.structures.model.description import Load, load_structure
+from rigwatch.structures.model.checks import load_structure
+from rigwatch.structures.model.description import Load
 from rigwatch.structures.records.record import Record
 from sim_plant.structure import simulate
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from rigwatch.structures.damage.detector import innovations
 from rigwatch.structures.damage.examination import Examination, Settings, examine
-from rigwatch.structures.model.description import Structure, coefficients, load_structure
+from rigwatch.structures.model.checks import load_structure
+from rigwatch.structures.model.description import Structure, coefficients
 from rigwatch.structures.records.record import FloatArray, Record
 from rigwatch.wire.errors import ModelError
 from sim_plant.structure import Damage, simulate, with_noise

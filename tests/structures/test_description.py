@@ -4,8 +4,8 @@ import pytest
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.model import load_model
 from rigwatch.physics.engine.equations.system import compose
-from rigwatch.structures.model.checks import check
-from rigwatch.structures.model.description import Structure, load_structure
+from rigwatch.structures.model.checks import check, load_structure
+from rigwatch.structures.model.description import Structure
 from rigwatch.structures.model.edit import Change, changed, with_unknowns, with_values
 from rigwatch.structures.model.matrices import modes, stiffness_matrix
 from rigwatch.structures.model.structure_model import port_of, to_model, to_system

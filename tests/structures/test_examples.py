@@ -6,7 +6,7 @@ import pytest
 from benchmarks.structures import Extreme
 from rigwatch.physics.engine.equations.model import load_model
 from rigwatch.structures.identification.identify import identify
-from rigwatch.structures.model.description import load_structure
+from rigwatch.structures.model.checks import load_structure
 from rigwatch.structures.records.record import Record
 from sim_plant import tower
 from sim_plant.earthquake import accelerogram

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigwatch.structures.live.live_watch import LiveDamage, LiveSettings, Said
-from rigwatch.structures.model.description import load_structure
+from rigwatch.structures.model.checks import load_structure
 from rigwatch.structures.records.record import Record
 from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.errors import ModelError

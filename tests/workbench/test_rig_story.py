@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.wire.bus.bus import connect
+from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.messages.message_types import EstimateBlock
 from rigwatch.wire.messages.topics import ESTIMATES
 from rigwatch.wire.rig_config import load_rig

@@ -22,14 +22,14 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.wire.host import ROUTER, Heartbeat, raise_priority
     from rigwatch.wire.rig_config import load_rig
 
-    bus = load_rig(arguments.config).bus
+    config = load_rig(arguments.config)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     heartbeat = Heartbeat("router")
     raise_priority(ROUTER)
-    close = open_router(bus.listen, bus.lease)
-    heartbeat.ready(f"listens at {bus.listen}")
+    close = open_router(config)
+    heartbeat.ready(f"listens at {config.bus.listen}")
     # Samples do not go through this loop: it only says that it turns.
     while not stop.wait(TURN):
         heartbeat.advance(0)

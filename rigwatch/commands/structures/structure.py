@@ -13,7 +13,7 @@ EXAMPLE = """\
   rigwatch structure modes configs/structures/kabe_antenna.toml --svg antenna.svg"""
 
 ACTIONS: dict[str, str] = {
-    # name: module below rigwatch.commands
+    # name: module below rigwatch.commands.structures
     "simulate": "structure_simulate",
     "identify": "structure_identify",
     "compare": "structure_compare",
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """One parser an action."""
     actions = parser.add_subparsers(metavar="ACTION", required=True, dest="action")
     for name, module_name in ACTIONS.items():
-        module = importlib.import_module(f"rigwatch.commands.{module_name}")
+        module = importlib.import_module(f"rigwatch.commands.structures.{module_name}")
         action = actions.add_parser(
             name,
             help=module.HELP,

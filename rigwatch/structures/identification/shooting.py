@@ -9,7 +9,8 @@ A longer window is believed as long as its errors stay what they were over short
 do not, disturbances grow along the way (a plant that runs away, a strongly nonlinear structure that
 is chaotic), and the longest windows that could be followed have the last word.
 
-Where nodes have no signal, `prolonged.py` follows one trajectory from the record's start instead.
+Where nodes have no signal, `progressive_fit.py` follows one
+trajectory from the record's start instead.
 """
 
 from dataclasses import dataclass, replace

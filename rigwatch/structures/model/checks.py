@@ -14,9 +14,21 @@ from rigwatch.structures.model.description import (
 )
 from rigwatch.structures.model.matrices import afloat
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files import load
 
 _NAME = re.compile(r"[A-Za-z0-9_]+")
 _ENTRY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+def load_structure(path: Path | str) -> Structure:
+    """The structure file at `path`, checked.
+
+    Raises:
+        ConfigError: it does not fit, or describes what cannot stand (see `check`).
+    """
+    structure = load(path, Structure)
+    check(structure, path)
+    return structure
 
 
 def check(structure: Structure, file: Path | str) -> None:
@@ -40,8 +52,8 @@ def _complaints(structure: Structure) -> Iterator[tuple[str, str, str]]:
             yield f"springs.{name}.length", length, f"a positive length for the law {spring.law}"
     for name, damper in structure.dampers.items():
         yield from _bad_ends(structure, f"dampers.{name}.between", damper)
-    for name, load in structure.loads.items():
-        yield from _bad_load(structure, f"loads.{name}", load)
+    for name, entry in structure.loads.items():
+        yield from _bad_load(structure, f"loads.{name}", entry)
     yield from _bad_signals(structure)
     yield from _loose_nodes(structure)
 

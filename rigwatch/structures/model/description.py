@@ -21,12 +21,11 @@ plus q·d² + c·d³; k stiffness [N/m], s length [m], q quadratic [N/m^2], c cu
 resists with the same in the rate of d: damping [N s/m], quadratic drag q·|ḋ|·ḋ, cubic c·ḋ³.
 """
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
-from rigwatch.wire.typed_files import Section, load
+from rigwatch.wire.typed_files import Section
 
 Text = Annotated[str, Meta(min_length=1)]
 INFINITE = float("inf")
@@ -134,19 +133,6 @@ class Structure(Section, frozen=True, kw_only=True):
 def label(kind: str, node: str) -> str:
     """Name of a node's own quantity: x6, or x_roof where the node's name is no number."""
     return f"{kind}{node}" if node[:1].isdigit() else f"{kind}_{node}"
-
-
-def load_structure(path: Path | str) -> Structure:
-    """The structure file at `path`, checked.
-
-    Raises:
-        ConfigError: it does not fit, or describes what cannot stand (see `checks.check`).
-    """
-    from rigwatch.structures.model.checks import check
-
-    structure = load(path, Structure)
-    check(structure, path)
-    return structure
 
 
 SPRING_PARTS = {"stiffness": "", "quadratic": "_quadratic", "cubic": "_cubic", "length": "_length"}

@@ -8,17 +8,11 @@ monitor answers.
 """
 
 from rigwatch.wire.bus.alarm_list import ask_alarm_list, serve_alarm_list
-from rigwatch.wire.bus.bus import (
-    MAX_PAYLOAD,
-    QUEUE_CAPACITY,
-    Bus,
-    Close,
-    Subscription,
-    connect,
-    unique_process,
-)
+from rigwatch.wire.bus.bus import Bus, unique_process
+from rigwatch.wire.bus.connection import connect, open_router
 from rigwatch.wire.bus.model_change import KEY, PATIENCE, Granted, Wish, ask_for_model
-from rigwatch.wire.bus.zenoh_transport import open_router
+from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Close
 
 __all__ = [
     "KEY",

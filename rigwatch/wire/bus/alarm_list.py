@@ -3,7 +3,8 @@
 import contextlib
 from collections.abc import Callable, Sequence
 
-from rigwatch.wire.bus.bus import Bus, Close
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.transport import Close
 from rigwatch.wire.errors import BusError, MessageError
 from rigwatch.wire.messages import Alarm, decode, encode
 

@@ -1,7 +1,7 @@
 """The bus between the processes of a rig: messages, questions, and who is alive.
 
     Bus             what processes use: messages in and out, encoded and checked here
-     └ Transport    what carries the bytes: Zenoh (`bus_zenoh.py`) or memory (`bus_memory.py`)
+     └ Transport    what carries the bytes: Zenoh, or memory (`zenoh_transport`, `memory_transport`)
 
 Publishing never waits for a reader: where a reader or the link is too slow, messages are dropped,
 and readers that cannot afford that ask a ring (`ring.py`) for what they miss. A receiving callback
@@ -9,117 +9,14 @@ only puts bytes into a bounded queue; they are decoded in the thread that takes 
 bad message is counted there and hurts nobody.
 """
 
-import contextlib
 import os
 import time
-from collections.abc import Callable, Iterator
-from queue import Empty, SimpleQueue
-from typing import Any, Protocol
+from collections.abc import Callable
 
-from rigwatch.wire.errors import BusError, MessageError
-from rigwatch.wire.messages import ALIVE_KEY, Message, Topic, bus_key, decode, encode
-from rigwatch.wire.rig_config import RigConfig
-
-MAX_PAYLOAD = 1 << 18
-"""Largest payload that any of our messages or replies has [bytes]; larger ones are refused."""
-QUEUE_CAPACITY = 4096
-"""Messages a subscription holds for a slow reader before the oldest are dropped."""
-
-Close = Callable[[], None]
-Answer = Callable[[bytes], list[bytes]]
-"""Given a question's bytes, the replies' bytes, none of them above `MAX_PAYLOAD`."""
-
-
-class Transport(Protocol):
-    """What carries bytes between processes. Keys are whole, such as "rig/bench1/daq/samples"."""
-
-    def put(self, key: str, payload: bytes) -> None:
-        """Send without waiting; dropped where the link is full or down."""
-
-    def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
-        """Call `receive` with each payload put to `key`, in the transport's own thread."""
-
-    def serve(self, key: str, answer: Answer) -> Close:
-        """Answer questions to `key`, in a thread of the transport."""
-
-    def ask(self, key: str, question: bytes, timeout: float) -> list[bytes]:
-        """The replies of all that serve `key`, as many as came within `timeout` [s]."""
-
-    def declare_token(self, key: str) -> Close:
-        """Show a token at `key` that vanishes when closed or when this process dies."""
-
-    def tokens(self, pattern: str, timeout: float) -> list[str]:
-        """Keys of the tokens that are alive now and match `pattern` (`*`: one part of a key)."""
-
-    def watch_tokens(self, pattern: str, changed: Callable[[str, bool], None]) -> Close:
-        """Call `changed(key, alive)` for tokens that match, first for those there already."""
-
-    def connected(self) -> bool:
-        """Whether there is a link to the router now."""
-
-    def close(self) -> None:
-        """Close everything that was opened through this transport."""
-
-
-class Subscription:
-    """Messages of one topic, waiting in a bounded queue; the oldest are dropped when it is full.
-
-    Attributes:
-        dropped: messages dropped because the reader was slow.
-        rejected: payloads dropped because they were too large or no such message.
-    """
-
-    def __init__(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> None:
-        self.topic = topic
-        self.dropped = 0
-        self.rejected = 0
-        self._capacity = capacity
-        self._waiting: SimpleQueue[bytes] = SimpleQueue()
-        self._close: Close = lambda: None
-
-    def __len__(self) -> int:
-        return self._waiting.qsize()
-
-    def receive(self, payload: bytes) -> None:
-        """Take one payload from the transport; never waits, never raises."""
-        if len(payload) > MAX_PAYLOAD:
-            self.rejected += 1
-            return
-        if self._waiting.qsize() >= self._capacity:
-            with contextlib.suppress(Empty):
-                self._waiting.get_nowait()
-                self.dropped += 1
-        self._waiting.put(payload)
-
-    def get(self, timeout: float | None = None) -> Any:
-        """The next message of the topic's class, or None when none came within `timeout` [s].
-
-        Args:
-            timeout: 0 does not wait, None waits for ever.
-        """
-        deadline = None if timeout is None else time.monotonic() + timeout
-        while True:
-            left = None if deadline is None else max(0.0, deadline - time.monotonic())
-            try:
-                payload = self._waiting.get(block=left != 0.0, timeout=left)
-            except Empty:
-                return None
-            with contextlib.suppress(MessageError):
-                return decode(self.topic.message, payload)
-            self.rejected += 1
-
-    def drain(self) -> list[Any]:
-        """All messages that wait now, oldest first."""
-        found = [self.get(timeout=0) for _ in range(self._waiting.qsize())]
-        return [message for message in found if message is not None]
-
-    def __iter__(self) -> Iterator[Any]:
-        while True:
-            yield self.get()
-
-    def close(self) -> None:
-        """Receive no more."""
-        self._close()
+from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Transport
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.messages import ALIVE_KEY, Message, Topic, bus_key, encode
 
 
 class Bus:
@@ -190,36 +87,6 @@ class Bus:
     def close(self) -> None:
         """Leave the bus; the process's tokens vanish."""
         self.transport.close()
-
-
-def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bus:
-    """Join the bus of a rig as `process`.
-
-    Args:
-        config: the rig's configuration.
-        process: name of the process, such as "daq".
-        timeout: how long the router may take to be reached [s]; None waits for ever, so that
-            processes can be started in any order. Once reached, a lost router is found again
-            in the background.
-
-    Raises:
-        BusError: the router was not reached within `timeout`, or its endpoint is wrong.
-    """
-    from rigwatch.wire.bus.zenoh_transport import (
-        ZenohTransport,  # slow to import, not needed in memory
-    )
-
-    transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease)
-    return Bus(transport, config.rig.id, process)
-
-
-def answered(answer: Answer, question: bytes) -> list[bytes]:
-    """The replies to a question; none where the one who answers fails or says too much."""
-    try:
-        return [reply for reply in answer(question) if len(reply) <= MAX_PAYLOAD]
-    except Exception:
-        # A question comes from outside: it must not end the thread that serves.
-        return []
 
 
 def wait_until(holds: Callable[[], bool], timeout: float, pause: float = 0.02) -> bool:

@@ -9,7 +9,8 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
-from rigwatch.wire.bus.bus import MAX_PAYLOAD, Answer, Bus, Close, answered
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, answered
 
 T = TypeVar("T")
 

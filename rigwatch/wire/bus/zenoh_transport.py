@@ -22,7 +22,7 @@ from typing import Any
 import zenoh
 from zenoh.handlers import Callback
 
-from rigwatch.wire.bus.bus import MAX_PAYLOAD, Answer, Close, answered
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, answered
 from rigwatch.wire.errors import BusError
 
 RETRY_MS = (100, 200)

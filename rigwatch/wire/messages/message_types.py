@@ -1,7 +1,7 @@
 """What the processes say to each other, and what a session file keeps: one declaration a message.
 
 Every message is a frozen dataclass. Its protobuf schema is built from the annotations
-(`schema.py`), so that the bus and the session files carry the same bytes and any protobuf or MCAP
+(`protobuf.py`), so that the bus and the session files carry the same bytes and any protobuf or MCAP
 tool can read them. A field's number on the wire is its place in the class: new fields go to the
 end, none is removed or moved.
 
@@ -37,7 +37,7 @@ class Column:
         name: channel or signal name, such as "voltage".
         unit: SI unit, "" for a pure number.
         values: shape (n,).
-        quality: shape (n,), flags of `quality.py`; empty where the signal has none.
+        quality: shape (n,), flags of `quality_flags.py`; empty where the signal has none.
     """
 
     name: str

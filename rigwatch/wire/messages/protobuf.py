@@ -1,4 +1,4 @@
-"""Protobuf bytes of the messages; schemas are built at run time from `messages.py`.
+"""Protobuf bytes of the messages; schemas are built at run time from `message_types.py`.
 
 `encode` and `decode` are the only way a message becomes bytes and back. The descriptors need no
 compiler, and `file_descriptor_set` is what MCAP stores so that other tools can decode a session.

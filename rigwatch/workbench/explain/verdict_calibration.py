@@ -87,6 +87,6 @@ def doubt(word: str, evidence: Evidence) -> float:
 
 @cache
 def _counts() -> dict[tuple[str, int, int], tuple[int, int]]:
-    text = (resources.files("rigwatch.workbench") / FILE).read_text("utf-8")
+    text = (resources.files("rigwatch.workbench.explain") / FILE).read_text("utf-8")
     cells = parse(text, Calibration, FILE).cells
     return {(c.word, c.left, c.margin): (c.cases, c.wrong) for c in cells}

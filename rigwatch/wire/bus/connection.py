@@ -1,0 +1,40 @@
+"""Joining a rig's bus over Zenoh, and the router that it meets on.
+
+Zenoh is slow to import and not needed on a bus in memory, so it is imported when it is used.
+"""
+
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.transport import Close
+from rigwatch.wire.rig_config import RigConfig
+
+
+def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bus:
+    """Join the bus of a rig as `process`.
+
+    Args:
+        config: the rig's configuration.
+        process: name of the process, such as "daq".
+        timeout: how long the router may take to be reached [s]; None waits for ever, so that
+            processes can be started in any order. Once reached, a lost router is found again
+            in the background.
+
+    Raises:
+        BusError: the router was not reached within `timeout`, or its endpoint is wrong.
+    """
+    from rigwatch.wire.bus.zenoh_transport import (
+        ZenohTransport,  # slow to import, not needed in memory
+    )
+
+    transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease)
+    return Bus(transport, config.rig.id, process)
+
+
+def open_router(config: RigConfig) -> Close:
+    """Run the router of a rig's bus, until the returned function is called.
+
+    Raises:
+        BusError: the endpoint is not well formed or already taken.
+    """
+    from rigwatch.wire.bus import zenoh_transport
+
+    return zenoh_transport.open_router(config.bus.listen, config.bus.lease)

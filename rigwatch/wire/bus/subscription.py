@@ -1,0 +1,75 @@
+"""Messages of one topic, waiting for a reader that may be slower than they come."""
+
+import contextlib
+import time
+from collections.abc import Iterator
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Close
+from rigwatch.wire.errors import MessageError
+from rigwatch.wire.messages import Topic, decode
+
+QUEUE_CAPACITY = 4096
+"""Messages a subscription holds for a slow reader before the oldest are dropped."""
+
+
+class Subscription:
+    """Messages of one topic, waiting in a bounded queue; the oldest are dropped when it is full.
+
+    Attributes:
+        dropped: messages dropped because the reader was slow.
+        rejected: payloads dropped because they were too large or no such message.
+    """
+
+    def __init__(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> None:
+        self.topic = topic
+        self.dropped = 0
+        self.rejected = 0
+        self._capacity = capacity
+        self._waiting: SimpleQueue[bytes] = SimpleQueue()
+        self._close: Close = lambda: None
+
+    def __len__(self) -> int:
+        return self._waiting.qsize()
+
+    def receive(self, payload: bytes) -> None:
+        """Take one payload from the transport; never waits, never raises."""
+        if len(payload) > MAX_PAYLOAD:
+            self.rejected += 1
+            return
+        if self._waiting.qsize() >= self._capacity:
+            with contextlib.suppress(Empty):
+                self._waiting.get_nowait()
+                self.dropped += 1
+        self._waiting.put(payload)
+
+    def get(self, timeout: float | None = None) -> Any:
+        """The next message of the topic's class, or None when none came within `timeout` [s].
+
+        Args:
+            timeout: 0 does not wait, None waits for ever.
+        """
+        deadline = None if timeout is None else time.monotonic() + timeout
+        while True:
+            left = None if deadline is None else max(0.0, deadline - time.monotonic())
+            try:
+                payload = self._waiting.get(block=left != 0.0, timeout=left)
+            except Empty:
+                return None
+            with contextlib.suppress(MessageError):
+                return decode(self.topic.message, payload)
+            self.rejected += 1
+
+    def drain(self) -> list[Any]:
+        """All messages that wait now, oldest first."""
+        found = [self.get(timeout=0) for _ in range(self._waiting.qsize())]
+        return [message for message in found if message is not None]
+
+    def __iter__(self) -> Iterator[Any]:
+        while True:
+            yield self.get()
+
+    def close(self) -> None:
+        """Receive no more."""
+        self._close()
