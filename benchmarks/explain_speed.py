@@ -139,7 +139,7 @@ def _in_processes(file: Path, repeats: int) -> Iterator[Row]:
 
 def _step(step: str, what: str, file: Path, caches: str, repeats: int) -> Row:
     """Median of a step's time, each time in a process of its own."""
-    folders = {"NUMBA_CACHE_DIR": f"{caches}/numba", "RIGWATCH_CACHE": f"{caches}/rigwatch"}
+    folders = {"NUMBA_CACHE_DIR": f"{caches}/numba"}
     found = []
     for _ in range(repeats):
         done = subprocess.run(

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import sympy
@@ -57,6 +57,14 @@ class Equations:
     pace: Pace
 
 
+class Jacobians(NamedTuple):
+    """Addresses of a system's functions: rates alone, outputs and rates with their Jacobians."""
+
+    plain: int
+    reads: int
+    rates: int
+
+
 def native_kernel(system: System) -> "NativeKernel":
     """The kernel of `system`; one for all systems of the same equations."""
     return _kernel(
@@ -81,7 +89,9 @@ class NativeKernel:
         by = (system.states, system.free, system.probes)
         self._rates = differentiated(system.rates, *by)
         self._reads = differentiated(system.reads, *by)
-        self._kept, self._along, self._slopes = list[Any](), (0, 0, 0, 0), (0, 0, 0)
+        self._kept, self._along = list[Any](), (0, 0, 0, 0)
+        self._slopes: Jacobians | None = None
+        self._sweeps: dict[int, tuple[int, int]] = {}
         self._crossing = np.array(system.pace.crossing, np.int64)
 
     def _compiled(self, functions: Sequence[Function]) -> Any:
@@ -97,8 +107,7 @@ class NativeKernel:
         asked = self._system.pace.asked
         if not all(self._along):
             address = self._compiled([
-                _with_sensitivities(self._system, "rates", self._rates, behind=True),
-                _with_sensitivities(self._system, "read", self._reads, behind=False),
+                *self._sensitive(self._columns),
                 _plain(self._system, "plain", self._rates.values),
                 _plain(self._system, "pace", asked),
             ])  # fmt: skip
@@ -119,19 +128,43 @@ class NativeKernel:
             for each in running:
                 each.result()
 
-    def linearise(  # noqa: PLR0917 -- they stand in the order of the driver's
-        self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, nodes: Any,
-        slopes: Any, y: Any, dy: Any,
-    ) -> None:  # fmt: skip
-        """Fill the states at the nodes, the slopes of rates there, outputs and their slopes."""
-        if not all(self._slopes):
+    def _sensitive(self, columns: int) -> tuple[Function, Function]:
+        return (
+            _with_sensitivities(self._system, "rates", self._rates, columns, behind=True),
+            _with_sensitivities(self._system, "read", self._reads, columns, behind=False),
+        )
+
+    def with_sensitivities(self, columns: int) -> tuple[int, int]:
+        """Addresses of `rates` and `read` for so many columns of S; the first are free parameters.
+
+        For loops of one's own; they are called by `integrator.call`.
+        """
+        if columns not in self._sweeps:
+            address = self._compiled(self._sensitive(columns))
+            self._sweeps[columns] = (address("rates"), address("read"))
+        return self._sweeps[columns]
+
+    def jacobians(self) -> Jacobians:
+        """Addresses of the equations without sensitivities, and of their Jacobians."""
+        if self._slopes is None:
             address = self._compiled([
                 _plain(self._system, "plain", self._rates.values),
                 _jacobian(self._system, "read_slopes", self._reads),
                 _jacobian(self._system, "rate_slopes", self._rates),
             ])  # fmt: skip
-            self._slopes = (address("plain"), address("read_slopes"), address("rate_slopes"))
-        driver.linearise(*self._slopes, u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy)
+            self._slopes = Jacobians(
+                address("plain"), address("read_slopes"), address("rate_slopes")
+            )
+        return self._slopes
+
+    def linearise(  # noqa: PLR0917 -- they stand in the order of the driver's
+        self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, nodes: Any,
+        slopes: Any, y: Any, dy: Any,
+    ) -> None:  # fmt: skip
+        """Fill the states at the nodes, the slopes of rates there, outputs and their slopes."""
+        driver.linearise(
+            *self.jacobians(), u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy
+        )
 
 
 def _function(system: Equations, name: str) -> Function:
@@ -155,11 +188,10 @@ def _values(function: Function, expressions: Sequence[sympy.Expr]) -> Iterator[s
 
 
 def _with_sensitivities(
-    system: Equations, name: str, found: Differentiated, *, behind: bool
+    system: Equations, name: str, found: Differentiated, m: int, *, behind: bool
 ) -> Function:
-    """Values, and J·S + ∂/∂p; the latter behind the values in `out`, or in `slopes`."""
-    function, n = _function(system, name), len(system.states)
-    m, k = len(system.free) + n, len(found.values)
+    """Values, and J·S + ∂/∂p in m columns, the latter behind the values or in `slopes`."""
+    function, n, k = _function(system, name), len(system.states), len(found.values)
     flat = [*found.values, *(e for r in found.by_state for e in r)]
     flat += [e for r in found.by_parameter for e in r]
     values = _values(function, flat)
