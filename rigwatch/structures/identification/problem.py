@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from rigwatch.physics.engine.equations import Model, compose
 from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.structures.identification.sweep import Sweeper, sweeper
-from rigwatch.structures.identification.weighting import weights
 from rigwatch.structures.model import Structure, coefficients, to_model, with_unknowns
-from rigwatch.structures.records import Record
+from rigwatch.structures.records import Record, weights
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
