@@ -86,9 +86,8 @@ def _wave(drive: Drive, t: Floats, seconds: float) -> Floats:
         case "multisine":
             return _lines(np.arange(3, 160, 2), MULTISINE_S, drive.seed, t)
         case "noise":
-            return _lines(
-                np.arange(round(0.5 * seconds), round(14.0 * seconds)), seconds, drive.seed, t
-            )
+            lines = np.arange(round(0.5 * seconds), round(14.0 * seconds))
+            return _lines(lines, seconds, drive.seed, t)
         case _:
             raise ValueError(f"shape {drive.shape!r}")
 

@@ -29,7 +29,9 @@ class Flavour:
         mistuned: the free generator is up to 2 % off; else a few tenths of a percent.
         abrupt: the excitation begins at full amplitude.
         late_fault: how `accel_late` is late: lag, delay or smoothing.
-        stranger: what `pressure` is: ripple, sag or blockage.
+        stranger: what `pressure` is: ripple of the supply, a lower middle pressure or a blockage.
+        regulated: a lost supply lowers the middle pressure but not the valve's gain.
+        softer: the hidden spring pushes away from mid stroke.
     """
 
     group: str
@@ -52,12 +54,15 @@ class Flavour:
     abrupt: bool = False
     late_fault: str = "lag"
     stranger: str = "ripple"
+    regulated: bool = False
+    softer: bool = False
 
 
 FLAVOURS: dict[str, Flavour] = {
     "iso": Flavour(
         "calibration", Flow.ISO_6358, Heat.ISOTHERMAL, Stage.PRESSURE,
-        own=Friction.LUGRE, added=Friction.LUGRE, late_fault="lag",
+        own=Friction.LUGRE, added=Friction.LUGRE, late_fault="lag", stranger="middle",
+        regulated=True, softer=True,
     ),
     "orifice": Flavour(
         "calibration", Flow.ORIFICE, Heat.POLYTROPIC, Stage.PRESSURE,
@@ -67,7 +72,7 @@ FLAVOURS: dict[str, Flavour] = {
     "blend": Flavour(
         "calibration", Flow.BLEND, Heat.ENERGY, Stage.PRESSURE,
         own=Friction.TANH, added=Friction.STRIBECK, asymmetry=True, smoothed=True, mistuned=True,
-        late_fault="smoothing", stranger="sag",
+        late_fault="smoothing", stranger="blockage",
     ),
     "nozzles": Flavour(
         "calibration", Flow.ORIFICE, Heat.ISOTHERMAL, Stage.BRIDGE,
@@ -77,12 +82,12 @@ FLAVOURS: dict[str, Flavour] = {
     "weymouth": Flavour(
         "judged", Flow.WEYMOUTH, Heat.POLYTROPIC, Stage.PRESSURE,
         own=None, added=Friction.DAHL, second_order_valve=False, slew=True, fine_position=True,
-        late_fault="smoothing", stranger="sag",
+        late_fault="smoothing", stranger="middle", softer=True,
     ),
     "isentropic": Flavour(
         "judged", Flow.ISENTROPIC, Heat.ENERGY, Stage.PRESSURE,
         own=Friction.LUGRE, added=Friction.LUGRE, asymmetry=True, high_passes=2, late=True,
-        drifting=True, late_fault="lag", stranger="ripple",
+        drifting=True, late_fault="lag", stranger="ripple", regulated=True,
     ),
     "capillary": Flavour(
         "judged", Flow.CAPILLARY, Heat.ISOTHERMAL, Stage.PRESSURE,
@@ -92,6 +97,6 @@ FLAVOURS: dict[str, Flavour] = {
     "spool": Flavour(
         "judged", Flow.ISO_6358, Heat.ENERGY, Stage.BRIDGE,
         own=None, added=Friction.STRIBECK, abrupt=True, fine_position=True,
-        late_fault="lag", stranger="blockage",
+        late_fault="lag", stranger="blockage", softer=True,
     ),
 }  # fmt: skip

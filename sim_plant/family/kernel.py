@@ -56,7 +56,7 @@ MEMBER_TYPE = np.dtype([(n, np.int64) for n in LAWS] + [(n, np.float64) for n in
 
 HIDDEN = {
     "dry": 0.0, "binding": 0.0, "spring": 0.0, "cubic": 0.0, "drag": 0.0, "mass": 0.0,
-    "deadband": 0.0, "saturation": 1e3, "valve_gain": 1.0, "supply": 1.0, "ripple": 0.0,
+    "deadband": 0.0, "saturation": 1e3, "valve_gain": 1.0, "supply": 1.0, "middle": 1.0, "ripple": 0.0,
     "ripple_rate": 0.0, "accelerometer_lag": 0.0, "blockage": 0.0,
 }  # fmt: skip
 """Hidden effects of the plant with the values at which they are absent."""
@@ -169,15 +169,15 @@ def chamber_flows(y: Floats, p: Record, e: Record, time: float) -> tuple[float, 
     u = p.valve_gain * (y[S] + p.valve_null)
     if p.stage == BRIDGE:
         u = min(max(u, -0.95), 0.95)
-        ps = p.supply * factor
+        ps = p.supply * factor * e.middle
         w1 = flow(law, ps, y[P1], c1 * (1.0 + u), b, lam)
         w1 -= flow(law, y[P1], p.ambient, c1 * p.nozzle_ratio * (1.0 - u), b, lam)
         w2 = flow(law, ps, y[P2], c2 * (1.0 - u), b, lam)
         w2 -= flow(law, y[P2], p.ambient, c2 * p.nozzle_ratio * (1.0 + u), b, lam)
     else:
         top = p.supply * factor
-        up1 = min(max(factor * (p.middle + u), p.ambient), top)
-        up2 = min(max(factor * (p.middle - u), p.ambient), top)
+        up1 = min(max(factor * (e.middle * p.middle + u), p.ambient), top)
+        up2 = min(max(factor * (e.middle * p.middle - u), p.ambient), top)
         w1 = flow(law, up1, y[P1], c1, b, lam)
         w2 = flow(law, up2, y[P2], c2, b, lam)
     return w1, w2, p.leak * (y[P1] - y[P2])

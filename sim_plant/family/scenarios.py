@@ -144,7 +144,7 @@ def _faults(member: Member) -> dict[str, Scenario]:
     plant = {
         "deadband": {"deadband": s(0.15, 0.25)},
         "saturation": {"saturation": s(0.8, 1.05)},
-        "supply": {"supply": s(0.7, 0.85)},
+        "supply": {"middle" if member.flavour.regulated else "supply": s(0.7, 0.85)},
         "valve_gain": {"valve_gain": s(0.8, 0.88)},
         "mass": {"mass": s(0.12, 0.2) * member["mass"]},
         "spring": {"spring": s(100.0, 180.0)},
@@ -192,19 +192,21 @@ def _hidden(member: Member, drive: Drive) -> dict[str, dict[str, float]]:
     out = free_run(member, voltage(drive, member, 16.0)[:, 0], member.rest.copy())
     x = float(np.abs(out[:, 1]).max())
     v = float(np.abs(np.gradient(out[:, 1], 1 / RATE)).max())
-    cubic = {"cubic": s(0.25, 0.45) * s.force / x**3}
-    weak = {"dry": s(0.05, 0.09) * s.force}
+    cubic = {"cubic": s(0.15, 0.35) * s.force / x**3}
+    weak = {"dry": s(0.03, 0.05) * s.force}
+    softer = member.flavour.softer
+    spring = s(-0.55, -0.35) * member["centring"] if softer else s(60.0, 140.0)
     return {
         "healthy": {},
         "none": {},
         "coulomb": weak,
-        "coulomb_strong": s.friction(),
-        "spring": {"spring": s(60.0, 140.0)},
+        "coulomb_strong": {"dry": s(0.1, 0.15) * s.force},
+        "spring": {"spring": spring},
         "cubic": cubic,
-        "drag": {"drag": s(0.2, 0.35) * s.force / v**2},
+        "drag": {"drag": s(0.12, 0.25) * s.force / v**2},
         "deadband": {"deadband": s(0.03, 0.06)},
         "saturation": {"saturation": s(1.5, 1.8) * drive.volts},
-        "binding": {"binding": s(0.15, 0.3) * s.force / x},
+        "binding": {"binding": s(0.08, 0.16) * s.force / x},
         "two": cubic | weak,
         "pressure": _stranger(member, s),
     }
@@ -215,8 +217,8 @@ def _stranger(member: Member, s: Strengths) -> dict[str, float]:
     match member.flavour.stranger:
         case "ripple":
             return {"ripple": s(0.04, 0.08), "ripple_rate": 2 * np.pi * s(2.2, 6.0)}
-        case "sag":
-            return {"ripple": s(0.10, 0.15), "ripple_rate": 2 * np.pi * s(0.03, 0.07)}
+        case "middle":
+            return {"middle": s(0.75, 0.85)}
         case _:
             return {"blockage": s(0.4, 0.6)}
 
