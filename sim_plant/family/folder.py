@@ -1,4 +1,4 @@
-"""Writes members as folders of CSV files with `truth.json`, laid out as the rig that is not ours."""
+"""Writes members as folders of CSV files with `truth.json`, as the rig that is not ours has."""
 
 import json
 from collections.abc import Callable

@@ -56,8 +56,8 @@ MEMBER_TYPE = np.dtype([(n, np.int64) for n in LAWS] + [(n, np.float64) for n in
 
 HIDDEN = {
     "dry": 0.0, "binding": 0.0, "spring": 0.0, "cubic": 0.0, "drag": 0.0, "mass": 0.0,
-    "deadband": 0.0, "saturation": 1e3, "valve_gain": 1.0, "supply": 1.0, "middle": 1.0, "ripple": 0.0,
-    "ripple_rate": 0.0, "accelerometer_lag": 0.0, "blockage": 0.0,
+    "deadband": 0.0, "saturation": 1e3, "valve_gain": 1.0, "supply": 1.0, "middle": 1.0,
+    "ripple": 0.0, "ripple_rate": 0.0, "accelerometer_lag": 0.0, "blockage": 0.0,
 }  # fmt: skip
 """Hidden effects of the plant with the values at which they are absent."""
 HIDDEN_TYPE = np.dtype([(name, np.float64) for name in HIDDEN])
@@ -96,7 +96,9 @@ def share_of_choked(law: int, r: float, critical: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def flow(law: int, a: float, b: float, c: float, critical: float, laminar: float) -> float:
+def flow(  # noqa: PLR0917
+    law: int, a: float, b: float, c: float, critical: float, laminar: float
+) -> float:
     """Flow times R T0 from pressure `a` to `b` [Pa m^3/s] through a conductance `c` [m^3/s].
 
     `laminar` is the pressure drop, as a share of the upstream pressure, below which flow is
@@ -130,7 +132,9 @@ def flow(law: int, a: float, b: float, c: float, critical: float, laminar: float
 
 
 @njit(cache=True, error_model="numpy")
-def dry_friction(law: int, level: float, v: float, z: float, net: float, p: Record) -> float:
+def dry_friction(  # noqa: PLR0917
+    law: int, level: float, v: float, z: float, net: float, p: Record
+) -> float:
     """Dry friction against +x [N] of a sliding level [N]; `z` is a bristle as a share of its reach.
 
     `net` is the sum of all other forces [N], which Karnopp's law holds at rest.
@@ -184,7 +188,7 @@ def chamber_flows(y: Floats, p: Record, e: Record, time: float) -> tuple[float, 
 
 
 @njit(cache=True, error_model="numpy")
-def gas_rates(
+def gas_rates(  # noqa: PLR0917
     pressure: float, temperature: float, volume: float, widening: float, w: float, p: Record
 ) -> tuple[float, float]:
     """Rates of pressure [Pa/s] and temperature [K/s] of a chamber that gets the flow `w`."""
@@ -216,7 +220,9 @@ def other_forces(y: Floats, p: Record, e: Record) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def rates(y: Floats, dy: Floats, u: float, time: float, p: Record, e: Record) -> float:
+def rates(  # noqa: PLR0917
+    y: Floats, dy: Floats, u: float, time: float, p: Record, e: Record
+) -> float:
     """Writes the rates of all states into `dy`, returns the accelerometer's output [m/s^2]."""
     x, v = y[X], y[V]
     net = other_forces(y, p, e)
@@ -260,7 +266,7 @@ def valve_input(volts: float, before: float, step: float, p: Record, e: Record) 
 
 
 @njit(cache=True, error_model="numpy")
-def runge_kutta(
+def runge_kutta(  # noqa: PLR0917
     y: Floats, work: Floats, u: float, time: float, h: float, p: Record, e: Record
 ) -> None:
     """One classical Runge-Kutta step of `h` [s] in place; `work` has three rows."""

@@ -96,25 +96,26 @@ def _tuned(member: Member, reach: float, offset: float) -> Member:
     """Valve's null trimmed to rest at mid stroke, but for `offset` [V], and its gain to `reach`."""
     p, newtons_per_volt = member.record, 1.0
     for _ in range(8):
-        rest = _rest(member)
+        rest = at_rest(member)
         newtons_per_volt = member["mass"] * reach * (2 * np.pi * _TUNED_HZ) ** 2 / _TUNED_VOLTS
         p["valve_null"] -= member["centring"] * rest[kernel.X] / newtons_per_volt
         factor = reach / _motion(member, rest)
         p["valve_gain"] *= factor
         p["valve_null"] /= factor
     p["valve_null"] += offset
-    rest = _rest(member)
+    rest = at_rest(member)
     p["lvdt_offset"] -= rest[kernel.X]
     feedback = member.feedback * member["centring"] / newtons_per_volt
     return replace(member, rest=rest, feedback=feedback)
 
 
-def _rest(member: Member) -> NDArray[np.float64]:
-    """States at rest, some seconds after the valve got 0 V."""
-    y = np.zeros(kernel.STATES)
-    y[[kernel.P1, kernel.P2]] = member["middle"]
-    y[[kernel.T1, kernel.T2]] = ROOM_TEMPERATURE
-    free_run(member, np.zeros(round(_REST_S * RATE)), y)
+def at_rest(member: Member, hidden: dict[str, float] | None = None) -> NDArray[np.float64]:
+    """States some seconds after the valve got 0 V, with `hidden` effects of the plant."""
+    y = member.rest.copy()
+    if y[kernel.P1] == 0.0:
+        y[[kernel.P1, kernel.P2]] = member["middle"]
+        y[[kernel.T1, kernel.T2]] = ROOM_TEMPERATURE
+    free_run(member, np.zeros(round(_REST_S * RATE)), y, hidden)
     y[[kernel.V, kernel.S_RATE, kernel.HIGH_1, kernel.HIGH_2, kernel.AMPLIFIER]] = 0.0
     return y
 
@@ -128,17 +129,23 @@ def _motion(member: Member, rest: NDArray[np.float64]) -> float:
 
 
 def free_run(
-    member: Member, volts: NDArray[np.float64], y: NDArray[np.float64]
+    member: Member,
+    volts: NDArray[np.float64],
+    y: NDArray[np.float64],
+    hidden: dict[str, float] | None = None,
 ) -> NDArray[np.float64]:
-    """Voltage, position, acceleration without noise, shape (n, 3); healthy; advances `y`."""
+    """Voltage, position, acceleration without noise, shape (n, 3); advances `y`.
+
+    `hidden` effects of the plant hold from the first sample on.
+    """
     out = np.empty((volts.size, 3))
     kernel.simulate(
         np.repeat(volts[:, None], kernel.SUBSTEPS, axis=1),
         0.0,
         np.zeros((volts.size, 2)),
         np.zeros(2, dtype=np.int64),
-        kernel.hidden_effects({}),
-        volts.size,
+        kernel.hidden_effects(hidden or {}),
+        0,
         member.record,
         y,
         RATE,

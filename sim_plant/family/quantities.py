@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_plant.family.flavours import Flavour
-from sim_plant.family.kernel import SUBSTEPS, flow
+from sim_plant.family.kernel import LAWS, QUANTITIES, SUBSTEPS, flow
 from sim_plant.family.laws import Friction, Heat, Stage
 
 Random = np.random.Generator
@@ -24,7 +24,7 @@ def body(kind: Flavour, random: Random) -> dict[str, float]:
         "mass": random.uniform(0.20, 0.28),
         "area_1": area,
         # A bridge has no null to trim two areas with, so its cylinder has a rod on both sides.
-        "area_2": area * (1.0 if kind.stage is Stage.BRIDGE else random.uniform(0.86, 0.95)),
+        "area_2": area * (1.0 if kind.stage is Stage.BRIDGE else random.uniform(0.93, 0.98)),
         "half_stroke": 0.5 * random.uniform(4.5, 5.5) * INCH,
         "centring": random.uniform(20.0, 45.0),
         "viscous": random.uniform(0.05, 0.4),
@@ -105,7 +105,7 @@ PARTS: tuple[Callable[[Flavour, Random], dict[str, float]], ...] = (
 
 def set_restrictions(record: NDArray[np.void], random: Random) -> None:
     """Conductances at which a piston at 0.25 m/s makes the pressure drops drawn, and the leak."""
-    p = {name: record[name][0] for name in record.dtype.names}
+    p = {name: record[name][0] for name in (*LAWS, *QUANTITIES)}
 
     def unit(a: float, b: float) -> float:
         return float(flow(p["flow"], a, b, 1.0, p["critical_ratio"], p["laminar"]))

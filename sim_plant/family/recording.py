@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from sim_plant.family import kernel
 from sim_plant.family.drives import voltage
-from sim_plant.family.member import RATE, Member
+from sim_plant.family.member import RATE, Member, at_rest
 from sim_plant.family.scenarios import Scenario
 
 Floats = NDArray[np.float64]
@@ -22,8 +22,7 @@ def play(member: Member, name: str, scenario: Scenario) -> Floats:
     random = np.random.default_rng([member.seed, 1, *name.encode()])
     out = np.empty((n, 4))
     out[:, 0] = np.arange(n) / RATE
-    start = 0.0 if scenario.from_s is None else scenario.from_s
-    onset = round(start * RATE)
+    onset = round((scenario.from_s or 0.0) * RATE)
     measured = np.empty((n, 3))
     kernel.simulate(
         volts,
@@ -33,7 +32,7 @@ def play(member: Member, name: str, scenario: Scenario) -> Floats:
         kernel.hidden_effects(scenario.hidden),
         onset,
         member.record,
-        member.rest.copy(),
+        _start(member, scenario),
         RATE,
         measured,
     )
@@ -44,6 +43,13 @@ def play(member: Member, name: str, scenario: Scenario) -> Floats:
         raise FloatingPointError(f"{member.name}, {name}: a value that is not finite")
     out[:, 1:] = measured
     return out
+
+
+def _start(member: Member, scenario: Scenario) -> Floats:
+    """States at rest; what is hidden from the start has let the rig come to rest with it."""
+    if scenario.hidden and not scenario.from_s:
+        return at_rest(member, scenario.hidden)
+    return member.rest.copy()
 
 
 def _smoothed(a: Floats, weight: float) -> Floats:

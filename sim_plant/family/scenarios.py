@@ -69,6 +69,7 @@ class Strengths:
         self.force = tuned_force(member)
 
     def __call__(self, low: float, high: float) -> float:
+        """A number between the two."""
         return float(self._random.uniform(low, high))
 
     def friction(self) -> dict[str, float]:
@@ -114,8 +115,8 @@ def watch(member: Member) -> dict[str, Scenario]:
             made[f"quiet_{name}"] = Scenario("healthy", drive, QUIET_S)
     made["start_stop_change"] = _start_stop_change()
     for number, (onset, drive) in enumerate(EXPERIMENTS, 1):
-        drive = held_back(member, drive, 4.0, 0.030)
-        made[f"experiment_{number}"] = _friction(member, f"experiment_{number}", drive, 8.0, onset)
+        name, held = f"experiment_{number}", held_back(member, drive, 4.0, 0.030)
+        made[name] = _friction(member, name, held, 8.0, onset)
     return made | _faults(member) | _hard(member)
 
 
