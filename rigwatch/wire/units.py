@@ -64,16 +64,16 @@ class Unit:
         return self.factor == 1 and self.offset == 0
 
     def to_si(self, value: float) -> float:
-        """The value in SI, rounded once; a value that is SI already stays to the bit."""
+        """The value in SI: 5.1 bar are 510000 Pa; a value that is SI already stays to the bit."""
         if self.plain or not math.isfinite(value):
             return value
-        return float(Fraction(value) * self.factor + self.offset)
+        return float(Fraction(repr(float(value))) * self.factor + self.offset)
 
     def from_si(self, value: float) -> float:
-        """The SI value in this unit, rounded once."""
+        """The SI value in this unit: 0.0007 m are 0.7 mm."""
         if self.plain or not math.isfinite(value):
             return value
-        return float((Fraction(value) - self.offset) / self.factor)
+        return float((Fraction(repr(float(value))) - self.offset) / self.factor)
 
 
 @lru_cache(maxsize=4096)
@@ -188,6 +188,7 @@ def _meant(name: str) -> str:
     if lower in IN_OTHER_WORDS:
         return f"did you mean {IN_OTHER_WORDS[lower]!r}?"
     same = [known for known in ENTRIES if known.lower() == lower]
+    same.sort(key=lambda known: sum(a != b for a, b in zip(name, known, strict=True)))
     close = same or difflib.get_close_matches(name, ENTRIES, 1)
     if close:
         return f"did you mean {close[0]!r}?"
