@@ -3,5 +3,13 @@
 from rigwatch.wire.exchange.exporting import export_session
 from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option
+from rigwatch.wire.exchange.units import AMBIGUOUS, conversion
 
-__all__ = ["ImportMapping", "export_session", "import_file", "parse_map_option"]
+__all__ = [
+    "AMBIGUOUS",
+    "ImportMapping",
+    "conversion",
+    "export_session",
+    "import_file",
+    "parse_map_option",
+]

@@ -37,7 +37,7 @@ _USUAL = {
     "N": "N, mN, kN, lbf, kgf",
     "Pa": "Pa, kPa, MPa, bar, mbar, psi",
 }
-_AMBIGUOUS = {
+AMBIGUOUS = {
     "g": "'g0' for standard gravity or 'gram'",
     "mg": "'mg0' for standard gravity or 'mgram'",
 }
@@ -50,8 +50,8 @@ def conversion(unit: str, channel: str) -> Conversion:
     Raises:
         ImportDataError: the unit is unknown, ambiguous, or not one of the channel's kind.
     """
-    if unit in _AMBIGUOUS:
-        raise ImportDataError(f"{channel}: found the unit {unit!r}, expected {_AMBIGUOUS[unit]}")
+    if unit in AMBIGUOUS:
+        raise ImportDataError(f"{channel}: found the unit {unit!r}, expected {AMBIGUOUS[unit]}")
     try:
         found = unit_of(unit)
     except UnitError as error:

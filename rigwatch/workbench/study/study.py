@@ -73,9 +73,9 @@ class Accepted(Section, frozen=True, kw_only=True):
 
     effect: Annotated[str, Meta(description="its name")]
     port: Annotated[str, Meta(description="where it enters")]
-    parameters: Annotated[dict[str, float], Meta(description="where its fit starts")] = field(
-        default_factory=dict
-    )
+    parameters: Annotated[
+        dict[str, float], Meta(description="where its fit starts, in the units that are shown")
+    ] = field(default_factory=dict)
 
 
 class StudyFile(Section, frozen=True, kw_only=True):
@@ -94,7 +94,8 @@ class StudyFile(Section, frozen=True, kw_only=True):
         dict[str, str], Meta(description="channel of a model's signal, where named otherwise")
     ] = field(default_factory=dict)
     start: Annotated[
-        dict[str, float], Meta(description="values of the model's parameters to start from")
+        dict[str, float],
+        Meta(description="values of the model's parameters to start from, in their units"),
     ] = field(default_factory=dict)
     derive: Derive | None = None
     thin: Thin | None = None
