@@ -106,7 +106,7 @@ def _parameters(f: Findings) -> str:
         for name, guess in zip(f.problem.names, guesses, strict=True)
     ]
     head = ["unknown", "guess", *f.found]
-    words = "In brackets 95 % intervals, for white noise of the size that the residuals show."
+    words = "In brackets 95 % intervals, for white noise of the size that the residuals show; SI."
     return f'<p class="note">{words}</p>{table(head, rows, range(1, len(head)))}'
 
 

@@ -10,6 +10,7 @@ from rigwatch.workbench.data import METHODS, Data, NoiseFloor, from_residual, pr
 from rigwatch.workbench.fit import (
     Fitted,
     Value,
+    as_written,
     commissioned,
     fit_base,
     fit_model,
@@ -41,7 +42,7 @@ class Comparison:
         unit: the channel's where there is one, else "noise floors".
         noise_from: how the floor is known.
         channels: by output.
-        parameters: by name.
+        parameters: by name, in the units that the model and its effects are written in.
         effects: accepted so far, as "effect@port".
         remarks: what was noticed, for people.
     """
@@ -134,7 +135,10 @@ def compare(study: Study, *, profiled: bool = False) -> Comparison:
     """
     bench = open_bench(study)
     found = comparison(bench)
-    return replace(found, parameters=profile(bench.base, bench.data.train)) if profiled else found
+    if not profiled:
+        return found
+    intervals = as_written(profile(bench.base, bench.data.train), bench.base.compiled.system)
+    return replace(found, parameters=intervals)
 
 
 def comparison(bench: Bench) -> Comparison:
@@ -158,7 +162,7 @@ def comparison(bench: Bench) -> Comparison:
         next(iter(channels.values())).unit if alone else "noise floors",
         METHODS[floor.method],
         channels,
-        found,
+        as_written(found, base.compiled.system),
         [f"{a.effect}@{a.port}" for a in bench.study.file.effects],
         [*bench.data.remarks, *weak],
     )

@@ -8,7 +8,7 @@ from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.explain.verdict_calibration import seen
-from rigwatch.workbench.fit import Value, values
+from rigwatch.workbench.fit import Value, as_written, values
 from rigwatch.workbench.ranking import Progress, Ranked, rank, unheard
 from rigwatch.workbench.study import Study
 
@@ -122,7 +122,7 @@ def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None)
     found: dict[str, Value] = {}
     if row.fitted is not None:
         prefix = row.placement.prefix
-        every = values(row.fitted.train, more)
+        every = as_written(values(row.fitted.train, more), row.fitted.compiled.system)
         found = {n[len(prefix) :]: v for n, v in every.items() if n.startswith(prefix)}
     others = [label for label in alike if label != row.label]
     return Row(

@@ -13,12 +13,13 @@ from rigwatch.workbench.fit.fitted_model import (
 from rigwatch.workbench.fit.free_run import free_run
 from rigwatch.workbench.fit.healthy_parameters import commissioned, loosened
 from rigwatch.workbench.fit.healthy_reference import referenced
-from rigwatch.workbench.fit.intervals import Value, values
+from rigwatch.workbench.fit.intervals import Value, as_written, values
 from rigwatch.workbench.fit.profile import profile
 
 __all__ = [
     "Fitted",
     "Value",
+    "as_written",
     "block_errors",
     "commissioned",
     "fit_again",

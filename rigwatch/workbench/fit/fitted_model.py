@@ -90,7 +90,7 @@ def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
     """The accepted effects, with their bounds in sizes of the recording."""
     sizes = port_sizes(study.model, recording)
     return tuple(
-        Placement(a.effect, study.effect(a.effect).scaled(sizes[a.port]), a.port)
+        Placement(a.effect, study.effect_at(a.effect, a.port).scaled(sizes[a.port]), a.port)
         if a.port in sizes
         else Placement(a.effect, study.effect(a.effect), a.port)
         for a in study.file.effects

@@ -144,7 +144,7 @@ def candidates(study: Study, recording: Recording) -> list[Candidate]:
         for port, place in study.model.ports.items()
         for name, effect in study.effects.items()
         if (name, port) not in placed and suits(effect, place, study.model)
-        for candidate in shaped(name, effect.scaled(sizes[port]), port)
+        for candidate in shaped(name, study.effect_at(name, port).scaled(sizes[port]), port)
     ]
 
 

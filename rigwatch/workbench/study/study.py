@@ -12,7 +12,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from msgspec import Meta, field, structs
@@ -20,15 +20,19 @@ from numpy.typing import NDArray
 
 from rigwatch.physics.engine.equations import (
     Effect,
+    EffectParameter,
     Model,
+    Parameter,
     library,
     load_effects,
     load_model,
     offered,
     shipped_models,
+    units_at,
 )
 from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError
 from rigwatch.wire.typed_files import Section, load
+from rigwatch.wire.units import Unit, unit_of
 
 FILE = "study.toml"
 LEDGER = "ledger.jsonl"
@@ -69,9 +73,9 @@ class Accepted(Section, frozen=True, kw_only=True):
 
     effect: Annotated[str, Meta(description="its name")]
     port: Annotated[str, Meta(description="where it enters")]
-    parameters: Annotated[dict[str, float], Meta(description="where its fit starts")] = field(
-        default_factory=dict
-    )
+    parameters: Annotated[
+        dict[str, float], Meta(description="where its fit starts, in the units that are shown")
+    ] = field(default_factory=dict)
 
 
 class StudyFile(Section, frozen=True, kw_only=True):
@@ -90,7 +94,8 @@ class StudyFile(Section, frozen=True, kw_only=True):
         dict[str, str], Meta(description="channel of a model's signal, where named otherwise")
     ] = field(default_factory=dict)
     start: Annotated[
-        dict[str, float], Meta(description="values of the model's parameters to start from")
+        dict[str, float],
+        Meta(description="values of the model's parameters to start from, in their units"),
     ] = field(default_factory=dict)
     derive: Derive | None = None
     thin: Thin | None = None
@@ -115,7 +120,7 @@ class Kept:
 
 @dataclass(frozen=True)
 class Study:
-    """A study that has been opened.
+    """A study that has been opened; values of parameters are SI, whatever its file says.
 
     Attributes:
         folder: where it is.
@@ -157,6 +162,17 @@ class Study:
             raise ModelError(f"found no effect {name!r}, expected {nearest(name, self.effects)}")
         return self.effects[name]
 
+    def effect_at(self, name: str, port: str) -> Effect:
+        """The effect called `name` with the units of a port, its numbers in SI.
+
+        Raises:
+            ModelError: it is unknown, or the port does not offer what its units name.
+        """
+        effect = self.effect(name)
+        if port not in self.model.ports:
+            return effect
+        return effect.at(units_at(self.model, port), f"effect {name} at {port}")
+
 
 def nearest(name: str, known: Mapping[str, object]) -> str:
     """Words for what `name` may have been meant to be."""
@@ -181,7 +197,32 @@ def open_study(folder: Path | str) -> Study:
     study = Study(folder, file, _model(folder, file.model), effects, frozenset(given))
     for accepted in file.effects:
         study.effect(accepted.effect)
-    return study
+    return _in_si(study)
+
+
+def _in_si(study: Study) -> Study:
+    """The study with the values of its file in SI; there they stand in the parameters' units."""
+    start = {
+        name: _unit(study.model.parameters.get(name)).to_si(value)
+        for name, value in study.file.start.items()
+    }
+    effects = [_converted(study, a, "to_si") for a in study.file.effects]
+    return replace(study, file=structs.replace(study.file, start=start, effects=tuple(effects)))
+
+
+def _converted(study: Study, accepted: Accepted, way: Literal["to_si", "from_si"]) -> Accepted:
+    """The values of an accepted effect, from the units that people write to SI or back."""
+    known = study.effect_at(accepted.effect, accepted.port).parameters
+    values = {
+        name: float(getattr(_unit(known.get(name)), way)(value))
+        for name, value in accepted.parameters.items()
+    }
+    return structs.replace(accepted, parameters=values)
+
+
+def _unit(parameter: Parameter | EffectParameter | None) -> Unit:
+    """The unit in which people write a parameter's values."""
+    return unit_of((parameter.shown or parameter.unit) if parameter else "")
 
 
 def _model(folder: Path, name: str) -> Model:
@@ -231,8 +272,9 @@ def create(folder: Path | str, template: Path | str, sessions: Path | str | None
 
 
 def append_effect(study: Study, accepted: Accepted) -> Study:
-    """The study with one more effect in its file."""
-    numbers = ", ".join(f"{name} = {value!r}" for name, value in accepted.parameters.items())
+    """The study with one more effect in its file, its values in the units of its parameters."""
+    written = _converted(study, accepted, "from_si").parameters
+    numbers = ", ".join(f"{name} = {value!r}" for name, value in written.items())
     table = (
         f'effect = "{accepted.effect}"\nport = "{accepted.port}"\nparameters = {{ {numbers} }}\n'
     )

@@ -31,6 +31,7 @@ from rigwatch.physics.engine.equations.system import (
     Placement,
     System,
     compose,
+    units_at,
 )
 
 __all__ = [
@@ -59,4 +60,5 @@ __all__ = [
     "parse",
     "shipped_models",
     "symbol",
+    "units_at",
 ]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import sympy
 
 from rigwatch.physics.engine.equations.effect import Effect
-from rigwatch.physics.engine.equations.model import Model, Parameter, Port, State
+from rigwatch.physics.engine.equations.model import Input, Model, Output, Parameter, Port, State
 from rigwatch.physics.engine.equations.scope import Scope, symbol
 from rigwatch.wire.errors import ModelError
 
@@ -115,7 +115,7 @@ class _Composer:
         self._scope = Scope()
         self._scope.define(TIME, symbol(TIME), "s")
         for table in (model.inputs, model.states, model.parameters):
-            self._scope.define_all({name: item.unit for name, item in table.items()})
+            self._scope.define_all({n: item.shown or item.unit for n, item in table.items()})
 
     def system(self) -> System:
         ports = self._entered("actuator") | self._entered("force")
@@ -188,48 +188,45 @@ class _Composer:
         self, placement: Placement, port: Port, arriving: sympy.Expr, unit: str
     ) -> Scope:
         """Names as the effect sees them; its own parameters and states join the system."""
-        scope, units = Scope(), {"F" if port.kind == "force" else "u": unit}
+        scope = Scope()
         scope.define(TIME, symbol(TIME), "s")
         for name, variable in port.variables.items():
             meaning = self._scope.read(variable.expression, variable.unit, f"port {placement.port}")
             scope.define(name, meaning, variable.unit)
-            units[name] = variable.unit
         if port.kind != "force":
             scope.define("u", arriving, unit)
             scope.define(LEFT, symbol(UNTIL), "s")
-        self._adopt(placement, units)
+        self._adopt(placement)
         for name in (*placement.effect.parameters, *placement.effect.states):
             label = placement.prefix + name
             own = self._parameters.get(label) or self._states[label]
-            scope.define(name, symbol(label), own.unit)
+            scope.define(name, symbol(label), own.shown or own.unit)
         return scope
 
-    def _adopt(self, placement: Placement, units: Mapping[str, str]) -> None:
-        for name, p in placement.effect.parameters.items():
+    def _adopt(self, placement: Placement) -> None:
+        effect = placement.effect.at(units_at(self._model, placement.port), str(placement))
+        for name, p in effect.parameters.items():
             self._parameters[placement.prefix + name] = Parameter(
                 value=1.0 if p.role == "switch" else p.value,
-                unit=_resolved(p.unit, units, placement),
+                unit=p.unit,
+                shown=p.shown,
                 low=p.low,
                 high=p.high,
                 fixed=p.role in ("constant", "switch"),
                 meaning=f"{placement.name}, {name}",
             )
-        for name, s in placement.effect.states.items():
-            unit = _resolved(s.unit, units, placement)
+        for name, s in effect.states.items():
             self._states[placement.prefix + name] = State(
-                unit=unit, derivative=s.derivative, start=s.start, low=s.low, high=s.high
-            )
+                unit=s.unit, derivative=s.derivative, start=s.start, low=s.low, high=s.high,
+                shown=s.shown,
+            )  # fmt: skip
 
 
-def _resolved(unit: str, units: Mapping[str, str], placement: Placement) -> str:
-    """A unit of an effect with the port's own units in place of braces."""
-    try:
-        return unit.format_map({name: _bracketed(value) for name, value in units.items()})
-    except KeyError as missing:
-        raise ModelError(
-            f"{placement}: found a need for {missing}, which this port does not offer"
-        ) from None
-
-
-def _bracketed(unit: str) -> str:
-    return f"({unit})" if any(sign in unit for sign in " */") else unit
+def units_at(model: Model, name: str) -> dict[str, str]:
+    """Units of a port as people write them, by what effects there call them in braces."""
+    port = model.ports[name]
+    own: Port | Input | Output = port
+    if port.kind != "force":
+        own = model.inputs[port.signal] if port.kind == "actuator" else model.outputs[port.signal]
+    units = {"F" if port.kind == "force" else "u": own.shown or own.unit}
+    return units | {name: v.shown or v.unit for name, v in port.variables.items()}
