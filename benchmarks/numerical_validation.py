@@ -19,7 +19,8 @@ from monitor.commissioning.friction_filter import (
 )
 from monitor.estimation.thesis_thresholds import Thresholds, thesis_thresholds
 from monitor.estimation.window import new_window, windowed_least_squares
-from rigwatch.physics.transfer.transfer_function import FloatArray, TransferFunction
+from rigwatch.physics.transfer.transfer_function import TransferFunction
+from rigwatch.wire.arrays import FloatArray
 from sim_plant.second_order import FAULT_TIME, NOISE, STEP, Validation, validation
 
 WINDOW, HOP = 300, 20

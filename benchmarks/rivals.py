@@ -18,7 +18,6 @@ from contextlib import contextmanager
 
 import numpy as np
 import pysindy
-from numpy.typing import NDArray
 from scipy.signal import decimate, savgol_filter
 from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
@@ -26,8 +25,8 @@ from sysidentpy.parameter_estimation import LeastSquares
 from threadpoolctl import threadpool_limits
 
 from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.wire.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 NOTHING = "nothing_missing"
 UNKNOWN = "unknown"
 

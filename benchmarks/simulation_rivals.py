@@ -20,8 +20,9 @@ import sympy
 from scipy.integrate import solve_ivp
 from sympy.printing.numpy import NumPyPrinter
 
-from benchmarks.simulation_task import FloatArray, Result, Simulator, Task
+from benchmarks.simulation_task import Result, Simulator, Task
 from rigwatch.physics.engine.compile.static_kernel import numpy_function
+from rigwatch.wire.arrays import FloatArray
 
 _CASADI = {
     "where": casadi.if_else, "maximum": casadi.fmax, "minimum": casadi.fmin,

@@ -22,12 +22,13 @@ from benchmarks.simulation_rivals import (
     in_jax,
     in_scipy,
 )
-from benchmarks.simulation_task import FloatArray, Result, Simulator, Task
+from benchmarks.simulation_task import Result, Simulator, Task
 from benchmarks.table import Row
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, System, compose
+from rigwatch.wire.arrays import FloatArray
 
 LENGTH = 256
 BAR = 1.5

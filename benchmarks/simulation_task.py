@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import TIME, System
+from rigwatch.wire.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 Result = tuple[FloatArray, FloatArray]
 """Outputs (windows, samples, outputs); slopes (windows, samples, outputs, columns)."""
 Simulator = Callable[[], Result]

@@ -22,7 +22,8 @@ from rigwatch.structures.damage.spring_model import SpringModel, split
 from rigwatch.structures.damage.threshold import false_alarm, threshold_for
 from rigwatch.structures.identification.identify import identify
 from rigwatch.structures.model.description import Load, Structure, coefficients, load_structure
-from rigwatch.structures.records.record import FloatArray, Record
+from rigwatch.structures.records.record import Record
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
 from sim_plant.structure import Damage, simulate, with_noise
 

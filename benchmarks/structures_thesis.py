@@ -8,7 +8,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.structures_published import Published
 from rigwatch.structures.identification.integrators import DORMAND_PRINCE
@@ -16,8 +15,8 @@ from rigwatch.structures.model.description import Structure
 from rigwatch.structures.model.edit import with_values
 from rigwatch.structures.model.matrices import mass_matrix, stiffness_matrix
 from rigwatch.structures.records.record import Record
+from rigwatch.wire.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 Rates = Callable[[float, FloatArray], FloatArray]
 
 

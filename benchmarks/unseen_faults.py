@@ -27,7 +27,7 @@ from monitor.signals.conditions import (
     STICTION,
 )
 from monitor.signals.recordings import Role
-from rigwatch.physics.transfer.transfer_function import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from sim_plant.effects import EFFECTS, Effect
 from sim_plant.excitation import Sine, Square, Triangle
 from sim_plant.parameters import RigParameters

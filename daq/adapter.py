@@ -12,8 +12,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.errors import DeviceError
-from rigwatch.wire.messages import ByteArray, IntArray
+from rigwatch.wire.messages import ByteArray
 
 
 class DeviceBusyError(DeviceError):

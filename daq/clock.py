@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.adapter import RawBlock
-from rigwatch.wire.messages import IntArray
+from rigwatch.wire.arrays import IntArray
 
 _BIN_US = 250_000
 _BINS = 240

@@ -17,8 +17,9 @@ import numpy as np
 from numba import njit
 
 from daq.adapter import RawBlock
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.device import Calibration
-from rigwatch.wire.messages import ByteArray, Column, FloatArray, IntArray, SampleBlock
+from rigwatch.wire.messages import ByteArray, Column, SampleBlock
 from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.rig_config import ChannelSection
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
+
 RATE = 256.0
 """Samples a second."""
 LARGEST = 40.0

@@ -25,7 +25,8 @@ from monitor.alarms.operator import refusal, wanted
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
 from monitor.signals import Condition
-from rigwatch.wire.messages import Alarm, AlarmCommand, Event, IntArray
+from rigwatch.wire.arrays import IntArray
+from rigwatch.wire.messages import Alarm, AlarmCommand, Event
 from rigwatch.wire.rig_config import AlarmSection
 
 Announcement = Alarm | Event

@@ -24,7 +24,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 SPAN = 256
 """Samples. Extremes are those of the running span and of the one before it, so that a peak from

@@ -26,12 +26,12 @@ from monitor.model import (
 )
 from monitor.signals import Recording, Role, modelled_acceleration
 from rigwatch.physics.transfer import (
-    FloatArray,
     FrequencyResponse,
     fit_transfer_function,
     frequency_response,
     velocity_filter,
 )
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 CHANNELS = ("voltage", "position", "acceleration")

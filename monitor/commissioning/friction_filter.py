@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigwatch.physics.transfer import (
-    FloatArray,
     OutputErrorFit,
     OutputErrorOrders,
     TransferFunction,
     fit_output_error,
 )
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 RIG_ORDERS = OutputErrorOrders(4, 3, 0)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 MATCH = 0.006
 """Rms by which an excitation may differ from itself one period later, as a share of its swing."""

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import betaincinv, erf
 
 from monitor.clipping import NEVER, judge_flat_tops, new_flat_tops
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 SURE = 0.999
 """Confidence of the share of repeats that has been seen."""

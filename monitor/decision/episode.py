@@ -46,7 +46,7 @@ from monitor.reference import (
     refine,
     restart,
 )
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 ENDS_AFTER = 64
 """Quiet samples that end an episode."""

@@ -29,7 +29,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from monitor.reference import PERIOD, POSITION_SWING, Reference, place_in_period
-from rigwatch.physics.transfer import FloatArray, filter_sample
+from rigwatch.physics.transfer import filter_sample
+from rigwatch.wire.arrays import FloatArray
 
 HISTORY = 512
 """Samples that are kept for judging."""

@@ -19,7 +19,7 @@ from monitor.estimation import (
     restart_energies,
     restart_window,
 )
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
 

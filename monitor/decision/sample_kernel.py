@@ -74,7 +74,7 @@ from monitor.signals import (
     Codes,
 )
 from monitor.signals import MODELLED as MODELLED_COLUMN
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 FINGERPRINT = "d92a8c466e34"
 """Of every source file whose code is compiled into `watch_block`."""

@@ -19,7 +19,8 @@ from monitor.detectors.innovation_test import nis_limit
 from monitor.detectors.parity import OperatingPoint, ParityDetector
 from monitor.detectors.unknown_input import NoiseModel, UnknownInputDetector
 from monitor.signals import GOOD, NEW_BOOT
-from rigwatch.physics.transfer import FloatArray, TransferFunction
+from rigwatch.physics.transfer import TransferFunction
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 Figures = Mapping[str, float]

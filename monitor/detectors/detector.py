@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor.signals import Admission, Condition
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.messages import Column, SampleBlock
 
 Findings = tuple[tuple[Column, ...], tuple[Condition, ...]]

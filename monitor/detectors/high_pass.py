@@ -8,7 +8,8 @@ fc  corner [Hz]    fs  sample rate [Hz]    β  share that is remembered; 1 for f
 import numpy as np
 from numba import njit
 
-from rigwatch.physics.transfer import FloatArray, TransferFunction
+from rigwatch.physics.transfer import TransferFunction
+from rigwatch.wire.arrays import FloatArray
 
 
 def forgetting(corner: float, sample_rate: float) -> float:

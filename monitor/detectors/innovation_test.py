@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 
 class NisWindow(NamedTuple):

@@ -31,7 +31,7 @@ from monitor.detectors.small_matrices import (
     times,
     transposed_product,
 )
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 

@@ -36,7 +36,8 @@ from monitor.detectors.adaptive_threshold import (
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
 from monitor.detectors.high_pass import forgetting
 from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
-from rigwatch.physics.transfer import FloatArray, TransferFunction, filter_sample
+from rigwatch.physics.transfer import TransferFunction, filter_sample
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 

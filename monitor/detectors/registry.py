@@ -13,7 +13,8 @@ from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:
     from monitor.detectors.detector import Channels, Detector
-    from rigwatch.physics.transfer import FloatArray, TransferFunction
+    from rigwatch.physics.transfer import TransferFunction
+    from rigwatch.wire.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

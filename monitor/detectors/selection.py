@@ -15,7 +15,7 @@ import numpy as np
 from monitor.detectors.detector import Channels, Detector
 from monitor.detectors.registry import detector_kind
 from monitor.model import ReferenceSection, RigModel, TransferPlant
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ConfigError
 
 FRICTION = "friction"

@@ -7,7 +7,7 @@ right, so that a replay gives the same bits everywhere, and for five rows they a
 import numpy as np
 from numba import njit
 
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 SMALLEST_PIVOT = 1e-13
 """A pivot below this share of the unit diagonal means a singular matrix [1]."""

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.physics.transfer import FloatArray, TransferFunction
+from rigwatch.physics.transfer import TransferFunction
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 

@@ -31,7 +31,8 @@ from monitor.detectors.kalman import augmented_matrices, generalised_update, kal
 from monitor.detectors.small_matrices import inverse, product, product_transposed, times
 from monitor.detectors.state_space import state_space
 from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
-from rigwatch.physics.transfer import FloatArray, TransferFunction
+from rigwatch.physics.transfer import TransferFunction
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 

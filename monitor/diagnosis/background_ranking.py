@@ -16,7 +16,7 @@ import numpy as np
 
 from monitor.diagnosis.ranking_job import ask
 from monitor.model import RigModel
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event, SampleBlock
 
 NAMED = ("departure", "dry_friction", "other_fault")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from monitor.diagnosis.rig_ports import RigPorts, rig_ports
 from monitor.model import RigModel
-from rigwatch.physics.engine.compile import FloatArray, compile_system
+from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Effect, Port, compose
 from rigwatch.physics.engine.score import (
     ALIKE,
@@ -29,6 +29,7 @@ from rigwatch.physics.engine.score import (
     shaped,
     trajectory,
 )
+from rigwatch.wire.arrays import FloatArray
 
 LEVEL = 0.01
 """Corrected p-value from which on nothing is named."""

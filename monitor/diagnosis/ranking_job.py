@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from monitor.model import RigModel, load_model, model_text
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
 
 LONGEST = 300

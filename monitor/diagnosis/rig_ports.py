@@ -30,7 +30,8 @@ from monitor.signals import (
     modelled_acceleration,
 )
 from rigwatch.physics.engine.equations import Input, Model, Output, Port, Variable
-from rigwatch.physics.transfer import FloatArray, velocity_filter
+from rigwatch.physics.transfer import velocity_filter
+from rigwatch.wire.arrays import FloatArray
 
 MOST = 2.0
 """Rms of an effect over that of the signal it enters at."""

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 HEAD, FILL, FRONT_LEFT = 0, 1, 2
 

@@ -17,10 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from rigwatch.wire.arrays import FloatArray, IntArray
 
 HEAD, FILL, FRONT_LEFT, LENGTH = 0, 1, 2, 3
 

@@ -20,7 +20,7 @@ from monitor.pipeline.promoted import PromotedFriction, check_can_follow
 from monitor.reference import ReferenceRules, new_reference
 from monitor.signals import Admission, Admitted, Condition, InertiaResidual, TransferResidual
 from monitor.signals import conditions as kinds
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
 
 PUBLISHED: tuple[tuple[str, str, int], ...] = (

@@ -19,7 +19,8 @@ from numba import njit
 
 from monitor.model import InertiaPlant, PromotedSection, RigModel
 from monitor.signals import DEAD, G1, G2, MODELLED, NEW_BOOT, RESTART, VELOCITY, Codes
-from rigwatch.physics.transfer import FloatArray, filter_sample
+from rigwatch.physics.transfer import filter_sample
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 

@@ -28,7 +28,7 @@ from monitor.reference.reference_state import (
     Reference,
     ReferenceRules,
 )
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 STRETCHES = 16
 """Stretches of `learn` samples of which an excitation without a period is learnt from."""

@@ -56,7 +56,7 @@ from monitor.reference.reference_state import (
     Reference,
     ReferenceRules,
 )
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 
 @njit()

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 SETTLING, LEARNING, ARMED, RESUMING = 0, 1, 2, 3
 NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC, FIXED = 0, 1, 2, 3, 4

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.messages import NON_FINITE, SATURATED, SPIKE, STALE, Column, SampleBlock, valid
 
 GOOD, HELD, DEAD, RESTART, NEW_BOOT = 0, 1, 2, 3, 4

@@ -31,7 +31,7 @@ from monitor.model import (
 )
 from monitor.signals.admission import DEAD, NEW_BOOT, RESTART, Codes
 from monitor.signals.recordings import Recording
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 CHANNELS = ("force", "position")

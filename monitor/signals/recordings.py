@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from rigwatch.physics.transfer import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages import SampleBlock, valid
 

@@ -16,7 +16,8 @@ from numba import njit
 
 from monitor.model import RigModel, TransferPlant
 from monitor.signals.admission import DEAD, NEW_BOOT, RESTART, Codes
-from rigwatch.physics.transfer import FloatArray, TransferFunction, filter_sample, velocity_filter
+from rigwatch.physics.transfer import TransferFunction, filter_sample, velocity_filter
+from rigwatch.wire.arrays import FloatArray
 
 COLUMNS = ("voltage", "position", "acceleration", "modelled", "velocity", "g1", "g2")
 """Columns of the stage's output."""

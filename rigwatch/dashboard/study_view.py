@@ -20,7 +20,7 @@ from rerun.experimental import ViewerClient
 
 from rigwatch.dashboard.board import APPLICATION, palette
 from rigwatch.dashboard.viewer import Viewer, ViewerError, save_picture
-from rigwatch.wire.messages import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 TIMELINE = "recording"
 _STORY, _TEST = "story", "test"

@@ -10,9 +10,8 @@ from html import escape
 from math import ceil, floor, isfinite, log10
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 MOST_POINTS = 900
 """Points of a line; longer ones show the highest and lowest sample of each pixel."""

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from monitor.alarms import Announcement
 from rigwatch.replay.reference import Output
-from rigwatch.wire.messages import Alarm, EstimateBlock, FloatArray
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.messages import Alarm, EstimateBlock
 
 TOLERANCE = 1e-6
 """Of a field that no pattern names, relative to the field's largest value."""

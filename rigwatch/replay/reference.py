@@ -14,16 +14,8 @@ from monitor.pipeline import RigMonitor, Watched
 from monitor.signals import Condition
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
-from rigwatch.wire.messages import (
-    Alarm,
-    Column,
-    EstimateBlock,
-    Event,
-    FloatArray,
-    RunInfo,
-    merged,
-    pieces,
-)
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Event, RunInfo, merged, pieces
 from rigwatch.wire.session import LARGEST_BLOCK, Session, SessionWriter, open_session
 
 CONDITION = "condition"

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from rigwatch.structures.damage.detector import innovations
 from rigwatch.structures.damage.examination import Examination, Settings, examine
 from rigwatch.structures.model.description import Structure, coefficients, load_structure
-from rigwatch.structures.records.record import FloatArray, Record
+from rigwatch.structures.records.record import Record
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from sim_plant.structure import Damage, simulate, with_noise
 

@@ -3,18 +3,17 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.compare import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.study.study import Span, Study, StudyFile
 from sim_plant.oscillator import DAMPING, MASS, RATE, STIFFNESS, Hidden, oscillate, strength_for
 
 HORIZON = 256
-FloatArray = NDArray[np.float64]
 
 
 def multisine(lines: FloatArray, size: float, seconds: float = 20.0, seed: int = 4) -> FloatArray:

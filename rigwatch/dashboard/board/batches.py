@@ -12,7 +12,8 @@ import rerun as rr
 
 from rigwatch.dashboard.board.entities import TIMELINE
 from rigwatch.dashboard.board.quantities import Plot
-from rigwatch.wire.messages import Column, FloatArray, IntArray
+from rigwatch.wire.arrays import FloatArray, IntArray
+from rigwatch.wire.messages import Column
 
 NANOSECONDS = "datetime64[ns]"
 

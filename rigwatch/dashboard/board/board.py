@@ -20,6 +20,7 @@ from rigwatch.dashboard.board.lanes import Lanes
 from rigwatch.dashboard.board.layout import Windows, blueprint
 from rigwatch.dashboard.board.status import advice, status
 from rigwatch.dashboard.board.survey import PlotPlan, Survey
+from rigwatch.wire.arrays import IntArray
 from rigwatch.wire.messages import (
     Alarm,
     Column,
@@ -27,7 +28,6 @@ from rigwatch.wire.messages import (
     Event,
     Gap,
     Health,
-    IntArray,
     Message,
     RunInfo,
     SampleBlock,

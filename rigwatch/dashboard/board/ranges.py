@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from rigwatch.wire.messages import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 Range = tuple[float, float]
 _STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)

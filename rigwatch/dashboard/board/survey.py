@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from rigwatch.dashboard.board import quantities
 from rigwatch.dashboard.board.quantities import Plot
 from rigwatch.dashboard.board.ranges import Range, around_signature, peak, symmetric
-from rigwatch.wire.messages import Column, FloatArray
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.messages import Column
 
 
 @dataclass(frozen=True, slots=True)

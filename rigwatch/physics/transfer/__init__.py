@@ -11,11 +11,10 @@ from rigwatch.physics.transfer.output_error import (
     OutputErrorOrders,
     fit_output_error,
 )
-from rigwatch.physics.transfer.transfer_function import FloatArray, TransferFunction, filter_sample
+from rigwatch.physics.transfer.transfer_function import TransferFunction, filter_sample
 from rigwatch.physics.transfer.velocity import velocity_filter
 
 __all__ = [
-    "FloatArray",
     "FrequencyResponse",
     "OutputErrorFit",
     "OutputErrorOrders",

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.physics.transfer.frequency_response import FrequencyResponse
-from rigwatch.physics.transfer.transfer_function import FloatArray, TransferFunction, reflected
+from rigwatch.physics.transfer.transfer_function import TransferFunction, reflected
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 Complex = NDArray[np.complex128]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import csd, welch
 
-from rigwatch.physics.transfer.transfer_function import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from rigwatch.physics.transfer.transfer_function import FloatArray, TransferFunction, reflected
+from rigwatch.physics.transfer.transfer_function import TransferFunction, reflected
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 

@@ -9,12 +9,10 @@ whose false-alarm rate is calculated.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.damage.spring_model import SpringModel
 from rigwatch.structures.damage.threshold import CumulativeSum, threshold_for
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 FLOOR = 1e-4
 """Share of a signal's rms below which its residual is taken for an error of the integration."""

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.damage.detector import RATE, Alarm, Judge, Watch
 from rigwatch.structures.damage.location import Ranking, locate, unexplained
@@ -22,9 +21,8 @@ from rigwatch.structures.damage.undamaged_reference import Figure, Reference, re
 from rigwatch.structures.identification import CONFIDENCE
 from rigwatch.structures.model import Structure
 from rigwatch.structures.records import Record
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 LATE = 0.1
 """Share of the data after an alarm that the way from onset to alarm may cost."""

@@ -12,14 +12,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
 from rigwatch.structures.damage.refit import STEPS, Refit, Stretch
 from rigwatch.structures.damage.spring_model import SpringModel, split
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 REFITTED = 4
 """Candidates of the first pass that are refitted."""

@@ -8,13 +8,11 @@ the 95 % interval holds those whose sum is at most 3.84 above that.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from rigwatch.structures.damage.detector import Alarm, Watch
 from rigwatch.structures.damage.spring_model import SpringModel
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 TRIED = 13
 """Instants in each of the rounds that narrow it down."""

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from rigwatch.physics.engine.score import ALIKE
@@ -23,8 +22,7 @@ from rigwatch.structures.damage.location import (
     scored,
 )
 from rigwatch.structures.damage.refit import STEPS, Refit, Stretch
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 REFITTED = 6
 """Pairs of the regression that are refitted."""

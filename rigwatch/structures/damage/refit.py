@@ -8,12 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.damage.spring_model import SpringModel
 from rigwatch.structures.identification import solve
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 STEPS = 15
 HALVINGS = 6

@@ -3,11 +3,9 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.damage.examination import Examination
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 SIGMAS = 3.0
 """Standard deviations of noise beyond which a single residual is remarkable."""

@@ -10,16 +10,14 @@ from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rigwatch.physics.engine.fit import initial_states
 from rigwatch.structures.identification import Problem, problem_of
 from rigwatch.structures.model import Structure, coefficients, label, with_values
 from rigwatch.structures.records import Record
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 KINDS = {"": "stiffness", "_quadratic": "quadratic", "_cubic": "cubic"}
 """What may change at a spring, by the ending of its coefficient's name."""

@@ -16,11 +16,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2
 
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 FORGETTING = 1.2
 """κ: what a sample may show on average without adding up."""

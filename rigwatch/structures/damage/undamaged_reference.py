@@ -8,16 +8,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.damage.detector import noise
 from rigwatch.structures.damage.spring_model import SpringModel, beside, spring_model
 from rigwatch.structures.identification import CONFIDENCE, problem_of, solver
 from rigwatch.structures.model import Structure, coefficients
 from rigwatch.structures.records import Record
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 NEAR = 0.1
 """Change of an iteration, in standard deviations, that will do."""

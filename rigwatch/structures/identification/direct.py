@@ -10,7 +10,6 @@ every error of the accelerations goes straight into the result.
 
 import numpy as np
 import sympy
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import make_interp_spline
 
@@ -19,9 +18,8 @@ from rigwatch.structures.identification.identify import Outcome, settled
 from rigwatch.structures.identification.least_squares import require_determined
 from rigwatch.structures.identification.least_squares import solve as least_squares
 from rigwatch.structures.identification.problem import Problem
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 DEGREE = 5
 """Of the splines that are differentiated."""

@@ -9,15 +9,12 @@ too far off the trajectories part from the record and it fails.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.identification.identify import Outcome, settled
 from rigwatch.structures.identification.least_squares import require_determined
 from rigwatch.structures.identification.least_squares import solve as least_squares
 from rigwatch.structures.identification.problem import Problem
-
-FloatArray = NDArray[np.float64]
-
+from rigwatch.wire.arrays import FloatArray
 
 SMALL = 0.02
 """Share of the signals up to which errors may be the model's own faults."""

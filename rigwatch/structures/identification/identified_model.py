@@ -1,12 +1,10 @@
 """What an identified model does where the record was taken."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.identification.identify import Identification
 from rigwatch.structures.identification.problem import Problem
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 
 def modelled(problem: Problem, found: Identification) -> FloatArray:

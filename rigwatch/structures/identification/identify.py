@@ -13,15 +13,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.physics.engine.equations import Model
 from rigwatch.structures.identification.problem import Problem, problem_of
 from rigwatch.structures.model import Structure
 from rigwatch.structures.records import Record
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 METHODS: dict[str, str] = {
     # name: module with `solve(problem, ...) -> Outcome`

@@ -12,11 +12,9 @@ square of the line through x, its nonlinear coefficients settle 1 to 2 % too hig
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,10 @@ told the noise, as published; nothing else gives it.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.identification.identify import Outcome, settled
 from rigwatch.structures.identification.problem import Problem
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 REMARK = "the filter was told the noise; its intervals are no wider than that makes them"
 

@@ -19,10 +19,8 @@ from rigwatch.structures.identification.sweep import Sweeper, sweeper
 from rigwatch.structures.identification.weighting import weights
 from rigwatch.structures.model import Structure, coefficients, to_model, with_unknowns
 from rigwatch.structures.records import Record
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 TURN = 0.1
 """Radians of the fastest motion per integration step of the methods that may choose it."""

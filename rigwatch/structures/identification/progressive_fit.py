@@ -11,15 +11,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.structures.identification.least_squares import Step
 from rigwatch.structures.identification.problem import Problem
 from rigwatch.structures.identification.whole_record import WholeRecord
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 FIRST = (4.0, 8.0, 2.0, 16.0)
 """Lengths of the first part, in periods of the fastest motion; the most promising first."""

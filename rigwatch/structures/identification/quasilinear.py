@@ -14,7 +14,6 @@ positions does not show is filled in thus:
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.identification.identify import Outcome, settled
 from rigwatch.structures.identification.integrators import Integrator
@@ -23,8 +22,7 @@ from rigwatch.structures.identification.least_squares import Step, require_deter
 from rigwatch.structures.identification.least_squares import solve as least_squares
 from rigwatch.structures.identification.problem import Problem, require_fine_enough
 from rigwatch.structures.identification.sweep import Swept
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 STABLE = 2.78
 """Radians a step up to which the classical Runge-Kutta method does not blow up."""

@@ -15,7 +15,6 @@ Where nodes have no signal, `prolonged.py` follows one trajectory from the recor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.identification.direct import solve as regression
 from rigwatch.structures.identification.identify import Outcome, settled
@@ -24,9 +23,8 @@ from rigwatch.structures.identification.problem import Problem
 from rigwatch.structures.identification.progressive_fit import followed
 from rigwatch.structures.identification.whole_record import WholeRecord
 from rigwatch.structures.identification.windows import Windows
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 SHORTEST = 4
 """Samples of the shortest windows; a period of the guess's fastest motion if longer."""

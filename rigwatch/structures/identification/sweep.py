@@ -23,9 +23,8 @@ from rigwatch.physics.engine.compile import (
 )
 from rigwatch.physics.engine.equations import System
 from rigwatch.structures.identification.integrators import CLASSICAL, Integrator
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 _SOURCE = '''"""Sweeps along a record, for the kernel {name}."""
 

@@ -7,11 +7,9 @@ jacobi:a,b       w = (1 − s)ᵃ·(1 + s)ᵇ, s from −1 to 1 over the record:
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 
 def weights(kind: str, time: FloatArray) -> FloatArray:

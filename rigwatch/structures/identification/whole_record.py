@@ -7,16 +7,14 @@ to have, and steps are halved until the error falls.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.identification.identify import settled
 from rigwatch.structures.identification.least_squares import FOUR_DIGITS, Step
 from rigwatch.structures.identification.least_squares import solve as least_squares
 from rigwatch.structures.identification.problem import Problem
 from rigwatch.structures.identification.windows import spreads
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 FINER = 2
 """How much shorter the integration steps are over the whole record, where errors add up."""

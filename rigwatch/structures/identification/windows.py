@@ -9,14 +9,12 @@ windows' states are iterated together with the parameters (lifted), hence one si
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.identification.least_squares import FOUR_DIGITS, Step
 from rigwatch.structures.identification.least_squares import solve as least_squares
 from rigwatch.structures.identification.problem import Problem
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 ENOUGH = 1e-3
 """Relative change of the parameters that will do for a guess of the next horizon."""

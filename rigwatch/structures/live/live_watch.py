@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.damage import (
     FINER,
@@ -31,10 +30,10 @@ from rigwatch.structures.damage import (
 from rigwatch.structures.model import Structure
 from rigwatch.structures.records import GrowingRecord
 from rigwatch.structures.report import verdict
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Event, SampleBlock, cut
 
-FloatArray = NDArray[np.float64]
 Said = EstimateBlock | Alarm | Event
 
 ALARM, SOURCE = "structure_damage", "structure"

@@ -6,12 +6,10 @@ Linear parts only: M diagonal [kg], K = Σ_s k_s·B_sᵀ·B_s [N/m], modes K·φ
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from rigwatch.structures.model.description import Structure, coefficient
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,10 @@ motion under any load; one that carries little is hard to identify.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.structures.model.description import Structure
 from rigwatch.structures.model.matrices import modes, spring_matrix
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.structures.records.record import Record
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.messages import SampleBlock
-
-FloatArray = NDArray[np.float64]
 
 ROOM = 4096
 

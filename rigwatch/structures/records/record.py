@@ -12,13 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Recording
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError, ModelError
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

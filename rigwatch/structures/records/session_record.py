@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rigwatch.structures.records.record import FloatArray, Record, read_record, record_of
+from rigwatch.structures.records.record import Record, read_record, record_of
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError
 from rigwatch.wire.messages import SampleBlock
 from rigwatch.wire.session import SUFFIX, open_session

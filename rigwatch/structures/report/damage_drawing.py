@@ -1,12 +1,10 @@
 """Draws an examination: the test and the residual with bound and instants, and rankings as bars."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.page import Plot
 from rigwatch.structures.damage import Examination, Ranking, band, pieces
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 HEIGHT = 260
 SHOWN = 6

@@ -7,7 +7,6 @@ from html import escape
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.page import Plot, exact, figure, key, limits, page, table
 from rigwatch.structures.identification import (
@@ -17,8 +16,8 @@ from rigwatch.structures.identification import (
     modelled,
     seconds_of,
 )
+from rigwatch.wire.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
 Series = Mapping[str, FloatArray]
 
 COLOURS = ("held", "before", "model", "rest", "good")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rigwatch.wire.messages import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.rig_config import ChannelSection
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError
-from rigwatch.wire.messages import FloatArray
 
 JITTER = 0.1
 """Time stamps this far from a uniform grid, in sample periods, are still taken for uniform."""

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ImportDataError, MissingExtraError
 from rigwatch.wire.exchange.mapping import ImportMapping
 from rigwatch.wire.exchange.mat5 import MatError, Value, read_mat5
-from rigwatch.wire.messages import FloatArray, IntArray
 
 FORMATS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv"} | {
     ".mat": "mat",

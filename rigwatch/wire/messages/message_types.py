@@ -17,10 +17,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.messages.quality_flags import valid
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
 
 Severity = Literal["info", "warning", "error", "critical"]

@@ -14,15 +14,9 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import DecodeError
 from google.protobuf.message import Message as ProtoMessage
 
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages.message_types import (
-    MESSAGE_TYPES,
-    ByteArray,
-    Column,
-    FloatArray,
-    IntArray,
-    Message,
-)
+from rigwatch.wire.messages.message_types import MESSAGE_TYPES, ByteArray, Column, Message
 
 PACKAGE = "rigwatch"
 _Field = descriptor_pb2.FieldDescriptorProto

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.uncertainty_budget import beyond
 from rigwatch.workbench.data import METHODS, Data, NoiseFloor, from_residual, prepare, quiet_scale
 from rigwatch.workbench.fit import (

@@ -11,8 +11,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import t as student
 
-from rigwatch.physics.engine.compile import FloatArray, IntArray
 from rigwatch.physics.engine.fit import Recording, initial_states
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.workbench.compare.compare import Bench
 from rigwatch.workbench.data import find_period
 

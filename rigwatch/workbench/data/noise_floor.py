@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import welch
 
-from rigwatch.physics.engine.compile import BoolArray, FloatArray
 from rigwatch.physics.engine.fit import Fit, Recording
+from rigwatch.wire.arrays import BoolArray, FloatArray
 
 METHODS = {
     "periods": "what differs between repeated periods of the excitation",

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import FloatArray, evaluated
+from rigwatch.physics.engine.compile import evaluated
 from rigwatch.physics.engine.equations import Model, Port, compose
 from rigwatch.physics.engine.fit import Recording, initial_states
+from rigwatch.wire.arrays import FloatArray
 
 Sizes = dict[str, float]
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Recording, Thinning
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.session import open_session
 from rigwatch.workbench.study import Derive, Span, Study, StudyFile, nearest

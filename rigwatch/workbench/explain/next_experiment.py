@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.fit import initial_states
 from rigwatch.physics.engine.score import Candidate, Projector, directions, trajectory
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.fit import nodes

@@ -7,8 +7,9 @@ it: in a right model with little noise such samples hold most of the error.
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import BoolArray, evaluated
+from rigwatch.physics.engine.compile import evaluated
 from rigwatch.physics.engine.fit import Fit, Recording, initial_states, seen, windows
+from rigwatch.wire.arrays import BoolArray
 
 JUMP = 0.5
 """Change from one sample to the next, over the largest that the effect ever is."""

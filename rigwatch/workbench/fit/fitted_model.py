@@ -6,15 +6,10 @@ from functools import partial
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import (
-    BoolArray,
-    CompiledSystem,
-    FloatArray,
-    compile_system,
-    even_substeps,
-)
+from rigwatch.physics.engine.compile import CompiledSystem, compile_system, even_substeps
 from rigwatch.physics.engine.equations import Placement, System, compose
 from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
+from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, port_sizes
 from rigwatch.workbench.fit.discontinuities import between_jumps

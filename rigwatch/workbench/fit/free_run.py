@@ -6,8 +6,8 @@ make it worse. It is shown, and decides nothing.
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.fit import Recording, initial_states
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.fit.fitted_model import Fitted
 
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from msgspec import structs
 
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.equations import Model
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit.fitted_model import fit_model
 from rigwatch.workbench.fit.intervals import covariance

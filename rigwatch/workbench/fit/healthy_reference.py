@@ -18,9 +18,9 @@ import numpy as np
 from msgspec import structs
 from scipy.signal import correlate
 
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.equations import Input, Model
 from rigwatch.physics.engine.fit import Recording, evaluate
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, find_period
 from rigwatch.workbench.fit.fitted_model import Fitted, fit_model

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.fit import Fit
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.fit.fitted_model import blocks
 
 CONFIDENCE = 0.95

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.equations import EffectParameter, Placement
 from rigwatch.physics.engine.fit import Recording, windows
 from rigwatch.physics.engine.score import (
@@ -29,6 +28,7 @@ from rigwatch.physics.engine.score import (
     suits,
     trajectory,
 )
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor, port_sizes
 from rigwatch.workbench.fit import (

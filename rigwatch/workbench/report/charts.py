@@ -7,7 +7,7 @@ import numpy as np
 from scipy.signal import welch
 
 from rigwatch.page import Plot, limits
-from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Region, motion, sample_numbers
 from rigwatch.workbench.steps import Signals, Stage
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rigwatch.page import exact, figure, key, limits, table
-from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Region
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.report import charts

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.fit import Recording, evaluate
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Bench, Comparison, bench_of, comparison, prepared
 from rigwatch.workbench.study import Study
 

@@ -25,8 +25,8 @@ from monitor.signals import (
     Admission,
     TransferResidual,
 )
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.fit import Recording
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages import SampleBlock
 from rigwatch.wire.session import open_session

@@ -7,10 +7,7 @@ is stepped.
 """
 
 from rigwatch.physics.engine.compile.compiled_system import (
-    BoolArray,
     CompiledSystem,
-    FloatArray,
-    IntArray,
     Linearisation,
     compile_system,
     load_source,
@@ -21,10 +18,7 @@ from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
 
 __all__ = [
-    "BoolArray",
     "CompiledSystem",
-    "FloatArray",
-    "IntArray",
     "Linearisation",
     "compile_system",
     "derivative",

@@ -17,18 +17,14 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.physics.engine.compile.derivatives import source
 from rigwatch.physics.engine.compile.kernel import native_kernel
 from rigwatch.physics.engine.compile.static_kernel import StaticKernel
 from rigwatch.physics.engine.compile.step_size import FINEST
 from rigwatch.physics.engine.equations import System
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,10 +16,9 @@ import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from rigwatch.wire.arrays import FloatArray, IntArray
+
 _DOUBLE = ir.DoubleType()
 WIDE = 1.5
 """How far a state may go in an interval, over what a step of Euler's says."""

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from rigwatch.physics.engine.compile.compiled_system import FloatArray
 from rigwatch.physics.engine.compile.static_kernel import numpy_function
 from rigwatch.physics.engine.compile.step_size import pace
 from rigwatch.physics.engine.equations import TIME, UNTIL, System
+from rigwatch.wire.arrays import FloatArray
 
 MOST_SUBSTEPS = 64
 FINER = 2.0

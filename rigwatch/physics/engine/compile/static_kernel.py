@@ -15,8 +15,7 @@ from sympy.printing.numpy import NumPyPrinter
 
 from rigwatch.physics.engine.compile.derivatives import derivative
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, parse, symbol
-
-FloatArray = NDArray[np.float64]
+from rigwatch.wire.arrays import FloatArray
 
 
 def numpy_function(names: Sequence[str], expressions: Any) -> Callable[..., Any]:

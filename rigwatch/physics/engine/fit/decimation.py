@@ -8,12 +8,10 @@ the least squares unbiased ("parallel filtering": M. Gautier, IEEE ICRA 1997).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import decimate
 
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

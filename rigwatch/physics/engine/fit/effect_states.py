@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import CompiledSystem, FloatArray, compile_system, evaluated
+from rigwatch.physics.engine.compile import CompiledSystem, compile_system, evaluated
 from rigwatch.physics.engine.equations import (
     LEFT,
     RATE,
@@ -29,6 +29,7 @@ from rigwatch.physics.engine.equations import (
     parse,
     symbol,
 )
+from rigwatch.wire.arrays import FloatArray
 
 Signals = dict[str, FloatArray]
 

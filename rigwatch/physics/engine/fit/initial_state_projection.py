@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import FloatArray, IntArray
+from rigwatch.wire.arrays import FloatArray, IntArray
 
 NEGLIGIBLE = 1e-10
 """Singular value over the largest below which a state shows in no output."""

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import CompiledSystem, FloatArray, IntArray
+from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit.effect_states import Recall
 from rigwatch.physics.engine.fit.initial_state_projection import Tangent
 from rigwatch.physics.engine.fit.recording import Recording, initial_states, windows
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
 START_STEPS = 2

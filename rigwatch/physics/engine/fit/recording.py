@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import savgol_filter
 
-from rigwatch.physics.engine.compile import FloatArray, IntArray
 from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit.decimation import Thinning
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
 

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from rigwatch.physics.engine.compile import BoolArray, CompiledSystem, FloatArray
+from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit.problem import Problem, Started
 from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.wire.arrays import BoolArray, FloatArray
 
 ROUNDS = 2
 """Solutions at most, each from where the last has led, while windows that went astray come back."""

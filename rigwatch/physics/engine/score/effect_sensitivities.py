@@ -19,10 +19,7 @@ import sympy
 from numba import njit
 
 from rigwatch.physics.engine.compile import (
-    BoolArray,
     CompiledSystem,
-    FloatArray,
-    IntArray,
     Linearisation,
     derivative,
     numpy_function,
@@ -39,6 +36,7 @@ from rigwatch.physics.engine.equations import (
     symbol,
 )
 from rigwatch.physics.engine.fit import Memory, held_at
+from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)

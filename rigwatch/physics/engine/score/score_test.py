@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from rigwatch.physics.engine.compile import FloatArray
+from rigwatch.wire.arrays import FloatArray
 
 ALIKE = 0.95
 """Cosine above which two candidates form a class."""

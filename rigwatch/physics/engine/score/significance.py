@@ -7,8 +7,8 @@ candidates looks good without being so: the p-values of the score test allow for
 import numpy as np
 from scipy.stats import chi2
 
-from rigwatch.physics.engine.compile import FloatArray
 from rigwatch.physics.engine.score.score_test import Scores
+from rigwatch.wire.arrays import FloatArray
 
 
 def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> FloatArray:
