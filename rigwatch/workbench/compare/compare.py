@@ -109,7 +109,7 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
     if healthy is None:
         floor = from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
         return Bench(study, data, base, floor, None)
-    bare = fit_model(study, healthy, (), study.file.start, base.train.scale)
+    bare = fit_model(study, healthy, (), study.file.start, base.train.scale, from_afar=True)
     return Bench(study, data, base, _of_healthy(study, healthy, base, bare), bare)
 
 

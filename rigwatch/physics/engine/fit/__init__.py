@@ -4,16 +4,19 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 """
 
 from rigwatch.physics.engine.fit.decimation import Thinning
-from rigwatch.physics.engine.fit.effect_states import Memory, held_at, seen
-from rigwatch.physics.engine.fit.recording import Recording, initial_states, windows
-from rigwatch.physics.engine.fit.windowed_fit import Fit, evaluate, fit
+from rigwatch.physics.engine.fit.effect_states import Memory, Recall, held_at, seen
+from rigwatch.physics.engine.fit.recording import Recording, filled, initial_states, windows
+from rigwatch.physics.engine.fit.windowed_fit import Fit, bounds, evaluate, fit
 
 __all__ = [
     "Fit",
     "Memory",
+    "Recall",
     "Recording",
     "Thinning",
+    "bounds",
     "evaluate",
+    "filled",
     "fit",
     "held_at",
     "initial_states",
