@@ -9,7 +9,7 @@ several starts; both are cheap, as nothing is integrated. The classical equation
 decides nothing.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -194,9 +194,9 @@ def _linear(
         made = numpy_function(list(seen), [*balance.columns, balance.rest])(*seen.values())
         shape = seen[TARGET].shape
         values = np.stack([np.broadcast_to(value, shape) for value in made], axis=1)
-        size = float(np.sqrt(np.mean(values[:, -1] ** 2))) or 1.0
-        blocks.append(values[:, :-1] / size)
-        rests.append(-values[:, -1] / size)
+        scale = float(np.sqrt(np.mean(values[:, -1] ** 2))) or 1.0
+        blocks.append(values[:, :-1] / scale)
+        rests.append(-values[:, -1] / scale)
     weights = np.ones(len(blocks))
     found = begin[free]
     for _ in range(REWEIGHTED):
@@ -206,7 +206,7 @@ def _linear(
         size = np.where(size > 0, size, 1.0)
         found = lsq_linear(matrix / size, wanted, (low * size, high * size)).x / size
         left = [np.std(r - b @ found) for r, b in zip(rests, blocks, strict=True)]
-        weights = 1 / np.maximum(left, 1e-9)
+        weights = 1 / np.maximum(np.array(left), 1e-9)
     vector = begin.copy()
     vector[free] = np.clip(found, low, high)
     return vector
@@ -242,14 +242,18 @@ def _nonlinear(
             return start
         theta = _moved(evaluated, theta, weights, low, high)
         left = [float(np.std(each[0])) for each in evaluated(theta)]
-        weights = 1 / np.maximum(left, 1e-9)
+        weights = 1 / np.maximum(np.array(left), 1e-9)
     vector = start.copy()
     vector[free] = theta
     return vector
 
 
-def _moved(  # noqa: PLR0917 -- they belong together
-    evaluated, theta: FloatArray, weights: FloatArray, low: FloatArray, high: FloatArray
+def _moved(
+    evaluated: Callable[[FloatArray], list[FloatArray]],
+    theta: FloatArray,
+    weights: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
 ) -> FloatArray:
     unit = np.maximum(np.abs(theta), 1e-9)
 

@@ -16,7 +16,6 @@ shortened; a start that blows up even then is left.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
@@ -30,13 +29,15 @@ from rigwatch.physics.engine.convergence import (
     spread,
 )
 from rigwatch.physics.engine.equation_error import equation_error_starts
-from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit
+from rigwatch.physics.engine.fit import Fit, Recording, error_at, fit
 from rigwatch.physics.engine.starts import drawn_start
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 NEAR = 2.0
 """Error over the sensors' noise up to which no other end of a fit could be much better."""
+QUIET = 0.1
+"""Noise over what a sensor reads up to which a fit that leaves no more than noise says much."""
 GROWTH = 4
 """A horizon over the one before."""
 FEWEST = 8
@@ -72,6 +73,8 @@ class _Search:
     def near_noise(self) -> bool:
         """Whether the best leaves little more than noise."""
         if self.noise is None or not self.found:
+            return False
+        if np.any(self.noise > QUIET * np.nanstd(self.recording.outputs, axis=0)):
             return False
         return float(np.sqrt(np.mean((self.best.rms / self.noise) ** 2))) <= NEAR
 
@@ -186,20 +189,23 @@ def _enough(search: _Search) -> bool:
     """Whether no further start is worth its time."""
     if not search.found:
         return False
+    steep = promise(search.best) > PROMISED
     if not search.compiled.system.model.states or not search.compiled.system.free:
-        return promise(search.best) <= PROMISED
-    return search.settled or (search.near_noise and len(search.found) > 1)
+        return not steep
+    return search.settled or (search.near_noise and not steep)
 
 
 def _attempts(search: _Search, begin: FloatArray) -> Iterator[tuple[str, FloatArray, bool]]:
     """Starts, each with its name and whether its horizons grow, the likeliest first."""
-    yield "the given values", begin, search.horizon >= LONG
-    balanced = _balanced(search, begin)
+    balanced, closer = _balanced(search, begin)
+    given = ("the given values", begin, search.horizon >= LONG)
+    if not closer:
+        yield given
     if balanced is not None:
         yield "the balance of the equations", balanced, False
+        if closer:
+            yield given
         yield "the balance of the equations, growing horizons", balanced, True
-    elif search.near_noise:
-        return
     yield "the given values, growing horizons", begin, True
     if _numbers(search) < DEAR:
         generator = np.random.default_rng(0)
@@ -207,35 +213,28 @@ def _attempts(search: _Search, begin: FloatArray) -> Iterator[tuple[str, FloatAr
             yield "drawn values", drawn_start(search.compiled.system, begin, generator), True
 
 
-def _balanced(search: _Search, begin: FloatArray) -> FloatArray | None:
-    """Of the starts that balance the equations the one that simulates best over a short horizon."""
+def _balanced(search: _Search, begin: FloatArray) -> tuple[FloatArray | None, bool]:
+    """Of the starts that balance the equations the one that simulates best over a short horizon.
+
+    Returns:
+        It, None where there is none; and whether it does better there than the given values.
+    """
     starts = equation_error_starts(search.compiled, search.recording, begin)
     if not starts:
-        return None
+        return None, False
     errors = [_short_error(search, each) for each in starts]
     least = int(np.argmin(errors))
-    return starts[least] if np.isfinite(errors[least]) else None
+    if not np.isfinite(errors[least]):
+        return None, False
+    return starts[least], errors[least] < _short_error(search, begin)
 
 
 def _short_error(search: _Search, parameters: FloatArray) -> float:
     """Scaled error over the second shortest of the growing horizons."""
     shorter = [*growing_horizons(search.horizon), search.horizon][:2][-1]
-    at = _at(search, parameters)
-    try:
-        return spread(at(search.recording, shorter, search.substeps))
-    except ModelError:
-        return float("inf")
-
-
-def _at(search: _Search, parameters: FloatArray):
-    """`evaluate` at given parameters."""
-    none = np.zeros((0, 0))
-    system = search.compiled.system
-    unfitted = Fit(
-        search.compiled, parameters, np.zeros((len(system.free), len(system.free))), none, none,
-        search.scale, none, none,
-    )  # fmt: skip
-    return partial(evaluate, unfitted)
+    return error_at(
+        search.compiled, search.recording, shorter, parameters, search.scale, search.substeps
+    )
 
 
 def _numbers(search: _Search) -> int:

@@ -172,7 +172,7 @@ class Sweeper:
     @property
     def hold(self) -> float:
         """1 where inputs run straight between samples, else 0."""
-        return 1.0 if self.compiled.system.model.hold == "linear" else 0.0
+        return 1.0 if self.compiled.system.model.hold != "zero" else 0.0
 
     def sweep(  # noqa: PLR0917 -- they stand in the order of the equations'
         self,

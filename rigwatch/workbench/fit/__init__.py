@@ -9,6 +9,7 @@ from rigwatch.workbench.fit.fitted_model import (
     fit_twice,
     may_be_better,
     nodes,
+    placements_of,
 )
 from rigwatch.workbench.fit.free_run import free_run
 from rigwatch.workbench.fit.healthy_parameters import commissioned, loosened
@@ -29,6 +30,7 @@ __all__ = [
     "loosened",
     "may_be_better",
     "nodes",
+    "placements_of",
     "profile",
     "referenced",
     "values",

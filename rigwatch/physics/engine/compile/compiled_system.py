@@ -158,7 +158,10 @@ class CompiledSystem:
             )
         if len(starts) and (starts.min() < 0 or starts.max() + length > len(inputs)):
             raise ModelError(f"{model.name}: found a window beyond the recording's end")
-        hold = np.array([float(model.held(name) == "linear") for name in model.inputs])
+        hold = np.array([
+            1.0 if model.held(name) == "linear" else -own.late
+            for name, own in model.inputs.items()
+        ])  # fmt: skip
         first = np.ascontiguousarray(initial, np.float64).reshape(len(starts), -1)
         values = np.ascontiguousarray(parameters, np.float64)
         driven = np.ascontiguousarray(inputs, np.float64)

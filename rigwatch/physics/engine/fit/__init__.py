@@ -6,7 +6,7 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.effect_states import Memory, Recall, held_at, seen
 from rigwatch.physics.engine.fit.recording import Recording, filled, initial_states, windows
-from rigwatch.physics.engine.fit.windowed_fit import Fit, bounds, evaluate, fit
+from rigwatch.physics.engine.fit.windowed_fit import Fit, bounds, error_at, evaluate, fit
 
 __all__ = [
     "Fit",
@@ -15,6 +15,7 @@ __all__ = [
     "Recording",
     "Thinning",
     "bounds",
+    "error_at",
     "evaluate",
     "filled",
     "fit",

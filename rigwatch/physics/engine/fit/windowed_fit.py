@@ -171,6 +171,32 @@ def evaluate(
     return replace(_result(problem, found), covariance=fitted.covariance)
 
 
+@_QUIET
+def error_at(  # noqa: PLR0917 -- they belong together
+    compiled: CompiledSystem,
+    recording: Recording,
+    horizon: int,
+    parameters: FloatArray,
+    scale: FloatArray,
+    substeps: int = 4,
+) -> float:
+    """Root mean square of the scaled error at given parameters; infinite where it blows up.
+
+    Args:
+        compiled, recording, horizon, substeps: as in `fit`.
+        parameters: all of them, shape (n_p,).
+        scale: divisor of each output's residuals, shape (outputs,).
+    """
+    problem = Problem(compiled, recording, horizon, scale=scale, substeps=substeps, initial=None)
+    try:
+        problem.recall(parameters)
+        error = problem.start_windows(parameters).error
+    except (ModelError, np.linalg.LinAlgError):
+        return float("inf")
+    size = float(np.sqrt(np.mean(error**2)))
+    return size if np.isfinite(size) else float("inf")
+
+
 def bounds(system: System) -> tuple[FloatArray, FloatArray]:
     """Lower and upper bounds of the free parameters, each of shape (m,)."""
     free = [system.parameters[name] for name in system.free]
@@ -181,9 +207,15 @@ def _result(problem: Problem, found: Started) -> Fit:
     """The fit at the parameters that have been found."""
     error, scale = found.error, problem.scale
     residual, jacobian = problem.cleaned(error, found.slopes)
+    curvature = jacobian.T @ jacobian
+    if not np.isfinite(curvature).all():
+        raise ModelError(
+            f"{problem.system.model.name}: the slopes leave the finite numbers; try other"
+            " starting values"
+        )
     used = residual.size - found.initial.size - len(problem.free)
     variance = float(residual @ residual) / max(used, 1)
-    covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * variance, np.float64)
+    covariance = np.asarray(np.linalg.pinv(curvature) * variance, np.float64)
     left = error.reshape(len(error), -1, problem.measured.shape[2]) * scale
     if problem.recording.thinning is None:
         left = np.where(np.isnan(problem.measured), np.nan, left)

@@ -102,7 +102,10 @@ def trajectory(
     following = np.minimum(rows + 1, len(inputs) - 1)
     model = compiled.system.model
     share = np.outer(place, [model.held(name) == "linear" for name in model.inputs])
-    at_nodes = inputs[rows] + share * (inputs[following] - inputs[rows])
+    late = np.array([own.late for own in model.inputs.values()])
+    before = (place[:, None] < late) & (share == 0.0) & (late > 0)
+    kept = np.where(before, inputs[np.maximum(rows - 1, 0)], inputs[rows])
+    at_nodes = kept + share * (inputs[following] - inputs[rows])
     return Trajectory(compiled, run, at_nodes, (rows + place) * dt, parameters)
 
 
