@@ -56,6 +56,8 @@ class Linearisation:
         rate_slopes: shape (windows, nodes, n, m + n + q): ∂rates.
         read_slopes: at the samples, shape (windows, samples, outputs, m + n + q): ∂outputs.
         outputs: at the samples, shape (windows, samples, outputs).
+        update_slopes: at the samples, shape (windows, samples, n, m + n + q): ∂states from there on
+            by those before; shape (windows, 0, …) where no state changes at samples.
     """
 
     spacing: float
@@ -64,6 +66,7 @@ class Linearisation:
     rate_slopes: FloatArray
     read_slopes: FloatArray
     outputs: FloatArray
+    update_slopes: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,8 +140,10 @@ class CompiledSystem:
         samples = (len(starts), length, len(self.system.outputs))
         states, rates = np.empty((*nodes, n)), np.zeros((*nodes, n, wide))
         outputs, reads = np.empty(samples), np.zeros((*samples, wide))
-        self.kernel.linearise(*arguments, states, rates, outputs, reads)
-        return Linearisation(dt / substeps, substeps, states, rates, reads, outputs)
+        count = length if self.system.updates else 0
+        updates = np.zeros((len(starts), count, n, wide))
+        self.kernel.linearise(*arguments, states, rates, outputs, reads, updates)
+        return Linearisation(dt / substeps, substeps, states, rates, reads, outputs, updates)
 
     def _arguments(  # noqa: PLR0917 -- they stand in the order of the kernel's
         self,

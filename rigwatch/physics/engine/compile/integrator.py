@@ -121,6 +121,18 @@ def across(  # noqa: PLR0917 -- a kernel
 
 
 @njit(cache=True, error_model="numpy")
+def renew(  # noqa: PLR0917 -- a kernel
+    update: int, u: FloatArray, row: int, hold: FloatArray, rows: int, dt: float, pp: int,
+    z: FloatArray, dz: FloatArray, us: FloatArray,
+) -> None:  # fmt: skip
+    """States that change at samples take what they are from this one on."""
+    place(u, row, 0.0, 0.0, hold, rows, dt, us)
+    call(update, row * dt, z.ctypes.data, us.ctypes.data, pp, dz.ctypes.data, dz.ctypes.data)
+    for i in range(z.size):
+        z[i] = dz[i]
+
+
+@njit(cache=True, error_model="numpy")
 def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
     """States as given for window w; each moves with its own initial value alone."""
     n = x0.shape[1]
@@ -164,10 +176,10 @@ def needed(  # noqa: PLR0917 -- a kernel
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def simulate(  # noqa: PLR0917 -- a kernel
-    rates: int, read: int, plain: int, pace: int, asked: int, crossing: IntArray, m: int,
-    rows: int, u: FloatArray, dt: float, substeps: int, finest: int, hold: FloatArray,
-    starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray, dy: FloatArray,
-    last: FloatArray,
+    rates: int, read: int, plain: int, pace: int, update: int, updated: bool, asked: int,
+    crossing: IntArray, m: int, rows: int, u: FloatArray, dt: float, substeps: int, finest: int,
+    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray,
+    dy: FloatArray, last: FloatArray,
 ) -> None:  # fmt: skip
     """Fill outputs y (windows, samples, outputs), slopes dy (…, m) and last states of each window.
 
@@ -201,15 +213,17 @@ def simulate(  # noqa: PLR0917 -- a kernel
                     )  # fmt: skip
                     steps = int(min(float(finest), max(float(substeps), math.ceil(wanted_steps))))
                 across(rates, u, row, steps, late, hold, rows, dt, pp, z, zs, dz, acc, us)
+                if updated and (row + 1) % rows == 0:
+                    renew(update, u, row + 1, hold, rows, dt, pp, z, dz, us)
         for i in range(n):
             last[w, i] = z[i]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def linearise(  # noqa: C901, PLR0917 -- a kernel
-    rates: int, read_slopes: int, rate_slopes: int, u: FloatArray, dt: float, substeps: int,
-    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, nodes: FloatArray,
-    slopes: FloatArray, y: FloatArray, dy: FloatArray,
+def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
+    rates: int, read_slopes: int, rate_slopes: int, update_slopes: int, u: FloatArray, dt: float,
+    substeps: int, hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray,
+    nodes: FloatArray, slopes: FloatArray, y: FloatArray, dy: FloatArray, jumps: FloatArray,
 ) -> None:  # fmt: skip
     """The trajectory without sensitivities, and the Jacobians at its nodes."""
     n, wide = x0.shape[1], slopes.shape[3]
@@ -240,3 +254,10 @@ def linearise(  # noqa: C901, PLR0917 -- a kernel
                 if not last:
                     following = (step + 1) / substeps
                     advance(rates, u, row, share, following, hold, 1, dt, pp, z, zs, dz, acc, us)
+            if jumps.shape[1] > 0 and not last:
+                place(u, row + 1, 0.0, 0.0, hold, 1, dt, us)
+                call(update_slopes, (row + 1) * dt, zp, up, pp, op, fp)
+                for i in range(n):
+                    z[i] = out[i]
+                    for j in range(wide):
+                        jumps[w, k + 1, i, j] = flat[i * wide + j]

@@ -9,6 +9,8 @@ of sensitivities and q probes; behind the inputs in u is the time until they cha
     pace         a = x, out = steps a second that are needed
     rate_slopes  a = x, out = dx/dt, slopes = ∂(dx/dt) by parameters, states, probes: (n, m + q)
     read_slopes  a = x, out = y, slopes = ∂y of shape (outputs, m + q)
+    update       a = [x | S] before a sample, out = [x | S] from there on
+    update_slopes  a = x, out = x from there on, slopes = ∂ of it, of shape (n, m + q)
 """
 
 import os
@@ -45,6 +47,7 @@ class Equations:
             outputs are differentiated.
         rates, reads: of the states, and of the outputs.
         pace: what the steps must follow.
+        updates: all states from a sample on; none where no state changes there.
     """
 
     states: tuple[str, ...]
@@ -55,6 +58,7 @@ class Equations:
     rates: tuple[sympy.Expr, ...]
     reads: tuple[sympy.Expr, ...]
     pace: Pace
+    updates: tuple[sympy.Expr, ...] = ()
 
 
 def native_kernel(system: System) -> "NativeKernel":
@@ -63,9 +67,15 @@ def native_kernel(system: System) -> "NativeKernel":
         Equations(
             tuple(system.states), tuple(system.model.inputs), tuple(system.parameters),
             system.free, system.probes, tuple(system.derivatives.values()),
-            tuple(system.outputs.values()), pace(system),
+            tuple(system.outputs.values()), pace(system), _updates(system),
         )
     )  # fmt: skip
+
+
+def _updates(system: System) -> tuple[sympy.Expr, ...]:
+    if not system.updates:
+        return ()
+    return tuple(system.updates.get(name, symbol(name)) for name in system.states)
 
 
 @lru_cache(maxsize=256)
@@ -81,7 +91,8 @@ class NativeKernel:
         by = (system.states, system.free, system.probes)
         self._rates = differentiated(system.rates, *by)
         self._reads = differentiated(system.reads, *by)
-        self._kept, self._along, self._slopes = list[Any](), (0, 0, 0, 0), (0, 0, 0)
+        self._updates = differentiated(system.updates, *by)
+        self._kept, self._along, self._slopes = list[Any](), (0, 0, 0, 0, 0), (0, 0, 0, 0)
         self._crossing = np.array(system.pace.crossing, np.int64)
 
     def _compiled(self, functions: Sequence[Function]) -> Any:
@@ -101,11 +112,13 @@ class NativeKernel:
                 _with_sensitivities(self._system, "read", self._reads, behind=False),
                 _plain(self._system, "plain", self._rates.values),
                 _plain(self._system, "pace", asked),
+                _with_sensitivities(self._system, "update", self._updates, behind=True),
             ])  # fmt: skip
-            self._along = tuple(address(name) for name in ("rates", "read", "plain", "pace"))
+            names = ("rates", "read", "plain", "pace", "update")
+            self._along = tuple(address(name) for name in names)
         kernel = partial(
-            driver.simulate, *self._along, len(asked), self._crossing, self._columns, rows, u, dt,
-            substeps, finest, hold,
+            driver.simulate, *self._along, bool(self._system.updates), len(asked),
+            self._crossing, self._columns, rows, u, dt, substeps, finest, hold,
         )  # fmt: skip
         numbers = x0.shape[1] * (1 + self._columns)
         if starts.size * y.shape[1] * substeps * numbers < LARGE:
@@ -121,17 +134,24 @@ class NativeKernel:
 
     def linearise(  # noqa: PLR0917 -- they stand in the order of the driver's
         self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, nodes: Any,
-        slopes: Any, y: Any, dy: Any,
+        slopes: Any, y: Any, dy: Any, jumps: Any,
     ) -> None:  # fmt: skip
-        """Fill the states at the nodes, the slopes of rates there, outputs and their slopes."""
+        """Fill the states at the nodes, the slopes of rates there, outputs and their slopes.
+
+        `jumps` takes the slopes of the states across each sample, where they change there.
+        """
         if not all(self._slopes):
             address = self._compiled([
                 _plain(self._system, "plain", self._rates.values),
                 _jacobian(self._system, "read_slopes", self._reads),
                 _jacobian(self._system, "rate_slopes", self._rates),
+                _jacobian(self._system, "update_slopes", self._updates),
             ])  # fmt: skip
-            self._slopes = (address("plain"), address("read_slopes"), address("rate_slopes"))
-        driver.linearise(*self._slopes, u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy)
+            names = ("plain", "read_slopes", "rate_slopes", "update_slopes")
+            self._slopes = tuple(address(name) for name in names)
+        driver.linearise(
+            *self._slopes, u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy, jumps
+        )
 
 
 def _function(system: Equations, name: str) -> Function:
@@ -160,6 +180,8 @@ def _with_sensitivities(
     """Values, and J·S + ∂/∂p; the latter behind the values in `out`, or in `slopes`."""
     function, n = _function(system, name), len(system.states)
     m, k = len(system.free) + n, len(found.values)
+    if not k:
+        return function
     flat = [*found.values, *(e for r in found.by_state for e in r)]
     flat += [e for r in found.by_parameter for e in r]
     values = _values(function, flat)

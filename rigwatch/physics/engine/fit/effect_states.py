@@ -97,10 +97,15 @@ def _alone(effect: Effect, inputs: list[str], hold: Hold, late: float) -> System
         parameters={n: Parameter(value=0.0, unit="1", fixed=True) for n in effect.parameters},
         outputs={name: Output(unit="1", expression=name) for name in effect.states},
     )
-    states = {n: State(unit="1", derivative=s.derivative) for n, s in effect.states.items()}
-    rates = {n: parse(s.derivative, names, f"state {n}") for n, s in effect.states.items()}
+    states = {
+        n: State(unit="1", derivative=s.derivative or s.update) for n, s in effect.states.items()
+    }
+    rates = {n: parse(s.derivative or "0", names, f"state {n}") for n, s in effect.states.items()}
+    updates = {
+        n: parse(s.update, names, f"state {n}") for n, s in effect.states.items() if s.update
+    }
     read = {name: symbol(name) for name in effect.states}
-    return System(model, (), states, model.parameters, rates, read, {}, ())
+    return System(model, (), states, model.parameters, rates, read, {}, (), updates)
 
 
 @dataclass(frozen=True, eq=False)
