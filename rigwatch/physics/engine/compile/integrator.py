@@ -20,6 +20,8 @@ from numba.extending import intrinsic
 from rigwatch.wire.arrays import FloatArray, IntArray
 
 _DOUBLE = ir.DoubleType()
+TINY = 1e-200
+"""Size below which what a sampled state holds is nothing."""
 WIDE = 1.5
 """How far a state may go in an interval, over what a step of Euler's says."""
 
@@ -129,7 +131,8 @@ def renew(  # noqa: PLR0917 -- a kernel
     place(u, row, 0.0, 0.0, hold, rows, dt, us)
     call(update, row * dt, z.ctypes.data, us.ctypes.data, pp, dz.ctypes.data, dz.ctypes.data)
     for i in range(z.size):
-        z[i] = dz[i]
+        # What has been forgotten is zero: numbers below the normal ones are slow.
+        z[i] = dz[i] if abs(dz[i]) > TINY else 0.0
 
 
 @njit(cache=True, error_model="numpy")
