@@ -7,7 +7,7 @@ come as addresses of functions, as `engine.compile.integrator` calls them.
 import numpy as np
 from numba import njit
 
-from rigwatch.physics.engine.compile import advance, call, place
+from rigwatch.physics.engine.compile import across, call, lateness, place
 from rigwatch.wire.arrays import FloatArray
 
 
@@ -64,7 +64,7 @@ def sweep(  # noqa: C901, PLR0917 -- a kernel
     ks, wide, pp = np.zeros((b.size, n, width)), np.empty((y.shape[1], width)), p.ctypes.data
     for k in range(count):
         _between(nominal, k, 0.0, xs)
-        place(u, k, 0.0, hold, 1, dt, us)
+        place(u, k, 0.0, 0.0, hold, 1, dt, us)
         for i in range(n):
             z[i] = xs[i]
             for j in range(width):
@@ -86,7 +86,7 @@ def sweep(  # noqa: C901, PLR0917 -- a kernel
             _add(dt, a[stage, :stage], ks, ss)
             share, t = c[stage], (first + k + c[stage]) * dt
             ks[stage] = 0.0
-            place(u, k, share, hold, 1, dt, us)
+            place(u, k, share, share, hold, 1, dt, us)
             if apart:
                 if share < 1.0:
                     _between(nominal, k, 0.0, xs)
@@ -128,8 +128,8 @@ def forward(  # noqa: PLR0917 -- a kernel
     for i in range(n):
         z[i] = x[i]
         z[n + i * m + m - n + i] = 1.0
-    for step in range(substeps):
-        advance(rates, u, row, step, substeps, hold, 1, dt, p.ctypes.data, z, zs, dz, acc, us)
+    late = lateness(hold)
+    across(rates, u, row, substeps, late, hold, 1, dt, p.ctypes.data, z, zs, dz, acc, us)
     for i in range(n):
         x[i] = z[i]
         for j in range(m):

@@ -1,9 +1,10 @@
 """Compares the model of a study with its recordings: errors, noise floor, parameters."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigwatch.physics.engine.fit import Convergence
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.uncertainty_budget import beyond
 from rigwatch.workbench.data import METHODS, Data, NoiseFloor, from_residual, prepare, quiet_scale
@@ -18,8 +19,9 @@ from rigwatch.workbench.fit import (
     profile,
     referenced,
     values,
+    with_hold,
 )
-from rigwatch.workbench.study import Study, check_data
+from rigwatch.workbench.study import Held, Study, check_data
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Comparison:
         parameters: by name, in the units that the model and its effects are written in.
         effects: accepted so far, as "effect@port".
         remarks: what was noticed, for people.
+        hold: what each input does between samples, by name.
+        convergence: how the fit of the model ended.
     """
 
     train_error: float
@@ -56,6 +60,8 @@ class Comparison:
     parameters: dict[str, Value]
     effects: list[str]
     remarks: list[str]
+    hold: dict[str, Held] = field(default_factory=dict)
+    convergence: Convergence | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +100,7 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     check_data(study)
     data = prepare(study)
     scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
+    study = with_hold(study, data, scale)
     study = commissioned(study, data, scale)
     return *referenced(study, data, scale), scale
 
@@ -105,12 +112,13 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
         study, data: prepared.
         scale: divisor of each output's residuals, shape (outputs,); its spread if None.
     """
+    study = with_hold(study, data, scale)
     base = fit_base(study, data, scale)
     healthy = data.of_healthy
     if healthy is None:
         floor = from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
         return Bench(study, data, base, floor, None)
-    bare = fit_model(study, healthy, (), study.file.start, base.train.scale)
+    bare = fit_model(study, healthy, (), study.file.start, base.train.scale, from_afar=True)
     return Bench(study, data, base, _of_healthy(study, healthy, base, bare), bare)
 
 
@@ -165,6 +173,8 @@ def comparison(bench: Bench) -> Comparison:
         as_written(found, base.compiled.system),
         [f"{a.effect}@{a.port}" for a in bench.study.file.effects],
         [*bench.data.remarks, *weak],
+        dict(bench.study.holds),
+        base.convergence,
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from rigwatch.workbench.compare import Bench, Comparison, beyond, comparison, open_bench
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
-from rigwatch.workbench.explain.verdict import Verdict, judge
+from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
 from rigwatch.workbench.explain.verdict_calibration import seen
 from rigwatch.workbench.fit import Value, as_written, values
 from rigwatch.workbench.ranking import Progress, Ranked, rank, unheard
@@ -43,7 +43,8 @@ class Explanation:
     """What a study learns from its recordings.
 
     Attributes:
-        verdict: nothing_missing, missing_effect, undetermined or unknown_effect.
+        verdict: nothing_missing, missing_effect, undetermined, unknown_effect or
+            model_inadequate.
         text: the verdict in a sentence.
         comparison: the model as it is.
         ranking: best first.
@@ -83,6 +84,11 @@ def explain(study: Study, progress: Progress = unheard) -> Explanation:
 
 def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], Verdict]:
     """The ranking, what the verdict names in front, and the verdict."""
+    stopped = not_converged({
+        "the model": bench.base, "the model to the healthy recording": bench.bare,
+    })  # fmt: skip
+    if stopped is not None:
+        return [], stopped
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = judge(bench.base, rows, bench.floor)
     if verdict.word == "unknown_effect" and verdict.best is not None:

@@ -1,17 +1,26 @@
 """A model with some effects, fitted to the training recordings and judged on those held out."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem, compile_system, even_substeps
 from rigwatch.physics.engine.equations import Placement, System, compose
-from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
+from rigwatch.physics.engine.fit import (
+    Convergence,
+    Fit,
+    Recording,
+    convergence,
+    evaluate,
+    fit,
+    fit_from_afar,
+    initial_states,
+)
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, parameters_of, port_sizes
+from rigwatch.workbench.data import Data, parameters_of, port_sizes, quiet_scale
 from rigwatch.workbench.fit.discontinuities import between_jumps
 from rigwatch.workbench.study import Study
 
@@ -36,6 +45,7 @@ class Fitted:
         horizon: samples from one re-initialisation to the next.
         calm: samples held out that are beside no jump of an effect, shape (windows, length); None
             where nothing jumps.
+        convergence: how the fit ended; None where it began at another's end and was not asked.
     """
 
     placements: tuple[Placement, ...]
@@ -44,6 +54,7 @@ class Fitted:
     substeps: int
     horizon: int
     calm: BoolArray | None = None
+    convergence: Convergence | None = None
 
     @property
     def compiled(self) -> CompiledSystem:
@@ -108,13 +119,14 @@ def fit_base(study: Study, data: Data, scale: FloatArray | None = None) -> Fitte
     """
     placements, start = placements_of(study, data.train), parameters_of(study.file)
     try:
-        return fit_twice(study, data, placements, start, scale)
+        return fit_twice(study, data, placements, start, scale, from_afar=True)
     except ModelError:
         if not placements:
             raise
-    found = fit_model(study, data, (), start, scale)
+    found = fit_model(study, data, (), start, scale, from_afar=True)
     for count in range(1, len(placements) + 1):
-        found = fit_twice(study, data, placements[:count], start | found.train.values(), scale)
+        begin = start | found.train.values()
+        found = fit_twice(study, data, placements[:count], begin, scale, from_afar=True)
     return found
 
 
@@ -126,9 +138,10 @@ def fit_twice(
     scale: FloatArray | None = None,
     *,
     base: Fitted | None = None,
+    from_afar: bool = False,
 ) -> Fitted:
     """`fit_model`, and once more where it may have ended in a local minimum."""
-    found = fit_model(study, data, placements, start, scale, base=base)
+    found = fit_model(study, data, placements, start, scale, base=base, from_afar=from_afar)
     if scale is None or not may_be_better(study, data, found, start):
         return found
     return fit_again(study, data, found, start)
@@ -143,7 +156,15 @@ def fit_again(study: Study, data: Data, found: Fitted, start: Mapping[str, float
         )  # fmt: skip
     except ModelError:
         return found
-    return min(found, again, key=lambda fitted: _size(fitted.train))
+    best = min(found, again, key=lambda fitted: _size(fitted.train))
+    return replace(best, convergence=_ended_again(found, again, best))
+
+
+def _ended_again(found: Fitted, again: Fitted, best: Fitted) -> Convergence | None:
+    """How the better of two fits ended; None where neither was asked."""
+    if best is found or found.convergence is None:
+        return found.convergence
+    return convergence(again.train, [found.train], "short horizons", near_noise=False)
 
 
 def fit_model(
@@ -155,6 +176,7 @@ def fit_model(
     *,
     base: Fitted | None = None,
     by_way_of_short: bool = False,
+    from_afar: bool = False,
 ) -> Fitted:
     """The study's model with `placements`, fitted from `start`.
 
@@ -166,6 +188,7 @@ def fit_model(
         base: a fit of less, whose initial states are a start for these.
         by_way_of_short: whether the search begins where short horizons lead: over long ones what
             sticks and slips has many local minima.
+        from_afar: whether `start` may be far from the truth, so that other starts are tried.
 
     Raises:
         ModelError: an effect does not fit its port, or the simulation leaves the finite numbers.
@@ -173,15 +196,36 @@ def fit_model(
     compiled = compile_system(compose(study.model, placements))
     horizon = data.horizon if study.model.states else len(data.train)
     begin, substeps = compiled.vector(start), study.file.substeps
+    first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
+    if from_afar:
+        found, ended = fit_from_afar(
+            compiled, data.train, horizon, start=begin, scale=scale,
+            noise=quiet_scale(data.train) if scale is None else scale, initial=first,
+            substeps=substeps,
+        )  # fmt: skip
+        return _judged(study, data, placements, found, horizon, later, ended)
     if study.model.states and (horizon >= LONG or by_way_of_short):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
-    first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
     found = fit_over(horizon, start=begin, initial=first)
+    return _judged(study, data, placements, found, horizon, later, None)
+
+
+def _judged(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    placements: Sequence[Placement],
+    found: Fit,
+    horizon: int,
+    initial: FloatArray | None,
+    ended: Convergence | None,
+) -> Fitted:
+    """A fit with its error on the recordings held out."""
     beside = data.horizon if study.model.states else len(data.held_out)
-    judged = evaluate(found, data.held_out, beside, substeps, later)
+    substeps = study.file.substeps
+    judged = evaluate(found, data.held_out, beside, substeps, initial)
     calm = between_jumps(found, data.held_out, beside)
-    return Fitted(tuple(placements), found, judged, substeps, horizon, calm)
+    return Fitted(tuple(placements), found, judged, substeps, horizon, calm, ended)
 
 
 def may_be_better(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> bool:

@@ -210,7 +210,7 @@ def rank(
         least = AGAIN * floor.above(base.train)
         likely = [row for row in chosen if row.explained > least]
         _try_again(study, data, base, likely, progress)
-    while double := _unfitted_double(rows):
+    while double := _unfitted_double(rows, floor):
         progress(f"fitting {double.label}, which looks like the best")
         refit(study, data, base, double, fit_model if enough else fit_twice)
     return sorted(rows, key=_order)
@@ -250,15 +250,20 @@ def _try_again(
         judge_fit(base, row)
 
 
-def _unfitted_double(rows: Sequence[Ranked]) -> Ranked | None:
-    """What looks like the best to first order and was not fitted: only its fit shows whether."""
+def _unfitted_double(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:
+    """What looks like the best to first order and was not fitted: only its fit shows whether.
+
+    One that looks the same altogether is fitted only where the best leaves more than noise.
+    """
     accepted = [row for row in rows if row.accepted]
     if not accepted:
         return None
     best = min(accepted, key=_order)
     waiting = {row.label: row for row in rows if row.fitted is None and not row.trouble}
     alike = (waiting[label] for label in best.alike if label in waiting)
-    return next((row for row in alike if best.cosines[row.label] <= SAME), None)
+    assert best.fitted is not None
+    enough = floor.reached(best.fitted.held_out)
+    return next((row for row in alike if best.cosines[row.label] <= SAME or not enough), None)
 
 
 def _leaves_nothing(row: Ranked, base: Fitted, floor: NoiseFloor) -> bool:

@@ -11,6 +11,7 @@ import shutil
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from rigwatch.physics.engine.equations import (
     Effect,
     EffectParameter,
+    Hold,
     Model,
     Parameter,
     library,
@@ -37,6 +39,13 @@ from rigwatch.wire.units import Unit, unit_of
 FILE = "study.toml"
 LEDGER = "ledger.jsonl"
 _TABLE = "\n[[effects]]\n"
+GIVEN = ("the study", "the model file")
+"""Sources of holds that nothing was chosen for."""
+CHOSEN = "  # chosen from the data, with the first effect"
+"""Behind holds that were written with the first effect, and go with it."""
+
+
+Lateness = Annotated[float, Meta(ge=0, le=1)]
 
 
 class Span(Section, frozen=True, kw_only=True):
@@ -97,6 +106,14 @@ class StudyFile(Section, frozen=True, kw_only=True):
         dict[str, float],
         Meta(description="values of the model's parameters to start from, in their units"),
     ] = field(default_factory=dict)
+    hold: Annotated[
+        dict[str, Hold],
+        Meta(description="what inputs do between samples; the data choose where nothing says"),
+    ] = field(default_factory=dict)
+    late: Annotated[
+        dict[str, Lateness],
+        Meta(description="shares of a sample by which inputs that are kept are late"),
+    ] = field(default_factory=dict)
     derive: Derive | None = None
     thin: Thin | None = None
     effect_files: Annotated[
@@ -119,6 +136,25 @@ class Kept:
 
 
 @dataclass(frozen=True)
+class Held:
+    """What an input does between samples, and how that is known.
+
+    Attributes:
+        hold: "linear" for a line, "zero" where it is kept.
+        late: share of a sample by which it changes late, where it is kept.
+        seconds: the same [s]; 0 where the time between samples is not known yet.
+        source: who says so.
+        error_ratio: error with it over that with a line, None where nothing was compared.
+    """
+
+    hold: Hold
+    late: float
+    seconds: float
+    source: str
+    error_ratio: float | None = None
+
+
+@dataclass(frozen=True)
 class Study:
     """A study that has been opened; values of parameters are SI, whatever its file says.
 
@@ -129,6 +165,7 @@ class Study:
         effects: every effect that may be tried: shipped, from entry points, own; by name.
         own: names of those that are not shipped.
         kept: what the healthy recording told, None before it was asked.
+        holds: what inputs do between samples, by name, where that is known.
     """
 
     folder: Path
@@ -137,6 +174,7 @@ class Study:
     effects: Mapping[str, Effect]
     own: frozenset[str]
     kept: Kept | None = None
+    holds: Mapping[str, Held] = dataclass_field(default_factory=dict)
 
     @property
     def ledger(self) -> Path:
@@ -194,7 +232,8 @@ def open_study(folder: Path | str) -> Study:
     file = load(path, StudyFile)
     given = offered(folder / name for name in file.effect_files)
     effects = {**library(), **given}
-    study = Study(folder, file, _model(folder, file.model), effects, frozenset(given))
+    model, holds = _held(_model(folder, file.model), file)
+    study = Study(folder, file, model, effects, frozenset(given), holds=holds)
     for accepted in file.effects:
         study.effect(accepted.effect)
     return _in_si(study)
@@ -232,6 +271,29 @@ def _model(folder: Path, name: str) -> Model:
     if name not in models:
         raise ModelError(f"{folder / FILE}: found model {name!r}, expected {nearest(name, models)}")
     return models[name]
+
+
+def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
+    """The model with the holds that the study gives it, and all that are given.
+
+    Raises:
+        ModelError: the study names an input that the model does not have.
+    """
+    for name in (*file.hold, *file.late):
+        if name not in model.inputs:
+            raise ModelError(f"hold: found input {name!r}, expected {nearest(name, model.inputs)}")
+    inputs, holds = {}, {}
+    for name, own in model.inputs.items():
+        hold, late = file.hold.get(name), file.late.get(name)
+        if late is not None:
+            hold = hold or "zero"
+        source = "the study" if hold else "the model file"
+        hold = hold or own.hold or model.hold
+        late = own.late if late is None else late
+        inputs[name] = structs.replace(own, hold=hold, late=late)
+        if hold:
+            holds[name] = Held(hold, late, 0.0, source)
+    return structs.replace(model, inputs=inputs), holds
 
 
 def create(folder: Path | str, template: Path | str, sessions: Path | str | None = None) -> Study:
@@ -292,7 +354,10 @@ def drop_effect(study: Study) -> Study:
     at = text.rfind(_TABLE)
     if not study.file.effects or at < 0:
         raise ModelError(f"{study.folder}: found no effect to undo")
-    return _rewritten(study, text[:at].rstrip() + "\n")
+    text = text[:at].rstrip() + "\n"
+    if len(study.file.effects) == 1:
+        text = "".join(line for line in text.splitlines(True) if CHOSEN not in line)
+    return _rewritten(study, text)
 
 
 def use_effect_file(study: Study, path: Path) -> Study:
@@ -309,6 +374,17 @@ def use_effect_file(study: Study, path: Path) -> Study:
     line = f"effect_files = [{', '.join(repr(n).replace(chr(39), chr(34)) for n in names)}]\n"
     kept = [x for x in _text(study).splitlines(True) if not x.startswith("effect_files")]
     return _rewritten(study, line + "".join(kept))
+
+
+def keep_holds(study: Study) -> Study:
+    """The study with the holds that the data have chosen in its file, so that they stay."""
+    chosen = {n: h for n, h in study.holds.items() if h.source not in GIVEN}
+    if not chosen or study.file.hold:
+        return study
+    holds = ", ".join(f'{name} = "{held.hold}"' for name, held in chosen.items())
+    late = ", ".join(f"{name} = {held.late!r}" for name, held in chosen.items() if held.late)
+    lines = f"hold = {{ {holds} }}{CHOSEN}\n" + (f"late = {{ {late} }}{CHOSEN}\n" if late else "")
+    return _rewritten(study, lines + _text(study))
 
 
 def _text(study: Study) -> str:

@@ -12,19 +12,20 @@ from rigwatch.physics.engine.compile.compiled_system import (
     compile_system,
 )
 from rigwatch.physics.engine.compile.derivatives import derivative
-from rigwatch.physics.engine.compile.integrator import advance, call, place
+from rigwatch.physics.engine.compile.integrator import across, call, lateness, place
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
 
 __all__ = [
     "CompiledSystem",
     "Linearisation",
-    "advance",
+    "across",
     "call",
     "compile_system",
     "derivative",
     "evaluated",
     "even_substeps",
+    "lateness",
     "numpy_function",
     "place",
 ]

@@ -43,6 +43,8 @@ class Linearisation:
         rate_slopes: shape (windows, nodes, n, m + n + q): ∂rates.
         read_slopes: at the samples, shape (windows, samples, outputs, m + n + q): ∂outputs.
         outputs: at the samples, shape (windows, samples, outputs).
+        update_slopes: at the samples, shape (windows, samples, n, m + n + q): ∂states from there on
+            by those before; shape (windows, 0, …) where no state changes at samples.
     """
 
     spacing: float
@@ -51,6 +53,7 @@ class Linearisation:
     rate_slopes: FloatArray
     read_slopes: FloatArray
     outputs: FloatArray
+    update_slopes: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +106,12 @@ class CompiledSystem:
 
     @property
     def hold(self) -> FloatArray:
-        """1 for an input that runs straight between samples, 0 for one that is kept; (inputs,)."""
+        """1 for an input that runs straight between samples, else less its lateness; (inputs,)."""
         model = self.system.model
-        return np.array([float(model.held(name) == "linear") for name in model.inputs])
+        return np.array([
+            1.0 if model.held(name) == "linear" else -own.late
+            for name, own in model.inputs.items()
+        ])  # fmt: skip
 
     @property
     def columns(self) -> int:
@@ -130,8 +136,10 @@ class CompiledSystem:
         samples = (len(starts), length, len(self.system.outputs))
         states, rates = np.empty((*nodes, n)), np.zeros((*nodes, n, wide))
         outputs, reads = np.empty(samples), np.zeros((*samples, wide))
-        self.kernel.linearise(*arguments, states, rates, outputs, reads)
-        return Linearisation(dt / substeps, substeps, states, rates, reads, outputs)
+        count = length if self.system.updates else 0
+        updates = np.zeros((len(starts), count, n, wide))
+        self.kernel.linearise(*arguments, states, rates, outputs, reads, updates)
+        return Linearisation(dt / substeps, substeps, states, rates, reads, outputs, updates)
 
     def _arguments(  # noqa: PLR0917 -- they stand in the order of the kernel's
         self,

@@ -9,6 +9,8 @@ of sensitivities and q probes; behind the inputs in u is the time until they cha
     pace         a = x, out = steps a second that are needed
     rate_slopes  a = x, out = dx/dt, slopes = ∂(dx/dt) by parameters, states, probes: (n, m + q)
     read_slopes  a = x, out = y, slopes = ∂y of shape (outputs, m + q)
+    update       a = [x | S] before a sample, out = [x | S] from there on
+    update_slopes  a = x, out = x from there on, slopes = ∂ of it, of shape (n, m + q)
 """
 
 import os
@@ -45,6 +47,7 @@ class Equations:
             outputs are differentiated.
         rates, reads: of the states, and of the outputs.
         pace: what the steps must follow.
+        updates: all states from a sample on; none where no state changes there.
     """
 
     states: tuple[str, ...]
@@ -55,14 +58,18 @@ class Equations:
     rates: tuple[sympy.Expr, ...]
     reads: tuple[sympy.Expr, ...]
     pace: Pace
+    updates: tuple[sympy.Expr, ...] = ()
 
 
 class Jacobians(NamedTuple):
-    """Addresses of a system's functions: rates alone, outputs and rates with their Jacobians."""
+    """Addresses of a system's functions: rates alone, and with their Jacobians the outputs, the
+    rates and what states become at samples.
+    """
 
     plain: int
     reads: int
     rates: int
+    updates: int
 
 
 def native_kernel(system: System) -> "NativeKernel":
@@ -71,9 +78,15 @@ def native_kernel(system: System) -> "NativeKernel":
         Equations(
             tuple(system.states), tuple(system.model.inputs), tuple(system.parameters),
             system.free, system.probes, tuple(system.derivatives.values()),
-            tuple(system.outputs.values()), pace(system),
+            tuple(system.outputs.values()), pace(system), _updates(system),
         )
     )  # fmt: skip
+
+
+def _updates(system: System) -> tuple[sympy.Expr, ...]:
+    if not system.updates:
+        return ()
+    return tuple(system.updates.get(name, symbol(name)) for name in system.states)
 
 
 @lru_cache(maxsize=256)
@@ -89,7 +102,8 @@ class NativeKernel:
         by = (system.states, system.free, system.probes)
         self._rates = differentiated(system.rates, *by)
         self._reads = differentiated(system.reads, *by)
-        self._kept, self._along = list[Any](), (0, 0, 0, 0)
+        self._updates = differentiated(system.updates, *by)
+        self._kept, self._along = list[Any](), (0, 0, 0, 0, 0)
         self._slopes: Jacobians | None = None
         self._sweeps: dict[int, tuple[int, int]] = {}
         self._crossing = np.array(system.pace.crossing, np.int64)
@@ -110,11 +124,15 @@ class NativeKernel:
                 *self._sensitive(self._columns),
                 _plain(self._system, "plain", self._rates.values),
                 _plain(self._system, "pace", asked),
+                _with_sensitivities(
+                    self._system, "update", self._updates, self._columns, behind=True
+                ),
             ])  # fmt: skip
-            self._along = tuple(address(name) for name in ("rates", "read", "plain", "pace"))
+            names = ("rates", "read", "plain", "pace", "update")
+            self._along = tuple(address(name) for name in names)
         kernel = partial(
-            driver.simulate, *self._along, len(asked), self._crossing, self._columns, rows, u, dt,
-            substeps, finest, hold,
+            driver.simulate, *self._along, bool(self._system.updates), len(asked),
+            self._crossing, self._columns, rows, u, dt, substeps, finest, hold,
         )  # fmt: skip
         numbers = x0.shape[1] * (1 + self._columns)
         if starts.size * y.shape[1] * substeps * numbers < LARGE:
@@ -151,19 +169,26 @@ class NativeKernel:
                 _plain(self._system, "plain", self._rates.values),
                 _jacobian(self._system, "read_slopes", self._reads),
                 _jacobian(self._system, "rate_slopes", self._rates),
+                _jacobian(self._system, "update_slopes", self._updates),
             ])  # fmt: skip
             self._slopes = Jacobians(
-                address("plain"), address("read_slopes"), address("rate_slopes")
+                plain=address("plain"),
+                reads=address("read_slopes"),
+                rates=address("rate_slopes"),
+                updates=address("update_slopes"),
             )
         return self._slopes
 
     def linearise(  # noqa: PLR0917 -- they stand in the order of the driver's
         self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, nodes: Any,
-        slopes: Any, y: Any, dy: Any,
+        slopes: Any, y: Any, dy: Any, jumps: Any,
     ) -> None:  # fmt: skip
-        """Fill the states at the nodes, the slopes of rates there, outputs and their slopes."""
+        """Fill the states at the nodes, the slopes of rates there, outputs and their slopes.
+
+        `jumps` takes the slopes of the states across each sample, where they change there.
+        """
         driver.linearise(
-            *self.jacobians(), u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy
+            *self.jacobians(), u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy, jumps
         )
 
 
@@ -192,6 +217,8 @@ def _with_sensitivities(
 ) -> Function:
     """Values, and J·S + ∂/∂p in m columns, the latter behind the values or in `slopes`."""
     function, n, k = _function(system, name), len(system.states), len(found.values)
+    if not k:
+        return function
     flat = [*found.values, *(e for r in found.by_state for e in r)]
     flat += [e for r in found.by_parameter for e in r]
     values = _values(function, flat)

@@ -62,10 +62,13 @@ class EffectParameter(Section, frozen=True, kw_only=True):
 
 
 class EffectState(Section, frozen=True, kw_only=True):
-    """Memory of an effect."""
+    """Memory of an effect: it has a rate of change, or is updated at each sample."""
 
     unit: Annotated[str, Meta(description="its unit")]
-    derivative: Annotated[Text, Meta(description="its rate of change")]
+    derivative: Annotated[str, Meta(description="its rate of change")] = ""
+    update: Annotated[
+        str, Meta(description="value from each sample on, of what was held and what arrives")
+    ] = ""
     start: Annotated[float, Meta(description="value to start from")] = 0.0
     low: Annotated[float, Meta(description="least that it can hold")] = float("-inf")
     high: Annotated[float, Meta(description="most that it can hold")] = float("inf")
@@ -104,6 +107,11 @@ class Effect(Section, frozen=True, kw_only=True):
         """Name of the strength."""
         roles = ("strength", "switch")
         return next(name for name, p in self.parameters.items() if p.role in roles)
+
+    @property
+    def sampled(self) -> bool:
+        """Whether it works on samples, as a filter in a computer does."""
+        return any(state.update for state in self.states.values())
 
     @property
     def free(self) -> int:
@@ -180,12 +188,17 @@ def usable(name: str, effect: Effect, file: Path | str) -> Effect:
     """The effect, if its declaration makes sense.
 
     Raises:
-        ConfigError: it has no strength, or more than one.
+        ConfigError: it has no strength, or more than one, or a state that does not say how it
+            changes.
     """
     strengths = [key for key, p in effect.parameters.items() if p.role in ("strength", "switch")]
     if len(strengths) != 1:
         found = f"{len(strengths)} parameters with role strength or switch"
         raise ConfigError(file, f"effects.{name}.parameters", found, "one")
+    for key, state in effect.states.items():
+        if bool(state.derivative) == bool(state.update):
+            found = "both" if state.derivative else "neither"
+            raise ConfigError(file, f"effects.{name}.states.{key}", found, "derivative or update")
     return effect
 
 

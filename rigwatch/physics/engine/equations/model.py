@@ -41,6 +41,9 @@ class Input(Section, frozen=True, kw_only=True):
         Hold | None, Meta(description="between samples, as the model's if not given")
     ] = None
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
+    late: Annotated[
+        float, Meta(ge=0, le=1, description="share of a sample by which one that is kept is late")
+    ] = 0.0
 
     def __post_init__(self) -> None:
         into_si(self)
@@ -129,7 +132,10 @@ class Model(Section, frozen=True, kw_only=True):
     name: Text
     summary: Annotated[Text, Meta(description="what it describes, in a sentence")]
     source: Annotated[str, Meta(description="where its equations come from")] = ""
-    hold: Annotated[Hold, Meta(description="input between samples: a line, or kept")] = "linear"
+    hold: Annotated[
+        Hold | None,
+        Meta(description="input between samples: a line, or kept; the data choose if not given"),
+    ] = None
     rough: Annotated[
         bool, Meta(description="leaves much unexplained on a healthy rig, too; see the workbench")
     ] = False
@@ -140,8 +146,12 @@ class Model(Section, frozen=True, kw_only=True):
     ports: dict[str, Port] = field(default_factory=dict)
 
     def held(self, name: str) -> Hold:
-        """What an input does between samples."""
-        return self.inputs[name].hold or self.hold
+        """What an input does between samples: a line where nothing is said."""
+        return self.inputs[name].hold or self.hold or "linear"
+
+    def unheld(self) -> tuple[str, ...]:
+        """Inputs of which the model does not say what they do between samples."""
+        return tuple(n for n, own in self.inputs.items() if not (own.hold or self.hold))
 
 
 def load_model(path: Path | str) -> Model:

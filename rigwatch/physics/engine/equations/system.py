@@ -6,7 +6,7 @@ another in the order in which they were placed.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import sympy
 
@@ -19,6 +19,8 @@ TIME = "t"
 PROBE = "probe_"
 RATE = "rate"
 """What an effect at a signal may call the signal's own rate of change."""
+STEP = "step"
+"""What the direction of an effect at a signal may call the signal's change over a sample."""
 UNTIL = "until_"
 LEFT = "left"
 """What an effect at a signal may call the time until an input that is kept changes; 0 elsewhere.
@@ -58,6 +60,7 @@ class System:
         ports: what each port is: the force that is added, the signal that leaves.
         probes: one a force or actuator port, added to what it is and always 0: derivatives by them
             say what any further effect there would do.
+        updates: values from each sample on of states that change there, by name; their rates are 0.
     """
 
     model: Model
@@ -68,6 +71,7 @@ class System:
     outputs: Mapping[str, sympy.Expr]
     ports: Mapping[str, sympy.Expr]
     probes: tuple[str, ...]
+    updates: Mapping[str, sympy.Expr] = field(default_factory=dict)
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -112,6 +116,7 @@ class _Composer:
         self._model, self._placements = model, placements
         self._states, self._parameters = dict(model.states), dict(model.parameters)
         self._rates: dict[str, sympy.Expr] = {}
+        self._updates: dict[str, sympy.Expr] = {}
         self._scope = Scope()
         self._scope.define(TIME, symbol(TIME), "s")
         for table in (model.inputs, model.states, model.parameters):
@@ -141,6 +146,7 @@ class _Composer:
             outputs,
             ports | sensors,
             tuple(PROBE + name for name in ports),
+            self._updates,
         )
 
     def _entered(self, kind: str) -> dict[str, sympy.Expr]:
@@ -179,9 +185,13 @@ class _Composer:
         """What one effect adds to a force port, or makes of the arriving signal."""
         scope = self._local_scope(placement, port, arriving, unit)
         for name, state in placement.effect.states.items():
-            rate_unit = f"({self._states[placement.prefix + name].unit})/s"
-            where = f"{placement}: state {name}"
-            self._rates[placement.prefix + name] = scope.read(state.derivative, rate_unit, where)
+            label, where = placement.prefix + name, f"{placement}: state {name}"
+            unit_of = self._states[label].unit
+            if state.update:
+                self._rates[label] = sympy.Integer(0)
+                self._updates[label] = scope.read(state.update, unit_of, where)
+            else:
+                self._rates[label] = scope.read(state.derivative, f"({unit_of})/s", where)
         return scope.read(placement.effect.expression, unit, str(placement))
 
     def _local_scope(
@@ -217,8 +227,8 @@ class _Composer:
             )
         for name, s in effect.states.items():
             self._states[placement.prefix + name] = State(
-                unit=s.unit, derivative=s.derivative, start=s.start, low=s.low, high=s.high,
-                shown=s.shown,
+                unit=s.unit, derivative=s.derivative or s.update, start=s.start, low=s.low,
+                high=s.high, shown=s.shown,
             )  # fmt: skip
 
 

@@ -3,18 +3,27 @@
 Recording ──windows──▶ Problem (initial states projected out) ──▶ fit, evaluate ──▶ Fit
 """
 
+from rigwatch.physics.engine.fit.convergence import Convergence, convergence
 from rigwatch.physics.engine.fit.decimation import Thinning
-from rigwatch.physics.engine.fit.effect_states import Memory, held_at, seen
-from rigwatch.physics.engine.fit.recording import Recording, initial_states, windows
-from rigwatch.physics.engine.fit.windowed_fit import Fit, evaluate, fit
+from rigwatch.physics.engine.fit.effect_states import Memory, Recall, held_at, seen
+from rigwatch.physics.engine.fit.fit_from_afar import fit_from_afar
+from rigwatch.physics.engine.fit.recording import Recording, filled, initial_states, windows
+from rigwatch.physics.engine.fit.windowed_fit import Fit, bounds, error_at, evaluate, fit
 
 __all__ = [
+    "Convergence",
     "Fit",
     "Memory",
+    "Recall",
     "Recording",
     "Thinning",
+    "bounds",
+    "convergence",
+    "error_at",
     "evaluate",
+    "filled",
     "fit",
+    "fit_from_afar",
     "held_at",
     "initial_states",
     "seen",
