@@ -42,7 +42,7 @@ def motion_recording(
     Args:
         model: as it was written, not transformed.
         recording: its inputs and outputs.
-        parts: lengths of the recordings that lie one behind the other; one if empty.
+        parts: lengths of what lies one behind the other; the recording's own if empty.
         settling: at the beginning of each part, what is not counted [s].
         widths: of the smoothing, by channel [samples]; as the noise asks for if None.
 
@@ -61,7 +61,9 @@ def motion_recording(
     inputs = np.column_stack([recording.inputs, *motion])
     outputs = _measured_outputs(model, recording, chosen, cut)
     shown = np.where(counted[:, None], outputs, np.nan)
-    return Recording(recording.dt, inputs, shown, _thinning(model, recording, chosen, cut))
+    lengths = tuple(np.diff([0, *cut, len(recording)]).tolist())
+    thinning = _thinning(model, recording, chosen, lengths)
+    return Recording(recording.dt, inputs, shown, thinning, lengths)
 
 
 def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ()) -> dict[str, int]:
@@ -109,20 +111,18 @@ def _measured_outputs(
 
 
 def _thinning(
-    model: Model, recording: Recording, widths: Mapping[str, int], cut: Sequence[int]
+    model: Model, recording: Recording, widths: Mapping[str, int], parts: tuple[int, ...]
 ) -> Thinning | None:
     """The recording's own or, for balances, one within what their kernels let through."""
     if recording.thinning is not None or predicted_outputs(model):
         return recording.thinning
     flat = min(flat_to(widths[s.channel], s.order + 1) for s in balanced_states(model))
-    lengths = np.diff([0, *cut, len(recording)])
-    return Thinning(max(math.ceil(PASSED / flat), 2), 0, tuple(lengths.tolist()))
+    return Thinning(max(math.ceil(PASSED / flat), 2), 0, parts)
 
 
 def _ends(recording: Recording, parts: Sequence[int]) -> list[int]:
     """Where one part of a recording ends and the next begins."""
-    given = parts or (recording.thinning.parts if recording.thinning else ())
-    return [int(end) for end in np.cumsum(given)[:-1]]
+    return [int(end) for end in np.cumsum(parts or recording.parts)[:-1]]
 
 
 def _channels(model: Model, recording: Recording) -> dict[str, FloatArray]:

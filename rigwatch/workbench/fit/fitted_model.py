@@ -9,6 +9,7 @@ import numpy as np
 from rigwatch.physics.engine.compile import CompiledSystem, compile_system, even_substeps
 from rigwatch.physics.engine.equations import Placement, System, compose
 from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
+from rigwatch.physics.engine.motion_fit import fit_along_motion
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, port_sizes
@@ -21,6 +22,8 @@ SHORTER = 8
 """The horizon over that one."""
 WELL_ABOVE = 1.5
 """Error over the channels' noise from which a fit may have ended in a local minimum."""
+FROM_AFAR = 5
+"""Free parameters from which a fit along the measured motion searches from several starts."""
 BLOCKS = 40
 """Blocks that a recording of a model without states is cut into for statistics."""
 
@@ -174,10 +177,14 @@ def fit_model(
     horizon = data.horizon if study.model.states else len(data.train)
     begin, substeps = compiled.vector(start), study.file.substeps
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
-    if study.model.states and (horizon >= LONG or by_way_of_short):
+    free_run = study.model.states and not data.along_motion
+    if free_run and (horizon >= LONG or by_way_of_short):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
     first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
-    found = fit_over(horizon, start=begin, initial=first)
+    if data.along_motion and len(compiled.system.free) >= FROM_AFAR and scale is not None:
+        found = fit_along_motion(compiled, data.train, start=begin, scale=scale, substeps=substeps)
+    else:
+        found = fit_over(horizon, start=begin, initial=first)
     beside = data.horizon if study.model.states else len(data.held_out)
     judged = evaluate(found, data.held_out, beside, substeps, later)
     calm = between_jumps(found, data.held_out, beside)

@@ -5,18 +5,21 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.effect_states import Memory, held_at, seen
+from rigwatch.physics.engine.fit.problem import Problem
 from rigwatch.physics.engine.fit.recording import Recording, initial_states, windows
-from rigwatch.physics.engine.fit.windowed_fit import Fit, evaluate, fit
+from rigwatch.physics.engine.fit.windowed_fit import Fit, evaluate, fit, result_of
 
 __all__ = [
     "Fit",
     "Memory",
+    "Problem",
     "Recording",
     "Thinning",
     "evaluate",
     "fit",
     "held_at",
     "initial_states",
+    "result_of",
     "seen",
     "windows",
 ]
