@@ -7,7 +7,16 @@ import numpy as np
 from rigwatch.physics.engine.fit import Convergence
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.uncertainty_budget import beyond
-from rigwatch.workbench.data import METHODS, Data, NoiseFloor, from_residual, prepare, quiet_scale
+from rigwatch.workbench.data import (
+    METHODS,
+    Data,
+    NoiseFloor,
+    along_motion,
+    from_residual,
+    goes_along_motion,
+    prepare,
+    quiet_scale,
+)
 from rigwatch.workbench.fit import (
     Fitted,
     Value,
@@ -99,7 +108,10 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     """
     check_data(study)
     data = prepare(study)
-    scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
+    if goes_along_motion(study):
+        study, data = along_motion(study, data)
+    several = data.train.outputs.shape[1] > 1 or data.along_motion
+    scale = quiet_scale(data.train) if several else None
     study = with_hold(study, data, scale)
     study = commissioned(study, data, scale)
     return *referenced(study, data, scale), scale
@@ -131,7 +143,8 @@ def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> Nois
     fits = [bare]
     if base.placements:
         fits.append(fit_base(study, healthy, base.train.scale))
-    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, "healthy")
+    method = "healthy motion" if healthy.along_motion else "healthy"
+    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, method)
 
 
 def compare(study: Study, *, profiled: bool = False) -> Comparison:

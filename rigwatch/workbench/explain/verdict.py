@@ -2,8 +2,8 @@
 
 `nothing_missing`, `missing_effect`, `undetermined` (rivals of different physics that this recording
 cannot tell apart), `unknown_effect` (the error stays above the noise floor, and no known effect
-brings it down) or `model_inadequate` (the model's own fit cannot be relied on, so that no effect is
-named). All five are results.
+brings it down) or `model_inadequate` (the model's own fit cannot be relied on, or does not describe
+the healthy rig, see `adequacy.py`; no effect is named). All five are results.
 
 Of effects that do equally well on the recordings held out, the one with the fewest parameters is
 named first; the others of its kind form its class.

@@ -1,5 +1,6 @@
 """A model with some effects, fitted to the training recordings and judged on those held out."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,8 +16,10 @@ from rigwatch.physics.engine.fit import (
     convergence,
     evaluate,
     fit,
+    fit_along_motion,
     fit_from_afar,
     initial_states,
+    windows,
 )
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
@@ -30,6 +33,12 @@ SHORTER = 8
 """The horizon over that one."""
 WELL_ABOVE = 1.5
 """Error over the channels' noise from which a fit may have ended in a local minimum."""
+FROM_AFAR = 5
+"""Free parameters from which a fit along the measured motion searches from several starts."""
+FAST, SLOWED = 1.0, 0.5
+"""Eigenvalue times step from which a linearisation takes finer ones, and what it then takes."""
+LOOKED_AT = 20
+"""Windows at most whose eigenvalues are looked at."""
 BLOCKS = 40
 """Blocks that a recording of a model without states is cut into for statistics."""
 
@@ -198,14 +207,18 @@ def fit_model(
     begin, substeps = compiled.vector(start), study.file.substeps
     first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
-    if from_afar:
+    if data.along_motion and len(compiled.system.free) >= FROM_AFAR and scale is not None:
+        found = fit_along_motion(compiled, data.train, start=begin, scale=scale, substeps=substeps)
+        return _judged(study, data, placements, found, horizon, later, None)
+    if from_afar and not data.along_motion:
         found, ended = fit_from_afar(
             compiled, data.train, horizon, start=begin, scale=scale,
             noise=quiet_scale(data.train) if scale is None else scale, initial=first,
             substeps=substeps,
         )  # fmt: skip
         return _judged(study, data, placements, found, horizon, later, ended)
-    if study.model.states and (horizon >= LONG or by_way_of_short):
+    free_run = study.model.states and not data.along_motion
+    if free_run and (horizon >= LONG or by_way_of_short):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
     found = fit_over(horizon, start=begin, initial=first)
     return _judged(study, data, placements, found, horizon, later, None)
@@ -255,4 +268,20 @@ def nodes(fitted: Fitted, recording: Recording) -> int:
     system = fitted.compiled.system
     if not system.states:
         return 1
-    return max(fitted.substeps, _even(system, recording, fitted.train.parameters))
+    even = max(fitted.substeps, _even(system, recording, fitted.train.parameters))
+    fastest = _fastest(fitted, recording) * recording.dt
+    return even if fastest <= FAST * even else math.ceil(fastest / SLOWED)
+
+
+def _fastest(fitted: Fitted, recording: Recording) -> float:
+    """Largest eigenvalue of the model at the beginning of its windows [1/s]."""
+    cut = windows(fitted.compiled.system, len(recording), fitted.horizon)
+    run = fitted.compiled.linearise(
+        recording.inputs, recording.dt, cut.starts[:LOOKED_AT], 2,
+        initial=fitted.train.initial[:LOOKED_AT], parameters=fitted.train.parameters,
+        substeps=fitted.substeps,
+    )  # fmt: skip
+    free, n = len(fitted.compiled.system.free), run.states.shape[2]
+    slopes = run.rate_slopes[:, 0, :, free : free + n]
+    finite = slopes[np.isfinite(slopes).all(axis=(1, 2))]
+    return float(np.abs(np.linalg.eigvals(finite)).max(initial=0.0))

@@ -7,7 +7,14 @@
 """
 
 from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, library, load_effects
-from rigwatch.physics.engine.equations.expression import parse
+from rigwatch.physics.engine.equations.expression import FUNCTIONS, parse
+from rigwatch.physics.engine.equations.measured_motion import (
+    along_measured_motion,
+    balanced_states,
+    has_hidden_states,
+    measured_states,
+    predicted_outputs,
+)
 from rigwatch.physics.engine.equations.model import (
     Hold,
     Input,
@@ -36,6 +43,7 @@ from rigwatch.physics.engine.equations.system import (
 )
 
 __all__ = [
+    "FUNCTIONS",
     "LEFT",
     "PROBE",
     "RATE",
@@ -54,12 +62,17 @@ __all__ = [
     "State",
     "System",
     "Variable",
+    "along_measured_motion",
+    "balanced_states",
     "compose",
+    "has_hidden_states",
     "library",
     "load_effects",
     "load_model",
+    "measured_states",
     "offered",
     "parse",
+    "predicted_outputs",
     "shipped_models",
     "symbol",
     "units_at",
