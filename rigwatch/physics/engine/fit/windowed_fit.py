@@ -227,5 +227,5 @@ def _result(problem: Problem, found: Started) -> Fit:
         left,
         scale,
         residual.reshape(len(error), -1),
-        jacobian.reshape(len(error), -1, len(problem.free)),
+        jacobian.reshape(*error.shape, len(problem.free)),
     )
