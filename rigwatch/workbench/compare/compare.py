@@ -20,6 +20,7 @@ from rigwatch.workbench.fit import (
     values,
 )
 from rigwatch.workbench.hold import with_hold
+from rigwatch.workbench.motion import along_motion, goes_along_motion
 from rigwatch.workbench.study import Held, Study, check_data
 
 
@@ -98,7 +99,10 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     """
     check_data(study)
     data = prepare(study)
-    scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
+    if goes_along_motion(study):
+        study, data = along_motion(study, data)
+    several = data.train.outputs.shape[1] > 1 or data.along_motion
+    scale = quiet_scale(data.train) if several else None
     study = with_hold(study, data, scale)
     study = commissioned(study, data, scale)
     return *referenced(study, data, scale), scale

@@ -5,7 +5,7 @@ simulation needs it everywhere, and the outputs beside it are not counted.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -46,6 +46,7 @@ class Data:
         healthy: recording with nothing wrong, None where there is none.
         horizon: samples from one re-initialisation to the next.
         remarks: what was noticed on the way, for people.
+        along_motion: whether the recordings are for a model along its measured motion.
     """
 
     train: Recording
@@ -53,13 +54,14 @@ class Data:
     healthy: Recording | None
     horizon: int
     remarks: tuple[str, ...]
+    along_motion: bool = False
 
     @property
     def of_healthy(self) -> "Data | None":
         """The healthy recording to be fitted and judged by itself, None where there is none."""
         if self.healthy is None:
             return None
-        return Data(self.healthy, self.healthy, None, self.horizon, ())
+        return replace(self, train=self.healthy, held_out=self.healthy, healthy=None, remarks=())
 
 
 def read_columns(study: Study, span: Span) -> Columns:
@@ -186,7 +188,7 @@ def _recording(
     u, y = np.concatenate(inputs), np.concatenate(outputs)
     u, y = _without_holes(study.model, u, y, use, remarks)
     _check_excitation(study.model, u, use)
-    return Recording(tables[0].dt, u, y, thinning)
+    return Recording(tables[0].dt, u, y, thinning, parts)
 
 
 def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:

@@ -11,6 +11,7 @@ from rigwatch.physics.engine.convergence import Convergence, convergence
 from rigwatch.physics.engine.equations import Placement, System, compose
 from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
 from rigwatch.physics.engine.fit_from_afar import fit_from_afar
+from rigwatch.physics.engine.motion_fit import fit_along_motion
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, port_sizes, quiet_scale
@@ -23,6 +24,8 @@ SHORTER = 8
 """The horizon over that one."""
 WELL_ABOVE = 1.5
 """Error over the channels' noise from which a fit may have ended in a local minimum."""
+FROM_AFAR = 5
+"""Free parameters from which a fit along the measured motion searches from several starts."""
 BLOCKS = 40
 """Blocks that a recording of a model without states is cut into for statistics."""
 
@@ -191,14 +194,18 @@ def fit_model(
     begin, substeps = compiled.vector(start), study.file.substeps
     first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
-    if from_afar:
+    if data.along_motion and len(compiled.system.free) >= FROM_AFAR and scale is not None:
+        found = fit_along_motion(compiled, data.train, start=begin, scale=scale, substeps=substeps)
+        return _judged(study, data, placements, found, horizon, later, None)
+    if from_afar and not data.along_motion:
         found, ended = fit_from_afar(
             compiled, data.train, horizon, start=begin, scale=scale,
             noise=quiet_scale(data.train) if scale is None else scale, initial=first,
             substeps=substeps,
         )  # fmt: skip
         return _judged(study, data, placements, found, horizon, later, ended)
-    if study.model.states and (horizon >= LONG or by_way_of_short):
+    free_run = study.model.states and not data.along_motion
+    if free_run and (horizon >= LONG or by_way_of_short):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
     found = fit_over(horizon, start=begin, initial=first)
     return _judged(study, data, placements, found, horizon, later, None)

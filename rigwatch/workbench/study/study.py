@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from msgspec import Meta, field, structs
@@ -93,6 +93,13 @@ class StudyFile(Section, frozen=True, kw_only=True):
         tuple[Span, ...], Meta(description="recordings with nothing wrong, for the noise floor")
     ] = ()
     horizon: Annotated[float, Meta(gt=0, description="time between re-initialisations [s]")] = 0.5
+    prediction: Annotated[
+        Literal["auto", "measured motion", "free"],
+        Meta(
+            description="along the measured motion, or free runs over horizons; auto: along the"
+            " motion where channels show some of the model's states but not all"
+        ),
+    ] = "auto"
     substeps: Annotated[int, Meta(ge=1, description="integration steps a sample")] = 2
     period: Annotated[float, Meta(ge=0, description="period of the excitation [s], 0: look")] = 0.0
     channels: Annotated[

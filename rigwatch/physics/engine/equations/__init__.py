@@ -7,7 +7,7 @@
 """
 
 from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, library, load_effects
-from rigwatch.physics.engine.equations.expression import parse
+from rigwatch.physics.engine.equations.expression import FUNCTIONS, parse
 from rigwatch.physics.engine.equations.model import (
     Hold,
     Input,
@@ -35,6 +35,7 @@ from rigwatch.physics.engine.equations.system import (
 )
 
 __all__ = [
+    "FUNCTIONS",
     "LEFT",
     "PROBE",
     "RATE",

@@ -5,12 +5,14 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.effect_states import Memory, Recall, held_at, seen
+from rigwatch.physics.engine.fit.problem import Problem
 from rigwatch.physics.engine.fit.recording import Recording, filled, initial_states, windows
-from rigwatch.physics.engine.fit.windowed_fit import Fit, bounds, error_at, evaluate, fit
+from rigwatch.physics.engine.fit.windowed_fit import Fit, bounds, error_at, evaluate, fit, result_of
 
 __all__ = [
     "Fit",
     "Memory",
+    "Problem",
     "Recall",
     "Recording",
     "Thinning",
@@ -21,6 +23,7 @@ __all__ = [
     "fit",
     "held_at",
     "initial_states",
+    "result_of",
     "seen",
     "windows",
 ]

@@ -20,12 +20,14 @@ class Recording:
         inputs: in the order of the model's inputs, shape (n, n_u).
         outputs: in the order of its outputs, shape (n, n_y); NaN where nothing valid was measured.
         thinning: how residuals and sensitivities are filtered and thinned, None where they are not.
+        parts: lengths of the recordings that lie one behind the other; one if empty.
     """
 
     dt: float
     inputs: FloatArray
     outputs: FloatArray
     thinning: Thinning | None = None
+    parts: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(self.inputs)

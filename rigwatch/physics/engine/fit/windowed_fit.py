@@ -111,7 +111,7 @@ def fit(
         found = problem.start_windows(problem.whole(begin, theta))
         if not found.came_back:
             break
-    return _result(problem, found)
+    return result_of(problem, found)
 
 
 def _smallest_error(problem: Problem, begin: FloatArray, theta: FloatArray) -> FloatArray:
@@ -168,7 +168,7 @@ def evaluate(
     )
     problem.recall(fitted.parameters)
     found = problem.start_windows(fitted.parameters)
-    return replace(_result(problem, found), covariance=fitted.covariance)
+    return replace(result_of(problem, found), covariance=fitted.covariance)
 
 
 @_QUIET
@@ -203,7 +203,7 @@ def bounds(system: System) -> tuple[FloatArray, FloatArray]:
     return np.array([p.low for p in free]), np.array([p.high for p in free])
 
 
-def _result(problem: Problem, found: Started) -> Fit:
+def result_of(problem: Problem, found: Started) -> Fit:
     """The fit at the parameters that have been found."""
     error, scale = found.error, problem.scale
     residual, jacobian = problem.cleaned(error, found.slopes)
