@@ -100,7 +100,7 @@ def _chosen(
     line = try_one("linear", 0.0, parameters_of(study.file), None)
     kept = try_one("zero", 0.0, line.fitted.train.values(), line.fitted)
     best = kept if _better(kept, line) else line
-    if _at_noise(best, data, scale):
+    if data.along_motion or _at_noise(best, data, scale):
         return best, line
     late = _refined(partial(try_one, "zero"), kept)
     return (late if late is not None and _better(late, best) else best), line

@@ -96,7 +96,7 @@ def along_measured_motion(model: Model) -> Model:
     outputs = _outputs(model)
     if not outputs:
         raise ModelError(f"{model.name}: found nothing to predict once the motion is given")
-    inputs = {name: replace(own, hold=own.hold or model.hold) for name, own in model.inputs.items()}
+    inputs = dict(model.inputs)
     inputs |= {n: Input(unit=s.unit, hold="linear") for n, s in model.states.items() if n in motion}
     states = {name: state for name, state in model.states.items() if name not in motion}
     ports = {
