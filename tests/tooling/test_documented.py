@@ -12,7 +12,11 @@ import pytest
 from rigwatch.commands import COMMANDS, main
 
 ROOT = Path(__file__).parents[2]
-PRINTED_PAGES = (("configuration.md", "config_docs"), ("commands.md", "command_docs"))
+PRINTED_PAGES = (
+    ("alarms.md", "alarm_docs"),
+    ("commands.md", "command_docs"),
+    ("configuration.md", "config_docs"),
+)
 
 
 def load_tool(name: str) -> ModuleType:
