@@ -88,7 +88,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the results there")
     parser.add_argument("--markdown", action="store_true", help="print the table as Markdown")
     parser.add_argument(
-        "--page", action="store_true", help="keep the results of a full run, and write docs/benchmarks.md"
+        "--page",
+        action="store_true",
+        help="keep the results of a full run, and write docs/benchmarks.md",
     )
     return parser
 

@@ -1,4 +1,4 @@
-"""The newest figures of every benchmark, kept in `results.json`, and docs/benchmarks.md made of them.
+"""The newest figures of every benchmark, kept in `results.json`, and the page made of them.
 
     make bench ──rows──▶ results.json ──page──▶ docs/benchmarks.md
 
@@ -19,8 +19,8 @@ PAGE = HERE.parent / "docs" / "benchmarks.md"
 SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     (
         "Watching a rig",
-        "The simulated servo-pneumatic rig with the seven excitations of the thesis's Table 5.2, and "
-        "rigs, drives and faults on which nothing was tuned.",
+        "The simulated servo-pneumatic rig with the seven excitations of the thesis's Table 5.2, "
+        "and rigs, drives and faults on which nothing was tuned.",
         (
             "numerical_validation",
             "experiments",
@@ -36,8 +36,8 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     (
         "Processes and recordings",
         "Real processes, a real serial line and a real router on one machine. Latency needs the "
-        "real-time scheduling class (root, `LimitRTPRIO`, or the compose file's `ulimits`); without "
-        "it, p99 grows to tens of milliseconds on a machine that is busy with other work.",
+        "real-time scheduling class (root, `LimitRTPRIO`, or the compose file's `ulimits`); "
+        "without it, p99 grows to tens of milliseconds on a machine that is busy with other work.",
         ("latency", "losses", "replay", "windowed_least_squares"),
     ),
     (
@@ -64,9 +64,9 @@ HEAD = """<!-- Printed by `make bench` from benchmarks/results.json. -->
 
 # Benchmarks
 
-`make bench` runs every benchmark and writes this page; `make bench BENCH="latency replay"` runs two of
-them and keeps the figures of the others. "Published" is W. B. Dunbar's thesis of 1999 unless a row says
-otherwise; "MISS" marks a figure that does not reach its bar.
+`make bench` runs every benchmark and writes this page; `make bench BENCH="latency replay"` runs
+two of them and keeps the figures of the others. "Published" is W. B. Dunbar's thesis of 1999
+unless a row says otherwise; "MISS" marks a figure that misses its bar.
 """
 
 

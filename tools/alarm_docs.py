@@ -1,4 +1,4 @@
-"""Prints the table of alarms in docs/alarms.md from `monitor/alarms/kinds.py`: `make docs` does it."""
+"""Prints the table of docs/alarms.md from `monitor/alarms/kinds.py`: `make docs` writes it."""
 
 import sys
 from pathlib import Path

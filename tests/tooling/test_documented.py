@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from types import ModuleType
 
 import pytest
 
+from benchmarks import results_page
 from rigwatch.commands import COMMANDS, main
 
 ROOT = Path(__file__).parents[2]
@@ -17,6 +19,11 @@ PRINTED_PAGES = (
     ("commands.md", "command_docs"),
     ("configuration.md", "config_docs"),
 )
+PICTURES = ROOT / "docs" / "pictures"
+LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
+"""Target of a link or a picture, without the place in the page."""
+NAMED_FILE = re.compile(r"`((?:rigwatch|daq|monitor|sim_plant|benchmarks|tests|tools)/[\w/.-]+)`")
+"""A file or folder of the repository in code style."""
 
 
 def load_tool(name: str) -> ModuleType:
@@ -28,9 +35,12 @@ def load_tool(name: str) -> ModuleType:
     return module
 
 
+def documents() -> list[Path]:
+    return [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
+
+
 def pages() -> str:
-    found = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-    return "\n".join(page.read_text(encoding="utf-8") for page in found)
+    return "\n".join(page.read_text(encoding="utf-8") for page in documents())
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -57,6 +67,37 @@ def test_every_key_of_a_configuration_has_a_description() -> None:
 def test_printed_pages_say_what_the_code_says(page: str, tool: str) -> None:
     text = (ROOT / "docs" / page).read_text(encoding="utf-8")
     assert text == load_tool(tool).page(), "run `make docs`"
+
+
+def test_the_page_of_the_benchmarks_shows_the_figures_that_are_kept() -> None:
+    text = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    assert text == results_page.page(), "run `make docs`"
+
+
+@pytest.mark.parametrize("source", sorted(PICTURES.glob("*.txt")), ids=lambda path: path.stem)
+def test_pictures_are_drawn_from_their_descriptions(source: Path) -> None:
+    drawn = load_tool("pictures").read(source).svg()
+    assert source.with_suffix(".svg").read_text(encoding="utf-8") == drawn, "run `make docs`"
+
+
+def test_every_link_of_a_page_leads_somewhere() -> None:
+    linked = [
+        f"{page.relative_to(ROOT)}: {target}"
+        for page in documents()
+        for target in LINK.findall(page.read_text(encoding="utf-8"))
+        if not (page.parent / target).exists()
+    ]
+    assert linked == []
+
+
+def test_every_file_that_a_page_names_exists() -> None:
+    named = [
+        f"{page.relative_to(ROOT)}: {name}"
+        for page in documents()
+        for name in NAMED_FILE.findall(page.read_text(encoding="utf-8"))
+        if not (ROOT / name).exists()
+    ]
+    assert named == []
 
 
 def test_help_is_quick_because_nothing_slow_is_imported() -> None:
