@@ -19,6 +19,7 @@ PRINTED_PAGES = (
     ("commands.md", "command_docs"),
     ("configuration.md", "config_docs"),
 )
+CODE = ("benchmarks", "daq", "monitor", "rigwatch", "sim_plant", "tests")
 PICTURES = ROOT / "docs" / "pictures"
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
 """Target of a link or a picture, without the place in the page."""
@@ -98,6 +99,19 @@ def test_every_file_that_a_page_names_exists() -> None:
         if not (ROOT / name).exists()
     ]
     assert named == []
+
+
+def test_every_section_of_the_theory_that_code_cites_exists() -> None:
+    theory = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+    sections = set(re.findall(r"^#+ ([\d.]+) ", theory, flags=re.MULTILINE))
+    sources = [file for top in CODE for file in (ROOT / top).rglob("*.py")]
+    cited = {
+        number
+        for file in sources
+        for number in re.findall(r"docs/theory\.md (\d(?:\.\d)?)", file.read_text(encoding="utf-8"))
+    }
+    assert cited
+    assert cited <= sections
 
 
 def test_help_is_quick_because_nothing_slow_is_imported() -> None:
