@@ -1,5 +1,6 @@
 """Every command and every key of a configuration is documented."""
 
+import ast
 import importlib.util
 import os
 import re
@@ -25,6 +26,9 @@ LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
 """Target of a link or a picture, without the place in the page."""
 NAMED_FILE = re.compile(r"`((?:rigwatch|daq|monitor|sim_plant|benchmarks|tests|tools)/[\w/.-]+)`")
 """A file or folder of the repository in code style."""
+
+STOP = re.compile(r"^\d+\. `([\w/]+\.py)` `([\w.]+)`", flags=re.MULTILINE)
+"""A stop of a walk: file and function."""
 
 
 def load_tool(name: str) -> ModuleType:
@@ -112,6 +116,27 @@ def test_every_section_of_the_theory_that_code_cites_exists() -> None:
     }
     assert cited
     assert cited <= sections
+
+
+@pytest.mark.parametrize("title", ["A sample from the wire", "A study from the file"])
+def test_a_walk_through_the_code_is_short_and_every_stop_exists(title: str) -> None:
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    _, _, walk = text.partition(f"### {title}")
+    stops = STOP.findall(walk.partition("\n#")[0])
+    assert 8 <= len(stops) <= 12
+    assert [name for file, name in stops if name not in defined(ROOT / file)] == []
+
+
+def defined(path: Path) -> set[str]:
+    """Names of a module's functions and methods: "run", "Monitor.update"."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)} | {
+        f"{node.name}.{inner.name}"
+        for node in classes
+        for inner in node.body
+        if isinstance(inner, ast.FunctionDef)
+    }
 
 
 def test_help_is_quick_because_nothing_slow_is_imported() -> None:
