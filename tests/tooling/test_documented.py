@@ -22,8 +22,8 @@ PRINTED_PAGES = (
 )
 CODE = ("benchmarks", "daq", "monitor", "rigwatch", "sim_plant", "tests")
 PICTURES = ROOT / "docs" / "pictures"
-LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
-"""Target of a link or a picture, without the place in the page."""
+LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]+))?\)")
+"""A link or a picture: file, empty for the same page, and heading."""
 NAMED_FILE = re.compile(r"`((?:rigwatch|daq|monitor|sim_plant|benchmarks|tests|tools)/[\w/.-]+)`")
 """A file or folder of the repository in code style."""
 
@@ -86,13 +86,24 @@ def test_pictures_are_drawn_from_their_descriptions(source: Path) -> None:
 
 
 def test_every_link_of_a_page_leads_somewhere() -> None:
-    linked = [
-        f"{page.relative_to(ROOT)}: {target}"
+    lost = [
+        f"{page.relative_to(ROOT)}: {target}#{heading}"
         for page in documents()
-        for target in LINK.findall(page.read_text(encoding="utf-8"))
-        if not (page.parent / target).exists()
+        for target, heading in LINK.findall(page.read_text(encoding="utf-8"))
+        if not leads_somewhere(page.parent / target if target else page, heading)
     ]
-    assert linked == []
+    assert lost == []
+
+
+def leads_somewhere(target: Path, heading: str) -> bool:
+    """Whether the file exists, and the heading in it."""
+    return target.exists() and (not heading or heading in anchors(target))
+
+
+def anchors(page: Path) -> set[str]:
+    """Headings as links name them: lower case, hyphens for spaces, no other punctuation."""
+    titles = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
 def test_every_file_that_a_page_names_exists() -> None:
