@@ -15,7 +15,7 @@ def page() -> str:
     """The whole page: the text as it stands, with the table as the code has it."""
     before, _, rest = TARGET.read_text(encoding="utf-8").partition(BEGIN)
     _, _, after = rest.partition(END)
-    return before + BEGIN + table() + END + after
+    return f"{before}{BEGIN}\n{table()}\n{END}{after}"
 
 
 def table() -> str:
