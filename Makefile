@@ -54,6 +54,7 @@ bench: $(STAMPS)/bench  ## run the benchmarks (BENCH names some) and write docs/
 docs: $(STAMPS)/run  ## write the pages, tables and pictures that are made by the code
 	@python -m tools.config_docs
 	@python -m tools.command_docs
+	@python -m tools.format_docs
 	@python -m tools.alarm_docs
 	@python -m tools.pictures
 	@python -m benchmarks.results_page

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import results_page
-from tools import alarm_docs, pictures
+from tools import alarm_docs, format_docs, pictures
 
 ROOT = Path(__file__).parents[2]
 CODE = ("benchmarks", "daq", "monitor", "rigwatch", "sim_plant", "tests")
@@ -29,6 +29,10 @@ def text_of(page: Path) -> str:
 
 def test_the_table_of_alarms_is_that_of_the_code() -> None:
     assert text_of(alarm_docs.TARGET) == alarm_docs.page(), "run `make docs`"
+
+
+def test_the_page_of_file_formats_says_what_the_code_says() -> None:
+    assert text_of(format_docs.TARGET) == format_docs.page(), "run `make docs`"
 
 
 def test_the_page_of_the_benchmarks_shows_the_figures_that_are_kept() -> None:
