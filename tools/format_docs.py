@@ -24,8 +24,8 @@ FILES: tuple[tuple[str, str, type[Section]], ...] = (
     (
         "Model",
         "Equations with ports where effects may enter; `model` in a study names one. Tables by "
-        "name: `[inputs.voltage]`, `[states.x]`, `[parameters.m]`, `[outputs.position]`, `[ports.load]`. "
-        "Examples: `rigwatch/physics/models/`.",
+        "name: `[inputs.voltage]`, `[states.x]`, `[parameters.m]`, `[outputs.position]`, "
+        "`[ports.load]`. Examples: `rigwatch/physics/models/`.",
         Model,
     ),
     (

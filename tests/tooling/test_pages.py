@@ -72,6 +72,18 @@ def test_every_file_that_is_named_exists(page: Path) -> None:
     assert [name for name in NAMED_FILE.findall(text_of(page)) if not (ROOT / name).exists()] == []
 
 
+def test_every_room_is_named_in_the_architecture() -> None:
+    page = text_of(ROOT / "docs" / "architecture.md")
+    houses = [ROOT / top for top in ("daq", "monitor", "rigwatch", "sim_plant")]
+    rooms = {file.parent for house in houses for file in house.rglob("__init__.py")}
+    missing = [
+        str(room.relative_to(ROOT))
+        for room in rooms
+        if not re.search(rf"`(?:\S*/)?{room.name}/?`", page) and room.name != "rigwatch"
+    ]
+    assert missing == []
+
+
 def test_every_section_of_the_theory_that_code_cites_exists() -> None:
     theory = text_of(ROOT / "docs" / "theory.md")
     sections = set(re.findall(r"^#+ ([\d.]+) ", theory, flags=re.MULTILINE))
