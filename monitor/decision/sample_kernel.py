@@ -1,5 +1,5 @@
 """Sample by sample, while armed: change of the residual, estimates, departure, verdict
-(theory 1.4).
+(docs/theory.md 1.4).
 
     change ─▶ sums and history ─▶ estimates ─▶ departure ─▶ episode ─▶ verdict
 
@@ -67,7 +67,7 @@ from monitor.signals import (
 from monitor.signals import MODELLED as MODELLED_COLUMN
 from rigwatch.wire.arrays import FloatArray
 
-FINGERPRINT = "d92a8c466e34"
+FINGERPRINT = "7c0221fe37c5"
 """Of every source file whose code is compiled into `watch_block`."""
 
 
