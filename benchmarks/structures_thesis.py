@@ -1,7 +1,7 @@
 """Records of the damaged Kabe antenna as the thesis made them: a fixed step, the recursion's own.
 
 The method is Simulink's default for a fixed step (J. R. Dormand and P. J. Prince, 1980, fifth
-order); see `rigwatch.structures.integrators` for how that was found.
+order); see `rigwatch.structures.identification.integrators` for how that was found.
 """
 
 from collections.abc import Callable

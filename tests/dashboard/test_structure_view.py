@@ -36,7 +36,7 @@ def test_an_identification_is_drawn_as_a_picture(
     record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The viewer's notices may be in the picture.
-    monkeypatch.setattr("rigwatch.dashboard.picture._FRAMES", 8)
+    monkeypatch.setattr("rigwatch.dashboard.viewer.picture._FRAMES", 8)
     target = tmp_path / "antenna.png"
     assert main(["structure", "identify", str(KABE), str(record), "--picture", str(target)]) < 2
     pixels = np.asarray(Image.open(target).convert("RGB")).astype(int)

@@ -29,7 +29,7 @@ def test_the_picture_shows_signals_and_verdict(
     session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The viewer's notices may be in the picture.
-    monkeypatch.setattr("rigwatch.dashboard.picture._FRAMES", 8)
+    monkeypatch.setattr("rigwatch.dashboard.viewer.picture._FRAMES", 8)
     picture = tmp_path / "rubbing.png"
     assert main(["view", str(session), "--picture", str(picture)]) == 0
     pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)

@@ -43,7 +43,7 @@ def test_the_error_falls_from_ten_newtons_to_two_and_decoys_are_refused(
     study: str, tmp_path: Path, told: Told, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The viewer's notices may be in the picture.
-    monkeypatch.setattr("rigwatch.dashboard.picture._FRAMES", 8)
+    monkeypatch.setattr("rigwatch.dashboard.viewer.picture._FRAMES", 8)
     _, start = told("compare", study)
     assert start["train_error"] == pytest.approx(9.49, abs=0.02)
     assert start["held_out_error"] == pytest.approx(9.77, abs=0.02)
@@ -191,7 +191,7 @@ def test_an_installed_package_offers_effects(
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: offers\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[rigwatch.effects]\nmine = offered_effects:effects\n")
     (tmp_path / "site" / "offered_effects.py").write_text(
-        "from rigwatch.physics.engine.effect import Effect, EffectParameter\n"
+        "from rigwatch.physics.engine.equations import Effect, EffectParameter\n"
         "def effects():\n"
         "    strength = EffectParameter(unit='{F}', role='strength')\n"
         "    return {'offered': Effect(port='force', expression='-F*sign(v)', physics='Mine.',\n"

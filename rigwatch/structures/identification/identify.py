@@ -132,7 +132,7 @@ def solver(method: str) -> Callable[..., Outcome]:
     """
     if method not in METHODS:
         raise ModelError(f"method: found {method!r}, expected one of {', '.join(METHODS)}")
-    module = importlib.import_module(f"rigwatch.structures.{METHODS[method]}")
+    module = importlib.import_module(f"rigwatch.structures.identification.{METHODS[method]}")
     solve: Callable[..., Outcome] = module.solve
     return solve
 
