@@ -52,7 +52,7 @@ bench: $(STAMPS)/bench  ## the benchmarks, printed as a table beside the publish
 	@python -m benchmarks $(BENCH)
 
 docs: $(STAMPS)/run  ## write the pages that are printed from the code
-	@python tools/config_docs.py && python tools/command_docs.py
+	@python tools/config_docs.py && python tools/command_docs.py && python tools/alarm_docs.py
 
 lock: $(STAMPS)/dev  ## write the lock files again (UPGRADE=1 takes newer versions)
 	@tools/lock.sh $(PYTHON_IN)

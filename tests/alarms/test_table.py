@@ -1,7 +1,5 @@
 """The table of alarms: complete, consistent, and its settings reach the alarms."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,6 @@ from rigwatch.wire.messages.message_types import Column, SampleBlock
 from rigwatch.wire.rig_config import AlarmSection
 from tests.alarms.alarm_signals import condition, run, spell
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "alarms.md"
 NAMES = {kind.name for kind in ALARM_KINDS}
 
 
@@ -32,17 +29,6 @@ def test_texts_say_what_is_wrong_and_what_to_do(kind):
     assert len(kind.cause) > 10
     assert kind.guidance.endswith(".")
     assert kind.cause.format(channel="position")
-
-
-@pytest.mark.parametrize("kind", ALARM_KINDS, ids=lambda kind: kind.name)
-def test_every_alarm_is_documented(kind):
-    defaults = kind.defaults
-    latch = "yes" if defaults.latch else "no"
-    row = (
-        f"| `{kind.name}` | {kind.severity} | {defaults.persistence} | {defaults.clear_after} "
-        f"| {latch} | {kind.cause} | {kind.guidance} |"
-    )
-    assert row in DOCUMENT.read_text(encoding="utf-8"), row
 
 
 def test_a_misspelt_alarm_in_the_configuration_is_refused():

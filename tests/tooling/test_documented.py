@@ -14,7 +14,11 @@ from rigwatch.commands import every_command, main
 
 COMMANDS = [name for name, _ in every_command()]
 ROOT = Path(__file__).parents[2]
-PRINTED_PAGES = (("configuration.md", "config_docs"), ("commands.md", "command_docs"))
+PRINTED_PAGES = (
+    ("configuration.md", "config_docs"),
+    ("commands.md", "command_docs"),
+    ("alarms.md", "alarm_docs"),
+)
 
 
 def load_tool(name: str) -> ModuleType:
