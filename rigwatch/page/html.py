@@ -11,6 +11,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 HERE = "rigwatch.page"
+STYLE = files(HERE).joinpath("style.css").read_text(encoding="utf-8")
 
 
 @cache
@@ -23,8 +24,7 @@ def templates(package: str = HERE) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    style = files(HERE).joinpath("style.css").read_text(encoding="utf-8")
-    made.globals["style"] = Markup(style)
+    made.globals["style"] = Markup(STYLE)
     return made
 
 

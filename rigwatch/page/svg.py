@@ -4,6 +4,7 @@ Colours are names of CSS variables, so that the page decides them, and a dark pa
 Numbers keep one decimal of a pixel: a page stays small.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
@@ -11,12 +12,15 @@ from math import isfinite
 import numpy as np
 from markupsafe import Markup
 
-from rigwatch.page.html import templates
+from rigwatch.page.html import STYLE, templates
 from rigwatch.page.scale import Scale, label
 from rigwatch.wire.arrays import FloatArray
 
 MOST_POINTS = 900
 """Points of a line; longer ones show the highest and lowest sample of each pixel."""
+_TEMPLATE = templates().get_template("plot.svg")
+_RULES = Markup("\n".join(re.findall(r"^svg.*?\}", STYLE, re.DOTALL | re.MULTILINE)))
+_LIGHT = dict(re.findall(r"--(\w+): (#\w+);", STYLE.partition("@media")[0]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +109,14 @@ class Plot:
                  "fill": f"var(--{colour})", "text-anchor": anchor}  # fmt: skip
         self.shapes.append(Shape("text", drawn, words=words))
 
-    def drawn(self, *, document: bool = False) -> Markup:
-        """The whole plot as an <svg> element of a page, or as a file that has its own style."""
-        return Markup(templates().get_template("plot.svg").render(plot=self, document=document))
+    def drawn(self) -> Markup:
+        """The whole plot as an <svg> element of a page, which gives it colours."""
+        return Markup(_TEMPLATE.render(plot=self, rules=""))
+
+    def document(self) -> str:
+        """The same as a file: in a light page's colours, as only browsers know CSS variables."""
+        text = _TEMPLATE.render(plot=self, rules=_RULES)
+        return re.sub(r"var\(--(\w+)\)", lambda found: _LIGHT[found[1]], text)
 
     def y_ticks(self) -> list[tuple[float, str]]:
         """Pixel and words of each tick of the vertical axis."""

@@ -45,12 +45,13 @@ def test_a_drawing_as_a_file_has_its_style_and_escapes_its_words() -> None:
     plot = Plot("a & b", (0, 1), (0, 1), "<x>", legend=[("series1", "<one>")])
     plot.line(np.array([0.0, 1.0]), np.array([0.0, 1.0]), "series1", name='"quoted" & <told>')
     plot.text(0.5, 0.5, "</svg>")
-    document = ElementTree.fromstring(plot.drawn(document=True))
+    document = ElementTree.fromstring(plot.document())
     assert document.get("aria-label") == "a & b"
     words = [element.text for element in document.iter() if element.text]
-    assert {"<x>", "<one>", '"quoted" & <told>', "</svg>"} <= set(words)
-    assert any(":root" in text for text in words)
-    assert ":root" not in plot.drawn()
+    assert {"a & b", "<x>", "<one>", '"quoted" & <told>', "</svg>"} <= set(words)
+    assert COLOURS["light"]["series1"] in plot.document()
+    assert "var(" not in plot.document()
+    assert "<style>" not in plot.drawn()
 
 
 def test_templates_and_style_are_in_the_wheel(tmp_path: Path) -> None:

@@ -26,4 +26,4 @@ def shares_plot(energy: StrainEnergy, title: str) -> Plot:
 
 def shares_svg(energy: StrainEnergy, title: str) -> str:
     """The same as an SVG document."""
-    return shares_plot(energy, title).drawn(document=True)
+    return shares_plot(energy, title).document()
