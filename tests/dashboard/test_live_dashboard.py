@@ -137,7 +137,7 @@ def test_the_screen_shows_the_rig_and_its_friction(
         assert screen.errors() == []
         process.send_signal(signal.SIGTERM)
         assert process.wait(15) == 0
-        eventually(lambda: not answers(port), "the viewer ends with the dashboard", 10.0)
+        eventually(lambda: not answers(port), "the viewer ends with the dashboard")
 
 
 def test_it_may_die_and_so_may_its_viewer(bus: Bus, config_file: Path, config: RigConfig) -> None:
@@ -156,7 +156,7 @@ def test_it_may_die_and_so_may_its_viewer(bus: Bus, config_file: Path, config: R
         screen = Screen(f"rerun+http://127.0.0.1:{port}/proxy")
         eventually(lambda: red_verdict(screen), "the new viewer shows the verdict")
         process.kill()
-        eventually(lambda: not answers(port), "the viewer ends with a killed dashboard", 10.0)
+        eventually(lambda: not answers(port), "the viewer ends with a killed dashboard")
         sent = player.sent
         eventually(lambda: player.sent > sent + 128, "the rig goes on")
     blocks = listener.drain()
