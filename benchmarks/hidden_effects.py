@@ -21,12 +21,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.hidden import asked, collected, confusion, counted, share_row, wanted
 from benchmarks.table import Row, as_text
-from rigwatch.physics.engine.equations.effect import library
-from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.compare.compare import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
@@ -36,21 +33,19 @@ from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.explain.verdict_calibration import Evidence, cell_of
 from rigwatch.workbench.fit.intervals import values
 from rigwatch.workbench.ranking.rank import Ranked, accepted_from
-from rigwatch.workbench.study.study import Accepted, Span, Study, StudyFile
+from rigwatch.workbench.study.study import Study
 from sim_plant.oscillator import (
     DAMPING,
     DIGITAL,
     MASS,
-    RATE,
     STIFFNESS,
     UNKNOWN,
     Hidden,
-    oscillate,
     strength_for,
 )
+from tests.workbench.simulated import HORIZON, multisine, recorded, size_of, study
 
 SAMPLES = 5120
-HORIZON = 256
 NOISE = 2e-3
 """Standard deviation of the sensors' noise over the rms of what they read."""
 RIGHT: dict[str, tuple[str, ...]] = {
@@ -189,31 +184,15 @@ class Outcome:
                 return not self.right
 
 
-def excitation(seed: int) -> NDArray[np.float64]:
+def excitation(seed: int) -> FloatArray:
     """Force with lines from 0.25 to 8 Hz, rms 4 N."""
-    time_, lines = np.arange(SAMPLES) / RATE, np.arange(0.25, 8, 0.25)
-    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(lines))
-    waves = np.cos(2 * np.pi * np.outer(time_, lines) + phases).sum(axis=1)
-    return np.asarray(4 * waves / np.sqrt(len(lines) / 2))
+    return multisine(np.arange(0.25, 8, 0.25), 4.0, seed=seed)
 
 
-def recorded(hidden: tuple[Hidden, ...], seed: int, *, held: bool = False) -> Recording:
+def noisy(hidden: tuple[Hidden, ...], seed: int, *, held: bool = False) -> Recording:
     """One recording of the plant, with sensor noise."""
     force = excitation(seed)
-    size = oscillate(force, (), np.zeros(2), 0, held=held).std(axis=0)
-    read = oscillate(force, hidden, NOISE * size, seed + 7, held=held)
-    return Recording(1 / RATE, force[:, None], read)
-
-
-def study(effects: tuple[Accepted, ...] = ()) -> Study:
-    """A study of the mass-spring-damper in memory; its recordings are given to it."""
-    span = (Span(session="simulated"),)
-    start = {"m": 1.2 * MASS, "c": 0.8 * DAMPING, "k": 1.1 * STIFFNESS}
-    file = StudyFile(
-        model="mass-spring-damper", train=span, held_out=span, start=start, effects=effects
-    )
-    model = shipped_models()["mass-spring-damper"]
-    return Study(Path(), file, model, library(), frozenset())
+    return recorded(force, hidden, NOISE * size_of(force, held=held), seed + 7, held=held)
 
 
 def solve(case: Case) -> Outcome:
@@ -241,9 +220,9 @@ def simulated(case: Case) -> Data:
         for name in case.hidden
     )
     return Data(
-        recorded(hidden, case.seed, held=case.held),
-        recorded(hidden, case.seed + 1000, held=case.held),
-        recorded((), case.seed + 2000, held=case.held), HORIZON, (),
+        noisy(hidden, case.seed, held=case.held),
+        noisy(hidden, case.seed + 1000, held=case.held),
+        noisy((), case.seed + 2000, held=case.held), HORIZON, (),
     )  # fmt: skip
 
 

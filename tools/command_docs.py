@@ -1,12 +1,12 @@
 """Prints docs/commands.md from the commands' own help: `make docs` writes it."""
 
-import importlib
 import inspect
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
-from rigwatch.commands import COMMANDS
+from rigwatch.commands import every_command
 
 TARGET = Path(__file__).parent.parent / "docs" / "commands.md"
 HEAD = """<!-- Printed by `make docs` from the commands' own help. -->
@@ -20,16 +20,15 @@ one plain line and then ends with a code other than 0.
 
 def page() -> str:
     """The whole page."""
-    return HEAD + "\n".join(part for name in COMMANDS for part in _command(name)) + "\n"
+    parts = (part for name, module in every_command() for part in _command(name, module))
+    return HEAD + "\n".join(parts) + "\n"
 
 
-def _command(name: str) -> Iterator[str]:
-    module = importlib.import_module(f"rigwatch.commands.{COMMANDS[name]}")
-    yield f"\n## rigwatch {name}\n"
-    yield f"{module.HELP[0].upper()}{module.HELP[1:]}.\n"
-    yield "```"
-    yield inspect.cleandoc(module.EXAMPLE)
-    yield "```"
+def _command(name: str, module: ModuleType) -> Iterator[str]:
+    yield f"\n{'#' * len(name.split())} {name}\n"
+    yield f"{module.HELP[0].upper()}{module.HELP[1:]}."
+    if not hasattr(module, "ACTIONS"):  # else its sub-commands follow, each with its examples
+        yield f"\n```\n{inspect.cleandoc(module.EXAMPLE)}\n```"
 
 
 def main() -> int:

@@ -7,15 +7,21 @@ A command module has
     def add_arguments(parser: argparse.ArgumentParser) -> None
     def run(arguments: argparse.Namespace) -> int      the exit code, 0 for success
 
-and imports what it needs inside `run` where the import is slow. Results go to stdout, progress and
-remarks to stderr. Every command has `--json`, added here: `arguments.json` is then true and stdout
-carries JSON and nothing else.
+and imports what it needs inside `run` where the import is slow. A command that has sub-commands has
+in place of both functions
+
+    ACTIONS: dict[str, str]      name of each: its module below rigwatch.commands
+
+and each of these is a command module again. Results go to stdout, progress and remarks to stderr.
+Every command has `--json`, added here: `arguments.json` is then true and stdout carries JSON and
+nothing else.
 """
 
 import argparse
 import importlib
 import os
 import sys
+from collections.abc import Iterator, Mapping, Sequence
 from types import ModuleType
 
 from rigwatch.version import __version__
@@ -75,35 +81,63 @@ def main(argv: list[str] | None = None) -> int:
         return EXIT_INTERRUPTED
 
 
-def _parser(argv: list[str]) -> argparse.ArgumentParser:
+def every_command(
+    table: Mapping[str, str] = COMMANDS, above: str = "rigwatch"
+) -> Iterator[tuple[str, ModuleType]]:
+    """What is typed, such as "rigwatch study new", and the module of each command."""
+    for name, module_name in table.items():
+        module = _module(module_name)
+        yield f"{above} {name}", module
+        yield from every_command(_actions(module), f"{above} {name}")
+
+
+def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rigwatch",
         description="Watches a test rig against a model of it and tells what the model is missing.",
     )
     parser.add_argument("--version", action="version", version=f"rigwatch {__version__}")
-    commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for name, module_name in COMMANDS.items():
-        # Only the command that was asked for is loaded whole, so that the others cost it nothing.
-        module = importlib.import_module(f"rigwatch.commands.{module_name}")
-        _add_command(commands, name, module, full=name in argv)
+    parser.set_defaults(json=False)
+    _add_commands(parser, "COMMAND", COMMANDS, argv)
     return parser
 
 
-def _add_command(
-    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
-    name: str,
-    module: ModuleType,
-    *,
-    full: bool,
+def _add_commands(
+    parser: argparse.ArgumentParser, kind: str, table: Mapping[str, str], argv: Sequence[str]
 ) -> None:
-    parser = commands.add_parser(
-        name,
-        help=module.HELP,
-        description=module.HELP,
-        epilog=f"example:\n{module.EXAMPLE}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    added = parser.add_subparsers(metavar=kind, required=True)
+    for name, module_name in table.items():
+        module = _module(module_name)
+        command = added.add_parser(
+            name,
+            help=module.HELP,
+            description=module.HELP,
+            epilog=f"example:\n{module.EXAMPLE}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        # Only the command that was asked for is loaded whole, so that the others cost it nothing.
+        if name in argv:
+            _fill(command, module, argv)
+
+
+def _fill(parser: argparse.ArgumentParser, module: ModuleType, argv: Sequence[str]) -> None:
+    """Arguments of a command, or its sub-commands."""
+    # Before a sub-command or after it: what is not given at one place must not undo the other.
+    parser.add_argument(
+        "--json", action="store_true", default=argparse.SUPPRESS, help="print results as JSON"
     )
-    if full:
-        parser.add_argument("--json", action="store_true", help="print results as JSON")
+    if actions := _actions(module):
+        _add_commands(parser, "ACTION", actions, argv)
+    else:
         module.add_arguments(parser)
         parser.set_defaults(run=module.run)
+
+
+def _module(name: str) -> ModuleType:
+    return importlib.import_module(f"rigwatch.commands.{name}")
+
+
+def _actions(module: ModuleType) -> Mapping[str, str]:
+    """Modules of a command's sub-commands by their names; empty where it has none."""
+    found: Mapping[str, str] = getattr(module, "ACTIONS", {})
+    return found

@@ -1,9 +1,10 @@
-"""Web pages that hold everything and ask the network for nothing: the page and plots in SVG.
+"""Web pages that hold everything and ask the network for nothing: templates and plots in SVG.
 
 Shared by the reports of workbench and structures; it knows neither of them.
 """
 
-from rigwatch.page.html import exact, figure, key, page, table
-from rigwatch.page.svg import Plot, limits
+from rigwatch.page.html import page
+from rigwatch.page.scale import limits
+from rigwatch.page.svg import Plot
 
-__all__ = ["Plot", "exact", "figure", "key", "limits", "page", "table"]
+__all__ = ["Plot", "limits", "page"]

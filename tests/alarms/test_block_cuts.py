@@ -1,12 +1,12 @@
 """The same samples give the same alarms however they are cut into blocks."""
 
 import numpy as np
-from alarm_signals import condition, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from monitor.alarms import AlarmManager
 from rigwatch.wire.rig_config import AlarmSection
+from tests.alarms.alarm_signals import condition, run
 
 NAMES = ("departure", "dry_friction", "gap", "not_observable", "sensor_stuck.position", "link")
 SAMPLES = 240

@@ -2,10 +2,9 @@
 
 from itertools import pairwise
 
-from alarm_signals import codes, condition, order, run, spell, steps, time_of, times
-
 from monitor.alarms import AlarmManager, Occasion
 from rigwatch.wire.messages.message_types import Alarm
+from tests.alarms.alarm_signals import codes, condition, order, run, spell, steps, time_of, times
 
 MINUTE = 60 * 256
 

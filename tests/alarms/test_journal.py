@@ -9,10 +9,10 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from alarm_signals import condition, order, run, spell
 
 from monitor.alarms import AlarmJournal, AlarmManager, last_records, read_journal
 from rigwatch.wire.errors import SessionError
+from tests.alarms.alarm_signals import condition, order, run, spell
 
 ROOT = Path(__file__).parents[2]
 
@@ -130,10 +130,8 @@ def test_kill_9_loses_nothing_that_was_written(tmp_path):
     path = tmp_path / "alarms.jsonl"
     program = textwrap.dedent(
         f"""
-        import sys
-        sys.path[:0] = [{str(ROOT)!r}, {str(Path(__file__).parent)!r}]
         from dataclasses import replace
-        from test_journal import faulty_manager
+        from tests.alarms.test_journal import faulty_manager
         from monitor.alarms import AlarmJournal
         journal = AlarmJournal({str(path)!r})
         record = faulty_manager().take_changes()[0]
@@ -142,7 +140,9 @@ def test_kill_9_loses_nothing_that_was_written(tmp_path):
             print(number, flush=True)
         """
     )
-    process = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
     assert process.stdout is not None
     for _ in range(50):
         process.stdout.readline()

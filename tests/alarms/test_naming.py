@@ -1,9 +1,9 @@
 """A fault is detected first and named later: one alarm in the list, at the detection's instant."""
 
 import pytest
-from alarm_signals import condition, order, run, spell, steps, times
 
 from monitor.alarms import AlarmManager
+from tests.alarms.alarm_signals import condition, order, run, spell, steps, times
 
 
 def conditions(departure: tuple[int, int], **names: tuple[int, int]):

@@ -1,13 +1,13 @@
 """Each arrow of the ISA-18.2 diagram in `monitor/alarms/state.py`, walked once."""
 
 import pytest
-from alarm_signals import codes, condition, order, run, spell, steps, times
 
 from monitor.alarms import AlarmManager, Occasion
 from monitor.alarms.kinds import AlarmSettings
 from monitor.alarms.state import AlarmInstance
 from rigwatch.wire.messages.message_types import Alarm, Event
 from rigwatch.wire.rig_config import AlarmSection
+from tests.alarms.alarm_signals import codes, condition, order, run, spell, steps, times
 
 GONE_AFTER = AlarmSection(persistence=3, clear_after=10, latch=False)
 LATCHED = AlarmSection(persistence=3, clear_after=10, latch=True)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from alarm_signals import condition, run, spell
 
 from monitor.alarms import ALARM_KINDS, AlarmManager, check_settings, quality_conditions
 from monitor.alarms.kinds import kind_of, settings_of
@@ -11,6 +10,7 @@ from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.messages.message_types import Column, SampleBlock
 from rigwatch.wire.rig_config import AlarmSection
+from tests.alarms.alarm_signals import condition, run, spell
 
 NAMES = {kind.name for kind in ALARM_KINDS}
 

@@ -7,16 +7,15 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
-from rigwatch.wire.bus.bus import Bus, wait_until
+from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.rig_config import RigConfig, load_rig
+from tests.waiting import PATIENCE, eventually
 
 ROOT = Path(__file__).parents[2]
-PATIENCE = 90.0
-"""Longest that anything may take before a test fails; machines are slow at times [s]."""
 
 CONFIG = """
 [rig]
@@ -53,11 +52,6 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
-
-
-def eventually(holds: Callable[[], bool], what: str) -> None:
-    """Wait for a condition, and fail with its name where it does not come."""
-    assert wait_until(holds, PATIENCE), f"not within {PATIENCE:g} s: {what}"
 
 
 class TestRig:

@@ -20,8 +20,9 @@ from rigwatch.wire.messages.message_types import Event
 from rigwatch.wire.messages.protobuf import encode
 from rigwatch.wire.messages.topics import EVENTS, SAMPLES
 from rigwatch.wire.rig_config import load_rig
-from tests.bus.rig import PATIENCE, TestRig, eventually, stopped
+from tests.bus.rig import TestRig, stopped
 from tests.bus.samples import block, is_intact
+from tests.waiting import PATIENCE, eventually
 
 Join = Callable[[str], Bus]
 
@@ -232,6 +233,7 @@ import sys, time
 from rigwatch.wire.bus import connect
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.messages import EVENTS
+from rigwatch.wire.messages.topics import EVENTS
 bus = connect(load_rig(sys.argv[1]), "frozen")
 subscription = bus.subscribe(EVENTS)
 time.sleep(600)

@@ -3,7 +3,6 @@
 import contextlib
 import io
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,17 +10,6 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from rigwatch.dashboard.board.palette import Colour
-
-PATIENCE = 60.0
-"""Seconds until a test gives up; reached on a hopelessly busy machine only."""
-
-
-def until(holds: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
-    """Wait until something holds; fails with `what` where it never does."""
-    deadline = time.monotonic() + patience
-    while not holds():
-        assert time.monotonic() < deadline, f"waited {patience:.0f} s in vain: {what}"
-        time.sleep(0.1)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from rigwatch.wire.messages.message_types import Alarm, EstimateBlock, Health, S
 from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, HEALTH, SAMPLES
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from tests.dashboard.rig_messages import RATE, Rig
-from tests.dashboard.screen import Screen, until
+from tests.dashboard.screen import Screen
+from tests.waiting import eventually
 
 TOPIC_OF = {SampleBlock: SAMPLES, EstimateBlock: ESTIMATES, Alarm: ALARMS, Health: HEALTH}
 CONFIG = """
@@ -126,17 +127,17 @@ def test_the_screen_shows_the_rig_and_its_friction(
     assert config.dashboard is not None
     port = config.dashboard.grpc_port
     with dashboard(config_file, "headless") as process, playing(bus):
-        until(lambda: answers(port) or process.poll() is not None, "the viewer answers")
+        eventually(lambda: answers(port) or process.poll() is not None, "the viewer answers")
         screen = Screen(f"rerun+http://127.0.0.1:{port}/proxy")
-        until(lambda: red_verdict(screen), "the verdict turns red")
+        eventually(lambda: red_verdict(screen), "the verdict turns red")
         end = screen.timeline_end()
-        until(lambda: screen.timeline_end() - end > 1.5e9, "time goes on")
+        eventually(lambda: screen.timeline_end() - end > 1.5e9, "time goes on")
         check_views(screen)
         check_colours(screen)
         assert screen.errors() == []
         process.send_signal(signal.SIGTERM)
         assert process.wait(15) == 0
-        until(lambda: not answers(port), "the viewer ends with the dashboard", 10.0)
+        eventually(lambda: not answers(port), "the viewer ends with the dashboard")
 
 
 def test_it_may_die_and_so_may_its_viewer(bus: Bus, config_file: Path, config: RigConfig) -> None:
@@ -144,18 +145,20 @@ def test_it_may_die_and_so_may_its_viewer(bus: Bus, config_file: Path, config: R
     port = config.dashboard.grpc_port
     listener, health = bus.subscribe(SAMPLES), bus.subscribe(HEALTH)
     with dashboard(config_file, "headless") as process, playing(bus) as player:
-        until(lambda: shows(health) or process.poll() is not None, "the dashboard shows the rig")
+        eventually(
+            lambda: shows(health) or process.poll() is not None, "the dashboard shows the rig"
+        )
         viewer = psutil.Process(process.pid).children()[0]
         viewer.kill()
         assert process.stderr is not None
         assert "has died and is opened again" in process.stderr.readline()
-        until(lambda: new_viewer(process.pid, viewer.pid) and answers(port), "a new viewer")
+        eventually(lambda: new_viewer(process.pid, viewer.pid) and answers(port), "a new viewer")
         screen = Screen(f"rerun+http://127.0.0.1:{port}/proxy")
-        until(lambda: red_verdict(screen), "the new viewer shows the verdict")
+        eventually(lambda: red_verdict(screen), "the new viewer shows the verdict")
         process.kill()
-        until(lambda: not answers(port), "the viewer ends with a killed dashboard", 10.0)
+        eventually(lambda: not answers(port), "the viewer ends with a killed dashboard")
         sent = player.sent
-        until(lambda: player.sent > sent + 128, "the rig goes on")
+        eventually(lambda: player.sent > sent + 128, "the rig goes on")
     blocks = listener.drain()
     assert [block.seq for block in blocks] == list(range(0, player.sent, 8))[: len(blocks)]
     assert len(blocks) * 8 >= player.sent - 8

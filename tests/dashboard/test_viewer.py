@@ -3,7 +3,6 @@
 import importlib.util
 import json
 import threading
-import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ from rigwatch.commands import main
 from rigwatch.dashboard.viewer.opening import open_viewer
 from rigwatch.dashboard.viewer.viewer import Viewer, ViewerError, answers, free_port
 from rigwatch.wire.rig_config import DashboardSection
-from tests.dashboard.screen import until
+from tests.waiting import eventually
 
 
 @pytest.fixture
@@ -47,7 +46,7 @@ def web(homes: Path) -> Iterator[Viewer]:
 
 
 def test_web_viewer_is_served_on_this_machine_only(web: Viewer) -> None:
-    until(lambda: answers(web.web_port), "the page is served")
+    eventually(lambda: answers(web.web_port), "the page is served")
     with urllib.request.urlopen(web.web_url, timeout=10) as page:
         assert b"<html" in page.read()
         assert page.url.endswith(f"/?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A{web.port}%2Fproxy")
@@ -68,8 +67,8 @@ def test_what_the_viewer_does_not_have_is_not_there(web: Viewer) -> None:
 
 
 def test_no_usage_report_is_kept_or_sent(web: Viewer, homes: Path) -> None:
-    until(lambda: answers(web.web_port), "the page is served")
-    time.sleep(0.5)
+    eventually(lambda: answers(web.web_port), "the page is served")
+    web.stop()  # what it would keep, it has kept when it has ended
     assert not homes.exists()
 
 

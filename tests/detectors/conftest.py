@@ -1,13 +1,8 @@
-"""Makes the helper modules beside the tests importable, and the simulated rig one for all tests."""
-
-import sys
-from pathlib import Path
+"""One simulated rig for all tests here."""
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from simulated_rig import SimulatedRig
+from tests.detectors.simulated_rig import SimulatedRig
 
 
 @pytest.fixture(scope="session")

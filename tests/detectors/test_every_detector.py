@@ -5,13 +5,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from simulated_rig import CHANNELS, RATE, block
 
 from monitor.alarms import ALARM_KINDS
 from monitor.detectors import DETECTORS, detector_kind
 from monitor.detectors.detector import LONGEST_HOLD
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages import quality_flags as quality
+from tests.detectors.simulated_rig import CHANNELS, RATE, block
 
 FAULTS = {
     "parity-arma": ("coulomb", 0.75),

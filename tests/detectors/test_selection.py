@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from msgspec import structs
-from simulated_rig import CHANNELS, FOLDER, RATE, SimulatedRig, block, recorded
 
 from monitor.commissioning.commission import commission
 from monitor.detectors import DETECTORS
@@ -14,6 +13,7 @@ from monitor.signals.recordings import recording_of
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages.message_types import Alarm
 from sim_plant.scenario import load_scenario
+from tests.detectors.simulated_rig import CHANNELS, FOLDER, RATE, SimulatedRig, block, recorded
 
 EVERY = ("friction", *(kind.name for kind in DETECTORS))
 NAMES = (CHANNELS.input, CHANNELS.output, CHANNELS.acceleration)

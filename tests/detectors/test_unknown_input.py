@@ -1,7 +1,6 @@
 """Nowakowski et al.: the bias of a position sensor on a cart, detected, then estimated."""
 
 import numpy as np
-import pendulum
 import pytest
 from scipy.stats import binom
 
@@ -11,6 +10,7 @@ from monitor.detectors.small_matrices import inverse
 from monitor.detectors.state_space import state_space
 from rigwatch.physics.transfer.transfer_function import TransferFunction
 from rigwatch.wire.errors import ModelError
+from tests.detectors import pendulum
 
 LENGTH, MEASURED = 20, 3
 BIAS, AT = 0.05, 10.0

@@ -4,11 +4,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from monitor_rig import RATE, SINE, UNITS, active, friction, run, watched
 
 from monitor.pipeline.pipeline import Result
 from monitor.signals import conditions as kinds
 from sim_plant.excitation import Chirp, Multisine, Recorded, Shape
+from tests.monitor.monitor_rig import RATE, SINE, UNITS, active, friction, run, watched
 
 ARMED_BY = 25.0
 """Eight seconds in which no period is found, sixteen that are learnt from [s]."""

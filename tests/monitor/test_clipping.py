@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from monitor_rig import RATE, SINE, UNITS, active, block, model, run
 from msgspec import structs
 
 from monitor.commissioning.repeated_readings import chance_of_repeat, step_of
@@ -11,6 +10,7 @@ from monitor.signals.conditions import DEPARTURE
 from rigwatch.wire.messages.message_types import SampleBlock
 from sim_plant.excitation import Chirp, Multisine, Recorded, Shape, Silence, Sine, Square, Triangle
 from sim_plant.scenario import Event
+from tests.monitor.monitor_rig import RATE, SINE, UNITS, active, block, model, run
 
 ONSET = int(4.0 * RATE)
 STEP = 0.01

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from monitor_rig import RATE, SINE, friction, model, run
 from scipy.io import loadmat
 from scipy.stats import chi2
 
@@ -20,6 +19,7 @@ from monitor.signals.recordings import Recording, recording_of
 from rigwatch.physics.transfer.transfer_function import TransferFunction
 from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.messages.message_types import Column, SampleBlock
+from tests.monitor.monitor_rig import RATE, SINE, friction, model, run
 
 
 def saved(found: RigModel, folder: Path) -> Path:

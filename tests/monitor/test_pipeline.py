@@ -2,7 +2,14 @@
 
 import numpy as np
 import pytest
-from monitor_rig import (
+
+from monitor.pipeline.pipeline import PUBLISHED, Monitor, Result
+from monitor.signals import conditions as kinds
+from rigwatch.wire.messages.message_types import Column, SampleBlock
+from rigwatch.wire.messages.quality_flags import NON_FINITE
+from sim_plant.effects import EFFECTS
+from sim_plant.excitation import Shape, Square
+from tests.monitor.monitor_rig import (
     OTHER_SINE,
     RATE,
     SINE,
@@ -15,13 +22,6 @@ from monitor_rig import (
     run,
     watched,
 )
-
-from monitor.pipeline.pipeline import PUBLISHED, Monitor, Result
-from monitor.signals import conditions as kinds
-from rigwatch.wire.messages.message_types import Column, SampleBlock
-from rigwatch.wire.messages.quality_flags import NON_FINITE
-from sim_plant.effects import EFFECTS
-from sim_plant.excitation import Shape, Square
 
 ONSET = int(4.0 * RATE)
 HEALTHY = run(SINE, 8.0, seed=21)

@@ -1,12 +1,12 @@
 """Which alarms a rig's monitor raises, with and without the friction scheme."""
 
 import numpy as np
-from monitor_rig import SINE, block, friction, model, run
 
 from monitor.decision.sample_kernel import watch_block
 from monitor.pipeline.rig_monitor import RigMonitor, compile_kernels
 from rigwatch.wire.messages.message_types import Alarm, Column, SampleBlock
 from rigwatch.wire.messages.protobuf import decode, encode
+from tests.monitor.monitor_rig import SINE, block, friction, model, run
 
 
 def raised(watching: RigMonitor) -> set[str]:

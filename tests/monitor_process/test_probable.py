@@ -1,6 +1,5 @@
 """An alarm is followed by what is probably missing, ranked without making samples wait."""
 
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from sim_plant.scenario import Event as Fault
 from sim_plant.scenario import load_scenario
 from tests.report.drive import COULOMB, VISCOUS, block
 from tests.report.drive import MODEL as INERTIA
+from tests.waiting import eventually
 
 RECORDINGS = Path(__file__).parents[1] / "verify"
 SCENARIOS = Path(__file__).parents[2] / "configs" / "scenarios"
@@ -148,10 +148,12 @@ def test_friction_on_the_simulated_rig_is_named_after_its_alarm() -> None:
                 if isinstance(said, Alarm):
                     explainer.hear(said)
     found: list[Event] = []
-    deadline = time.monotonic() + 60.0
-    while not found and time.monotonic() < deadline:
-        found = explainer.results()
-        time.sleep(0.01)
+
+    def explained() -> bool:
+        found.extend(explainer.results())
+        return bool(found)
+
+    eventually(explained, "the change is explained")
     assert len(found) == 1
     assert found[0].code == "PROBABLY MISSING"
     assert "probably missing: coulomb@load (p < 1e-6" in found[0].text

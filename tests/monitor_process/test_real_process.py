@@ -13,8 +13,9 @@ import pytest
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.messages.message_types import EstimateBlock
 from rigwatch.wire.messages.topics import ESTIMATES
-from tests.bus.rig import PATIENCE, ROOT, TestRig, eventually, kill, stopped
+from tests.bus.rig import ROOT, TestRig, kill, stopped
 from tests.monitor_process.model import monitor_section
+from tests.waiting import PATIENCE, eventually
 
 
 class Judged:

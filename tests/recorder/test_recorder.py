@@ -32,6 +32,7 @@ from rigwatch.wire.messages.message_types import (
 from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, EVENTS, GAPS, SAMPLES
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session, run_info
+from tests.waiting import eventually
 
 CONFIG = """
 [rig]
@@ -83,6 +84,11 @@ class Source:
             self.ring.add(part)
             self.bus.publish(SAMPLES, part)
             self.next += 1
+
+    def goes_on(self, samples: int) -> None:
+        """So many further samples have been sent."""
+        wanted = self.next + samples
+        eventually(lambda: self.next >= wanted, f"sample {wanted} is sent")
 
 
 def recorded(folder: Path) -> list[int]:
@@ -178,13 +184,13 @@ def start(config: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
 
 
-def wait_for_file(root: Path, timeout: float = 20.0) -> Path:
-    deadline = time.monotonic() + timeout
-    while time.monotonic() < deadline:
-        if found := sorted(root.glob("*/*.mcap")):
-            return found[-1]
-        time.sleep(0.05)
-    raise AssertionError("nothing was recorded")
+def writes_files(recorder: subprocess.Popen[str], root: Path, count: int) -> None:
+    """The recorder runs until so many files are there."""
+    eventually(
+        lambda: recorder.poll() is not None or len(list(root.glob("*/*.mcap"))) >= count,
+        f"{count} files",
+    )
+    assert recorder.poll() is None
 
 
 @pytest.mark.usefixtures("router")
@@ -202,16 +208,14 @@ def test_killed_and_started_again_over_zenoh(tmp_path: Path, config: Path) -> No
     thread.start()
     first = start(config)
     try:
-        wait_for_file(tmp_path / "sessions")
-        time.sleep(1.2)
+        writes_files(first, tmp_path / "sessions", 1)
+        source.goes_on(200)
         os.kill(first.pid, signal.SIGKILL)
         first.wait()
         second = start(config)
         try:
-            while len(list((tmp_path / "sessions").glob("*/*.mcap"))) < 2:
-                time.sleep(0.05)
-                assert second.poll() is None
-            time.sleep(1.0)
+            writes_files(second, tmp_path / "sessions", 2)
+            source.goes_on(200)
         finally:
             second.send_signal(signal.SIGTERM)
             output, _ = second.communicate(timeout=20)

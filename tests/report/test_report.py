@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.page.svg import Plot, Scale, limits
+from rigwatch.page.scale import Scale, limits
+from rigwatch.page.svg import Plot
 from rigwatch.workbench.study.study import Study
+from tests.report.style import COLOURS, WORDS
 
 SECTIONS = ("errors", "signals", "where", "ranking", "parameters", "ledger")
 VOID = ("meta", "path", "rect", "circle", "i")
@@ -62,6 +64,12 @@ def test_it_asks_the_network_for_nothing(page: tuple[str, Page]) -> None:
     text, parsed = page
     assert not re.search(r"https?://|//[a-z]|@import|url\(|<script|<link|<img|<iframe", text)
     assert not {k for k, _ in parsed.attributes} & {"src", "href", "srcset", "onload"}
+
+
+def test_its_colours_are_those_of_the_style(page: tuple[str, Page]) -> None:
+    text, _ = page
+    assert set(re.findall(r"var\(--(\w+)\)", text)) <= COLOURS["light"].keys()
+    assert set(re.findall(r'<text [^>]*fill="var\(--(\w+)\)"', text)) <= WORDS
 
 
 def test_it_is_whole_and_every_section_has_content(page: tuple[str, Page]) -> None:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.structures import Extreme
 from rigwatch.physics.engine.equations.model import load_model
 from rigwatch.structures.identification.identify import identify
 from rigwatch.structures.model.checks import load_structure
@@ -12,6 +11,7 @@ from sim_plant import tower
 from sim_plant.earthquake import accelerogram
 from sim_plant.structure import simulate, with_noise
 from tests.structures.antenna import FILE, FOLDER, antenna, positions
+from tests.structures.extreme import Extreme
 
 FRAME = {"columns": 25.0, "columns_cubic": 2.5, "joints": 1.0, "joints_cubic": 0.1}
 NEAR = {"columns": 24.0, "columns_cubic": 2.0, "joints": 0.9, "joints_cubic": 0.08}

@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
-from benchmarks.structures_published import ROWS
-from benchmarks.structures_thesis import thesis_record
 from rigwatch.structures.identification.identify import METHODS, identify
 from rigwatch.structures.identification.problem import problem_of
 from rigwatch.structures.records.record import Record
 from rigwatch.wire.errors import ModelError
 from sim_plant.structure import simulate, with_noise
 from tests.structures.antenna import FILE, NAMES, TRUTH, antenna, positions, record
+from tests.structures.published import ROWS
+from tests.structures.thesis_record import thesis_record
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,9 @@ from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, E
 from rigwatch.wire.messages.protobuf import encode
 from rigwatch.wire.messages.quality_flags import STALE
 from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, EVENTS, HEALTH, SAMPLES
-from tests.bus.rig import TestRig, eventually
+from tests.bus.rig import TestRig
 from tests.structures.test_damage import K4, KABE, kabe_record
+from tests.waiting import eventually
 
 KNOWN = LiveSettings(known=True)
 

@@ -1,6 +1,7 @@
 """Every command and every key of a configuration is documented."""
 
 import importlib.util
+import json
 import os
 import subprocess
 import sys
@@ -9,8 +10,9 @@ from types import ModuleType
 
 import pytest
 
-from rigwatch.commands import COMMANDS, main
+from rigwatch.commands import every_command, main
 
+COMMANDS = [name for name, _ in every_command()]
 ROOT = Path(__file__).parents[2]
 PRINTED_PAGES = (
     ("configuration.md", "config_docs"),
@@ -38,15 +40,47 @@ def test_help_of_every_command_has_an_example_that_names_it(
     name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as exit_:
-        main([name, "--help"])
+        main([*name.split()[1:], "--help"])
     assert exit_.value.code == 0
     _, _, example = capsys.readouterr().out.partition("example:")
-    assert f"rigwatch {name}" in example
+    assert name in example
+
+
+@pytest.mark.parametrize("group", ["structure", "study"])
+def test_help_of_a_group_names_each_sub_command(
+    group: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main([group, "--help"])
+    said = capsys.readouterr().out
+    actions = [name.split()[2] for name in COMMANDS if name.startswith(f"rigwatch {group} ")]
+    assert len(actions) >= 6
+    for action in actions:
+        assert f"\n    {action}" in said
+
+
+@pytest.mark.parametrize("words", ["structure --json modes", "structure modes --json"])
+def test_json_may_stand_before_a_sub_command_or_after_it(
+    words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = str(ROOT / "configs" / "structures" / "kabe_antenna.toml")
+    assert main([*words.split(), file]) == 0
+    assert len(json.loads(capsys.readouterr().out)["omega"]) == 8
+
+
+def test_a_sub_command_that_is_missing_or_unknown_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for words in (["study"], ["study", "nwe", "emps"]):
+        with pytest.raises(SystemExit) as exit_:
+            main(words)
+        assert exit_.value.code == 2
+    assert "'nwe'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_is_in_the_readme_or_the_documentation(name: str) -> None:
-    assert f"rigwatch {name}" in pages()
+    assert name in pages()
 
 
 def test_every_key_of_a_configuration_has_a_description() -> None:

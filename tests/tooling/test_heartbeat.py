@@ -66,12 +66,31 @@ def test_ready_status_and_stopping_are_systemds_words(supervisor: socket.socket)
     assert (second, third) == ("STATUS=reconnecting", "STOPPING=1")
 
 
-def test_nothing_is_needed_where_nobody_listens(tmp_path: Path) -> None:
-    Heartbeat("daq", {}).advance(1)
-    gone = Heartbeat("daq", {"NOTIFY_SOCKET": str(tmp_path / "gone")})
-    gone.ready()
-    gone.advance(1)
-    gone.stopping()
+def test_a_process_that_was_started_by_hand_opens_no_socket(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    opened: list[object] = []
+    monkeypatch.setattr(socket, "socket", lambda *kind: opened.append(kind))
+    beat = Heartbeat("daq", {})
+    beat.ready()
+    beat.advance(1)
+    beat.stopping()
+    assert opened == []
+
+
+def test_words_reach_a_supervisor_that_comes_later(tmp_path: Path) -> None:
+    clock, place = Clock(), str(tmp_path / "notify")
+    beat = Heartbeat("daq", {"NOTIFY_SOCKET": place}, clock)
+    beat.ready()
+    beat.advance(1)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
+        listener.bind(place)
+        listener.setblocking(False)
+        clock.now += INTERVAL
+        beat.advance(3)
+        beat.stopping()
+        assert said(listener) == ["WATCHDOG=1\nX_RIGWATCH_COUNT=3", "STOPPING=1"]
+    beat.stopping()
 
 
 def test_a_full_socket_does_not_block(supervisor: socket.socket) -> None:

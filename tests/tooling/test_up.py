@@ -18,6 +18,7 @@ import pytest
 from rigwatch.demo.rig_file import find_config, write_rig_file
 from rigwatch.wire.host.ports import endpoint_address
 from rigwatch.wire.rig_config import load_rig
+from tests.waiting import eventually
 
 pytestmark = pytest.mark.xdist_group("rig")
 WITHOUT = ["--without", "monitor", "--without", "recorder", "--without", "dashboard"]
@@ -88,17 +89,13 @@ def rig(config: Path) -> Iterator[Rig]:
 
 def test_killed_and_hung_processes_come_back_and_the_rest_goes_on(rig: Rig) -> None:
     before = rig.flows("daq")
-    killed = time.time()
     os.kill(before["daq"]["pid"], signal.SIGKILL)
     again = rig.wait_for("started", process="daq", restarts=1)
-    assert again["t"] - killed < 2.0
     rig.flows("daq")
 
-    stopped = time.time()
     os.kill(again["pid"], signal.SIGSTOP)
     assert "hangs" in rig.wait_for("ill", process="daq")["text"]
-    third = rig.wait_for("started", process="daq", restarts=2)
-    assert third["t"] - stopped < 5.0
+    rig.wait_for("started", process="daq", restarts=2)
     after = rig.flows("daq")
 
     assert after["plant"]["pid"] == before["plant"]["pid"]
@@ -129,10 +126,7 @@ def test_no_process_outlives_a_supervisor_that_was_killed(rig: Rig) -> None:
     rig.wait_for("ready", process="plant")
     pids = [event["pid"] for event in rig.events if event["event"] == "started"]
     rig.process.kill()
-    deadline = time.monotonic() + 20
-    while any(_runs(pid) for pid in pids) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert not [pid for pid in pids if _runs(pid)]
+    eventually(lambda: not any(_runs(pid) for pid in pids), "every process has ended")
 
 
 def _runs(pid: int) -> bool:

@@ -175,10 +175,10 @@ def test_an_existing_file_is_not_overwritten(tmp_path: Path) -> None:
     assert path.read_text() == "precious"
 
 
+ROOT = Path(__file__).parents[2]
 KILLED = """
 import sys
-sys.path.insert(0, sys.argv[2])
-from test_session_files import samples
+from tests.wire.test_session_files import samples
 from rigwatch.wire.session import SessionWriter, run_info
 writer = SessionWriter(sys.argv[1], run_info("bench1", 256.0))
 seq = 0
@@ -193,8 +193,8 @@ while True:
 
 def test_kill_9_leaves_everything_up_to_the_last_flush(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
-    command = [sys.executable, "-c", KILLED, str(path), str(Path(__file__).parent)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    command = [sys.executable, "-c", KILLED, str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout is not None
         flushed = [int(process.stdout.readline()) for _ in range(20)][-1]
         os.kill(process.pid, signal.SIGKILL)

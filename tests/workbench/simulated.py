@@ -10,7 +10,7 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.compare import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
-from rigwatch.workbench.study.study import Span, Study, StudyFile
+from rigwatch.workbench.study.study import Accepted, Span, Study, StudyFile
 from sim_plant.oscillator import DAMPING, MASS, RATE, STIFFNESS, Hidden, oscillate, strength_for
 
 HORIZON = 256
@@ -32,19 +32,36 @@ def opened(force: FloatArray, hidden: str = "", share: float = 0.05, noise: floa
 
 def fitted(force: FloatArray, hidden: tuple[Hidden, ...], noise: float, seed: int = 1) -> Bench:
     """The same with effects of given strengths; `noise` over the outputs' rms."""
-    scale = noise * oscillate(force, (), np.zeros(2), 0).std(axis=0)
-    made = [
-        Recording(1 / RATE, force[:, None], oscillate(force, effects, scale, seed + k))
-        for k, effects in enumerate((hidden, hidden, ()))
-    ]
+    scale = noise * size_of(force)
+    made = [recorded(force, e, scale, seed + k) for k, e in enumerate((hidden, hidden, ()))]
     data = Data(made[0], made[1], made[2], HORIZON, ())
     return bench_of(study(), data, scale)
 
 
-def study() -> Study:
-    """A mass-spring-damper that is to be fitted."""
+def recorded(
+    force: FloatArray,
+    hidden: tuple[Hidden, ...],
+    scale: FloatArray,
+    seed: int,
+    *,
+    held: bool = False,
+) -> Recording:
+    """One recording of the plant; `scale` is the noise's standard deviation of each output."""
+    read = oscillate(force, hidden, scale, seed, held=held)
+    return Recording(1 / RATE, force[:, None], read)
+
+
+def size_of(force: FloatArray, *, held: bool = False) -> FloatArray:
+    """Standard deviation of each output of the healthy plant under a force."""
+    return np.asarray(oscillate(force, (), np.zeros(2), 0, held=held).std(axis=0))
+
+
+def study(effects: tuple[Accepted, ...] = ()) -> Study:
+    """A mass-spring-damper that is to be fitted; its recordings are given to it."""
     span = (Span(session="simulated"),)
     start = {"m": 1.2 * MASS, "c": 0.8 * DAMPING, "k": 1.1 * STIFFNESS}
-    file = StudyFile(model="mass-spring-damper", train=span, held_out=span, start=start)
+    file = StudyFile(
+        model="mass-spring-damper", train=span, held_out=span, start=start, effects=effects
+    )
     model = shipped_models()["mass-spring-damper"]
     return Study(Path(), file, model, library(), frozenset())

@@ -1,11 +1,37 @@
 """A recording cannot decide; the experiment that is proposed does."""
 
-from benchmarks.next_experiment import decide
+import numpy as np
+
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.compare.compare import Bench, bench_of
+from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.explain.explain import explanation, ranking
+from rigwatch.workbench.explain.next_experiment import excitation
+from sim_plant.oscillator import RATE, Hidden, strength_for
+from tests.workbench.simulated import HORIZON, recorded, size_of, study
+
+SINE = 4 * np.sin(2 * np.pi * 3.0 * np.arange(5120) / RATE)
+NOISE = 0.02 * size_of(SINE)
+HIDDEN = (Hidden("quadratic_stiffness", strength_for("quadratic_stiffness", SINE, 0.02)),)
+
+
+def bench_under(force: FloatArray, seed: int) -> Bench:
+    """The plant driven by a force, its spring lopsided but for the healthy recording."""
+    train, held_out, healthy = (
+        recorded(force, effects, NOISE, seed + 50 * k)
+        for k, effects in enumerate((HIDDEN, HIDDEN, ()))
+    )
+    data = Data(train, held_out, healthy, HORIZON, ())
+    return bench_of(study(), data, 2e-3 * np.nanstd(train.outputs, axis=0))
 
 
 def test_the_proposed_experiment_tells_a_lopsided_spring_from_a_sensor_s_offset() -> None:
-    case = decide("quadratic_stiffness", 3.0, 0.02)
-    assert case is not None, "one sine must not be enough"
-    assert "offset@position_sensor" in case.rivals
-    assert case.proposal
-    assert case.right, case
+    bench = bench_under(SINE, seed=3)
+    rows, verdict = ranking(bench)
+    assert verdict.word == "undetermined", "one sine must not be enough"
+    assert "offset@position_sensor" in verdict.rivals
+    proposed = explanation(bench, rows, verdict).next_experiment
+    assert proposed is not None
+    _, after = ranking(bench_under(excitation(bench, proposed)[:, 0], seed=13))
+    assert after.word == "missing_effect"
+    assert "quadratic_stiffness@load" in after.members

@@ -1,12 +1,14 @@
 """Pairs of effects: scored from the ranking of single ones, fitted, and named together."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.explain.pairs import _pair, likely_pairs, two_effects
+from rigwatch.workbench.explain.pairs import Pair, _pair, likely_pairs, two_effects
 from rigwatch.workbench.explain.verdict import judge
-from rigwatch.workbench.ranking.rank import SIMILAR, rank, unheard
+from rigwatch.workbench.ranking.rank import SIMILAR, Ranked, rank, unheard
 from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.simulated import fitted, multisine
 
@@ -26,17 +28,49 @@ def rows(bench):
     return rank(bench.study, bench.data, bench.base, bench.floor)
 
 
-def test_a_pair_explains_what_least_squares_of_both_directions_would(rows):
-    for one, other in [(rows[0], rows[1]), (rows[0], rows[2])]:
-        found = _pair(one, other)
-        cosine = one.turned[other.label]
-        assert one.cosines[other.label] == pytest.approx(abs(cosine))
-        gram = np.array([[1.0, cosine], [cosine, 1.0]])
-        along = np.sqrt([one.explained, other.explained])
-        if found is not None:
-            assert found.explained == pytest.approx(along @ np.linalg.solve(gram, along))
-        else:
-            assert abs(cosine) > SIMILAR or (np.linalg.solve(gram, along) <= 0).any()
+def pair_of(rows: list[Ranked], explained: tuple[float, float], cosine: float) -> Pair | None:
+    """The pair of two effects that explain so much alone and have this cosine."""
+    one, other = (
+        dataclasses.replace(row, explained=share, turned={beside.label: cosine})
+        for row, beside, share in zip(rows[:2], rows[1::-1], explained, strict=True)
+    )
+    return _pair(one, other)
+
+
+@pytest.mark.parametrize(
+    ("explained", "cosine"),
+    [((0.5, 0.3), 0.2), ((0.3, 0.5), 0.2), ((0.5, 0.3), -0.6), ((0.5, 0.3), 0.0)],
+)
+def test_a_pair_explains_what_least_squares_of_both_directions_would(
+    rows: list[Ranked], explained: tuple[float, float], cosine: float
+) -> None:
+    found = pair_of(rows, explained, cosine)
+    assert found is not None
+    assert found.one.explained == max(explained)
+    along = np.sqrt(explained)
+    gram = np.array([[1.0, cosine], [cosine, 1.0]])
+    assert found.explained == pytest.approx(along @ np.linalg.solve(gram, along))
+
+
+@pytest.mark.parametrize(
+    ("explained", "cosine"),
+    [
+        pytest.param((0.5, 0.3), SIMILAR + 0.01, id="alike"),
+        pytest.param((0.5, 0.3), -SIMILAR - 0.01, id="opposite and alike"),
+        pytest.param((0.5, 0.05), 0.6, id="the second would turn its sign"),
+    ],
+)
+def test_no_pair_is_made_of_one_effect_or_of_one_with_the_wrong_sign(
+    rows: list[Ranked], explained: tuple[float, float], cosine: float
+) -> None:
+    assert pair_of(rows, explained, cosine) is None
+
+
+def test_a_cosine_with_a_sign_has_the_size_of_the_one_without(rows: list[Ranked]) -> None:
+    for one in rows[:3]:
+        for other in rows[:3]:
+            if one is not other:
+                assert abs(one.turned[other.label]) == pytest.approx(one.cosines[other.label])
 
 
 def test_the_two_that_are_hidden_are_the_likeliest_pair(bench, rows):

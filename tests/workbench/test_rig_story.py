@@ -16,7 +16,8 @@ from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.messages.message_types import EstimateBlock
 from rigwatch.wire.messages.topics import ESTIMATES
 from rigwatch.wire.rig_config import load_rig
-from tests.bus.rig import ROOT, eventually, free_port
+from tests.bus.rig import ROOT, free_port
+from tests.waiting import eventually
 
 PAGE = (ROOT / "docs" / "rig-story.md").read_text(encoding="utf-8")
 RATE, ENOUGH = 256, 21 * 256

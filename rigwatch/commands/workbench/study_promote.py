@@ -1,4 +1,4 @@
-"""What `rigwatch study promote` does: the model goes to the running monitor, else into its file."""
+"""`rigwatch study promote`: the model goes to the running monitor, else into its file."""
 
 import argparse
 import getpass
@@ -11,21 +11,32 @@ from rigwatch.commands.common import print_json, say
 if TYPE_CHECKING:
     from rigwatch.wire.bus import Granted, Wish
 
+HELP = "hand the accepted model to the monitor of a rig, or take the one before again"
+EXAMPLE = """\
+  rigwatch study promote emps --rig emps-rig.toml
+  rigwatch study promote emps --rig emps-rig.toml --rollback"""
 LINK_TIMEOUT = 3.0
 
 
-def promote(arguments: argparse.Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    parser.add_argument("study", type=Path, help="the study's folder")
+    parser.add_argument(
+        "--rig", type=Path, required=True, metavar="CONFIG", help="the rig's configuration"
+    )
+    parser.add_argument("--rollback", action="store_true", help="the model before again")
+    parser.add_argument("--user", default="", help="who acts; else the user logged in")
+
+
+def run(arguments: argparse.Namespace) -> int:
     """0 where the other model is in force; 1 where the monitor refuses it."""
     from monitor.model import load_model
     from monitor.process import monitor_section
     from rigwatch.wire.bus import Wish
-    from rigwatch.wire.errors import ConfigError
     from rigwatch.wire.rig_config import load_rig
     from rigwatch.workbench.steps import promotion
     from rigwatch.workbench.study import open_study
 
-    if arguments.rig is None:
-        raise ConfigError(arguments.study, "--rig", "nothing", "the rig's configuration")
     study = open_study(arguments.study)
     path = Path(monitor_section(load_rig(arguments.rig), arguments.rig).model)
     user, name = arguments.user or getpass.getuser(), study.folder.resolve().name

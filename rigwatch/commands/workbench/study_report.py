@@ -1,12 +1,24 @@
-"""What `rigwatch study report` does."""
+"""`rigwatch study report`: the whole study as one web page."""
 
 import argparse
+from pathlib import Path
 
 from rigwatch.commands.common import print_json, say
 
+HELP = "write the whole study as one HTML page that needs no network"
+EXAMPLE = "  rigwatch study report emps --output emps.html"
 
-def report(arguments: argparse.Namespace) -> int:
-    """Write the page; 0."""
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    parser.add_argument("study", type=Path, help="the study's folder")
+    parser.add_argument(
+        "--output", type=Path, metavar="HTML", help="else report.html in the study's folder"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when the page was written."""
     from rigwatch.workbench.report import write_report
     from rigwatch.workbench.study import open_study
 

@@ -1,4 +1,4 @@
-"""What `rigwatch study view` does: the steps of a study in the viewer, a file or a picture."""
+"""`rigwatch study view`: the steps of a study in the viewer, a file or a picture."""
 
 import argparse
 from collections.abc import Callable
@@ -14,7 +14,21 @@ if TYPE_CHECKING:
     from rigwatch.workbench.study import Study
 
 
-def view(arguments: argparse.Namespace) -> int:
+HELP = "show measured and modelled signals of every step: in the viewer, a file or a picture"
+EXAMPLE = """\
+  rigwatch study view emps
+  rigwatch study view emps --save emps.rrd
+  rigwatch study view emps --picture emps.png"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    parser.add_argument("study", type=Path, help="the study's folder")
+    parser.add_argument("--save", type=Path, metavar="FILE", help="write a file for Rerun")
+    parser.add_argument("--picture", type=Path, metavar="PNG", help="write a picture")
+
+
+def run(arguments: argparse.Namespace) -> int:
     """0 when it was drawn, and when a window was shown, once that is closed."""
     ready_to_draw(arguments.save, arguments.picture)
     from rigwatch.workbench.steps import signals, stages

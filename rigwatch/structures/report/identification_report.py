@@ -3,12 +3,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from html import escape
 from math import isfinite
 
 import numpy as np
 
-from rigwatch.page import Plot, exact, figure, key, limits, page, table
+from rigwatch.page import Plot, limits, page
 from rigwatch.structures.identification import (
     SETTLED,
     Identification,
@@ -53,6 +52,11 @@ class Findings:
         return {method: modelled(self.problem, one) for method, one in self.found.items()}
 
     @property
+    def converged(self) -> list[str]:
+        """Methods that converged."""
+        return [method for method, one in self.found.items() if one.converged]
+
+    @property
     def legend(self) -> list[tuple[str, str]]:
         """Colour and name of each method."""
         return list(zip(COLOURS, self.found, strict=False))
@@ -60,85 +64,27 @@ class Findings:
 
 def report_html(findings: Findings) -> str:
     """The page."""
-    name = findings.problem.sweeper.compiled.system.model.name
     return page(
-        f"{name}: identification",
-        _header(findings, name),
-        [
-            ("parameters", "Parameters", _parameters(findings)),
-            ("methods", "Methods", _methods(findings)),
-            ("iterations", "Iterations", _iterations(findings)),
-            ("signals", "Measured against modelled", "".join(_signals(findings))),
-        ],
+        "rigwatch.structures.report",
+        "identification.html",
+        f=findings,
+        name=findings.problem.sweeper.compiled.system.model.name,
+        headline=_headline(findings),
+        left={method: _left(findings, method) for method in findings.found},
+        iterations=_iterations(findings),
+        signals=_signals(findings),
     )
 
 
-def _header(f: Findings, name: str) -> str:
-    problem, dt = f.problem, f.problem.recording.dt
-    good = [method for method, one in f.found.items() if one.converged]
-    shares = {method: np.nan_to_num(_share(f, method), nan=np.inf) for method in good}
-    words = _best(f, shares) if shares else "no method converged"
-    settled = f" Converged: {', '.join(good)}." if good else ""
-    span = f"{len(problem.observed) * dt:g} s every {dt:g} s, {len(problem.names)} unknowns"
-    return (
-        f'<p class="kicker">{escape(name)}</p><h1>{escape(words)}</h1>'
-        f'<p class="sub">Record {escape(f.record)}: {escape(span)}.{escape(settled)}</p>'
-    )
-
-
-def _best(f: Findings, shares: Mapping[str, float]) -> str:
+def _headline(f: Findings) -> str:
     """The method that explains most, where one explains anything."""
+    if not f.converged:
+        return "no method converged"
+    shares = {m: np.nan_to_num(_share(f, m), nan=np.inf) for m in f.converged}
     best = min(shares, key=lambda method: shares[method])
     if shares[best] > FOLLOWS:
         return "converged, but no trajectory follows the whole record"
     return f"{best} leaves {_left(f, best)} of the signals"
-
-
-def _parameters(f: Findings) -> str:
-    """Each unknown by every method, with its interval."""
-    guesses = f.problem.guess.tolist()
-    rows = [
-        [
-            f"<code>{escape(name)}</code>",
-            exact(guess),
-            *(_figure(one, name) for one in f.found.values()),
-        ]
-        for name, guess in zip(f.problem.names, guesses, strict=True)
-    ]
-    head = ["unknown", "guess", *f.found]
-    words = "In brackets 95 % intervals, for white noise of the size that the residuals show; SI."
-    return f'<p class="note">{words}</p>{table(head, rows, range(1, len(head)))}'
-
-
-def _figure(one: Identification, name: str) -> str:
-    low, high = one.intervals[name]
-    ends = f"<br>[{low:.5g}, {high:.5g}]" if isfinite(low) else ""
-    vague = '<br><span class="warn">not determined</span>' if name in one.undetermined else ""
-    return f"{exact(one.parameters[name], f'{one.method}:{name}')}{ends}{vague}"
-
-
-def _methods(f: Findings) -> str:
-    """How each went."""
-    rows = [
-        [escape(method), _state(one), str(len(one.iterations)), f"{one.seconds:.2f}",
-         _left(f, method), escape("; ".join(one.remarks))]
-        for method, one in f.found.items()
-    ]  # fmt: skip
-    rows += [
-        [escape(method), '<span class="no">failed</span>', "", "", "", escape(why)]
-        for method, why in f.failed.items()
-    ]
-    head = ["method", "", "iterations", "time [s]", "left of the signals", "remarks"]
-    words = (
-        "Left: rms of the residual over rms of the signals, along one trajectory from the first"
-        " sample on. Where motion is chaotic or runs away, right figures part from the record too."
-    )
-    return f'<p class="note">{words}</p>{table(head, rows, (2, 3, 4))}'
-
-
-def _state(one: Identification) -> str:
-    kind, words = ("good", "converged") if one.converged else ("no", "did not converge")
-    return f'<span class="{kind}">{words}</span>'
 
 
 def _left(f: Findings, method: str) -> str:
@@ -156,7 +102,7 @@ def _share(f: Findings, method: str) -> float:
 
 
 def _iterations(f: Findings) -> str:
-    """How fast each method settled, and its figures on the way."""
+    """How fast each method settled."""
     changes = {method: _changes(f.problem, one) for method, one in f.found.items()}
     longest = max((len(c) for c in changes.values()), default=1)
     high = max((float(c.max()) for c in changes.values() if len(c)), default=1.0)
@@ -171,7 +117,7 @@ def _iterations(f: Findings) -> str:
         plot.line(
             moved + np.float64(1.0), drawn[moved], colour, marks=longest <= MARKED, name=method
         )
-    return f"{key(*f.legend)}{figure(plot.drawn())}{''.join(_turns(f))}"
+    return plot.drawn()
 
 
 def _changes(problem: Problem, one: Identification) -> FloatArray:
@@ -186,27 +132,18 @@ def _changes(problem: Problem, one: Identification) -> FloatArray:
     return np.where(change == 0, 0.0, seen)
 
 
-def _turns(f: Findings) -> Iterator[str]:
-    for method, one in f.found.items():
-        rows = [
-            [str(number), *(exact(value) for value in row)]
-            for number, row in enumerate([f.problem.guess.tolist(), *one.iterations.tolist()])
-        ]
-        head = ["", *one.names]
-        yield f"<details><summary>{escape(method)}: unknowns after each iteration</summary>"
-        yield f"{table(head, rows, range(1, len(head)))}</details>"
-
-
-def _signals(f: Findings) -> Iterator[str]:
-    yield key(("measured", "measured"), *f.legend)
+def _signals(f: Findings) -> Iterator[tuple[str, str, str]]:
+    """Name of each measured output, its drawing, and that of what is left of it."""
     seconds, outputs = seconds_of(f.problem), f.problem.sweeper.compiled.system.model.outputs
     for k, (name, output) in enumerate(outputs.items()):
         measured = f.problem.observed[:, k]
         if np.isfinite(measured).any():
             made = {method: values[:, k] for method, values in f.modelled.items()}
-            yield f"<h3>{escape(name)}</h3>"
-            yield figure(_signal(f, seconds, measured, made, f"{name} [{output.unit}]"))
-            yield figure(_residual(f, seconds, measured, made, f"residual [{output.unit}]"))
+            yield (
+                name,
+                _signal(f, seconds, measured, made, f"{name} [{output.unit}]"),
+                _residual(f, seconds, measured, made, f"residual [{output.unit}]"),
+            )
 
 
 def _signal(

@@ -12,6 +12,8 @@ from rigwatch.workbench.compare import Region, motion, sample_numbers
 from rigwatch.workbench.steps import Signals, Stage
 
 CELLS = 22
+NARROW = 6
+"""Bars that have room in half the page's width."""
 CROSSINGS = 8
 """Crossings of its mean that a measured signal makes in the stretch that is shown."""
 
@@ -46,7 +48,8 @@ def error_chart(stages: Sequence[Stage], refused: Sequence[Refused]) -> str:
         f"error [{found[0].unit}]", 760, 320, names=[s.label for s in stages],
     )  # fmt: skip
     for k, level in enumerate(floor.tolist()):
-        plot.box((k - 0.5, k + 0.5), (0.0, level), "floor", f"noise floor {level:.4g}", 0.55)
+        plot.box((k - 0.5, k + 0.5), (0.0, level), "floor", f"noise floor {level:.4g}", 0.25)
+        plot.line(np.array([k - 0.5, k + 0.5]), np.full(2, level), "floor")
     plot.text(-0.46, float(floor[0]), "noise floor", up=6)
     plot.line(at, train, "train", width=2, dash="6 5", marks=True, name="training")
     plot.line(at, held_out, "held", width=3, marks=True, name="held out")
@@ -170,7 +173,7 @@ def bars_chart(
     names = [region.name for region in before]
     by_name = {region.name: region for region in now}
     values = np.array([r.rms for r in (*before, *now)])
-    wide = len(names) > 6
+    wide = len(names) > NARROW
     plot = Plot(
         f"residual by {words}", (-0.6, len(names) - 0.4), limits(values, zero=True),
         "" if not wide else words, f"rms [{unit}]", 760 if wide else 372, 230,
@@ -219,17 +222,3 @@ def _density(stage: Stage, channel: int) -> tuple[FloatArray, FloatArray]:
     length = min(len(residual), max(256, len(residual) // 6))
     rate, density = welch(residual, 1 / (recording.dt * factor), nperseg=length)
     return rate[1:], np.maximum(density[1:], 1e-300)
-
-
-def interval_chart(value: float, interval: tuple[float, float] | None) -> str:
-    """A parameter's interval relative to its value, from −50 % to +50 %."""
-    if interval is None or value == 0:
-        return ""
-    low, high = ((end - value) / abs(value) for end in interval)
-    a, b = (60 + 110 * float(np.clip(end, -0.5, 0.5)) for end in (low, high))
-    return (
-        f'<svg viewBox="0 0 120 14" class="whisker" role="img">'
-        f'<title>{low:+.1%} to {high:+.1%}</title><path class="grid" d="M60 1V13"/>'
-        f'<path d="M{a:.1f} 7H{max(b, a + 1):.1f}" stroke="var(--held)" stroke-width="3"/>'
-        f'<circle cx="60" cy="7" r="3" fill="var(--held)"/></svg>'
-    )

@@ -14,7 +14,7 @@ from rigwatch.page import page
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import locate
 from rigwatch.workbench.explain import explanation, ranking
-from rigwatch.workbench.report import sections
+from rigwatch.workbench.report import charts, sections
 from rigwatch.workbench.steps import signals, stages
 from rigwatch.workbench.study import Study
 from rigwatch.workbench.study import ledger as book
@@ -40,17 +40,9 @@ def gather(study: Study, progress: Callable[[str], None] = lambda _: None) -> se
 
 def report_html(m: sections.Material) -> str:
     """The page."""
+    name = m.study.folder.resolve().name
     return page(
-        f"{m.study.folder.resolve().name}: what the model is missing",
-        sections.header(m),
-        [
-            ("errors", "The error, step by step", sections.errors(m)),
-            ("signals", "Measured against modelled", sections.measured(m)),
-            ("where", "Where the model fails", sections.where(m)),
-            ("ranking", "What may be missing still", sections.ranking(m)),
-            ("parameters", "Parameters", sections.parameters(m)),
-            ("ledger", "Ledger", sections.ledger(m)),
-        ],
+        "rigwatch.workbench.report", "study.html", m=m, name=name, sections=sections, charts=charts
     )
 
 

@@ -1,16 +1,16 @@
-"""The report's sections: what a study's numbers are in words, tables and pictures."""
+"""The report's sections: what `templates/study.html` shows of a study, in words and drawings."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
 from typing import Any
 
 import numpy as np
 
-from rigwatch.page import exact, figure, key, limits, table
+from rigwatch.page import limits
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Region
-from rigwatch.workbench.explain import Explanation, Row
+from rigwatch.workbench.explain import Explanation
+from rigwatch.workbench.fit import Value
 from rigwatch.workbench.report import charts
 from rigwatch.workbench.report.text_report import VERDICTS, doubt_of
 from rigwatch.workbench.steps import Signals, Stage
@@ -57,28 +57,7 @@ class Material:
         return list(found.values())
 
 
-def header(m: Material) -> str:
-    """The verdict in plain words, and the figures that matter."""
-    first, last = m.stages[0].comparison, m.stages[-1].comparison
-    unit = escape(last.unit)
-    cards = [
-        (exact(first.held_out_error), f"held-out error of the model alone [{unit}]"),
-        (exact(last.held_out_error, "held_out_error"), f"held-out error now [{unit}]"),
-        (exact(last.train_error, "train_error"), f"training error now [{unit}]"),
-        (exact(last.noise_floor, "noise_floor"), f"noise floor [{unit}]"),
-    ]
-    name = m.study.folder.resolve().name
-    figures = "".join(f'<div class="figure"><b>{n}</b><span>{w}</span></div>' for n, w in cards)
-    return (
-        f'<p class="kicker">{escape(name)} · {escape(m.study.model.name)}</p>'
-        f'<h1 id="verdict" data-verdict="{m.explanation.verdict}">{escape(_headline(m))}</h1>'
-        f"<p>{escape(_story(m))}</p><p>{escape(_sentence(doubt_of(m.explanation)))}</p>"
-        f'<p class="sub">{escape(m.study.model.summary)} Noise floor from'
-        f' {escape(last.noise_from)}.</p><div class="figures">{figures}</div>'
-    )
-
-
-def _headline(m: Material) -> str:
+def headline(m: Material) -> str:
     """What a reader takes along: how far the error fell, and what is missing still."""
     first, last = m.stages[0].comparison, m.stages[-1].comparison
     best = m.explanation.ranking[0] if m.explanation.ranking else None
@@ -98,7 +77,9 @@ def _headline(m: Material) -> str:
     return f"{fall} on unseen data; {still}"
 
 
-def _sentence(text: str) -> str:
+def doubt(m: Material) -> str:
+    """How sure the verdict is, as a sentence."""
+    text = doubt_of(m.explanation)
     return f"{text[0].upper()}{text[1:]}."
 
 
@@ -111,7 +92,8 @@ def _listed(m: Material) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
-def _story(m: Material) -> str:
+def story(m: Material) -> str:
+    """What was done and what came of it."""
     first, last = m.stages[0].comparison, m.stages[-1].comparison
     verdict = f"Verdict on the model as it is: {m.explanation.text}."
     if len(m.stages) == 1:
@@ -122,44 +104,8 @@ def _story(m: Material) -> str:
     )
 
 
-def errors(m: Material) -> str:
-    """Errors step by step."""
-    picture = charts.error_chart(m.stages, m.refused)
-    rows = []
-    for stage in m.stages:
-        c = stage.comparison
-        physics = m.study.effects[stage.added.split("@")[0]].physics if stage.added else ""
-        rows.append(
-            [
-                escape(stage.added or "model alone"), exact(c.train_error), exact(c.held_out_error),
-                exact(c.noise_floor), escape(physics),
-            ]
-        )  # fmt: skip
-    legend = key(
-        ("held", "held out"), ("train", "training"), ("floor", "noise floor"),
-        ("refused", "refused (hollow)"),
-    )  # fmt: skip
-    head = ["step", "training", "held out", "noise floor", "what it is"]
-    channels = [
-        [
-            escape(name), exact(c.train_error, f"{name}.train_error"),
-            exact(c.held_out_error, f"{name}.held_out_error"),
-            exact(c.noise_floor, f"{name}.noise_floor"), escape(c.unit),
-        ]
-        for name, c in m.stages[-1].comparison.channels.items()
-    ]  # fmt: skip
-    per_channel = table(["channel, now", "training", "held out", "noise floor", "unit"], channels,
-                        (1, 2, 3))  # fmt: skip
-    return figure(picture) + legend + table(head, rows, (1, 2, 3)) + per_channel
-
-
-def measured(m: Material) -> str:
-    """Measured against modelled before and after each accepted effect."""
-    parts = [
-        key(("measured", "measured"), ("model", "modelled"), ("rest", "residual")),
-        '<p class="note">Recordings held out; the stretch where the error fell most. All steps'
-        " share their axes.</p>",
-    ]
+def measured(m: Material) -> Iterator[tuple[str, str, str]]:
+    """Of each channel and step: heading, drawn signals, drawn residual."""
     for channel, (name, output) in enumerate(m.study.model.outputs.items()):
         axis = f"{name} [{output.unit}]"
         part = charts.stretch(m.signals[0], m.signals[-1], channel)
@@ -169,11 +115,11 @@ def measured(m: Material) -> str:
         rest = _without_spikes([s.residual[part, channel] for s in m.signals])
         for stage, found in zip(m.stages, m.signals, strict=True):
             error = stage.comparison.channels[name].held_out_error
-            heading = f"{stage.label}: {name}, {error:.3g} {output.unit} over the whole recording"
-            parts += [f"<h3>{escape(heading)}</h3>"]
-            parts += [figure(charts.signal_chart(found, channel, part, axis, ends))]
-            parts += [figure(charts.residual_chart(found, channel, part, output.unit, rest))]
-    return "".join(parts)
+            yield (
+                f"{stage.label}: {name}, {error:.3g} {output.unit} over the whole recording",
+                charts.signal_chart(found, channel, part, axis, ends),
+                charts.residual_chart(found, channel, part, output.unit, rest),
+            )
 
 
 def _without_spikes(residuals: Sequence[FloatArray]) -> tuple[float, float]:
@@ -182,47 +128,51 @@ def _without_spikes(residuals: Sequence[FloatArray]) -> tuple[float, float]:
     return limits(*usual, room=0.25)
 
 
-def where(m: Material) -> str:
-    """Where-maps: motion, direction, amplitude, time, frequency."""
-    parts = [
-        key(("before", "model alone"), ("held", "model as it is"), ("plus", "mean above 0"),
-            ("minus", "below 0")),
-        '<p class="note">Residual of the training recordings, as rigwatch locate counts it.</p>',
-    ]  # fmt: skip
+@dataclass(frozen=True)
+class Where:
+    """Where the model fails in one channel: drawings by their captions.
+
+    Attributes:
+        channel: its name.
+        maps: mean residual by position and velocity, empty where the model has no motion.
+        peak: mean residual of full colour, in the channel's unit.
+        narrow, wide: bars, two beside each other and one by one.
+    """
+
+    channel: str
+    maps: dict[str, str]
+    peak: float
+    narrow: dict[str, str]
+    wide: dict[str, str]
+
+
+def where(m: Material) -> Iterator[Where]:
+    """Where-maps of each channel: motion, direction, amplitude, time, frequency."""
     first, last = m.stages[0], m.stages[-1]
     for channel, (name, output) in enumerate(m.study.model.outputs.items()):
-        parts.append(f"<h3>{escape(name)}</h3>")
-        most = charts.surface_peak(first, channel)
-        maps = [charts.surface_chart(s, channel, most, output.unit) for s in (first, last)]
-        words = ("model alone", "model as it is")
-        drawn = [figure(p, w) for p, w in zip(maps, words, strict=True) if p]
-        if drawn:
-            parts.append(f'<div class="pair">{"".join(drawn)}</div>')
-            scale = f"Full colour from {most:.3g} {output.unit} of mean residual in a cell on."
-            parts.append(f'<p class="note">{escape(scale)}</p>')
-        parts += _bars(m, name, output.unit)
-        parts.append(
-            figure(
-                charts.spectrum_chart(first, last, channel, output.unit),
-                "Spectral density of the residual",
-            )
-        )
-    return "".join(parts)
+        peak = charts.surface_peak(first, channel)
+        drawn = {
+            words: charts.surface_chart(stage, channel, peak, output.unit)
+            for words, stage in (("model alone", first), ("model as it is", last))
+        }
+        maps = {words: drawing for words, drawing in drawn.items() if drawing}
+        bars = {wide: _bars(m, name, output.unit, wide=wide) for wide in (False, True)}
+        spectrum = charts.spectrum_chart(first, last, channel, output.unit)
+        wide = bars[True] | {"Spectral density of the residual": spectrum}
+        yield Where(name, maps, peak, bars[False], wide)
 
 
-def _bars(m: Material, channel: str, unit: str) -> list[str]:
+def _bars(m: Material, channel: str, unit: str, *, wide: bool) -> dict[str, str]:
+    """Bars of the views that need the page's whole width, or of those that do not."""
     floor = m.stages[-1].comparison.channels[channel].noise_floor
-    pair, wide = list[str](), list[str]()
+    drawn = {}
     for view, words in VIEWS.items():
         old, new = ([r for r in found if (r.channel, r.view) == (channel, view)]
                     for found in (m.before, m.now))  # fmt: skip
-        if not old:
-            continue
-        old = sorted(old, key=_order)
-        picture = figure(charts.bars_chart(old, new, floor, words, unit), f"By {words}")
-        (wide if len(old) > 6 else pair).append(picture)
-    both = [f'<div class="pair">{"".join(pair)}</div>'] if pair else []
-    return both + wide
+        if old and wide == (len(old) > charts.NARROW):
+            ordered = sorted(old, key=_order)
+            drawn[f"By {words}"] = charts.bars_chart(ordered, new, floor, words, unit)
+    return drawn
 
 
 def _order(region: Region) -> tuple[float, str]:
@@ -230,78 +180,16 @@ def _order(region: Region) -> tuple[float, str]:
     return (float(words[0]) if words else 0.0), region.name
 
 
-def ranking(m: Material) -> str:
-    """What may be missing still, and why rivals were not taken."""
-    found = m.explanation
-    rows = [_ranked(row) for row in found.ranking]
-    head = ["effect@port", "training", "held out", "p", "decision", "cannot be told from"]
-    top, rest = rows[:10], rows[10:]
-    parts = [
-        f'<p class="note">{escape(found.text)}. {len(rows)} effects at ports were scored along the'
-        " model as it is; p is corrected for that number. Errors stand where a full fit was worth"
-        " it.</p>",
-        table(head, top, (1, 2, 3)),
-    ]
-    if rest:
-        more = table(head, rest, (1, 2, 3))
-        parts.append(f"<details><summary>{len(rest)} more</summary>{more}</details>")
-    if m.refused:
-        tried = [
-            [escape(r.label), exact(r.held_out_error),
-             exact(m.stages[r.after].comparison.held_out_error), '<span class="no">refused</span>']
-            for r in m.refused
-        ]  # fmt: skip
-        parts.append("<h3>Tried, and refused on the recordings held out</h3>")
-        parts.append(table(["effect@port", "held out with it", "without it", ""], tried, (1, 2)))
-    if found.next_experiment:
-        parts.append(f"<h3>Next experiment</h3><p>{escape(found.next_experiment.text)}</p>")
-    return "".join(parts)
+def relative(value: Value) -> tuple[float, float] | None:
+    """Ends of a parameter's interval, from its value and as a share of it; None without one."""
+    if value.interval is None or value.value == 0:
+        return None
+    low, high = ((end - value.value) / abs(value.value) for end in value.interval)
+    return low, high
 
 
-def _ranked(row: Row) -> list[str]:
-    p = "&lt; 1e-6" if row.p_value < 1e-6 else f"{row.p_value:.1g}"
-    kind = "good" if row.accepted else "no"
-    words = "accepted" if row.accepted else row.reason
-    decision = f'<span class="{kind}">{escape(words)}</span>'
-    return [
-        escape(f"{row.effect}@{row.port}"), exact(row.train_error), exact(row.held_out_error), p,
-        decision, escape(", ".join(row.class_)),
-    ]  # fmt: skip
-
-
-def parameters(m: Material) -> str:
-    """Values with intervals."""
-    rows = []
-    for name, v in m.stages[-1].comparison.parameters.items():
-        ends = "held" if v.interval is None else f"{v.interval[0]:.4g} … {v.interval[1]:.4g}"
-        note = f'<span class="warn">{escape(v.note)}</span>'
-        whisker = charts.interval_chart(v.value, v.interval)
-        rows.append([f"<code>{escape(name)}</code>", exact(v.value, name), ends,
-                     escape(v.unit.strip("()")), whisker, note])  # fmt: skip
-    head = ["parameter", "value", "95 % interval", "unit", "−50 % to +50 %", ""]
-    words = "Intervals hold where residuals hang together: whole blocks vary, not samples."
-    return f'<p class="note">{words}</p>{table(head, rows, (1, 2))}'
-
-
-def ledger(m: Material) -> str:
-    """Every step, with what it stood on."""
-    rows = [
-        [
-            escape(str(line.get("time", ""))), escape(str(line.get("step", ""))),
-            escape(f"{line['effect']}@{line['port']}" if "effect" in line else ""),
-            exact(line.get("train_error")), exact(line.get("held_out_error")),
-            escape(str(line.get("reason", ""))),
-        ]
-        for line in m.ledger
-    ]  # fmt: skip
-    head = ["time", "step", "effect", "training", "held out", "why"]
-    hashes = dict(m.ledger[-1].get("data", {})) if m.ledger else {}
-    data = [[f"<code>{escape(n)}</code>", f"<code>{escape(h)}</code>"] for n, h in hashes.items()]
-    if m.ledger:
-        data.append(["model and effects", f"<code>{escape(m.ledger[-1]['model'])}</code>"])
-    words = f"rigwatch study replay {m.study.folder} fits every step again and compares."
-    return (
-        f'<p class="note">{escape(words)}</p>{table(head, rows, (3, 4))}'
-        f"<details><summary>SHA-256 of what the last step stood on</summary>"
-        f"{table(['file', 'SHA-256'], data)}</details>"
-    )
+def hashes(m: Material) -> dict[str, str]:
+    """SHA-256 of all that the ledger's last step stood on, by file."""
+    if not m.ledger:
+        return {}
+    return {**m.ledger[-1].get("data", {}), "model and effects": m.ledger[-1]["model"]}

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.structures_published import Published
 from rigwatch.structures.identification.integrators import DORMAND_PRINCE
 from rigwatch.structures.model.description import Structure
 from rigwatch.structures.model.edit import with_values
 from rigwatch.structures.model.matrices import mass_matrix, stiffness_matrix
 from rigwatch.structures.records.record import Record
 from rigwatch.wire.arrays import FloatArray
+from tests.structures.published import Published
 
 Rates = Callable[[float, FloatArray], FloatArray]
 

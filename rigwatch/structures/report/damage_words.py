@@ -1,0 +1,77 @@
+"""What an examination found, in words for people."""
+
+from rigwatch.structures.damage import Damage, Examination, Ranking
+from rigwatch.structures.model import label
+
+
+def verdict(found: Examination) -> str:
+    """The result in a few words."""
+    if not found.damages:
+        return "no damage"
+    places = [
+        f"{changes(d)} at {d.instant.time:.3f} s"
+        if d.explained
+        else f"a damage at {d.alarm:.3f} s that no change of one spring or two explains"
+        for d in found.damages
+    ]
+    return "; ".join(places)
+
+
+def changes(damage: Damage) -> str:
+    """What changed, in words."""
+    return " and ".join(f"{c.spring} {c.words}" for c in damage.ranking.changed)
+
+
+def remark(found: Examination) -> str:
+    """What a reader has to know of the sensors, empty where every position was measured."""
+    model = found.reference.model
+    nodes = [label("x", node) for node in model.structure.nodes]
+    hidden = [name for name in nodes if name not in model.signals]
+    if not hidden:
+        return ""
+    return (
+        f" The positions {', '.join(hidden)} were not measured: large changes that move them are"
+        " noticed, but located less surely."
+    )
+
+
+def rule(found: Examination) -> str:
+    """What counts as an alarm."""
+    if found.settings.limit is not None:
+        return f"An alarm is a residual beyond {found.settings.limit:g}, the limit that was set."
+    share = 100 * found.settings.rate
+    return (
+        "An alarm is a cumulative sum of squared residuals beyond a threshold that noise alone"
+        f" reaches in {share:g} % of such records."
+    )
+
+
+def alike(ranking: Ranking) -> str:
+    """Which places this record cannot tell apart."""
+    changed = ranking.changed
+    known = "No change of a single spring explains the data. " if ranking.second else ""
+    vague = [
+        f"This record cannot tell {c.name} from a change of {', '.join(c.alike)}."
+        for c in changed
+        if c.alike
+    ]
+    return known + (" ".join(vague) or "Nothing else looks like it in this record.")
+
+
+def doubt(damage: Damage) -> str:
+    """A warning where nothing explains the damage, else nothing."""
+    if damage.explained:
+        return ""
+    return (
+        " Neither one change nor two at once explain the data; the figures below are not to be"
+        " trusted."
+    )
+
+
+def unseen(damage: Damage, found: Examination) -> str:
+    """At which springs the data would not show a damage."""
+    weak = damage.ranking.unseen
+    total = len(found.reference.model.structure.springs)
+    if not weak:
+        return f" The data would show a tenth of stiffness lost at any of the {total} springs."
+    return f" They would not show a tenth of stiffness lost at {', '.join(weak)}."
