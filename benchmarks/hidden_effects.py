@@ -25,6 +25,7 @@ import numpy as np
 from benchmarks.hidden import asked, collected, confusion, counted, share_row, wanted
 from benchmarks.table import Row, as_text
 from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.compare import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain import verdict_calibration as calibration
