@@ -170,8 +170,8 @@ def comparison(bench: Bench) -> Comparison:
 
 
 def _free(bench: Bench) -> list[float | None]:
-    """Errors of a free run; none for a model without states or a recording in several parts."""
+    """Errors of a free run; none without states, along the motion or of several recordings."""
     model, file = bench.study.model, bench.study.file
-    if not model.states or len(file.held_out) > 1:
+    if not model.states or bench.data.along_motion or len(file.held_out) > 1:
         return [None] * len(model.outputs)
     return [float(error) for error in free_run(bench.base, bench.data.held_out)]
