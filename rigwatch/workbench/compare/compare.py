@@ -92,7 +92,15 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
         ModelError: data have changed, or do not suit the model.
     """
     check_data(study)
-    data = prepare(study)
+    return told_by_healthy(study, prepare(study))
+
+
+def told_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:
+    """The same of recordings that are in memory, for the study's model as it was written.
+
+    Raises:
+        ModelError: the model cannot be fitted to the healthy recording.
+    """
     if goes_along_motion(study):
         study, data = along_motion(study, data)
     several = data.train.outputs.shape[1] > 1 or data.along_motion
