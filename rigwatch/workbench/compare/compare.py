@@ -107,7 +107,15 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
         ModelError: data have changed, or do not suit the model.
     """
     check_data(study)
-    data = prepare(study)
+    return told_by_healthy(study, prepare(study))
+
+
+def told_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:
+    """The same of recordings that are in memory, for the study's model as it was written.
+
+    Raises:
+        ModelError: the model cannot be fitted to the healthy recording.
+    """
     if goes_along_motion(study):
         study, data = along_motion(study, data)
     several = data.train.outputs.shape[1] > 1 or data.along_motion
@@ -192,8 +200,8 @@ def comparison(bench: Bench) -> Comparison:
 
 
 def _free(bench: Bench) -> list[float | None]:
-    """Errors of a free run; none for a model without states or a recording in several parts."""
+    """Errors of a free run; none without states, along the motion or of several recordings."""
     model, file = bench.study.model, bench.study.file
-    if not model.states or len(file.held_out) > 1:
+    if not model.states or bench.data.along_motion or len(file.held_out) > 1:
         return [None] * len(model.outputs)
     return [float(error) for error in free_run(bench.base, bench.data.held_out)]

@@ -104,7 +104,8 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     """The same for people and programs."""
     members, rivals = [*verdict.members, *verdict.rivals], list(verdict.rivals)
     experiment = None
-    if verdict.best is not None and rivals:
+    # An excitation is tried by simulating the motion, which a model along it does not.
+    if verdict.best is not None and rivals and not bench.data.along_motion:
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
     more: dict[str, float] = {}
     if verdict.best is not None and verdict.best.fitted is not None:
