@@ -18,6 +18,7 @@ from rigwatch.workbench.fit import (
     referenced,
     values,
 )
+from rigwatch.workbench.healthy_remainder import learns_from_healthy, with_healthy_remainder
 from rigwatch.workbench.motion import along_motion, goes_along_motion
 from rigwatch.workbench.study import Study, check_data
 
@@ -93,6 +94,8 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     """
     check_data(study)
     data = prepare(study)
+    if learns_from_healthy(study):
+        return *with_healthy_remainder(study, data), None
     if goes_along_motion(study):
         study, data = along_motion(study, data)
     several = data.train.outputs.shape[1] > 1 or data.along_motion

@@ -13,7 +13,7 @@ from rigwatch.workbench.fit.fitted_model import (
 from rigwatch.workbench.fit.free_run import free_run
 from rigwatch.workbench.fit.healthy_parameters import commissioned, loosened
 from rigwatch.workbench.fit.healthy_reference import referenced
-from rigwatch.workbench.fit.intervals import Value, values
+from rigwatch.workbench.fit.intervals import Value, covariance, values
 from rigwatch.workbench.fit.profile import profile
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "Value",
     "block_errors",
     "commissioned",
+    "covariance",
     "fit_again",
     "fit_base",
     "fit_model",
