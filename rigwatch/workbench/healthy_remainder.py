@@ -19,6 +19,7 @@ from msgspec import structs
 from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.measured_motion import has_hidden_states
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, port_sizes
 from rigwatch.workbench.fit import Fitted, covariance, fit_model
@@ -33,12 +34,18 @@ FIT_SHARE = 0.6
 WORTH = 0.03
 """Share by which the error of windows that were not fitted must fall for more terms."""
 SUBSTEPS = 4
+"""Integration steps a sample at least: the hidden states are as fast as a valve."""
+LARGER = 1.2
+"""Motion over the healthy one under which a model must still stay bounded."""
+TOGETHER, BOUNDED = 0.02, 3.0
+"""How far two runs may be apart at last, and how large they may become, in sizes of the output."""
 
 Sizes = Mapping[str, Mapping[str, float]]
 Step = Callable[[Model, Sizes], Model]
 STEPS: Mapping[str, Step] = {
     "friction": with_friction,
-    "products of three": lambda model, sizes: with_products(model, sizes, 3),
+    "products of motion": lambda model, sizes: with_products(model, sizes, 3, ("flow",)),
+    "products of motion and drive": lambda model, sizes: with_products(model, sizes, 3),
     "products of two": lambda model, sizes: with_products(model, sizes, 2),
 }
 """What is tried in turn, by what it is called."""
@@ -84,12 +91,13 @@ def with_healthy_remainder(study: Study, data: Data) -> tuple[Study, Data]:
         )
     horizon = LONGER * data.horizon
     study, driven = along_motion(study, data)
-    assert driven.healthy is not None
-    every = (driven.train, driven.held_out, driven.healthy)
+    healthy = driven.healthy
+    assert healthy is not None
+    every = (driven.train, driven.held_out, healthy)
     whole = all(part % horizon == 0 for recording in every for part in recording.parts)
     driven = replace(driven, horizon=horizon if whole else data.horizon)
     study = replace(study, file=structs.replace(study.file, substeps=SUBSTEPS))
-    found = learn(study, driven.healthy, driven.horizon)
+    found = learn(study, healthy, driven.horizon)
     kept = tuple(found.fitted.compiled.system.free)
     told = Kept(kept, covariance(found.fitted.train)[0])
     # What the file says to start from has been used, and must not move what was learned.
@@ -116,11 +124,36 @@ def learn(study: Study, healthy: Recording, horizon: int) -> Learned:
         if larger is model:
             continue
         tried = _tried(study, larger, both, best.train.values())
-        if tried is not None and tried.held_out_error < (1 - WORTH) * best.held_out_error:
+        if tried is None or tried.held_out_error > (1 - WORTH) * best.held_out_error:
+            continue
+        if _forgets(tried, healthy):
             model, best = larger, tried
             steps.append(name)
     whole = Data(healthy, healthy, None, horizon, ())
     return Learned(model, _fit(study, model, whole, best.train.values()), tuple(steps))
+
+
+def _forgets(fitted: Fitted, healthy: Recording) -> bool:
+    """Whether the model stays where it belongs under a motion larger than any that was fitted.
+
+    Products may hold several equilibria, and one that nobody has seen is met by the next recording.
+    So two runs from different states must come together, and stay as large as the output.
+    """
+    states = len(fitted.compiled.system.states)
+    starts = np.stack([np.zeros(states), _largest_states(fitted)])
+    run = fitted.compiled.simulate(
+        LARGER * healthy.inputs, healthy.dt, np.zeros(2, np.int64), len(healthy), initial=starts,
+        parameters=fitted.train.parameters, substeps=fitted.substeps,
+    )  # fmt: skip
+    later = run.outputs[:, len(healthy) // 2 :]
+    size = np.nanstd(healthy.outputs, axis=0)
+    apart = np.sqrt(np.mean((later[0] - later[1]) ** 2, axis=0))
+    reached = np.sqrt(np.mean(later**2, axis=(0, 1)))
+    return bool(np.all(apart < TOGETHER * size) and np.all(reached < BOUNDED * size))
+
+
+def _largest_states(fitted: Fitted) -> FloatArray:
+    return np.asarray(np.max(np.abs(fitted.train.initial), axis=0))
 
 
 def _tried(study: Study, model: Model, both: Data, start: Mapping[str, float]) -> Fitted | None:

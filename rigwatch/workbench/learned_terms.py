@@ -55,24 +55,39 @@ def with_friction(model: Model, sizes: Mapping[str, Mapping[str, float]]) -> Mod
     return model
 
 
-def with_products(model: Model, sizes: Mapping[str, Mapping[str, float]], order: int) -> Model:
-    """The model with products of one order at its port `remainder`; as it is where it has none."""
+def with_products(
+    model: Model,
+    sizes: Mapping[str, Mapping[str, float]],
+    order: int,
+    without: tuple[str, ...] = (),
+) -> Model:
+    """The model with products of one order at its port `remainder`; as it is where it has none.
+
+    Args:
+        model: to be extended; products that it has already are not added again.
+        sizes: of each port's variables, in their units.
+        order: of the products.
+        without: variables of the port that are left out.
+    """
     port = model.ports.get(PORT)
     if port is None:
         return model
+    variables = {n: variable for n, variable in port.variables.items() if n not in without}
     parameters = dict(model.parameters)
     shares = {}
-    for name, variable in port.variables.items():
+    for name, variable in variables.items():
         size = f"{LEARNED}size_{name}"
-        parameters[size] = Parameter(value=sizes[PORT][name], unit=variable.unit, fixed=True)
-        shares[name] = _share(
-            variable.expression, size, bounded=variable.expression in model.states
+        parameters.setdefault(
+            size, Parameter(value=sizes[PORT][name], unit=variable.unit, fixed=True)
         )
+        bounded = variable.expression in model.states
+        shares[name] = _share(variable.expression, size, bounded=bounded)
     terms = []
-    for names in combinations_with_replacement(port.variables, order):
+    for names in combinations_with_replacement(variables, order):
         coefficient = LEARNED + "_".join(names)
-        parameters[coefficient] = Parameter(value=0.0, unit=port.unit, kept=True)
-        terms.append("*".join([coefficient, *(shares[name] for name in names)]))
+        if coefficient not in parameters:
+            parameters[coefficient] = Parameter(value=0.0, unit=port.unit, kept=True)
+            terms.append("*".join([coefficient, *(shares[name] for name in names)]))
     return _entering(replace(model, parameters=parameters), PORT, " + ".join(terms))
 
 

@@ -11,5 +11,15 @@ from rigwatch.workbench.explain.explain import (
     explanation,
     ranking,
 )
+from rigwatch.workbench.explain.verdict import MUCH_WORSE, Verdict
 
-__all__ = ["Explanation", "Row", "as_data", "explain", "explanation", "ranking"]
+__all__ = [
+    "MUCH_WORSE",
+    "Explanation",
+    "Row",
+    "Verdict",
+    "as_data",
+    "explain",
+    "explanation",
+    "ranking",
+]

@@ -10,6 +10,7 @@ from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.explain.verdict_calibration import seen
 from rigwatch.workbench.fit import Value, values
 from rigwatch.workbench.ranking import Progress, Ranked, rank, unheard
+from rigwatch.workbench.rough_verdict import modest
 from rigwatch.workbench.study import Study
 
 
@@ -88,6 +89,8 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     if verdict.word == "unknown_effect" and verdict.best is not None:
         progress(f"{verdict.best.label} leaves much: trying two effects at once")
         verdict = two_effects(bench, rows, verdict, progress)
+    if bench.study.model.rough:
+        verdict = modest(bench.base, rows, bench.floor, verdict)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
