@@ -1,4 +1,4 @@
-"""A linear black box of the rig: what it leaves of a healthy recording is no effect."""
+"""A linear black box that runs free: what it leaves of a healthy recording is no effect."""
 
 from pathlib import Path
 
@@ -23,9 +23,12 @@ def record(folder: Path, name: str, noise: int, phases: int = 1, **effects: floa
     write_session(folder / f"{name}.mcap", scenario, seed=noise)
 
 
-def study(folder: Path, text: str = "") -> Study:
+FREE = 'prediction = "free"\n' + TEMPLATE.read_text(encoding="utf-8")
+
+
+def study(folder: Path, text: str = FREE) -> Study:
     template = folder / "template.toml"
-    template.write_text(text or TEMPLATE.read_text(encoding="utf-8"), encoding="utf-8")
+    template.write_text(text, encoding="utf-8")
     return create(folder / "study", template)
 
 
@@ -50,7 +53,7 @@ def test_drag_shows_above_what_the_box_leaves_anyway(tmp_path):
 def test_recordings_that_start_elsewhere_in_the_period_are_aligned(tmp_path):
     record(tmp_path, "healthy", 1)
     record(tmp_path, "rig", 2)
-    text = TEMPLATE.read_text(encoding="utf-8").replace("end = 12.0", "start = 1.37\nend = 13.37")
+    text = FREE.replace("end = 12.0", "start = 1.37\nend = 13.37")
     bench = open_bench(study(tmp_path, text))
     assert bench.floor.ratio(bench.base.train) < 1.1
 
@@ -62,15 +65,14 @@ def test_recordings_that_start_elsewhere_in_the_period_are_aligned(tmp_path):
 def test_without_the_same_excitation_it_says_what_is_needed(tmp_path, phases, cut, words):
     record(tmp_path, "healthy", 1, phases)
     record(tmp_path, "rig", 2)
-    text = TEMPLATE.read_text(encoding="utf-8")
     with pytest.raises(ModelError, match=words):
-        open_bench(study(tmp_path, text.split(cut)[0] if cut else text))
+        open_bench(study(tmp_path, FREE.split(cut)[0] if cut else FREE))
 
 
 def test_a_period_must_hold_whole_horizons(tmp_path):
     record(tmp_path, "healthy", 1)
     record(tmp_path, "rig", 2)
-    text = TEMPLATE.read_text(encoding="utf-8").replace("horizon = 0.5", "horizon = 0.6")
+    text = FREE.replace("horizon = 0.5", "horizon = 0.6")
     with pytest.raises(ModelError, match="multiple of the horizon"):
         open_bench(study(tmp_path, text))
 

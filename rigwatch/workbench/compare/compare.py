@@ -25,9 +25,11 @@ from rigwatch.workbench.fit import (
     fit_base,
     fit_model,
     free_run,
+    learns_from_healthy,
     profile,
     referenced,
     values,
+    with_healthy_remainder,
     with_hold,
 )
 from rigwatch.workbench.study import Held, Study, check_data
@@ -116,6 +118,8 @@ def told_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray |
     Raises:
         ModelError: the model cannot be fitted to the healthy recording.
     """
+    if learns_from_healthy(study):
+        return *with_healthy_remainder(study, data), None
     if goes_along_motion(study):
         study, data = along_motion(study, data)
     several = data.train.outputs.shape[1] > 1 or data.along_motion

@@ -8,6 +8,7 @@ from rigwatch.workbench.explain.adequacy import inadequate
 from rigwatch.workbench.explain.believed import believed
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
+from rigwatch.workbench.explain.rough_verdict import modest
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.explain.verdict_calibration import seen
 from rigwatch.workbench.fit import Value, as_written, values
@@ -95,6 +96,8 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     if verdict.word == "unknown_effect" and verdict.best is not None:
         progress(f"{verdict.best.label} leaves much: trying two effects at once")
         verdict = two_effects(bench, rows, verdict, progress)
+    if bench.study.model.rough:
+        verdict = modest(bench.base, rows, bench.floor, verdict)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict

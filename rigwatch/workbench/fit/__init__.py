@@ -14,8 +14,9 @@ from rigwatch.workbench.fit.fitted_model import (
 from rigwatch.workbench.fit.free_run import free_run
 from rigwatch.workbench.fit.healthy_parameters import commissioned, loosened
 from rigwatch.workbench.fit.healthy_reference import referenced
+from rigwatch.workbench.fit.healthy_remainder import learns_from_healthy, with_healthy_remainder
 from rigwatch.workbench.fit.input_hold import held_as, with_hold
-from rigwatch.workbench.fit.intervals import Value, as_written, values
+from rigwatch.workbench.fit.intervals import Value, as_written, covariance, values
 from rigwatch.workbench.fit.profile import profile
 
 __all__ = [
@@ -24,12 +25,14 @@ __all__ = [
     "as_written",
     "block_errors",
     "commissioned",
+    "covariance",
     "fit_again",
     "fit_base",
     "fit_model",
     "fit_twice",
     "free_run",
     "held_as",
+    "learns_from_healthy",
     "loosened",
     "may_be_better",
     "nodes",
@@ -37,5 +40,6 @@ __all__ = [
     "profile",
     "referenced",
     "values",
+    "with_healthy_remainder",
     "with_hold",
 ]

@@ -1,0 +1,75 @@
+"""What a verdict on a rough model may claim.
+
+A model that has learned what a healthy rig does knows it along the motions that it was shown. A
+fault changes the motion, and a little of what is left then is the model's own. So
+
+* where no more is left than on the healthy rig, nothing is missing, whatever would fit that better;
+* where hardly more is left, an effect that fits it is not named;
+* where the best effect leaves more than the healthy rig does, another one that does nearly as well
+  may be the right one: the model's own error may favour either.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.verdict import MUCH_WORSE, Verdict
+from rigwatch.workbench.fit import Fitted
+from rigwatch.workbench.ranking import Ranked
+
+TRANSFERS = 1.2
+"""Error over the healthy one up to which another motion may be all that is behind it.
+
+Healthy rigs of the simulated family leave 1.07 to 1.3 times as much under another excitation.
+"""
+NEARLY = 0.8
+"""Share of the best effect's gain from which another one may be right as well."""
+
+
+def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdict) -> Verdict:
+    """The verdict with no more claimed than a rough model can know.
+
+    Args:
+        base: the model as it is.
+        rows: the ranking.
+        floor: what the model leaves of the healthy recording.
+        found: the verdict on the ranking.
+    """
+    ratio = floor.ratio(base.held_out)
+    if floor.reached(base.held_out):
+        text = f"the held-out error is {ratio:.2f} times that on the healthy recording"
+        return Verdict("nothing_missing", None, (), (), text, evidence=found.evidence)
+    if found.word != "missing_effect" or found.best is None:
+        return found
+    if ratio <= TRANSFERS:
+        text = (
+            f"the held-out error is {ratio:.2f} times that on the healthy recording; as much may"
+            f" be the model's own under another motion; {found.best.label} would explain it"
+        )
+        return replace(found, word="undetermined", text=text)
+    rivals = _nearly_as_good(rows, floor, found)
+    if not rivals:
+        return found
+    text = f"{found.best.label} explains most, and {', '.join(rivals)} nearly as much"
+    return replace(found, word="undetermined", rivals=rivals, text=text)
+
+
+def _nearly_as_good(rows: Sequence[Ranked], floor: NoiseFloor, found: Verdict) -> tuple[str, ...]:
+    """Effects of other physics that may be right where the best leaves more than a healthy rig."""
+    best = found.best
+    assert best is not None
+    assert best.fitted is not None
+    if floor.reached(best.fitted.held_out) or not best.gain or found.second:
+        return ()
+    family = best.placement.effect.family
+    return tuple(
+        row.label
+        for row in rows
+        if row.accepted
+        and row.label not in found.members
+        and not (family and row.placement.effect.family == family and row.port == best.port)
+        and row.gain is not None
+        and row.gain > NEARLY * best.gain
+        and row.held_out_error < MUCH_WORSE * best.held_out_error
+        and row.free <= best.free
+    )
