@@ -48,11 +48,17 @@ unit: $(STAMPS)/dev viewer-packages
 		echo "test: RIGWATCH_DATA names no folder with the measured data sets" >&2; exit 1; fi
 	@pytest -n 2 --dist loadgroup $(TESTS)
 
-bench: $(STAMPS)/bench  ## the benchmarks, printed as a table beside the published figures
-	@python -m benchmarks $(BENCH)
+bench: $(STAMPS)/bench  ## run the benchmarks (BENCH names some) and write docs/benchmarks.md
+	@python -m benchmarks --page $(BENCH)
 
-docs: $(STAMPS)/run  ## write the pages that are printed from the code
-	@python tools/config_docs.py && python tools/command_docs.py && python tools/alarm_docs.py
+docs: $(STAMPS)/run  ## write the pages, tables and pictures that are made by the code
+	@python -m tools.config_docs
+	@python -m tools.command_docs
+	@python -m tools.format_docs
+	@python -m tools.alarm_docs
+	@python -m tools.unit_docs
+	@python -m tools.pictures
+	@python -m benchmarks.results_page
 
 lock: $(STAMPS)/dev  ## write the lock files again (UPGRADE=1 takes newer versions)
 	@tools/lock.sh $(PYTHON_IN)

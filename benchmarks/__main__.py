@@ -1,7 +1,7 @@
 """`python -m benchmarks [NAME...]`: runs the benchmarks and prints one table.
 
 A benchmark is a module of this folder with `def run(quick: bool) -> list[Row]`; nothing else has
-to be entered anywhere.
+to be registered. `--page` keeps the results and writes them to docs/benchmarks.md.
 """
 
 import argparse
@@ -16,7 +16,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 import benchmarks
-from benchmarks.table import Row, as_markdown, as_text
+from benchmarks import results_page
+from benchmarks.table import Row, as_markdown, as_text, failed
 
 
 def names() -> list[str]:
@@ -46,14 +47,14 @@ def _processor() -> str:
 
 
 def measure(name: str, quick: bool) -> list[Row]:
-    """A benchmark's rows; one that fails is a row that misses its bar, and the others go on."""
+    """A benchmark's rows; one that fails is a row that misses its bar, and the others still run."""
     started = time.perf_counter()
     print(f"{name} ...", end=" ", file=sys.stderr, flush=True)
     try:
         rows: list[Row] = importlib.import_module(f"benchmarks.{name}").run(quick)
     except Exception as error:
         traceback.print_exc()
-        rows = [Row(name, f"failed: {type(error).__name__}", "runs", "", str(error), passed=False)]
+        rows = [failed(name, error)]
     print(f"{time.perf_counter() - started:.1f} s", file=sys.stderr)
     return rows
 
@@ -69,6 +70,8 @@ def main() -> int:
     rows = [row for found in results.values() for row in found]
     print("measured on " + ", ".join(f"{key} {value}" for key, value in machine().items()) + "\n")
     print(as_markdown(rows) if arguments.markdown else as_text(rows))
+    if arguments.page and not arguments.quick:
+        results_page.write(results_page.keep(results, machine()))
     if arguments.json:
         as_dicts = {name: [asdict(row) for row in found] for name, found in results.items()}
         text = {"machine": machine(), "results": as_dicts}
@@ -83,7 +86,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("names", nargs="*", metavar="NAME", help="which, default all")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, to try them")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the results there")
-    parser.add_argument("--markdown", action="store_true", help="print the table for a README")
+    parser.add_argument("--markdown", action="store_true", help="print the table as Markdown")
+    parser.add_argument(
+        "--page",
+        action="store_true",
+        help="keep the results of a full run, and write docs/benchmarks.md",
+    )
     return parser
 
 

@@ -1,4 +1,4 @@
-"""What the detectors of theory section 3 see on the simulated rig, beside the friction scheme.
+"""What the detectors of docs/theory.md 3 see on the simulated rig, beside the friction scheme.
 
 All four run in one monitor on the same samples with the same persistence, calibrated from one model
 file. A delay counts from the sample at which the fault comes to the one that raises the alarm.

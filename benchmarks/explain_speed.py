@@ -23,7 +23,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.hidden_effects import NOISE, excitation, explained, noisy
+from benchmarks.hidden_effects import (
+    HORIZON,
+    NOISE,
+    excitation,
+    explained,
+    recorded,
+    study,
+)
 from benchmarks.table import Row
 from rigwatch.physics.engine.equations.effect import load_effects
 from rigwatch.physics.engine.score.significance import corrected_p_values
@@ -31,7 +38,6 @@ from rigwatch.workbench.compare.compare import Bench, bench_of, comparison
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.ranking.rank import candidates, rank_only, refit, score_all
 from sim_plant.oscillator import Hidden, strength_for
-from tests.workbench.simulated import HORIZON, study
 
 CANDIDATES = 30
 SEED = 11
@@ -54,8 +60,8 @@ parameters.vs = { unit = "{v}", role = "constant", value = 1e-3, scale = "v" }
 def recordings() -> Data:
     """What is to be explained."""
     hidden = (Hidden("coulomb", strength_for("coulomb", excitation(SEED), 0.05)),)
-    held_out, healthy = noisy(hidden, SEED + 1000), noisy((), SEED + 2000)
-    return Data(noisy(hidden, SEED), held_out, healthy, HORIZON, ())
+    held_out, healthy = recorded(hidden, SEED + 1000), recorded((), SEED + 2000)
+    return Data(recorded(hidden, SEED), held_out, healthy, HORIZON, ())
 
 
 def opened(data: Data) -> Bench:
@@ -133,7 +139,7 @@ def _in_processes(file: Path, repeats: int) -> Iterator[Row]:
 
 def _step(step: str, what: str, file: Path, caches: str, repeats: int) -> Row:
     """Median of a step's time, each time in a process of its own."""
-    folders = {"NUMBA_CACHE_DIR": f"{caches}/numba", "RIGWATCH_CACHE": f"{caches}/rigwatch"}
+    folders = {"NUMBA_CACHE_DIR": f"{caches}/numba"}
     found = []
     for _ in range(repeats):
         done = subprocess.run(

@@ -82,7 +82,7 @@ def share_row(what: str, hits: Sequence[bool], bar: float | None, note: str) -> 
     """A row that says how many of all hit, against the bar where there is one."""
     passed = None if not hits or bar is None else sum(hits) >= bar * len(hits)
     share = f" = {sum(hits) / len(hits):.1%}" if hits else ""
-    said = "" if bar is None else f"≥ {bar:.0%}"
+    said = "" if bar is None else f"≥ {100 * bar:g}%"
     return Row(what, f"{sum(hits)}/{len(hits)}{share}", said, "", note, passed)
 
 

@@ -16,12 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.hidden import counted, share_row
-from benchmarks.hidden_effects import RIGHT, Case, explained, simulated
+from benchmarks.hidden_effects import RIGHT, Case, explained, simulated, study
 from benchmarks.rivals import NOTHING, TERMS, pysindy_names, sysidentpy_names
 from benchmarks.table import Row
 from rigwatch.workbench.data.signals import Data
 from sim_plant.oscillator import UNKNOWN
-from tests.workbench.simulated import study
 
 POLYNOMIAL = ("constant_force", "quadratic_stiffness", "cubic_stiffness")
 """Effects that a polynomial NARX model can name."""

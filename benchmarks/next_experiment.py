@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.hidden_effects import RIGHT, SAMPLES, explained
+from benchmarks.hidden_effects import HORIZON, RIGHT, SAMPLES, explained, study
 from benchmarks.table import Row
+from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import explanation
 from rigwatch.workbench.explain.next_experiment import excitation
-from sim_plant.oscillator import RATE, Hidden, strength_for
-from tests.workbench.simulated import HORIZON, recorded, size_of, study
+from sim_plant.oscillator import RATE, Hidden, oscillate, strength_for
 
 NOISE = 0.02
 """Standard deviation of the sensors' noise over the rms of what they read under the sine."""
@@ -51,7 +51,7 @@ def decide(name: str, frequency: float, share: float, seed: int = 3) -> Decided 
     """Explain, propose, run, explain; None where the first recording leaves no rivals."""
     time = np.arange(SAMPLES) / RATE
     force = 4 * np.sin(2 * np.pi * frequency * time)
-    noise = NOISE * size_of(force)
+    noise = NOISE * oscillate(force, (), np.zeros(2), 0).std(axis=0)
     hidden = (Hidden(name, strength_for(name, force, share)),)
     bench, rows, verdict = explained(study(), _recorded(force, hidden, noise, seed))
     if verdict.word != "undetermined":
@@ -68,7 +68,7 @@ def decide(name: str, frequency: float, share: float, seed: int = 3) -> Decided 
 
 def _recorded(force: Force, hidden: tuple[Hidden, ...], noise: Force, seed: int) -> Data:
     made = [
-        recorded(force, effects, noise, seed + 50 * k)
+        Recording(1 / RATE, force[:, None], oscillate(force, effects, noise, seed + 50 * k))
         for k, effects in enumerate((hidden, hidden, ()))
     ]
     return Data(made[0], made[1], made[2], HORIZON, ())

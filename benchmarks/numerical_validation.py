@@ -1,4 +1,4 @@
-"""The numerical validation of theory 1.5: second-order plant, three faults, 100 seeds of noise.
+"""The numerical validation of docs/theory.md 1.5: second-order plant, three faults, 100 seeds.
 
 The scheme as published: friction filter [3, 2, 0] from a recording with the known fault, window of
 300 samples moved on by 20, first 100 and last 200 samples left out, thresholds mean ± 3·sd of the

@@ -50,7 +50,7 @@ class Task:
     @property
     def hold(self) -> float:
         """1 where inputs are straight lines between samples, 0 where they are steps."""
-        return 1.0 if self.system.model.hold == "linear" else 0.0
+        return 1.0 if self.system.model.hold != "zero" else 0.0
 
     def names(self) -> list[sympy.Symbol]:
         """Arguments of the equations: time, states, inputs, all parameters."""

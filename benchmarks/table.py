@@ -7,6 +7,8 @@ from dataclasses import dataclass
 HEADINGS = ("", "what", "measured", "bar", "published")
 WIDEST = (4, 44, 34, 26, 26)
 """Widest that a column gets in text [characters]; longer cells are wrapped."""
+RUNS = "runs"
+"""Bar of a benchmark that ended with an error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +37,16 @@ class Row:
         return {True: "ok", False: "MISS", None: ""}[self.passed]
 
 
+def failed(name: str, error: Exception) -> Row:
+    """The row of a benchmark that ended with `error`."""
+    return Row(name, f"failed: {type(error).__name__}", RUNS, "", str(error), passed=False)
+
+
+def ran(rows: Sequence[Row]) -> bool:
+    """Whether a benchmark came to its end and measured something."""
+    return bool(rows) and all(row.bar != RUNS for row in rows)
+
+
 def as_text(rows: Sequence[Row]) -> str:
     """The table for a terminal, notes below their rows."""
     wrapped = [[_wrap(cell, w) for cell, w in zip(_cells(r), WIDEST, strict=True)] for r in rows]
@@ -52,7 +64,7 @@ def as_text(rows: Sequence[Row]) -> str:
 
 
 def as_markdown(rows: Sequence[Row]) -> str:
-    """The table for the README."""
+    """The table for a page of the documentation."""
     out = [
         "| | what | measured | bar | published | note |",
         "| --- | --- | --- | --- | --- | --- |",

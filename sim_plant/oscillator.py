@@ -10,11 +10,14 @@ friction could stop within a step, the mass is held as long as the other forces 
 Symbols: x position [m], v velocity [m/s], u commanded force [N], F force that acts [N].
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from scipy.optimize import brentq
+from scipy.signal import lfilter
 
 from rigwatch.wire.arrays import FloatArray
 
@@ -35,8 +38,13 @@ EFFECTS: tuple[str, ...] = (
     "viscous_by_direction", "dead_band", "saturation", "valve_hysteresis", "delay",
     "acceleration_lag", "position_lag", "acceleration_gain", "position_offset", "position_drift",
     "van_der_pol", "maxwell", "pulsating_spring", "knocks",
+    "acceleration_smoothing", "position_smoothing", "drive_smoothing",
+    "acceleration_average", "position_average", "drive_average",
 )  # fmt: skip
-"""Names of the hidden effects; the last four are in no library."""
+"""Names of the hidden effects; those in `UNKNOWN` are in no library."""
+DIGITAL = EFFECTS[-6:]
+"""Done by a computer, sample by sample: y'(k) = s·y'(k-1) + (1-s)·y(k), or a mean of 1+s samples,
+rounded up. At the drive they make sense where the force is held from sample to sample."""
 UNKNOWN = ("van_der_pol", "maxwell", "pulsating_spring", "knocks")
 
 
@@ -54,7 +62,12 @@ class Hidden:
 
 
 def oscillate(
-    force: FloatArray, hidden: tuple[Hidden, ...], noise: FloatArray, seed: int
+    force: FloatArray,
+    hidden: tuple[Hidden, ...],
+    noise: FloatArray,
+    seed: int,
+    *,
+    held: bool = False,
 ) -> FloatArray:
     """Position [m] and acceleration [m/s^2] as the sensors read them, shape (n, 2).
 
@@ -63,16 +76,31 @@ def oscillate(
         hidden: what is hidden, nothing for a healthy plant.
         noise: standard deviations of the two sensors' white noise, shape (2,).
         seed: of the noise.
+        held: whether the force stays from sample to sample, as a converter's; else a line.
     """
     strengths = np.zeros(len(EFFECTS))
     for effect in hidden:
         strengths[EFFECTS.index(effect.name)] = effect.strength
+    digital = {effect.name: effect.strength for effect in hidden if effect.name in DIGITAL}
+    sent = _digital(np.asarray(force, np.float64), "drive", digital)
     clean = np.empty((len(force), 2))
-    _run(np.ascontiguousarray(force, np.float64), strengths, clean)
+    _run(np.ascontiguousarray(sent), strengths, held, clean)
+    clean[:, 0] = _digital(clean[:, 0], "position", digital)
+    clean[:, 1] = _digital(clean[:, 1], "acceleration", digital)
     return clean + noise * np.random.default_rng(seed).normal(size=clean.shape)
 
 
-def strength_for(name: str, force: FloatArray, share: float) -> float:
+def _digital(signal: FloatArray, where: str, strengths: Mapping[str, float]) -> FloatArray:
+    """What a computer makes of a signal's samples."""
+    if share := min(strengths.get(f"{where}_smoothing", 0.0), 0.995):
+        signal = lfilter([1 - share], [1, -share], signal, zi=[share * signal[0]])[0]
+    if count := 1 + math.ceil(strengths.get(f"{where}_average", 0.0) - 1e-9):
+        before = np.concatenate([np.full(count - 1, signal[0]), signal])
+        signal = np.convolve(before, np.full(count, 1 / count), "valid")
+    return np.asarray(signal, np.float64)
+
+
+def strength_for(name: str, force: FloatArray, share: float, *, held: bool = False) -> float:
     """The strength at which an effect changes the outputs by `share` of their rms.
 
     The larger of the shares of both channels counts.
@@ -81,13 +109,14 @@ def strength_for(name: str, force: FloatArray, share: float) -> float:
         name: one of `EFFECTS`.
         force: commanded, shape (n,) [N].
         share: such as 0.05.
+        held: whether the force stays from sample to sample.
     """
     silent = np.zeros(2)
-    healthy = oscillate(force, (), silent, 0)
+    healthy = oscillate(force, (), silent, 0, held=held)
     size = np.sqrt(np.mean(healthy**2, axis=0))
 
     def caused(strength: float) -> float:
-        moved = oscillate(force, (Hidden(name, strength),), silent, 0) - healthy
+        moved = oscillate(force, (Hidden(name, strength),), silent, 0, held=held) - healthy
         found = float(np.max(np.sqrt(np.mean(moved**2, axis=0)) / size))
         return found if np.isfinite(found) else LIMIT
 
@@ -109,7 +138,7 @@ def _clipped(value: float, limit: float) -> float:
 
 
 @njit(cache=True)
-def _run(force: FloatArray, s: FloatArray, out: FloatArray) -> None:  # noqa: C901, PLR0912, PLR0915 -- a kernel
+def _run(force: FloatArray, s: FloatArray, held: bool, out: FloatArray) -> None:  # noqa: C901, PLR0912, PLR0915 -- a kernel
     h = 1.0 / (RATE * STEPS)
     x, v, a, played, bent, yielded, branch = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     slow_x, slow_a = 0.0, 0.0
@@ -119,7 +148,7 @@ def _run(force: FloatArray, s: FloatArray, out: FloatArray) -> None:  # noqa: C9
         for step in range(STEPS):
             place = k * STEPS + step - late
             row, part = max(place, 0) // STEPS, (max(place, 0) % STEPS) / STEPS
-            following = min(row + 1, len(force) - 1)
+            following = row if held else min(row + 1, len(force) - 1)
             u = force[row] + part * (force[following] - force[row])
             t = (k * STEPS + step) * h
             if s[12] > 0:

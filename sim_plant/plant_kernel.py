@@ -11,11 +11,11 @@ Pe of the room [Pa], w flow times R T [Pa m^3/s], c = 2 psi2 Cd a sqrt(R T) [m^3
 of area a, r laminar resistance to volume flow [Pa s/m^3], n ratio of heat capacities [1], A areas
 [m^2], V volumes, Vd dead volume [m^3], L stroke [m], x from mid stroke [m], m mass [kg].
 
-The flow is that of theory eq 5.14 behind a laminar passage, solved in closed form: a fast flow
-follows eq 5.14, and near Pu = Pd it is linear, which takes away the infinite slope. Steps are
-semi-implicit (velocity, then position, then pressure, so that the air spring conserves energy). Dry
-friction is implicit: an impulse of at most level times step that cannot turn the velocity round, so
-the mass sticks exactly and no level is too large.
+The flow is that of (5.14), docs/theory.md 1.1, behind a laminar passage, solved in closed form: a
+fast flow follows (5.14), and near Pu = Pd it is linear, which takes away the infinite slope. Steps
+are semi-implicit (velocity, then position, then pressure, so that the air spring conserves energy).
+Dry friction is implicit: an impulse of at most level times step that cannot turn the velocity
+round, so the mass sticks exactly and no level is too large.
 """
 
 # Fields of a record are known to numba, not to mypy.

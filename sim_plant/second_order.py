@@ -1,4 +1,4 @@
-"""The second-order plant of the numerical validation (theory 1.5, thesis section 5.7.1).
+"""The second-order plant of the numerical validation (docs/theory.md 1.5).
 
     m dv/dt = u - k x - c v - alpha sgn(v),   dx/dt = v,   u = 3 sin(2 pi 4 t)
 

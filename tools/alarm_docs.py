@@ -1,30 +1,40 @@
-"""Writes the table of alarms in docs/alarms.md from the one in the code: `make docs`."""
+"""Prints the table of docs/alarms.md from `monitor/alarms/kinds.py`: `make docs` writes it."""
 
 import sys
 from pathlib import Path
 
-from monitor.alarms import ALARM_KINDS
-from monitor.alarms.kinds import AlarmKind
+from monitor.alarms.kinds import ALARM_KINDS, AlarmKind
 
 TARGET = Path(__file__).parent.parent / "docs" / "alarms.md"
-BEGIN = "<!-- Printed by `make docs` from the table in monitor/alarms/kinds.py. -->\n"
-HEAD = """
-| alarm | severity | persistence | clear after | latch | cause | what to do |
-| --- | --- | --- | --- | --- | --- | --- |
-"""
+BEGIN = "<!-- Printed by `make docs` from monitor/alarms/kinds.py. -->\n"
+END = "<!-- End of the printed table. -->\n"
+HEADINGS = ("alarm", "severity", "persistence", "clear after", "latch", "cause", "what to do")
 
 
 def page() -> str:
-    """The page as it stands, with the table anew."""
-    text, _, _ = TARGET.read_text(encoding="utf-8").partition(BEGIN)
-    return text + BEGIN + HEAD + "".join(map(_row, ALARM_KINDS))
+    """The whole page: the text as it stands, with the table as the code has it."""
+    before, _, rest = TARGET.read_text(encoding="utf-8").partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n{table()}\n{END}{after}"
 
 
-def _row(kind: AlarmKind) -> str:
-    of = kind.defaults
-    latch = "yes" if of.latch else "no"
-    settings = f"{of.persistence} | {of.clear_after} | {latch}"
-    return f"| `{kind.name}` | {kind.severity} | {settings} | {kind.cause} | {kind.guidance} |\n"
+def table() -> str:
+    """One line an alarm."""
+    rows = [HEADINGS, ("---",) * len(HEADINGS), *map(_cells, ALARM_KINDS)]
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
+
+
+def _cells(kind: AlarmKind) -> tuple[str, ...]:
+    defaults = kind.defaults
+    return (
+        f"`{kind.name}`",
+        kind.severity,
+        str(defaults.persistence),
+        str(defaults.clear_after),
+        "yes" if defaults.latch else "no",
+        kind.cause,
+        kind.guidance,
+    )
 
 
 def main() -> int:

@@ -4,6 +4,7 @@ A key's description stands beside its type in the code; here it only becomes a t
 page cannot say anything else than the program does.
 """
 
+import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,7 +38,7 @@ def page() -> str:
     """The whole page."""
     head = "<!-- Printed by `make docs` from the descriptions in the code. -->\n"
     return head + "\n".join(
-        f"\n# {title}\n\n{text}\n\n" + "\n".join(_sections(kind)) for title, text, kind in PAGES
+        f"\n# {title}\n\n{text}\n\n" + "\n".join(sections(kind)) for title, text, kind in PAGES
     )
 
 
@@ -55,10 +56,16 @@ def undocumented() -> list[str]:
     return found
 
 
-def _sections(root: type[Section]) -> Iterator[str]:
+def sections(root: type[Section], level: int = 2) -> Iterator[str]:
+    """The struct and all that its fields may hold: a heading, a text and a table each.
+
+    Args:
+        root: of a file.
+        level: of the headings.
+    """
     for kind in _structs(root):
         first, _, rest = (kind.__doc__ or "").partition("\n")
-        yield f"## {first.strip().rstrip('.')}\n"
+        yield f"{'#' * level} {first.strip().rstrip('.')}\n"
         yield from _text(rest)
         yield "| key | type | default | |"
         yield "| --- | --- | --- | --- |"
@@ -168,8 +175,9 @@ def _default(field: inspect.Field) -> str:
     if field.required:
         return "required"
     if field.default is msgspec.NODEFAULT:
-        return "the section's own" if list(_inner_structs(field.type)) else "empty"
-    if field.default is None:
+        one = isinstance(_plain(field.type), inspect.StructType)
+        return "the section's own" if one else "empty"
+    if field.default in (None, math.inf, -math.inf):
         return "none"
     return f"`{msgspec.json.encode(field.default).decode()}`"
 

@@ -15,7 +15,7 @@ further alarms stand and are journalled, but are announced only as events, until
 critical alarms always show.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from monitor.alarms.debounce import Debouncer
@@ -333,8 +333,3 @@ class AlarmManager:
     def _take_said(self) -> list[Announcement]:
         said, self._said = self._said, []
         return said
-
-
-def alarms_of(said: Sequence[Announcement]) -> list[Alarm]:
-    """The alarms among what was said."""
-    return [one for one in said if isinstance(one, Alarm)]

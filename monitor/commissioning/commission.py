@@ -1,8 +1,8 @@
 """Commissioning: recordings in, one model file out.
 
-chirp or multisine, no friction  ──▶ frequency response ──▶ Ĝ (5.16), (5.19); corner of the
-accelerometer healthy reference(s)             ──▶ shift, amplitude scale, one healthy period,
-noise, time to settle known friction                   ──▶ friction filter Ge and γf (5.29)
+chirp or multisine, no friction ──▶ Ĝ (5.16), (5.19); corner of the accelerometer
+healthy reference(s)            ──▶ shift, amplitude scale, one healthy period, noise
+known friction                  ──▶ friction filter Ge and γf (5.29)
 """
 
 from collections.abc import Sequence
@@ -135,8 +135,7 @@ def _sensor_corner(chirp: Recording) -> float:
 
 
 def _with_shift(plant: TransferPlant, healthy: Sequence[Recording], rate: float) -> TransferPlant:
-    """The shift that makes modelled and measured acceleration most alike: a thing to measure
-    (theory 1.2).
+    """The shift at which modelled and measured acceleration agree best (docs/theory.md 1.2).
 
     Only advances that Ĝ's own delay pays for are tried: a longer one would delay every alarm, and
     the healthy average takes up what it would have gained.

@@ -1,4 +1,4 @@
-"""The friction filter: how friction at the mass reaches the acceleration residual (theory 1.3).
+"""The friction filter: how friction at the mass reaches the residual (docs/theory.md 1.3).
 
     a_r(t) = Ge(q⁻¹)·[ sgn(v) + γf·v ] + e(t)                                              (5.29)
 

@@ -47,15 +47,3 @@ def averaged(signals: FloatArray, period: int) -> Averaged:
     freedom = period * (periods - 1)
     scatter = np.sqrt(((folded - mean[:, None, :]) ** 2).sum(axis=(1, 2)) / freedom)
     return Averaged(mean, scatter, periods)
-
-
-def same_excitation(voltage: FloatArray, reference: FloatArray) -> int | None:
-    """Turn by which one period `voltage` has to be shifted to match `reference`, None where it is
-    another excitation.
-    """
-    if voltage.size != reference.size:
-        return None
-    swing = float(np.std(reference))
-    errors = [np.mean((np.roll(voltage, turn) - reference) ** 2) for turn in range(voltage.size)]
-    best = int(np.argmin(errors))
-    return best if errors[best] <= (0.02 * swing) ** 2 else None

@@ -26,11 +26,6 @@ from monitor.estimation import FILL, Energies, energy, recent_energy
 from monitor.reference import (
     APERIODIC,
     FIXED,
-    POSITION_NOISE,
-    POSITION_SWING,
-    SOURCE,
-    SWING,
-    VOLTAGE_NOISE,
     Reference,
 )
 
@@ -50,14 +45,14 @@ def moved(energies: Energies, signal: int, count: int) -> float:
 def position_limit(rules: Rules, ref: Reference) -> float:
     """How far the position may lie from its healthy period, root mean square [m]."""
     return max(
-        _NOISES * ref.value[POSITION_NOISE], rules.position_floor * ref.value[POSITION_SWING]
+        _NOISES * ref.levels.position_noise, rules.position_floor * ref.levels.position_swing
     )
 
 
 @njit(inline="always")
 def voltage_limit(rules: Rules, ref: Reference) -> float:
     """The same of the voltage [V]."""
-    return max(_NOISES * ref.value[VOLTAGE_NOISE], rules.voltage_floor * ref.value[SWING])
+    return max(_NOISES * ref.levels.voltage_noise, rules.voltage_floor * ref.levels.swing)
 
 
 @njit(inline="always")
@@ -66,17 +61,17 @@ def departed(rules: Rules, ref: Reference, state: WatchState) -> bool:
     of k.
     """
     held, energies = state.held, state.energies
-    if ref.number[SOURCE] == FIXED:
+    if ref.counts.source == FIXED:
         return held[DEVIATION] > rules.factor
     variance = spread_of_change(ref) ** 2
     largest = held[DEVIATION] / rules.factor
     largest = max(largest, np.sqrt(recent_energy(energies, Y, SHORT) / variance / rules.limit_8))
     if energies.place[FILL] >= LONG:
         largest = max(largest, np.sqrt(energy(energies, Y) / variance / rules.limit_64))
-    if ref.number[SOURCE] != APERIODIC:
+    if ref.counts.source != APERIODIC:
         largest = max(largest, moved(energies, X, LONG) / position_limit(rules, ref))
         voltage = moved(energies, V, LONG)
-        held[MOVED_VOLTAGE] = voltage / max(ref.value[SWING], 1e-12)
+        held[MOVED_VOLTAGE] = voltage / max(ref.levels.swing, 1e-12)
         largest = max(largest, voltage / voltage_limit(rules, ref))
     held[DEVIATION] = largest * rules.factor
     return largest > 1.0

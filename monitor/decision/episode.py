@@ -13,15 +13,12 @@ from monitor.decision.isolation import HISTORY, swing_of_voltage_change, weigh
 from monitor.decision.isolation_verdict import Seen, verdict
 from monitor.decision.kernel_state import (  # fmt: skip
     DEVIATION,
-    EPISODE,
-    EXCITED,
     EXPLAINED,
     FRICTION,
     LONG,
     NEW_EXCITATION,
     NO_VERDICT,
     OTHER,
-    QUIET,
     REST,
     RHO,
     SHARE,
@@ -36,12 +33,8 @@ from monitor.decision.kernel_state import (  # fmt: skip
     forget,
 )
 from monitor.reference import (
-    ACCELERATION_SWING,
     APERIODIC,
-    CYCLE,
     FIXED,
-    SOURCE,
-    SWING,
     Reference,
     refine,
     restart,
@@ -76,16 +69,16 @@ def follow(  # noqa: PLR0917
     state: WatchState,
 ) -> None:
     """Take sample `seq`, at `place` of the period, which is `out` of its limits or not."""
-    number = state.number
+    counts = state.counts
     _count(out, state)
-    if number[EPISODE] == 0:
+    if counts.episode == 0:
         if state.held[DEVIATION] < PLAINLY_HEALTHY * rules.factor:
             refine(ref, place, row)
-    elif number[EPISODE] >= FIRST_LOOK and seq % LOOK_EVERY == 0:
+    elif counts.episode >= FIRST_LOOK and seq % LOOK_EVERY == 0:
         _look(seq, rules, ref, state)
         excited = state.held[VERDICT] == NEW_EXCITATION
-        number[EXCITED] = number[EXCITED] + 1 if excited else 0
-        if number[EXCITED] >= LOOKS_AT_NEW_EXCITATION:
+        counts.excited = counts.excited + 1 if excited else 0
+        if counts.excited >= LOOKS_AT_NEW_EXCITATION:
             restart(ref, True)
             forget(state, rules.window)
 
@@ -93,15 +86,15 @@ def follow(  # noqa: PLR0917
 @njit(inline="always")
 def _count(out: bool, state: WatchState) -> None:
     """Begin, continue or end the episode."""
-    number, held = state.number, state.held
+    counts, held = state.counts, state.held
     if out:
-        number[QUIET] = 0
-        number[EPISODE] += 1
-    elif number[EPISODE] > 0:
-        number[QUIET] += 1
-        number[EPISODE] += 1
-        if number[QUIET] >= ENDS_AFTER:
-            number[EPISODE] = number[QUIET] = 0
+        counts.quiet = 0
+        counts.episode += 1
+    elif counts.episode > 0:
+        counts.quiet += 1
+        counts.episode += 1
+        if counts.quiet >= ENDS_AFTER:
+            counts.episode = counts.quiet = 0
             held[VERDICT] = NO_VERDICT
             held[EXPLAINED] = held[SHARE] = held[RHO] = held[REST] = 0.0
 
@@ -109,15 +102,15 @@ def _count(out: bool, state: WatchState) -> None:
 @njit()
 def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     """Weigh the evidence since the departure and judge by it."""
-    held, since = state.held, state.number[EPISODE]
-    if ref.number[SOURCE] == FIXED:
+    held, since = state.held, state.counts.episode
+    if ref.counts.source == FIXED:
         held[VERDICT] = FRICTION if held[THETA1] > rules.high1 else OTHER
         return
-    if ref.number[SOURCE] == APERIODIC:
-        louder = swing_of_voltage_change(state.history, HISTORY) > LOUDER * ref.value[SWING]
+    if ref.counts.source == APERIODIC:
+        louder = swing_of_voltage_change(state.history, HISTORY) > LOUDER * ref.levels.swing
         held[VERDICT] = NEW_EXCITATION if louder else NO_VERDICT
         return
-    cycle = max(SHORTEST_CYCLE, min(ref.number[CYCLE], LONGEST_CYCLE))
+    cycle = max(SHORTEST_CYCLE, min(ref.counts.cycle, LONGEST_CYCLE))
     evidence = weigh(state.history, ref, seq, min(since, HISTORY), min(since, 2 * cycle))
     held[EXPLAINED], held[SHARE] = evidence.explained, evidence.share
     held[RHO], held[REST] = evidence.rho, evidence.rest
@@ -130,7 +123,7 @@ def _seen(since: int, cycle: int, rules: Rules, ref: Reference, state: WatchStat
     """Which channels have moved since the departure."""
     energies, count = state.energies, min(since, LONG)
     spread = spread_of_change(ref)
-    acceleration_limit = max(3.0 * spread, 0.002 * ref.value[ACCELERATION_SWING])
+    acceleration_limit = max(3.0 * spread, 0.002 * ref.levels.acceleration_swing)
     return Seen(
         state.held[VERDICT],
         since,
@@ -138,6 +131,6 @@ def _seen(since: int, cycle: int, rules: Rules, ref: Reference, state: WatchStat
         moved(energies, V, count) > voltage_limit(rules, ref),
         moved(energies, X, count) > position_limit(rules, ref),
         moved(energies, A, count) > acceleration_limit,
-        swing_of_voltage_change(state.history, count) / max(ref.value[SWING], 1e-30),
+        swing_of_voltage_change(state.history, count) / max(ref.levels.swing, 1e-30),
         spread,
     )

@@ -31,13 +31,7 @@ from monitor.decision.kernel_state import (  # fmt: skip
 from monitor.estimation import FILL, LENGTH, energy, solve_two, sums
 from monitor.reference import (
     APERIODIC,
-    DEPTH,
     FIXED,
-    LEFT_SHARE,
-    NOISE,
-    QUICK,
-    SLOW,
-    SOURCE,
     Reference,
 )
 
@@ -50,11 +44,11 @@ _APERIODIC_VARIANCE = 9.0
 @njit(inline="always")
 def spread_of_change(ref: Reference) -> float:
     """Standard deviation of the change of the residual, error of the healthy average included."""
-    if ref.number[SOURCE] == APERIODIC:
-        level = max(ref.value[QUICK], ref.value[SLOW])
-        variance = ref.value[NOISE] ** 2 + ref.value[LEFT_SHARE] * level
+    if ref.counts.source == APERIODIC:
+        level = max(ref.levels.quick, ref.levels.slow)
+        variance = ref.levels.noise**2 + ref.levels.left_share * level
         return np.sqrt((1.0 + _APERIODIC_VARIANCE) * variance)
-    return ref.value[NOISE] * np.sqrt(1.0 + 4.0 / max(ref.number[DEPTH], 1))
+    return ref.levels.noise * np.sqrt(1.0 + 4.0 / max(ref.counts.depth, 1))
 
 
 @njit(inline="always")
@@ -79,7 +73,7 @@ def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
     held[THETA1], held[THETA2] = theta1, theta2
     held[LOW1], held[HIGH1], held[LOW2], held[HIGH2] = -reach1, reach1, -reach2, reach2
     held[DEVIATION] = np.sqrt(max(theta1 * s[2] + theta2 * s[4], 0.0)) / spread
-    if ref.number[SOURCE] == FIXED:
+    if ref.counts.source == FIXED:
         _judge_by_band(rules, state)
 
 

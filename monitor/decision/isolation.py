@@ -28,7 +28,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.reference import PERIOD, POSITION_SWING, Reference, place_in_period
+from monitor.reference import Reference, place_in_period
 from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 
@@ -140,11 +140,11 @@ def swing_of_voltage_change(history: History, count: int) -> float:
 
 @njit()
 def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
-    period = ref.number[PERIOD]
+    period = ref.counts.period
     mean = 0.0
     for place in range(period):
         mean += ref.template[1, place] / period
-    swing = max(ref.value[POSITION_SWING], 1e-12)
+    swing = max(ref.levels.position_swing, 1e-12)
     for k in range(n):
         place = place_in_period(ref, seq - n + 1 + k)
         later, earlier = (place + 1) % period, (place - 1) % period

@@ -17,7 +17,6 @@ from numba import njit
 
 from monitor.decision.isolation import Evidence
 from monitor.decision.kernel_state import (  # fmt: skip
-    AGREED,
     FRICTION,
     LONG,
     NEW_EXCITATION,
@@ -94,8 +93,8 @@ def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
     if seen.voltage_swing > NEW_DRIVE and seen.moved_acceleration:
         return NEW_EXCITATION
     agrees = _friction(seen, evidence)
-    state.number[AGREED] = state.number[AGREED] + 1 if agrees else 0
-    if seen.before in (FRICTION, STICKING) or state.number[AGREED] >= LOOKS:
+    state.counts.agreed = state.counts.agreed + 1 if agrees else 0
+    if seen.before in (FRICTION, STICKING) or state.counts.agreed >= LOOKS:
         stuck = evidence.rest >= STUCK and seen.moved_acceleration
         return STICKING if stuck else FRICTION
     return OTHER if _other(seen, evidence) else seen.before

@@ -1,14 +1,13 @@
 """What the watch carries from sample to sample, and the names of its places.
 
-`WatchState.held` holds the newest value of every output; `number` counts samples of the running
+`WatchState.held` holds the newest value of every output; `counts` counts samples of the running
 episode, the stretch from a departure until everything has been quiet again.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from monitor.decision.isolation import History, new_history
 from monitor.estimation import (
@@ -19,6 +18,7 @@ from monitor.estimation import (
     restart_energies,
     restart_window,
 )
+from monitor.reference import new_record
 from rigwatch.wire.arrays import FloatArray
 
 NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
@@ -31,10 +31,15 @@ NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
 OUTPUTS = 23
 """Places in `held` and in the kernel's output."""
 
-EPISODE, QUIET, AGREED, HOP, EXCITED = range(5)
-"""Counters in `number`: samples since the departure; quiet samples; looks in a row that found
-friction; samples since the last estimate; looks in a row that found another excitation.
-"""
+_COUNTS = np.dtype(
+    [
+        ("episode", np.int64),  # samples since the departure
+        ("quiet", np.int64),  # quiet samples
+        ("agreed", np.int64),  # looks in a row that found friction
+        ("hop", np.int64),  # samples since the last estimate
+        ("excited", np.int64),  # looks in a row that found another excitation
+    ]
+)
 Y, X, V, A, S = range(5)
 """Signals whose energies are kept: change of the residual, of position, voltage and acceleration
 against the healthy period, and the velocity itself.
@@ -69,7 +74,7 @@ class WatchState(NamedTuple):
     window: Window
     energies: Energies
     history: History
-    number: NDArray[np.int64]
+    counts: Any
     held: FloatArray
     recent: FloatArray
     signals: FloatArray
@@ -90,7 +95,7 @@ def new_watch_state(
         new_window(longest_window, 2),
         new_energies(LONG, 5),
         new_history(friction_b, friction_a),
-        np.zeros(5, np.int64),
+        new_record(_COUNTS),
         np.zeros(OUTPUTS),
         np.zeros(8),
         np.zeros(5),
@@ -105,6 +110,7 @@ def forget(state: WatchState, window: int) -> None:
     restart_window(state.window, window)
     restart_energies(state.energies)
     state.history.rows[:, :] = 0.0
-    state.number[:] = 0
+    counts = state.counts
+    counts.episode = counts.quiet = counts.agreed = counts.hop = counts.excited = 0
     state.held[:] = 0.0
     state.recent[:] = 0.0

@@ -1,5 +1,5 @@
 """Sample by sample, while armed: change of the residual, estimates, departure, verdict
-(theory 1.4).
+(docs/theory.md 1.4).
 
     change ─▶ sums and history ─▶ estimates ─▶ departure ─▶ episode ─▶ verdict
 
@@ -24,8 +24,6 @@ from monitor.decision.kernel_state import (  # fmt: skip
     ARMED_FLAG,
     CHANGE,
     DEVIATION,
-    EPISODE,
-    HOP,
     LEARNT_HERE,
     MODELLED,
     OBSERVABLE,
@@ -42,15 +40,8 @@ from monitor.decision.kernel_state import (  # fmt: skip
 )
 from monitor.estimation import FILL, Window, add, push
 from monitor.reference import (
-    ACCELERATION_SWING,
     APERIODIC,
     ARMED,
-    MODE,
-    NOISE,
-    PERIOD,
-    POSITION_NOISE,
-    SCALE,
-    SOURCE,
     Reference,
     ReferenceRules,
     follow_level,
@@ -76,7 +67,7 @@ from monitor.signals import (
 from monitor.signals import MODELLED as MODELLED_COLUMN
 from rigwatch.wire.arrays import FloatArray
 
-FINGERPRINT = "d92a8c466e34"
+FINGERPRINT = "7c0221fe37c5"
 """Of every source file whose code is compiled into `watch_block`."""
 
 
@@ -101,13 +92,13 @@ def watch_block(  # noqa: PLR0917
             restart(ref, code[k] == NEW_BOOT)
             forget(state, rules.window)
         good = code[k] == GOOD or code[k] == RESTART or code[k] == NEW_BOOT
-        if good and ref.number[MODE] != ARMED:
+        if good and ref.counts.mode != ARMED:
             observe(ref, arming, seq, data[k])
-            if ref.number[MODE] == ARMED:
+            if ref.counts.mode == ARMED:
                 forget(state, _window_length(rules.window, ref, state.window))
         elif good:
             _judge(data[k], seq, position_valid[k], rules, ref, state)
-        elif code[k] == HELD and ref.number[MODE] == ARMED:
+        elif code[k] == HELD and ref.counts.mode == ARMED:
             _skip(state)
         _write(data[k], code[k], ref, state, out[:, k])
 
@@ -119,9 +110,9 @@ def _window_length(wanted: int, ref: Reference, window: Window) -> int:
     Without a period it is as long as the history: what the model leaves in a healthy rig comes and
     goes with the drive, and averages out over seconds only.
     """
-    period = ref.number[PERIOD]
+    period = ref.counts.period
     room = window.rows.shape[0]
-    if ref.number[SOURCE] == APERIODIC:
+    if ref.counts.source == APERIODIC:
         return min(room, HISTORY)
     return min(((wanted + period - 1) // period) * period, (room // period) * period)
 
@@ -132,8 +123,8 @@ def _skip(state: WatchState) -> None:
     push(state.window, np.zeros(3))
     add(state.energies, np.zeros(5))
     remember(state.history, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    if state.number[EPISODE] > 0:
-        state.number[EPISODE] += 1
+    if state.counts.episode > 0:
+        state.counts.episode += 1
 
 
 @njit(inline="always")
@@ -148,9 +139,9 @@ def _judge(  # noqa: PLR0917
     """One good sample."""
     place = place_in_period(ref, seq)
     _take(data, place, position_valid, ref, state)
-    state.number[HOP] += 1
-    if state.number[HOP] >= rules.hop:
-        state.number[HOP] = 0
+    state.counts.hop += 1
+    if state.counts.hop >= rules.hop:
+        state.counts.hop = 0
         estimate(rules, ref, state)
     follow(departed(rules, ref, state), seq, place, data, rules, ref, state)
 
@@ -163,9 +154,9 @@ def _take(
     signals, row, healthy = state.signals, state.row, ref.template
     acceleration = data[ACCELERATION] - healthy[ACCELERATION, place]
     modelled = data[MODELLED_COLUMN] - healthy[MODELLED_COLUMN, place]
-    y = acceleration - ref.value[SCALE] * modelled
-    if ref.number[SOURCE] == APERIODIC:
-        follow_level(ref, ref.value[SCALE] * modelled)
+    y = acceleration - ref.levels.scale * modelled
+    if ref.counts.source == APERIODIC:
+        follow_level(ref, ref.levels.scale * modelled)
     signals[Y], signals[A], signals[S] = y, acceleration, data[VELOCITY]
     signals[X] = data[POSITION] - healthy[POSITION, place] if position_valid else 0.0
     signals[V] = data[VOLTAGE] - healthy[VOLTAGE, place]
@@ -192,8 +183,8 @@ def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
     spread -= min(recent[0], recent[1], recent[2], recent[3])
     shaken = max(recent[4], recent[5], recent[6], recent[7])
     shaken -= min(recent[4], recent[5], recent[6], recent[7])
-    weak = abs(recent[7]) < 0.15 * ref.value[ACCELERATION_SWING] + 5.0 * ref.value[NOISE]
-    still = spread < 6.0 * ref.value[POSITION_NOISE] and shaken < 10.0 * ref.value[NOISE] and weak
+    weak = abs(recent[7]) < 0.15 * ref.levels.acceleration_swing + 5.0 * ref.levels.noise
+    still = spread < 6.0 * ref.levels.position_noise and shaken < 10.0 * ref.levels.noise and weak
     return 1.0 if still else 0.0
 
 
@@ -201,11 +192,11 @@ def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
 def _write(data: FloatArray, code: int, ref: Reference, state: WatchState, out: FloatArray) -> None:
     for i in range(out.size):
         out[i] = state.held[i]
-    scale = ref.value[SCALE]
+    scale = ref.levels.scale
     out[MODELLED] = scale * data[MODELLED_COLUMN]
     out[RESIDUAL] = data[ACCELERATION] - scale * data[MODELLED_COLUMN]
     out[SPEED] = data[VELOCITY]
-    armed = ref.number[MODE] == ARMED and code != DEAD and state.energies.place[FILL] > 0
+    armed = ref.counts.mode == ARMED and code != DEAD and state.energies.place[FILL] > 0
     out[ARMED_FLAG] = 1.0 if armed else 0.0
     out[LEARNT_HERE] = learnt_here(ref) if armed else 0.0
     if not armed:

@@ -4,7 +4,7 @@ between.
 A detector says what it sees at each sample and nothing else: persistence, latching and naming are
 the alarms' business. Samples that are missing or invalid never reach it: short runs are predicted
 through with the last good value and judged by nobody, after a long one it starts afresh
-(`monitor.admission`).
+(`monitor.signals.admission`).
 """
 
 from abc import ABC, abstractmethod
@@ -94,7 +94,7 @@ class SampleDetector(ABC):
 
         Args:
             signals: shape (n, channels), finite, held where not good.
-            code: shape (n,), codes of `monitor.admission`.
+            code: shape (n,), codes of `monitor.signals.admission`.
         """
 
     def update(self, block: SampleBlock) -> Findings:

@@ -1,6 +1,6 @@
-"""Least squares over a sliding window, exact after any number of samples (theory 5.39).
+"""Least squares over a sliding window, exact after any number of samples (docs/theory.md 1.4).
 
-    θ̂ = ( Σ g·gᵀ )⁻¹ · Σ g·y   over the last N samples
+    θ̂ = ( Σ g·gᵀ )⁻¹ · Σ g·y   over the last N samples                                     (5.39)
 
 The sums over the window are never down-dated. They are kept the way a queue is made of two stacks:
 `back` is the running sum of the newer samples, `front[i]` the sum of the older ones from place i

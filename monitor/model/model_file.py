@@ -53,7 +53,7 @@ Plant = TransferPlant | InertiaPlant
 
 
 class VelocitySection(Section, frozen=True, kw_only=True):
-    """[velocity] — velocity from the accelerometer (theory 1.3)."""
+    """[velocity] — velocity from the accelerometer (docs/theory.md 1.3)."""
 
     corner: Annotated[float, Meta(gt=0, description="corner of the high-pass [Hz]")] = 0.5
     sensor_corner: Annotated[

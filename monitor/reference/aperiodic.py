@@ -10,21 +10,8 @@ import numpy as np
 from numba import njit
 
 from monitor.reference.reference_state import (
-    ACCELERATION_SWING,
     APERIODIC,
     ARMED,
-    CYCLE,
-    DEPTH,
-    LEARNT,
-    LEFT_SHARE,
-    MODE,
-    NOISE,
-    POSITION_SWING,
-    QUICK,
-    SCALE,
-    SLOW,
-    SOURCE,
-    SWING,
     Reference,
     ReferenceRules,
 )
@@ -39,15 +26,15 @@ APERIODIC_CYCLE = 256
 @njit()
 def learn_aperiodic(ref: Reference, rules: ReferenceRules, row: FloatArray) -> None:
     """Σa², Σa·am, Σam², Σx² and ΣV² of each stretch; their number counts one by one."""
-    stretch = ref.number[LEARNT] // rules.learn
+    stretch = ref.counts.learnt // rules.learn
     a, am = row[2], row[3]
     ref.sums[0, stretch] += a * a
     ref.sums[1, stretch] += a * am
     ref.sums[2, stretch] += am * am
     ref.sums[3, stretch] += row[1] * row[1]
     ref.products[4] += row[0] * row[0]
-    ref.number[LEARNT] += 1
-    if ref.number[LEARNT] >= STRETCHES * rules.learn:
+    ref.counts.learnt += 1
+    if ref.counts.learnt >= STRETCHES * rules.learn:
         _arm_aperiodic(ref, rules.learn)
 
 
@@ -56,7 +43,7 @@ def _arm_aperiodic(ref: Reference, length: int) -> None:
     """Nothing repeats: the residual itself is judged, against what stretches of `length` samples
     left.
     """
-    total, learnt = np.zeros(4), ref.number[LEARNT]
+    total, learnt = np.zeros(4), ref.counts.learnt
     for i in range(4):
         for k in range(STRETCHES):
             total[i] += ref.sums[i, k]
@@ -69,22 +56,22 @@ def _arm_aperiodic(ref: Reference, length: int) -> None:
         moved = scale**2 * ref.sums[2, k]
         left = ref.sums[0, k] - 2.0 * scale * ref.sums[1, k] + moved
         largest = max(largest, (left - share * moved) / length)
-    ref.value[LEFT_SHARE] = share
-    ref.value[QUICK] = ref.value[SLOW] = scale**2 * mm / learnt
+    ref.levels.left_share = share
+    ref.levels.quick = ref.levels.slow = scale**2 * mm / learnt
     ref.template[:, :] = 0.0
-    ref.value[SCALE] = scale
-    ref.value[NOISE] = max(ref.value[NOISE], np.sqrt(largest))
-    ref.value[SWING] = np.sqrt(ref.products[4] / learnt)
-    ref.value[POSITION_SWING] = np.sqrt(xx / learnt)
-    ref.value[ACCELERATION_SWING] = np.sqrt(aa / learnt)
-    ref.number[DEPTH] = learnt
-    ref.number[CYCLE] = APERIODIC_CYCLE
-    ref.number[SOURCE] = APERIODIC
-    ref.number[MODE] = ARMED
+    ref.levels.scale = scale
+    ref.levels.noise = max(ref.levels.noise, np.sqrt(largest))
+    ref.levels.swing = np.sqrt(ref.products[4] / learnt)
+    ref.levels.position_swing = np.sqrt(xx / learnt)
+    ref.levels.acceleration_swing = np.sqrt(aa / learnt)
+    ref.counts.depth = learnt
+    ref.counts.cycle = APERIODIC_CYCLE
+    ref.counts.source = APERIODIC
+    ref.counts.mode = ARMED
 
 
 @njit(inline="always")
 def follow_level(ref: Reference, modelled: float) -> None:
     """Take in one modelled acceleration, scaled, where there is no period [m/s^2]."""
-    ref.value[QUICK] += (modelled * modelled - ref.value[QUICK]) / 64.0
-    ref.value[SLOW] += (modelled * modelled - ref.value[SLOW]) / 512.0
+    ref.levels.quick += (modelled * modelled - ref.levels.quick) / 64.0
+    ref.levels.slow += (modelled * modelled - ref.levels.slow) / 512.0

@@ -26,33 +26,16 @@ from numba import njit
 
 from monitor.reference.aperiodic import learn_aperiodic
 from monitor.reference.reference_state import (
-    ACCELERATION_SWING,
-    ANCHOR,
     APERIODIC,
     ARMED,
-    CYCLE,
-    DEPTH,
     FIXED,
     FROM_MODEL,
     FROM_RUN,
     LEARNING,
-    LEARNT,
     LONGEST_AVERAGE,
-    MODE,
     NO_REFERENCE,
-    NOISE,
-    PERIOD,
-    POSITION_NOISE,
-    POSITION_SWING,
     RESUMING,
-    RING_FILL,
-    RING_HEAD,
-    SCALE,
     SETTLING,
-    SINCE,
-    SOURCE,
-    SWING,
-    VOLTAGE_NOISE,
     Reference,
     ReferenceRules,
 )
@@ -62,45 +45,45 @@ from rigwatch.wire.arrays import FloatArray
 @njit()
 def restart(ref: Reference, new_boot: bool) -> None:
     """Filters have been reset: settle again, and forget the reference where its phase is lost."""
-    ref.number[SINCE] = 0
-    ref.number[RING_FILL] = 0
-    ref.number[RING_HEAD] = 0
-    ref.number[LEARNT] = 0
-    keeps = ref.number[MODE] == ARMED or ref.number[MODE] == RESUMING
-    ref.number[MODE] = RESUMING if keeps and not new_boot else SETTLING
-    if ref.number[MODE] == SETTLING:
-        ref.number[SOURCE] = NO_REFERENCE
+    ref.counts.since = 0
+    ref.counts.ring_fill = 0
+    ref.counts.ring_head = 0
+    ref.counts.learnt = 0
+    keeps = ref.counts.mode in (ARMED, RESUMING)
+    ref.counts.mode = RESUMING if keeps and not new_boot else SETTLING
+    if ref.counts.mode == SETTLING:
+        ref.counts.source = NO_REFERENCE
 
 
 @njit(inline="always")
 def place_in_period(ref: Reference, seq: int) -> int:
     """φ of sample number `seq`."""
-    return (seq - ref.number[ANCHOR]) % ref.number[PERIOD]
+    return (seq - ref.counts.anchor) % ref.counts.period
 
 
 @njit(inline="always")
 def learnt_here(ref: Reference) -> int:
     """Samples of this run that the reference rests on, 0 where the model file holds it."""
-    own = ref.number[SOURCE] == FROM_RUN or ref.number[SOURCE] == APERIODIC
-    return ref.number[DEPTH] * ref.number[PERIOD] if own else 0
+    own = ref.counts.source in (FROM_RUN, APERIODIC)
+    return ref.counts.depth * ref.counts.period if own else 0
 
 
 @njit()
 def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
     """Take one good sample (V, x, a, am) before the reference is armed; may arm it."""
-    number = ref.number
-    number[SINCE] += 1
+    counts = ref.counts
+    counts.since += 1
     _remember(ref, row[0])
-    if number[MODE] == RESUMING:
-        if number[SINCE] >= rules.settle:
-            number[MODE] = ARMED
-    elif number[MODE] == SETTLING and rules.fixed:
-        if number[SINCE] >= rules.settle:
+    if counts.mode == RESUMING:
+        if counts.since >= rules.settle:
+            counts.mode = ARMED
+    elif counts.mode == SETTLING and rules.fixed:
+        if counts.since >= rules.settle:
             _arm_fixed(ref, rules)
-    elif number[MODE] == SETTLING:
-        if number[SINCE] >= rules.settle and number[SINCE] % 16 == 0:
+    elif counts.mode == SETTLING:
+        if counts.since >= rules.settle and counts.since % 16 == 0:
             _look_for_period(ref, rules, seq)
-    elif number[MODE] == LEARNING:
+    elif counts.mode == LEARNING:
         _learn(ref, rules, seq, row)
 
 
@@ -108,23 +91,23 @@ def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) ->
 def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
     """No healthy average: the residual is friction itself, its limits stand in the model file."""
     ref.template[:, :] = 0.0
-    ref.number[PERIOD], ref.number[ANCHOR], ref.number[DEPTH] = 1, 0, LONGEST_AVERAGE
-    ref.number[SOURCE], ref.number[MODE] = FIXED, ARMED
-    ref.value[SCALE], ref.value[NOISE] = 1.0, rules.residual_noise
+    ref.counts.period, ref.counts.anchor, ref.counts.depth = 1, 0, LONGEST_AVERAGE
+    ref.counts.source, ref.counts.mode = FIXED, ARMED
+    ref.levels.scale, ref.levels.noise = 1.0, rules.residual_noise
 
 
 @njit()
 def _remember(ref: Reference, voltage: float) -> None:
     size = ref.ring.size
-    ref.ring[ref.number[RING_HEAD]] = voltage
-    ref.number[RING_HEAD] = (ref.number[RING_HEAD] + 1) % size
-    ref.number[RING_FILL] = min(ref.number[RING_FILL] + 1, size)
+    ref.ring[ref.counts.ring_head] = voltage
+    ref.counts.ring_head = (ref.counts.ring_head + 1) % size
+    ref.counts.ring_fill = min(ref.counts.ring_fill + 1, size)
 
 
 @njit()
 def _past(ref: Reference, ago: int) -> float:
     """Voltage `ago` samples before the newest."""
-    return ref.ring[(ref.number[RING_HEAD] - 1 - ago) % ref.ring.size]
+    return ref.ring[(ref.counts.ring_head - 1 - ago) % ref.ring.size]
 
 
 @njit()
@@ -141,7 +124,7 @@ def _swing(ref: Reference, count: int) -> float:
 
 @njit()
 def _look_for_period(ref: Reference, rules: ReferenceRules, seq: int) -> None:
-    count = ref.number[RING_FILL]
+    count = ref.counts.ring_fill
     swing = _swing(ref, count)
     if swing < 10.0 * rules.voltage_noise:
         return
@@ -152,7 +135,7 @@ def _look_for_period(ref: Reference, rules: ReferenceRules, seq: int) -> None:
             return
     if count >= 2 * rules.longest_period:
         _found(ref, rules, seq, 1, swing)
-        ref.number[SOURCE] = APERIODIC
+        ref.counts.source = APERIODIC
 
 
 @njit()
@@ -168,17 +151,17 @@ def _repeats(ref: Reference, period: int, count: int, tolerance: float) -> bool:
 
 @njit()
 def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: float) -> None:
-    number, value = ref.number, ref.value
-    number[PERIOD], number[ANCHOR] = period, seq + 1
-    number[LEARNT], number[DEPTH] = 0, 0
-    value[SWING] = swing
-    value[NOISE] = rules.residual_noise
-    value[POSITION_NOISE] = rules.position_noise
-    value[VOLTAGE_NOISE] = rules.voltage_noise
+    counts, levels = ref.counts, ref.levels
+    counts.period, counts.anchor = period, seq + 1
+    counts.learnt, counts.depth = 0, 0
+    levels.swing = swing
+    levels.noise = rules.residual_noise
+    levels.position_noise = rules.position_noise
+    levels.voltage_noise = rules.voltage_noise
     ref.sums[:, :] = 0.0
     ref.products[:] = 0.0
-    number[MODE] = LEARNING
-    number[SOURCE] = FROM_RUN
+    counts.mode = LEARNING
+    counts.source = FROM_RUN
     for index in range(ref.known_period.size):
         if ref.known_period[index] == period and period > 1:
             turn = _turn(ref, index, period, swing)
@@ -212,17 +195,17 @@ def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) ->
     for row in range(4):
         for place in range(period):
             ref.template[row, place] = ref.known[index, row, place]
-    ref.number[ANCHOR] = seq - turn
-    ref.number[DEPTH] = ref.known_depth[index]
-    ref.value[SCALE] = ref.known_scale[index]
-    ref.number[SOURCE] = FROM_MODEL
+    ref.counts.anchor = seq - turn
+    ref.counts.depth = ref.known_depth[index]
+    ref.levels.scale = ref.known_scale[index]
+    ref.counts.source = FROM_MODEL
     _measure_swings(ref)
-    ref.number[MODE] = ARMED
+    ref.counts.mode = ARMED
 
 
 @njit()
 def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
-    number, period = ref.number, ref.number[PERIOD]
+    counts, period = ref.counts, ref.counts.period
     if period == 1:
         learn_aperiodic(ref, rules, row)
         return
@@ -234,9 +217,9 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
     ref.products[2] += row[3] * row[3]
     ref.products[3] += row[1] * row[1]
     ref.products[4] += row[0] * row[0]
-    number[LEARNT] += 1
+    counts.learnt += 1
     wanted = max(4, (rules.learn + period - 1) // period) * period
-    if number[LEARNT] >= wanted:
+    if counts.learnt >= wanted:
         _finish_learning(ref, rules, wanted // period)
 
 
@@ -245,11 +228,11 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     """Averages, amplitude scale and scatter; start over where the scatter says that the rig has
     not settled.
     """
-    number, value, period = ref.number, ref.value, ref.number[PERIOD]
+    counts, levels, period = ref.counts, ref.levels, ref.counts.period
     for i in range(4):
         for place in range(period):
             ref.template[i, place] = ref.sums[i, place] / depth
-    number[DEPTH] = depth
+    counts.depth = depth
     aa = am = mm = xx = vv = 0.0
     for place in range(period):
         aa += ref.template[2, place] ** 2
@@ -263,34 +246,41 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     scatter = (p[0] - depth * aa) - 2.0 * scale * (p[1] - depth * am)
     scatter += scale**2 * (p[2] - depth * mm)
     noise = np.sqrt(max(scatter, 0.0) / freedom)
-    value[SCALE] = scale
-    value[NOISE] = max(noise, rules.residual_noise)
-    value[POSITION_NOISE] = max(
+    levels.scale = scale
+    levels.noise = max(noise, rules.residual_noise)
+    levels.position_noise = max(
         np.sqrt(max(p[3] - depth * xx, 0.0) / freedom), rules.position_noise
     )
-    value[VOLTAGE_NOISE] = max(np.sqrt(max(p[4] - depth * vv, 0.0) / freedom), rules.voltage_noise)
+    levels.voltage_noise = max(np.sqrt(max(p[4] - depth * vv, 0.0) / freedom), rules.voltage_noise)
     _measure_swings(ref)
     quiet = noise <= 1.5 * rules.residual_noise
     if quiet:
-        number[MODE] = ARMED
+        counts.mode = ARMED
     else:
-        number[LEARNT] = 0
+        counts.learnt = 0
         ref.sums[:, :] = 0.0
         ref.products[:] = 0.0
 
 
 @njit()
 def _measure_swings(ref: Reference) -> None:
-    period = ref.number[PERIOD]
-    for i, place in ((0, SWING), (1, POSITION_SWING), (2, ACCELERATION_SWING)):
-        mean = 0.0
-        for k in range(period):
-            mean += ref.template[i, k] / period
-        square = 0.0
-        for k in range(period):
-            square += (ref.template[i, k] - mean) ** 2 / period
-        ref.value[place] = np.sqrt(square)
-    ref.number[CYCLE] = period // _turns(ref)
+    period = ref.counts.period
+    ref.levels.swing = _periodic_rms(ref.template[0], period)
+    ref.levels.position_swing = _periodic_rms(ref.template[1], period)
+    ref.levels.acceleration_swing = _periodic_rms(ref.template[2], period)
+    ref.counts.cycle = period // _turns(ref)
+
+
+@njit()
+def _periodic_rms(signal: FloatArray, period: int) -> float:
+    """Root mean square of a period of a signal, about its mean."""
+    mean = 0.0
+    for k in range(period):
+        mean += signal[k] / period
+    square = 0.0
+    for k in range(period):
+        square += (signal[k] - mean) ** 2 / period
+    return np.sqrt(square)
 
 
 @njit()
@@ -298,7 +288,7 @@ def _turns(ref: Reference) -> int:
     """How often the mass goes to and fro within one period of the samples, at least once: an
     excitation of 5 Hz repeats after 256 samples and has five cycles in them.
     """
-    period, swing = ref.number[PERIOD], ref.value[POSITION_SWING]
+    period, swing = ref.counts.period, ref.levels.position_swing
     mean = 0.0
     for k in range(period):
         mean += ref.template[1, k] / period
@@ -316,11 +306,11 @@ def _turns(ref: Reference) -> int:
 @njit(inline="always")
 def refine(ref: Reference, place: int, row: FloatArray) -> None:
     """Let one plainly healthy sample into the average, while that is still growing."""
-    period = ref.number[PERIOD]
-    if period == 1 or ref.number[SOURCE] != FROM_RUN or ref.number[DEPTH] >= LONGEST_AVERAGE:
+    period = ref.counts.period
+    if period == 1 or ref.counts.source != FROM_RUN or ref.counts.depth >= LONGEST_AVERAGE:
         return
-    gain = 1.0 / (ref.number[DEPTH] + 1)
+    gain = 1.0 / (ref.counts.depth + 1)
     for i in range(4):
         ref.template[i, place] += gain * (row[i] - ref.template[i, place])
     if place == period - 1:
-        ref.number[DEPTH] += 1
+        ref.counts.depth += 1

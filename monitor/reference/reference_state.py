@@ -1,6 +1,6 @@
-"""What the healthy reference carries from sample to sample, and the names of its places."""
+"""What the healthy reference carries from sample to sample."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,28 +10,53 @@ from rigwatch.wire.arrays import FloatArray
 SETTLING, LEARNING, ARMED, RESUMING = 0, 1, 2, 3
 NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC, FIXED = 0, 1, 2, 3, 4
 
-MODE, SOURCE, SINCE, PERIOD, ANCHOR, LEARNT, RING_FILL, RING_HEAD, DEPTH, CYCLE = range(10)
-"""Integers of the state: mode, where the reference is from, samples since the last restart, period
-[samples], sample number of its first place, samples learnt, fill and head of the voltage ring,
-periods averaged, one to and fro of the mass [samples].
-"""
-SCALE, NOISE, POSITION_NOISE, VOLTAGE_NOISE, SWING, POSITION_SWING, ACCELERATION_SWING = range(7)
-LEFT_SHARE, QUICK, SLOW = range(7, 10)
-"""Floats: amplitude scale; noise of y, x, V; rms of the periodic part of V, x, a. Without a period:
-r²; mean square of the modelled acceleration, quick to follow and slow to forget [(m/s^2)^2].
-"""
+_COUNTS = np.dtype(
+    [
+        ("mode", np.int64),
+        ("source", np.int64),  # where the reference is from
+        ("since", np.int64),  # samples since the last restart
+        ("period", np.int64),  # [samples]
+        ("anchor", np.int64),  # sample number of the period's first place
+        ("learnt", np.int64),  # samples
+        ("ring_fill", np.int64),  # of the ring of voltages
+        ("ring_head", np.int64),
+        ("depth", np.int64),  # periods averaged
+        ("cycle", np.int64),  # one to and fro of the mass [samples]
+    ]
+)
+_LEVELS = np.dtype(
+    [
+        ("scale", np.float64),  # amplitude scale
+        ("noise", np.float64),  # of the residual's change y
+        ("position_noise", np.float64),
+        ("voltage_noise", np.float64),
+        ("swing", np.float64),  # rms of the periodic part of the voltage
+        ("position_swing", np.float64),
+        ("acceleration_swing", np.float64),
+        # Without a period:
+        ("left_share", np.float64),  # r²
+        ("quick", np.float64),  # mean square of the modelled acceleration, quick to follow
+        ("slow", np.float64),  # the same, slow to forget [(m/s^2)^2]
+    ]
+)
 
 LONGEST_AVERAGE = 512
 """Periods after which the reference is complete."""
 
 
+def new_record(layout: np.dtype[Any]) -> Any:
+    """Named numbers, all zero, that a compiled function reads and changes by name."""
+    return np.zeros(1, layout).view(np.recarray)[0]
+
+
 class Reference(NamedTuple):
-    """State. Templates and sums have one row a signal (V, x, a, am) and one column a place in the
-    period.
+    """State: `counts` and `levels` are records of named numbers.
+
+    Templates and sums have one row a signal (V, x, a, am) and one column a place in the period.
     """
 
-    number: NDArray[np.int64]
-    value: FloatArray
+    counts: Any
+    levels: Any
     template: FloatArray
     sums: FloatArray
     products: FloatArray
@@ -60,11 +85,11 @@ def new_reference(rules: ReferenceRules, known: list[tuple[FloatArray, float, in
     stored = np.zeros((len(known), 4, longest))
     for place, (signals, _, _) in enumerate(known):
         stored[place, :, : signals.shape[1]] = signals
-    number, value = np.zeros(10, np.int64), np.zeros(10)
-    value[SCALE] = 1.0
+    counts, levels = new_record(_COUNTS), new_record(_LEVELS)
+    levels.scale = 1.0
     return Reference(
-        number,
-        value,
+        counts,
+        levels,
         np.zeros((4, longest)),
         np.zeros((4, longest)),
         np.zeros(6),

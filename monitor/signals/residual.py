@@ -1,5 +1,5 @@
-"""From samples to the acceleration residual's ingredients (theory 1.2 to 1.4), rig with a transfer
-function.
+"""From samples to the acceleration residual's ingredients, rig with a transfer function
+(docs/theory.md 1.2 to 1.4).
 
     modelled   am = fs²·(1 - q⁻¹)²·q^s·Ĝ(q⁻¹)·V      advanced by the measured shift s [samples]
     velocity   v  = high-pass and integrator of a    [m/s]

@@ -30,13 +30,13 @@ _HOST = "127.0.0.1"
 
 
 def find_config(name: str) -> Path:
-    """The file `name` of the folder configs, here or in the checkout that rigwatch runs from.
+    """The file `name` of the folder configs: here, in the checkout, or as the wheel brought it.
 
     Raises:
         ConfigError: there is none.
     """
-    checkout = Path(__file__).parents[2]
-    for root in (Path(), checkout):
+    package = Path(__file__).parents[1]
+    for root in (Path(), package.parent, package):
         path = root / "configs" / name
         if path.is_file():
             return path

@@ -232,7 +232,7 @@ _FREEZING_READER = """
 import sys, time
 from rigwatch.wire.bus import connect
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.messages.topics import EVENTS
+from rigwatch.wire.messages import EVENTS
 bus = connect(load_rig(sys.argv[1]), "frozen")
 subscription = bus.subscribe(EVENTS)
 time.sleep(600)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import daq.adapters
+import daq.adapters.registry
 from daq.adapter import DeviceBusyError, RawBlock
 from daq.adapters import adapter_for, known
 from daq.supervisor import Supervisor
@@ -45,7 +45,7 @@ def test_the_four_built_in_adapters_are_entry_points() -> None:
 
 def test_a_plugin_is_found_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint("counting", "tests.daq.test_adapters:Counting", "rigwatch.adapters")
-    monkeypatch.setattr(daq.adapters, "entry_points", lambda group: [point])
+    monkeypatch.setattr(daq.adapters.registry, "entry_points", lambda group: [point])
     section = 'adapter = "plugin"\nname = "counting"\noptions = { step = 2.5 }'
     config = config_of(section, channels=2)
     running = Running(config, adapter_for(config.daq.device, config.channels))
@@ -62,7 +62,7 @@ def test_a_missing_plugin_is_named_beside_those_installed() -> None:
 
 def test_a_plugin_that_cannot_be_loaded_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     point = EntryPoint("broken", "no_such_module:adapter", "rigwatch.adapters")
-    monkeypatch.setattr(daq.adapters, "entry_points", lambda group: [point])
+    monkeypatch.setattr(daq.adapters.registry, "entry_points", lambda group: [point])
     config = config_of('adapter = "plugin"\nname = "broken"')
     with pytest.raises(DeviceError, match=r"'broken' \(no_such_module:adapter\): No module named"):
         adapter_for(config.daq.device, config.channels)

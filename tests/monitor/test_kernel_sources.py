@@ -21,4 +21,6 @@ SOURCES = (
 def test_the_fingerprint_is_that_of_the_sources() -> None:
     joined = "".join(inspect.getsource(module) for module in SOURCES)
     fingerprint = hashlib.sha256(joined.encode()).hexdigest()[:12]
-    assert fingerprint == watch.FINGERPRINT, f'put FINGERPRINT = "{fingerprint}" in watch.py'
+    assert fingerprint == watch.FINGERPRINT, (
+        f'put FINGERPRINT = "{fingerprint}" in sample_kernel.py'
+    )

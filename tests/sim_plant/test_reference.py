@@ -1,4 +1,4 @@
-"""The kernel against SciPy's adaptive solver on the same rig, written out again from theory 1.1."""
+"""The kernel against SciPy's adaptive solver on the same rig, as in docs/theory.md 1.1."""
 
 import numpy as np
 import pytest

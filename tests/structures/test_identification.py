@@ -21,7 +21,7 @@ def off(found, truth=TRUTH):
 
 
 def same_steps(structure, truth, h=0.01, duration=10.0):
-    """A record by the recursion's own integrator and step, as in theory 4.1."""
+    """A record by the recursion's own integrator and step, as in docs/theory.md 4.1."""
     count = round(duration / h) + 1
     empty = Record(h, {f"x{n}": np.zeros(count) for n in range(1, 9)})
     problem = problem_of(structure, empty, NAMES, truth, substeps=1)

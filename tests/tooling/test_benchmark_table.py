@@ -1,7 +1,10 @@
-"""The table that `make bench` prints."""
+"""The table that `make bench` prints, and the page that it writes."""
+
+from pathlib import Path
 
 from benchmarks.__main__ import measure
-from benchmarks.table import Row, as_markdown, as_text
+from benchmarks.results_page import keep, page, read
+from benchmarks.table import Row, as_markdown, as_text, failed
 
 GOOD = Row("replay speed", "2 400 × real time", "2 000 ×", "", "one core", passed=True)
 BAD = Row("false alarms", "1 in 24 h", "0", "none", "", passed=False)
@@ -30,3 +33,29 @@ def test_markdown_has_a_line_a_row_and_no_stray_column() -> None:
 def test_a_benchmark_that_fails_is_a_row_that_misses_its_bar() -> None:
     rows = measure("no_such_benchmark", quick=True)
     assert [row.passed for row in rows] == [False]
+
+
+def test_a_run_replaces_the_rows_of_what_ran_and_keeps_the_others(tmp_path: Path) -> None:
+    file = tmp_path / "results.json"
+    keep({"replay": [GOOD], "false_alarms": [BAD]}, {"cores": "2"}, file)
+    keep({"replay": [OPEN]}, {"cores": "4"}, file)
+    kept = read(file)
+    assert (kept["replay"].rows, kept["replay"].machine) == ([OPEN], {"cores": "4"})
+    assert (kept["false_alarms"].rows, kept["false_alarms"].machine) == ([BAD], {"cores": "2"})
+
+
+def test_a_benchmark_that_fails_keeps_its_earlier_rows(tmp_path: Path) -> None:
+    file = tmp_path / "results.json"
+    keep({"replay": [GOOD]}, {}, file)
+    keep({"replay": [failed("replay", OSError("no room"))], "rivals": []}, {}, file)
+    assert {name: kept.rows for name, kept in read(file).items()} == {"replay": [GOOD]}
+
+
+def test_the_page_names_command_machine_and_verdict_also_of_a_benchmark_it_does_not_know(
+    tmp_path: Path,
+) -> None:
+    text = page(keep({"replay": [GOOD], "odd": [BAD]}, {"cores": "2"}, tmp_path / "results.json"))
+    assert "`python -m benchmarks replay`, on 2 cores." in text
+    assert "| ok | replay speed |" in text
+    assert "| MISS | false alarms |" in text
+    assert text.index("replay speed") < text.index("Further benchmarks") < text.index("### odd")

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 PRINTED_PAGES = (
     ("configuration.md", "config_docs"),
     ("commands.md", "command_docs"),
-    ("alarms.md", "alarm_docs"),
+    ("units.md", "unit_docs"),
 )
 
 

@@ -17,7 +17,7 @@ LIMITS = Limits(start=20, silence=1.0, stall=1.5, stop=2, first_pause=0.1, settl
 
 WORKER = """
 import signal, sys, time
-from rigwatch.wire.host.heartbeat import Heartbeat
+from rigwatch.wire.host import Heartbeat
 run = [True]
 signal.signal(signal.SIGTERM, lambda *_: run.clear())
 beat = Heartbeat("worker")

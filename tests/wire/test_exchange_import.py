@@ -13,14 +13,15 @@ from scipy.io import loadmat, savemat
 
 from rigwatch.commands import main
 from rigwatch.wire.errors import ImportDataError, RigwatchError
+from rigwatch.wire.exchange.column_units import conversion
 from rigwatch.wire.exchange.importing import Imported, import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
 from rigwatch.wire.exchange.mat5 import read_mat5
-from rigwatch.wire.exchange.units import UNITS, conversion
 from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.messages.message_types import SampleBlock
 from rigwatch.wire.session import open_session
 from rigwatch.wire.typed_files.loading import load
+from rigwatch.wire.units.unit_table import ENTRIES
 
 MAPPINGS = Path(__file__).parents[2] / "configs" / "imports"
 GOOD = "t,qm,u\n0,1.0,5\n1,2.0,6\n2,3.0,7\n"
@@ -50,7 +51,7 @@ def simple(**changes: object) -> ImportMapping:
 
 
 def test_columns_become_channels_in_si_units(tmp_path: Path) -> None:
-    channels = {"position": "qm[mm]", "force": "u * 35.15065 - 2 [N]", "a": "u*-2[g]"}
+    channels = {"position": "qm[mm]", "force": "u * 35.15065 - 2 [N]", "a": "u*-2[g0]"}
     block, result = made(tmp_path, GOOD, simple(channels=channels))
     assert [(c.name, c.unit) for c in block.channels] == [
         ("position", "m"),
@@ -80,7 +81,7 @@ def test_an_si_column_comes_over_bit_for_bit(tmp_path: Path) -> None:
         ("in", "m", 0.0254),
         ("bar", "Pa", 1e5),
         ("psi", "Pa", 6894.757293168361),
-        ("g", "m/s^2", 9.80665),
+        ("g0", "m/s^2", 9.80665),
         ("ms", "s", 1e-3),
         ("V", "V", 1.0),
         ("lbf", "N", 4.4482216152605),
@@ -94,16 +95,26 @@ def test_units(unit: str, si: str, factor: float) -> None:
 
 
 def test_every_unit_leads_to_an_si_unit_that_stays() -> None:
-    for found in UNITS.values():
-        assert UNITS[found.unit].factor == 1.0
-        assert UNITS[found.unit].offset == 0.0
+    for name in ENTRIES.keys() - {"g", "mg"}:
+        found = conversion(conversion(name, "anything").unit, "anything")
+        assert (found.factor, found.offset) == (1.0, 0.0)
+
+
+def test_g_has_to_say_whether_it_is_gravity_or_the_gram() -> None:
+    with pytest.raises(ImportDataError, match="'g', expected 'g0' for standard gravity or 'gram'"):
+        conversion("g", "tower")
+    assert conversion("gram", "load").factor == 1e-3
 
 
 @pytest.mark.parametrize(
     ("text", "changes", "complaint"),
     [
         (GOOD, {"channels": {"position": "qn[mm]"}}, "run.csv: position: found no column 'qn'"),
-        (GOOD, {"channels": {"position": "qm[mmm]"}}, "unknown unit 'mmm', expected 'mm'?"),
+        (
+            GOOD,
+            {"channels": {"position": "qm[mmm]"}},
+            "unknown unit 'mmm', expected a known one: did you mean 'mm'?",
+        ),
         (GOOD, {"channels": {"position": "qm[bar]"}}, "position: found the unit 'bar', expected"),
         (GOOD, {"channels": {"position": "qm"}}, "found 'qm', expected column[unit]"),
         (GOOD, {"channels": {"force": "u*gtau[N]"}}, "force: found no scalar 'gtau'"),

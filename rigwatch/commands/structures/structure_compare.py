@@ -6,9 +6,11 @@ from rigwatch.commands.common import print_json
 from rigwatch.commands.structures.structure_files import (
     add_problem,
     add_report,
+    as_written,
     figures,
     plain,
     problem_asked,
+    units_of,
     write_report,
 )
 from rigwatch.commands.structures.structure_view import add_views, draw_methods, wanted
@@ -44,18 +46,20 @@ def run(arguments: argparse.Namespace) -> int:
         write_report(arguments, problem, results)
     if drawn:
         draw_methods(arguments, problem, results)
+    units = units_of(problem)
+    written = {m: r if isinstance(r, str) else as_written(r, units) for m, r in results.items()}
     if arguments.json:
         print_json(
-            {m: {"error": r} if isinstance(r, str) else plain(r) for m, r in results.items()}
+            {m: {"error": r} if isinstance(r, str) else plain(r, units) for m, r in written.items()}
         )
     else:
-        for method, result in results.items():
-            _print(method, result)
+        for method, result in written.items():
+            _print(method, result, units)
     good = any(not isinstance(r, str) and r.converged for r in results.values())
     return 0 if good else 1
 
 
-def _print(method: str, result: object) -> None:
+def _print(method: str, result: object, units: dict[str, str]) -> None:
     from rigwatch.structures.identification import Identification
 
     if not isinstance(result, Identification):
@@ -63,4 +67,4 @@ def _print(method: str, result: object) -> None:
         return
     state = "converged" if result.converged else "did not converge"
     print(f"{method}: {state} in {len(result.iterations)} iterations, {result.seconds:.2f} s")
-    print("\n".join([*figures(result), *(f"  note: {remark}" for remark in result.remarks)]))
+    print("\n".join([*figures(result, units), *(f"  note: {remark}" for remark in result.remarks)]))

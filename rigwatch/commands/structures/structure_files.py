@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -129,21 +130,52 @@ def subject_of(path: Path) -> "Structure | Model":
     return load_model(path) if has_equations else load_structure(path)
 
 
-def figures(found: "Identification") -> list[str]:
-    """One line an unknown: estimate and 95 % interval."""
+def units_of(problem: "Problem") -> dict[str, str]:
+    """The unit that each unknown is written in, by name; x(0) has that of the state x."""
+    system = problem.sweeper.compiled.system
+    units = {name: p.shown or p.unit for name, p in system.parameters.items()}
+    units |= {f"{name}(0)": state.shown or state.unit for name, state in system.states.items()}
+    return {name: units[name] for name in problem.names}
+
+
+def as_written(found: "Identification", units: Mapping[str, str]) -> "Identification":
+    """What was identified, from SI to the units that the model's file is written in."""
+    from rigwatch.wire.units import unit_of
+
+    given = {name: unit_of(units[name]) for name in found.names}
+    if all(unit.plain for unit in given.values()):
+        return found
+    iterations = found.iterations.copy()
+    for column, name in zip(iterations.T, found.names, strict=True):
+        column[:] = [given[name].from_si(value) for value in column.tolist()]
+    values = {name: given[name].from_si(found.parameters[name]) for name in found.names}
+    ends = {
+        name: (given[name].from_si(low), given[name].from_si(high))
+        for name, (low, high) in found.intervals.items()
+        if name in given
+    }
+    return replace(
+        found, iterations=iterations, parameters={**found.parameters, **values}, intervals=ends
+    )
+
+
+def figures(found: "Identification", units: Mapping[str, str] | None = None) -> list[str]:
+    """One line an unknown: estimate and 95 % interval, and its unit where `units` are given."""
     width = max(len(name) for name in found.names)
     lines = []
     for name in found.names:
         low, high = found.intervals[name]
+        unit = f" {units[name]}" if units else ""
         vague = "  not determined by this record" if name in found.undetermined else ""
         lines.append(
-            f"  {name:<{width}}  {found.parameters[name]:>13.6g}   [{low:.6g}, {high:.6g}]{vague}"
+            f"  {name:<{width}}  {found.parameters[name]:>13.6g}   [{low:.6g}, {high:.6g}]"
+            f"{unit}{vague}"
         )
     return lines
 
 
-def plain(found: "Identification") -> dict[str, object]:
-    """The identification as plain data, for JSON."""
+def plain(found: "Identification", units: Mapping[str, str]) -> dict[str, object]:
+    """The identification as plain data with the unknowns' units, for JSON."""
     return {
         "method": found.method,
         "converged": found.converged,
@@ -152,7 +184,11 @@ def plain(found: "Identification") -> dict[str, object]:
             dict(zip(found.names, row.tolist(), strict=True)) for row in found.iterations
         ],
         "parameters": {
-            name: {"value": found.parameters[name], "interval": list(found.intervals[name])}
+            name: {
+                "value": found.parameters[name],
+                "unit": units[name],
+                "interval": list(found.intervals[name]),
+            }
             for name in found.names
         },
         "undetermined": list(found.undetermined),

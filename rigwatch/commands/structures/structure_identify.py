@@ -6,9 +6,11 @@ from rigwatch.commands.common import print_json
 from rigwatch.commands.structures.structure_files import (
     add_problem,
     add_report,
+    as_written,
     figures,
     plain,
     problem_asked,
+    units_of,
     write_report,
 )
 from rigwatch.commands.structures.structure_view import add_views, draw_methods, wanted
@@ -48,14 +50,17 @@ def run(arguments: argparse.Namespace) -> int:
         write_report(arguments, problem, {found.method: found})
     if drawn:
         draw_methods(arguments, problem, {found.method: found})
+    units = units_of(problem)
+    found = as_written(found, units)
     if arguments.json:
-        print_json(plain(found))
+        print_json(plain(found, units))
     else:
         state = "converged" if found.converged else "did not converge"
         print(
             f"{found.method}: {state} in {len(found.iterations)} iterations, {found.seconds:.2f} s"
         )
-        print("\n".join([*figures(found), *(f"  note: {remark}" for remark in found.remarks)]))
+        remarks = [f"  note: {remark}" for remark in found.remarks]
+        print("\n".join([*figures(found, units), *remarks]))
     return 0 if found.converged else 1
 
 

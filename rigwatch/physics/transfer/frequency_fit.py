@@ -12,11 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.physics.transfer.frequency_response import FrequencyResponse
+from rigwatch.physics.transfer.levenberg import (
+    Descent,
+    descend,
+    least_squares_coefficients,
+)
 from rigwatch.physics.transfer.transfer_function import TransferFunction, reflected
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 Complex = NDArray[np.complex128]
+DESCENT = Descent(steps=200, more=4.0, less=5.0, worth=1e-12)
 
 
 def fit_transfer_function(
@@ -40,7 +46,7 @@ def fit_transfer_function(
         )
     problem = _Problem(measured, poles, zeros, delay)
     theta = problem.linear_start()
-    theta = problem.gauss_newton(theta)
+    theta = problem.descend(theta)
     return problem.function(theta)
 
 
@@ -76,7 +82,7 @@ class _Problem:
     def _levy(self, weight: FloatArray) -> FloatArray:
         rows = np.hstack([self.numerator, -self.g[:, None] * self.denominator]) * weight[:, None]
         target = np.asarray(self.g * weight, dtype=np.complex128)
-        return _real_lstsq(np.asarray(rows, dtype=np.complex128), target)
+        return least_squares_coefficients(np.asarray(rows, dtype=np.complex128), target)
 
     def _stable(self, theta: FloatArray) -> FloatArray:
         a = reflected(np.concatenate([[1.0], theta[self.zeros + 1 :]]))
@@ -84,7 +90,7 @@ class _Problem:
 
     def _best_numerator(self, a: FloatArray) -> FloatArray:
         scale = self.w / (1.0 + self.denominator @ a)
-        return _real_lstsq(
+        return least_squares_coefficients(
             self.numerator * scale[:, None], np.asarray(self.g * self.w, dtype=np.complex128)
         )
 
@@ -104,37 +110,12 @@ class _Problem:
         columns = [self.numerator / a[:, None], -self.denominator * (model / a)[:, None]]
         return np.asarray(np.hstack(columns) * self.w[:, None])
 
-    def gauss_newton(self, theta: FloatArray, steps: int = 200) -> FloatArray:
-        cost, damping = self._cost(theta), 1e-3
-        for _ in range(steps):
-            trial = self._stable(
-                theta + _damped_step(self._gradient(theta), self._errors(theta), damping)
-            )
-            trial_cost = self._cost(trial)
-            gained = cost - trial_cost
-            if gained <= 0.0:
-                damping *= 4.0
-                if damping > 1e8:
-                    break
-                continue
-            theta, cost, damping = trial, trial_cost, max(damping / 5.0, 1e-12)
-            if gained < 1e-12 * cost:
-                break
-        return theta
-
-
-def _real_lstsq(rows: Complex, target: Complex) -> FloatArray:
-    stacked = np.vstack([rows.real, rows.imag])
-    scale = np.linalg.norm(stacked, axis=0)
-    solution = np.linalg.lstsq(
-        stacked / scale, np.concatenate([target.real, target.imag]), rcond=None
-    )
-    return np.asarray(solution[0] / scale)
-
-
-def _damped_step(gradient: Complex, error: Complex, damping: float) -> FloatArray:
-    rows = np.vstack([gradient.real, gradient.imag])
-    scale = np.linalg.norm(rows, axis=0)
-    padded = np.vstack([rows / scale, np.sqrt(damping) * np.eye(scale.size)])
-    target = np.concatenate([error.real, error.imag, np.zeros(scale.size)])
-    return np.asarray(np.linalg.lstsq(padded, target, rcond=None)[0] / scale)
+    def descend(self, theta: FloatArray) -> FloatArray:
+        return descend(
+            theta,
+            DESCENT,
+            errors=self._errors,
+            gradient=self._gradient,
+            cost=self._cost,
+            admissible=self._stable,
+        )

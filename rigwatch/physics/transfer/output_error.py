@@ -13,9 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from rigwatch.physics.transfer.levenberg import (
+    Descent,
+    descend,
+    least_squares_coefficients,
+)
 from rigwatch.physics.transfer.transfer_function import TransferFunction, reflected
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+
+DESCENT = Descent(steps=60, more=10.0, less=10.0, worth=1e-10)
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,7 @@ def fit_output_error(
     if not (np.any(u) and np.any(y)):
         raise ModelError("output-error model: found an input or output of zeros")
     search = _Search(u, y, orders, skip)
-    theta = search.gauss_newton(search.start())
+    theta = search.descend(search.start())
     error = search.errors(theta)
     energy = float(np.sum(y[skip:] ** 2))
     return OutputErrorFit(
@@ -111,14 +118,16 @@ class _Search:
         filtered_u, filtered_y = lfilter([1.0], a, self.u), lfilter([1.0], a, self.y)
         columns = self._delays(filtered_u, self._input_delays())
         columns += [-c for c in self._delays(filtered_y, range(1, self.orders.nf + 1))]
-        theta = _lstsq(np.column_stack(columns)[self.skip :], filtered_y[self.skip :])
+        theta = least_squares_coefficients(
+            np.column_stack(columns)[self.skip :], filtered_y[self.skip :]
+        )
         stable = reflected(np.concatenate([[1.0], theta[self.orders.nb :]]), 1e-4)
         return np.concatenate([self._best_numerator(stable), stable[1:]])
 
     def _best_numerator(self, a: FloatArray) -> FloatArray:
         filtered = lfilter([1.0], a, self.u)
         columns = np.column_stack(self._delays(filtered, self._input_delays()))
-        return _lstsq(columns[self.skip :], self.y[self.skip :])
+        return least_squares_coefficients(columns[self.skip :], self.y[self.skip :])
 
     def _input_delays(self) -> range:
         return range(self.orders.nk, self.orders.nk + self.orders.nb)
@@ -143,32 +152,17 @@ class _Search:
         columns += [-c for c in self._delays(filtered_y, range(1, self.orders.nf + 1))]
         return np.column_stack(columns)[self.skip :]
 
-    def gauss_newton(self, theta: FloatArray, steps: int = 60) -> FloatArray:
-        cost, damping, nb = self.cost(theta), 1e-3, self.orders.nb
-        for _ in range(steps):
-            trial = theta + _damped_step(self.gradient(theta), self.errors(theta), damping)
-            trial[nb:] = reflected(np.concatenate([[1.0], trial[nb:]]), 1e-4)[1:]
-            gained = cost - (trial_cost := self.cost(trial))
-            if gained <= 0.0:
-                damping *= 10.0
-                if damping > 1e8:
-                    break
-                continue
-            theta, cost, damping = trial, trial_cost, max(damping / 10.0, 1e-12)
-            if gained < 1e-10 * cost:
-                break
-        return theta
+    def descend(self, theta: FloatArray) -> FloatArray:
+        return descend(
+            theta,
+            DESCENT,
+            errors=self.errors,
+            gradient=self.gradient,
+            cost=self.cost,
+            admissible=self._stable,
+        )
 
-
-def _lstsq(rows: FloatArray, target: FloatArray) -> FloatArray:
-    scale = np.linalg.norm(rows, axis=0)
-    scale[scale == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(rows / scale, target, rcond=None)[0] / scale)
-
-
-def _damped_step(gradient: FloatArray, error: FloatArray, damping: float) -> FloatArray:
-    scale = np.linalg.norm(gradient, axis=0)
-    scale[scale == 0.0] = 1.0
-    padded = np.vstack([gradient / scale, np.sqrt(damping) * np.eye(scale.size)])
-    target = np.concatenate([error, np.zeros(scale.size)])
-    return np.asarray(np.linalg.lstsq(padded, target, rcond=None)[0] / scale)
+    def _stable(self, theta: FloatArray) -> FloatArray:
+        nb, stable = self.orders.nb, theta.copy()
+        stable[nb:] = reflected(np.concatenate([[1.0], theta[nb:]]), 1e-4)[1:]
+        return stable

@@ -1,4 +1,4 @@
-"""Velocity from an accelerometer alone (theory 1.3), without the lead that a high-pass brings.
+"""Velocity from an accelerometer alone (docs/theory.md 1.3), without the lead of a high-pass.
 
 A third-order Butterworth high-pass H(s) = s³/D(s), D = s³ + 2·c·s² + 2·c²·s + c³, removes what a
 piezo cannot know, and an integrator does the rest. Well above the corner c [rad/s] the high-pass

@@ -84,30 +84,22 @@ class _Filter:
 
         Initial states are smoothed only through the parameters; they keep what they started from.
         """
-        problem, kernel = self.problem, self.problem.sweeper.kernel
+        problem, sweeper = self.problem, self.problem.sweeper
         parameters, x = problem.split(unknowns)
         m, n = len(problem.free), len(x)
         whole = self._joined(covariance, m, n)
-        slopes, steps = np.empty((n, m + n)), np.eye(m + n)
-        width = problem.observed.shape[1]
-        y, read = np.empty(width), np.empty((width, m + n))
+        inputs, dt, steps = problem.recording.inputs, problem.recording.dt, np.eye(m + n)
         system_noise = np.concatenate([np.zeros(m), (self.drift * self.size) ** 2])
         for k in range(len(problem.observed)):
             row = problem.first + k
-            kernel.observe(
-                problem.recording.inputs, problem.recording.dt, row, x, parameters, y, read
-            )
+            y, read = sweeper.observe(inputs, dt, row, x, parameters)
             change, whole = self._corrected(whole, problem.observed[k] - y, read)
             parameters[problem.free] += change[:m]
             x += change[m:]
             if not np.isfinite(change).all() or not np.isfinite(whole).all():
                 return None, covariance
             if k + 1 < len(problem.observed):
-                kernel.forward(
-                    problem.recording.inputs, problem.recording.dt, row, problem.substeps,
-                    problem.sweeper.hold, x, parameters, slopes,
-                )  # fmt: skip
-                steps[m:] = slopes
+                steps[m:] = sweeper.forward(inputs, dt, row, problem.substeps, x, parameters)
                 whole = steps @ whole @ steps.T
                 whole[np.diag_indices(m + n)] += system_noise
         after = covariance.copy()

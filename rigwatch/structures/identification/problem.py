@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from rigwatch.physics.engine.equations import Model, compose
 from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.structures.identification.sweep import Sweeper, sweeper
-from rigwatch.structures.identification.weighting import weights
 from rigwatch.structures.model import Structure, coefficients, to_model, with_unknowns
-from rigwatch.structures.records import Record
+from rigwatch.structures.records import Record, weights
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.units import unit_of
 
 TURN = 0.1
 """Radians of the fastest motion per integration step of the methods that may choose it."""
@@ -264,8 +264,13 @@ def _freed(model: Model, unknowns: Sequence[str], guess: Mapping[str, float]) ->
             raise ModelError(
                 f"{model.name}: found the unknown {name!r}, expected one of {', '.join(known)}"
             )
+    # A person guesses in the unit that the model's file is written in.
+    values = {
+        name: unit_of(p.shown or p.unit).to_si(guess[name]) if name in guess else p.value
+        for name, p in model.parameters.items()
+    }
     parameters = {
-        name: msgspec.structs.replace(p, fixed=name not in unknowns, value=guess.get(name, p.value))
+        name: msgspec.structs.replace(p, fixed=name not in unknowns, value=values[name])
         for name, p in model.parameters.items()
     }
     return msgspec.structs.replace(model, parameters=parameters)
@@ -282,6 +287,8 @@ def _initial(
     shown = initial_states(system, recording)[first]
     found = shown if first else known
     found[loose] = shown[loose]
-    for index, name in enumerate(system.states):
-        found[index] = guess.get(f"{name}(0)", found[index])
+    for index, (name, state) in enumerate(system.states.items()):
+        if f"{name}(0)" in guess:
+            written = unit_of(state.shown or state.unit)
+            found[index] = written.to_si(guess[f"{name}(0)"])
     return found

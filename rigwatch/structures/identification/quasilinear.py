@@ -110,12 +110,11 @@ class _Nominal:
         """All states from the guess on, shape (samples, n)."""
         problem, states = self._problem, np.empty_like(self._states)
         parameters, x = problem.split(problem.guess)
-        slopes = np.empty((len(x), problem.sweeper.compiled.columns))
         for row in range(len(states)):
             states[row] = x
             if row + 1 < len(states):
-                problem.sweeper.kernel.forward(
+                problem.sweeper.forward(
                     problem.recording.inputs, problem.recording.dt, problem.first + row,
-                    problem.substeps, problem.sweeper.hold, x, parameters, slopes,
+                    problem.substeps, x, parameters,
                 )  # fmt: skip
         return states

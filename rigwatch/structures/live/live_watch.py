@@ -197,9 +197,6 @@ class _Beside:
         columns = len(base.model.candidates) + len(self._state)
         self._slopes = np.zeros((len(self._state), columns))
         self._slopes[:, len(base.model.candidates) :] = np.eye(len(self._state))
-        self._outputs = np.empty(len(system.outputs))
-        self._output_slopes = np.zeros((len(system.outputs), columns))
-        self._step = np.empty((len(self._state), columns))
         self._innovations = Innovations(base.spread)
         samples = rounded(round(settings.span / dt))
         threshold = threshold_for(settings.rate, len(base.sigma), samples, base.samples)
@@ -212,32 +209,30 @@ class _Beside:
         """
         if row:
             self._advance(record, row - 1)
-        kernel, count = self.model.problem.sweeper.kernel, len(self.model.signals)
-        kernel.observe(
-            record.inputs, record.dt, row, self._state, self._parameters, self._outputs,
-            self._output_slopes,
-        )  # fmt: skip
-        residual = self._outputs[:count] - record.observed[row]
-        scaled = self._innovations.update(residual / self._sigma, self._seen(count))
+        count = len(self.model.signals)
+        outputs, slopes = self.model.problem.sweeper.observe(
+            record.inputs, record.dt, row, self._state, self._parameters
+        )
+        residual = outputs[:count] - record.observed[row]
+        scaled = self._innovations.update(residual / self._sigma, self._seen(slopes[:count]))
         over = self.judge.update(scaled)
         return np.append(residual, self.judge.value / self.judge.threshold), over
 
-    def _seen(self, count: int) -> FloatArray:
+    def _seen(self, output_slopes: FloatArray) -> FloatArray:
         """Slopes of the scaled signals by coefficients and first state, shape (m, c + n)."""
         free = len(self.model.candidates)
-        direct, by_state = self._output_slopes[:count, :free], self._output_slopes[:count, free:]
+        direct, by_state = output_slopes[:, :free], output_slopes[:, free:]
         slopes = by_state @ self._slopes
         slopes[:, :free] += direct
         return np.asarray(slopes / self._sigma[:, None])
 
     def _advance(self, record: GrowingRecord, row: int) -> None:
         problem, free = self.model.problem, len(self.model.candidates)
-        problem.sweeper.kernel.forward(
-            record.inputs, record.dt, row, FINER * problem.substeps, problem.sweeper.hold,
-            self._state, self._parameters, self._step,
-        )  # fmt: skip
-        moved = self._step[:, free:] @ self._slopes
-        moved[:, :free] += self._step[:, :free]
+        step = problem.sweeper.forward(
+            record.inputs, record.dt, row, FINER * problem.substeps, self._state, self._parameters
+        )
+        moved = step[:, free:] @ self._slopes
+        moved[:, :free] += step[:, :free]
         self._slopes = moved
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from rigwatch.structures.records.record import Record, read_record, record_of
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError
-from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.exchange import AMBIGUOUS, conversion
+from rigwatch.wire.messages import Column, SampleBlock
 from rigwatch.wire.session import SUFFIX, open_session
 
 TABLES = {".csv", ".npz"}
@@ -56,4 +57,21 @@ def _place(block: SampleBlock, at: int, columns: dict[str, FloatArray], clock: F
     rows = slice(at, at + len(block))
     clock[rows] = np.asarray(block.device_us, np.float64) * 1e-6
     for column in block.channels:
-        columns[column.name][rows] = column.usable()
+        columns[column.name][rows] = _in_si(column)
+
+
+def _in_si(column: Column) -> FloatArray:
+    """Valid values in SI; as they are where the unit is not known.
+
+    Raises:
+        ImportDataError: the unit is g, which may be gravity or the gram.
+    """
+    try:
+        to_si = conversion(column.unit, column.name)
+    except ImportDataError:
+        if column.unit in AMBIGUOUS:
+            raise
+        return column.usable()
+    if (to_si.factor, to_si.offset) == (1.0, 0.0):
+        return column.usable()
+    return column.usable() * to_si.factor + to_si.offset

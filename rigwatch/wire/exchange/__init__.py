@@ -1,7 +1,15 @@
 """Sessions to and from other formats: CSV, Parquet and MAT files, with units converted."""
 
+from rigwatch.wire.exchange.column_units import AMBIGUOUS, conversion
 from rigwatch.wire.exchange.exporting import export_session
 from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option
 
-__all__ = ["ImportMapping", "export_session", "import_file", "parse_map_option"]
+__all__ = [
+    "AMBIGUOUS",
+    "ImportMapping",
+    "conversion",
+    "export_session",
+    "import_file",
+    "parse_map_option",
+]

@@ -100,6 +100,22 @@ def file_descriptor_set() -> bytes:
 
 
 @cache
+def field_tags(kind: type[Message] | type[Column]) -> Mapping[str, int]:
+    """The byte in front of each field on the wire: its number and how it is written."""
+    proto = next(p for p in _file_descriptor().message_type if p.name == kind.__name__)
+    by_length = 2
+    return {
+        field.name: field.number << 3 | (0 if _is_varint(field) else by_length)
+        for field in proto.field
+    }
+
+
+def _is_varint(field: Any) -> bool:
+    single = field.label != _Field.LABEL_REPEATED
+    return single and field.type in (_Field.TYPE_SINT64, _Field.TYPE_BOOL)
+
+
+@cache
 def _pool() -> descriptor_pool.DescriptorPool:
     pool = descriptor_pool.DescriptorPool()
     pool.Add(_file_descriptor())

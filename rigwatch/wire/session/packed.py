@@ -18,11 +18,17 @@ from rigwatch.wire.messages import protobuf as schema
 _NO_QUALITY: ByteArray = np.zeros(0, np.uint8)
 _F8, _I8, _U1 = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
 _MOST_LAYOUTS = 256
-_DEVICE, _BOOT, _SEQ = 0x0A, 0x10, 0x18
-"""Tags on the wire: number of the field and how it is written."""
-_TIMES = {SampleBlock: (0x22, 0x2A), EstimateBlock: (0x22,)}
-_COLUMNS = {SampleBlock: 0x32, EstimateBlock: 0x2A}
-_NAME, _UNIT, _VALUES, _QUALITY = 0x0A, 0x12, 0x1A, 0x22
+_TAGS = {kind: schema.field_tags(kind) for kind in (SampleBlock, EstimateBlock)}
+_DEVICE, _BOOT, _SEQ = (_TAGS[SampleBlock][name] for name in ("device", "boot", "seq"))
+_TIMES = {
+    SampleBlock: (_TAGS[SampleBlock]["device_us"], _TAGS[SampleBlock]["t_ns"]),
+    EstimateBlock: (_TAGS[EstimateBlock]["t_ns"],),
+}
+_COLUMNS = {
+    SampleBlock: _TAGS[SampleBlock]["channels"],
+    EstimateBlock: _TAGS[EstimateBlock]["columns"],
+}
+_NAME, _UNIT, _VALUES, _QUALITY = schema.field_tags(Column).values()
 Span = tuple[int, int]
 K = TypeVar("K", SampleBlock, EstimateBlock)
 

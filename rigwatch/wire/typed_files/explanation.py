@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.units import UnitError
 
 _PLACE = re.compile(r" - at `(?:key in )?\$(?P<path>[^`]*)`$")
 _UNKNOWN = re.compile(r"Object contains unknown field `(?P<key>[^`]+)`")
@@ -23,9 +24,14 @@ _STEP = re.compile(r"\.?([^.\[\]]+)|\[(\d+|\.\.\.)\]")
 
 
 def explained(
-    complaint: str, raw: Any, kind: type[msgspec.Struct], text: str, file: Path | str
+    error: msgspec.ValidationError,
+    raw: Any,
+    kind: type[msgspec.Struct],
+    text: str,
+    file: Path | str,
 ) -> ConfigError:
-    """The error to show for msgspec's `complaint` about `raw`, read from `text` of `file`."""
+    """The error to show for what msgspec says about `raw`, read from `text` of `file`."""
+    complaint = str(error)
     place = _PLACE.search(complaint)
     reason = complaint[: place.start()] if place else complaint
     path, value, schema = _follow(place["path"] if place else "", raw, kind)
@@ -35,6 +41,9 @@ def explained(
     if match := _MISSING.search(reason):
         key = _below(path, match["key"])
         return ConfigError(file, key, "no such key", "a value for it", _line(text, path))
+    if isinstance(error.__cause__, UnitError):
+        unit, key = error.__cause__, _below(path, "unit")
+        return ConfigError(file, key, unit.found, unit.expected, _line(text, key))
     return ConfigError(file, path, _shown(value), _expected(reason, schema), _line(text, path))
 
 

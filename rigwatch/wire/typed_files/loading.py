@@ -43,7 +43,7 @@ def parse(text: str, kind: type[S], file: Path | str) -> S:
     try:
         return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:
-        raise explained(str(error), raw, kind, text, file) from None
+        raise explained(error, raw, kind, text, file) from None
 
 
 def _read(path: Path) -> str:

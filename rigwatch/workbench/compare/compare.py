@@ -1,15 +1,26 @@
 """Compares the model of a study with its recordings: errors, noise floor, parameters."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rigwatch.physics.engine.fit import Convergence
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.uncertainty_budget import beyond
-from rigwatch.workbench.data import METHODS, Data, NoiseFloor, from_residual, prepare, quiet_scale
+from rigwatch.workbench.data import (
+    METHODS,
+    Data,
+    NoiseFloor,
+    along_motion,
+    from_residual,
+    goes_along_motion,
+    prepare,
+    quiet_scale,
+)
 from rigwatch.workbench.fit import (
     Fitted,
     Value,
+    as_written,
     commissioned,
     fit_base,
     fit_model,
@@ -17,8 +28,9 @@ from rigwatch.workbench.fit import (
     profile,
     referenced,
     values,
+    with_hold,
 )
-from rigwatch.workbench.study import Study, check_data
+from rigwatch.workbench.study import Held, Study, check_data
 
 
 @dataclass(frozen=True)
@@ -41,9 +53,11 @@ class Comparison:
         unit: the channel's where there is one, else "noise floors".
         noise_from: how the floor is known.
         channels: by output.
-        parameters: by name.
+        parameters: by name, in the units that the model and its effects are written in.
         effects: accepted so far, as "effect@port".
         remarks: what was noticed, for people.
+        hold: what each input does between samples, by name.
+        convergence: how the fit of the model ended.
     """
 
     train_error: float
@@ -55,6 +69,8 @@ class Comparison:
     parameters: dict[str, Value]
     effects: list[str]
     remarks: list[str]
+    hold: dict[str, Held] = field(default_factory=dict)
+    convergence: Convergence | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +108,11 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     """
     check_data(study)
     data = prepare(study)
-    scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
+    if goes_along_motion(study):
+        study, data = along_motion(study, data)
+    several = data.train.outputs.shape[1] > 1 or data.along_motion
+    scale = quiet_scale(data.train) if several else None
+    study = with_hold(study, data, scale)
     study = commissioned(study, data, scale)
     return *referenced(study, data, scale), scale
 
@@ -104,12 +124,13 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
         study, data: prepared.
         scale: divisor of each output's residuals, shape (outputs,); its spread if None.
     """
+    study = with_hold(study, data, scale)
     base = fit_base(study, data, scale)
     healthy = data.of_healthy
     if healthy is None:
         floor = from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
         return Bench(study, data, base, floor, None)
-    bare = fit_model(study, healthy, (), study.file.start, base.train.scale)
+    bare = fit_model(study, healthy, (), study.file.start, base.train.scale, from_afar=True)
     return Bench(study, data, base, _of_healthy(study, healthy, base, bare), bare)
 
 
@@ -122,7 +143,8 @@ def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> Nois
     fits = [bare]
     if base.placements:
         fits.append(fit_base(study, healthy, base.train.scale))
-    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, "healthy")
+    method = "healthy motion" if healthy.along_motion else "healthy"
+    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, method)
 
 
 def compare(study: Study, *, profiled: bool = False) -> Comparison:
@@ -134,7 +156,10 @@ def compare(study: Study, *, profiled: bool = False) -> Comparison:
     """
     bench = open_bench(study)
     found = comparison(bench)
-    return replace(found, parameters=profile(bench.base, bench.data.train)) if profiled else found
+    if not profiled:
+        return found
+    intervals = as_written(profile(bench.base, bench.data.train), bench.base.compiled.system)
+    return replace(found, parameters=intervals)
 
 
 def comparison(bench: Bench) -> Comparison:
@@ -158,9 +183,11 @@ def comparison(bench: Bench) -> Comparison:
         next(iter(channels.values())).unit if alone else "noise floors",
         METHODS[floor.method],
         channels,
-        found,
+        as_written(found, base.compiled.system),
         [f"{a.effect}@{a.port}" for a in bench.study.file.effects],
         [*bench.data.remarks, *weak],
+        dict(bench.study.holds),
+        base.convergence,
     )
 
 

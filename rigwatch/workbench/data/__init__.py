@@ -1,5 +1,6 @@
 """What a study measures: signals on one grid, their scales, and the noise floor."""
 
+from rigwatch.workbench.data.motion import along_motion, goes_along_motion
 from rigwatch.workbench.data.noise_floor import (
     METHODS,
     NoiseFloor,
@@ -14,8 +15,10 @@ __all__ = [
     "METHODS",
     "Data",
     "NoiseFloor",
+    "along_motion",
     "find_period",
     "from_residual",
+    "goes_along_motion",
     "parameters_of",
     "port_sizes",
     "prepare",

@@ -5,16 +5,17 @@ simulation needs it everywhere, and the outputs beside it are not counted.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from rigwatch.physics.engine.equations import Model
+from rigwatch.physics.engine.equations import Input, Model, Output
 from rigwatch.physics.engine.fit import Recording, Thinning
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.session import open_session
+from rigwatch.workbench.data.signal_units import check_unit, in_si
 from rigwatch.workbench.study import Derive, Span, Study, StudyFile, nearest
 
 MOST_MISSING = 0.2
@@ -27,11 +28,13 @@ class Columns:
 
     Attributes:
         dt: time between samples [s].
-        values: by channel, each of shape (n,); NaN where nothing valid was measured.
+        values: by channel, each of shape (n,), in SI; NaN where nothing valid was measured.
+        units: of the channels as they were recorded.
     """
 
     dt: float
     values: Mapping[str, FloatArray]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))
@@ -46,6 +49,7 @@ class Data:
         healthy: recording with nothing wrong, None where there is none.
         horizon: samples from one re-initialisation to the next.
         remarks: what was noticed on the way, for people.
+        along_motion: whether the recordings are for a model along its measured motion.
     """
 
     train: Recording
@@ -53,13 +57,14 @@ class Data:
     healthy: Recording | None
     horizon: int
     remarks: tuple[str, ...]
+    along_motion: bool = False
 
     @property
     def of_healthy(self) -> "Data | None":
         """The healthy recording to be fitted and judged by itself, None where there is none."""
         if self.healthy is None:
             return None
-        return Data(self.healthy, self.healthy, None, self.horizon, ())
+        return replace(self, train=self.healthy, held_out=self.healthy, healthy=None, remarks=())
 
 
 def read_columns(study: Study, span: Span) -> Columns:
@@ -88,7 +93,9 @@ def read_columns(study: Study, span: Span) -> Columns:
             f"{span.session}: found {count * dt:g} s, expected samples from {span.start:g} s"
             f" to {span.end:g} s"
         )
-    return Columns(dt, {name: column[begin:end] for name, column in values.items()})
+    units = {column.name: column.unit for block in blocks for column in block.channels}
+    cut = {name: in_si(column[begin:end], units[name]) for name, column in values.items()}
+    return Columns(dt, cut, units)
 
 
 def with_derived(columns: Columns, derive: Derive | None) -> Columns:
@@ -117,7 +124,15 @@ def with_derived(columns: Columns, derive: Derive | None) -> Columns:
         for _ in range(signal.order):
             smooth = np.gradient(smooth, columns.dt)
         found[name] = np.where(np.isfinite(raw), smooth, np.nan)
-    return Columns(columns.dt, found)
+    return Columns(columns.dt, found, {**columns.units, **_derived_units(columns, derive)})
+
+
+def _derived_units(columns: Columns, derive: Derive) -> dict[str, str]:
+    units = {name: columns.units.get(s.channel, "") for name, s in derive.signals.items()}
+    return {
+        name: f"({unit})/s^{derive.signals[name].order}" if unit else ""
+        for name, unit in units.items()
+    }
 
 
 def bridged(signal: FloatArray) -> FloatArray:
@@ -186,23 +201,26 @@ def _recording(
     u, y = np.concatenate(inputs), np.concatenate(outputs)
     u, y = _without_holes(study.model, u, y, use, remarks)
     _check_excitation(study.model, u, use)
-    return Recording(tables[0].dt, u, y, thinning)
+    return Recording(tables[0].dt, u, y, thinning, parts)
 
 
 def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:
     model, file = study.model, study.file
 
-    def column(name: str, channel: str) -> FloatArray:
-        wanted = file.channels.get(name, channel or name)
+    def column(name: str, signal: Input | Output) -> FloatArray:
+        wanted = file.channels.get(name, signal.channel or name)
         if wanted not in table.values:
             raise ModelError(
                 f"{model.name}: found no channel {wanted!r} for {name}, expected"
                 f" {nearest(wanted, table.values)}"
             )
+        check_unit(
+            table.units.get(wanted, ""), signal, f"channel {wanted!r}", f"{model.name}: {name}"
+        )
         return table.values[wanted]
 
-    u = [column(name, signal.channel) for name, signal in model.inputs.items()]
-    y = [column(name, signal.channel) for name, signal in model.outputs.items()]
+    u = [column(name, signal) for name, signal in model.inputs.items()]
+    y = [column(name, signal) for name, signal in model.outputs.items()]
     return np.stack(u, axis=1) if u else np.zeros((len(table), 0)), np.stack(y, axis=1)
 
 

@@ -11,5 +11,6 @@ from rigwatch.workbench.explain.explain import (
     explanation,
     ranking,
 )
+from rigwatch.workbench.explain.verdict import Verdict, judge
 
-__all__ = ["Explanation", "Row", "as_data", "explain", "explanation", "ranking"]
+__all__ = ["Explanation", "Row", "Verdict", "as_data", "explain", "explanation", "judge", "ranking"]

@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rigwatch.workbench.compare import Bench, Comparison, beyond, comparison, open_bench
+from rigwatch.workbench.explain.adequacy import inadequate
+from rigwatch.workbench.explain.believed import believed
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
-from rigwatch.workbench.explain.verdict import Verdict, judge
+from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.explain.verdict_calibration import seen
-from rigwatch.workbench.fit import Value, values
-from rigwatch.workbench.ranking import Progress, Ranked, rank, unheard
+from rigwatch.workbench.fit import Value, as_written, values
+from rigwatch.workbench.ranking import Progress, Ranked, rank, rank_all, unheard
 from rigwatch.workbench.study import Study
 
 
@@ -43,7 +45,7 @@ class Explanation:
     """What a study learns from its recordings.
 
     Attributes:
-        verdict: nothing_missing, missing_effect, undetermined or unknown_effect.
+        verdict: nothing_missing, missing_effect, undetermined, unknown_effect or model_inadequate.
         text: the verdict in a sentence.
         comparison: the model as it is.
         ranking: best first.
@@ -83,8 +85,13 @@ def explain(study: Study, progress: Progress = unheard) -> Explanation:
 
 def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], Verdict]:
     """The ranking, what the verdict names in front, and the verdict."""
+    stopped = not_converged({
+        "the model": bench.base, "the model to the healthy recording": bench.bare,
+    }) or inadequate(bench)  # fmt: skip
+    if stopped is not None:
+        return rank_all(bench.study, bench.data, bench.base), stopped
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
-    verdict = judge(bench.base, rows, bench.floor)
+    verdict = believed(bench, rows)
     if verdict.word == "unknown_effect" and verdict.best is not None:
         progress(f"{verdict.best.label} leaves much: trying two effects at once")
         verdict = two_effects(bench, rows, verdict, progress)
@@ -122,7 +129,7 @@ def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None)
     found: dict[str, Value] = {}
     if row.fitted is not None:
         prefix = row.placement.prefix
-        every = values(row.fitted.train, more)
+        every = as_written(values(row.fitted.train, more), row.fitted.compiled.system)
         found = {n[len(prefix) :]: v for n, v in every.items() if n.startswith(prefix)}
     others = [label for label in alike if label != row.label]
     return Row(

@@ -14,10 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigwatch.physics.engine.equations import Input
 from rigwatch.physics.engine.fit import initial_states
 from rigwatch.physics.engine.score import Candidate, Projector, directions, trajectory
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.units import unit_of
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.fit import nodes
 from rigwatch.workbench.ranking import Ranked
@@ -85,14 +87,20 @@ def _worded(
     bench: Bench, name: str, share: float, separation: dict[str, float], now: dict[str, float]
 ) -> Experiment:
     signal = _driven(bench)
-    unit = bench.study.model.inputs[signal].unit
+    driven = bench.study.model.inputs[signal]
     amplitude = share * _amplitude(bench, signal)
     rival, size = min(separation.items(), key=lambda item: item[1])
     text = (
-        f"{name} of {signal}, amplitude {amplitude:.3g} {unit}, {DURATION:g} s:"
+        f"{name} of {signal}, amplitude {_in_words(amplitude, driven)}, {DURATION:g} s:"
         f" {rival} would differ by {size:.3g} noise floors (on this recording: {now[rival]:.3g})"
     )
-    return Experiment(name, signal, amplitude, unit, DURATION, separation, now, text)
+    return Experiment(name, signal, amplitude, driven.unit, DURATION, separation, now, text)
+
+
+def _in_words(amplitude: float, driven: Input) -> str:
+    """An amplitude in the unit that the model's file is written in; an offset has no part in it."""
+    shown = driven.shown or driven.unit
+    return f"{amplitude / float(unit_of(shown).factor):.3g} {shown}"
 
 
 def _driven(bench: Bench) -> str:

@@ -1,14 +1,15 @@
-"""The verdict: what the ranking means, in one of four words.
+"""The verdict: what the ranking means, in one of five words.
 
 `nothing_missing`, `missing_effect`, `undetermined` (rivals of different physics that this recording
-cannot tell apart) or `unknown_effect` (the error stays above the noise floor, and no known effect
-brings it down). All four are results.
+cannot tell apart), `unknown_effect` (the error stays above the noise floor, and no known effect
+brings it down) or `model_inadequate` (the model's own fit cannot be relied on, or does not describe
+the healthy rig, see `adequacy.py`; no effect is named). All five are results.
 
 Of effects that do equally well on the recordings held out, the one with the fewest parameters is
 named first; the others of its kind form its class.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -20,7 +21,9 @@ from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, doub
 from rigwatch.workbench.fit import Fitted, block_errors
 from rigwatch.workbench.ranking import EXPLAINED, SAME, SIMILAR, Ranked, left_over
 
-Word = Literal["nothing_missing", "missing_effect", "undetermined", "unknown_effect"]
+Word = Literal[
+    "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
+]
 EQUAL = 2.0
 """Standard deviations of a paired difference below which two effects do equally well."""
 NO_DIFFERENCE = 1e-4
@@ -38,7 +41,7 @@ class Verdict:
     """What is missing.
 
     Attributes:
-        word: one of four.
+        word: one of five.
         best: what is named, None where nothing is.
         members: labels that the best cannot be told from, itself first.
         rivals: labels of other physics that this recording cannot tell from it.
@@ -59,6 +62,22 @@ class Verdict:
     def doubt(self) -> float:
         """Probability of being wrong, calibrated on simulated cases."""
         return doubt(self.word, self.evidence)
+
+
+def not_converged(fits: Mapping[str, Fitted | None]) -> Verdict | None:
+    """The verdict where a fit that the others build on did not converge, None where all did.
+
+    Args:
+        fits: by what they are of, in words.
+    """
+    for name, fitted in fits.items():
+        ended = fitted.convergence if fitted else None
+        if ended is not None and not ended.converged:
+            text = f"the fit of {name} did not converge: {ended.reason}"
+            if ended.undetermined:
+                text += f"; the data do not determine {', '.join(ended.undetermined)}"
+            return Verdict("model_inadequate", None, (), (), text)
+    return None
 
 
 def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:

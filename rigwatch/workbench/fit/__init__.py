@@ -9,16 +9,19 @@ from rigwatch.workbench.fit.fitted_model import (
     fit_twice,
     may_be_better,
     nodes,
+    placements_of,
 )
 from rigwatch.workbench.fit.free_run import free_run
 from rigwatch.workbench.fit.healthy_parameters import commissioned, loosened
 from rigwatch.workbench.fit.healthy_reference import referenced
-from rigwatch.workbench.fit.intervals import Value, values
+from rigwatch.workbench.fit.input_hold import held_as, with_hold
+from rigwatch.workbench.fit.intervals import Value, as_written, values
 from rigwatch.workbench.fit.profile import profile
 
 __all__ = [
     "Fitted",
     "Value",
+    "as_written",
     "block_errors",
     "commissioned",
     "fit_again",
@@ -26,10 +29,13 @@ __all__ = [
     "fit_model",
     "fit_twice",
     "free_run",
+    "held_as",
     "loosened",
     "may_be_better",
     "nodes",
+    "placements_of",
     "profile",
     "referenced",
     "values",
+    "with_hold",
 ]

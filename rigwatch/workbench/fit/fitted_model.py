@@ -1,17 +1,29 @@
 """A model with some effects, fitted to the training recordings and judged on those held out."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem, compile_system, even_substeps
 from rigwatch.physics.engine.equations import Placement, System, compose
-from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
+from rigwatch.physics.engine.fit import (
+    Convergence,
+    Fit,
+    Recording,
+    convergence,
+    evaluate,
+    fit,
+    fit_along_motion,
+    fit_from_afar,
+    initial_states,
+    windows,
+)
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, parameters_of, port_sizes
+from rigwatch.workbench.data import Data, parameters_of, port_sizes, quiet_scale
 from rigwatch.workbench.fit.discontinuities import between_jumps
 from rigwatch.workbench.study import Study
 
@@ -21,6 +33,12 @@ SHORTER = 8
 """The horizon over that one."""
 WELL_ABOVE = 1.5
 """Error over the channels' noise from which a fit may have ended in a local minimum."""
+FROM_AFAR = 5
+"""Free parameters from which a fit along the measured motion searches from several starts."""
+FAST, SLOWED = 1.0, 0.5
+"""Eigenvalue times step from which a linearisation takes finer ones, and what it then takes."""
+LOOKED_AT = 20
+"""Windows at most whose eigenvalues are looked at."""
 BLOCKS = 40
 """Blocks that a recording of a model without states is cut into for statistics."""
 
@@ -36,6 +54,7 @@ class Fitted:
         horizon: samples from one re-initialisation to the next.
         calm: samples held out that are beside no jump of an effect, shape (windows, length); None
             where nothing jumps.
+        convergence: how the fit ended; None where it began at another's end and was not asked.
     """
 
     placements: tuple[Placement, ...]
@@ -44,6 +63,7 @@ class Fitted:
     substeps: int
     horizon: int
     calm: BoolArray | None = None
+    convergence: Convergence | None = None
 
     @property
     def compiled(self) -> CompiledSystem:
@@ -90,7 +110,7 @@ def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
     """The accepted effects, with their bounds in sizes of the recording."""
     sizes = port_sizes(study.model, recording)
     return tuple(
-        Placement(a.effect, study.effect(a.effect).scaled(sizes[a.port]), a.port)
+        Placement(a.effect, study.effect_at(a.effect, a.port).scaled(sizes[a.port]), a.port)
         if a.port in sizes
         else Placement(a.effect, study.effect(a.effect), a.port)
         for a in study.file.effects
@@ -108,13 +128,14 @@ def fit_base(study: Study, data: Data, scale: FloatArray | None = None) -> Fitte
     """
     placements, start = placements_of(study, data.train), parameters_of(study.file)
     try:
-        return fit_twice(study, data, placements, start, scale)
+        return fit_twice(study, data, placements, start, scale, from_afar=True)
     except ModelError:
         if not placements:
             raise
-    found = fit_model(study, data, (), start, scale)
+    found = fit_model(study, data, (), start, scale, from_afar=True)
     for count in range(1, len(placements) + 1):
-        found = fit_twice(study, data, placements[:count], start | found.train.values(), scale)
+        begin = start | found.train.values()
+        found = fit_twice(study, data, placements[:count], begin, scale, from_afar=True)
     return found
 
 
@@ -126,9 +147,10 @@ def fit_twice(
     scale: FloatArray | None = None,
     *,
     base: Fitted | None = None,
+    from_afar: bool = False,
 ) -> Fitted:
     """`fit_model`, and once more where it may have ended in a local minimum."""
-    found = fit_model(study, data, placements, start, scale, base=base)
+    found = fit_model(study, data, placements, start, scale, base=base, from_afar=from_afar)
     if scale is None or not may_be_better(study, data, found, start):
         return found
     return fit_again(study, data, found, start)
@@ -143,7 +165,15 @@ def fit_again(study: Study, data: Data, found: Fitted, start: Mapping[str, float
         )  # fmt: skip
     except ModelError:
         return found
-    return min(found, again, key=lambda fitted: _size(fitted.train))
+    best = min(found, again, key=lambda fitted: _size(fitted.train))
+    return replace(best, convergence=_ended_again(found, again, best))
+
+
+def _ended_again(found: Fitted, again: Fitted, best: Fitted) -> Convergence | None:
+    """How the better of two fits ended; None where neither was asked."""
+    if best is found or found.convergence is None:
+        return found.convergence
+    return convergence(again.train, [found.train], "short horizons", near_noise=False)
 
 
 def fit_model(
@@ -155,6 +185,7 @@ def fit_model(
     *,
     base: Fitted | None = None,
     by_way_of_short: bool = False,
+    from_afar: bool = False,
 ) -> Fitted:
     """The study's model with `placements`, fitted from `start`.
 
@@ -166,6 +197,7 @@ def fit_model(
         base: a fit of less, whose initial states are a start for these.
         by_way_of_short: whether the search begins where short horizons lead: over long ones what
             sticks and slips has many local minima.
+        from_afar: whether `start` may be far from the truth, so that other starts are tried.
 
     Raises:
         ModelError: an effect does not fit its port, or the simulation leaves the finite numbers.
@@ -173,15 +205,40 @@ def fit_model(
     compiled = compile_system(compose(study.model, placements))
     horizon = data.horizon if study.model.states else len(data.train)
     begin, substeps = compiled.vector(start), study.file.substeps
-    fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
-    if study.model.states and (horizon >= LONG or by_way_of_short):
-        begin = fit_over(horizon // SHORTER, start=begin).parameters
     first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
+    fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
+    if data.along_motion and len(compiled.system.free) >= FROM_AFAR and scale is not None:
+        found = fit_along_motion(compiled, data.train, start=begin, scale=scale, substeps=substeps)
+        return _judged(study, data, placements, found, horizon, later, None)
+    if from_afar and not data.along_motion:
+        found, ended = fit_from_afar(
+            compiled, data.train, horizon, start=begin, scale=scale,
+            noise=quiet_scale(data.train) if scale is None else scale, initial=first,
+            substeps=substeps,
+        )  # fmt: skip
+        return _judged(study, data, placements, found, horizon, later, ended)
+    free_run = study.model.states and not data.along_motion
+    if free_run and (horizon >= LONG or by_way_of_short):
+        begin = fit_over(horizon // SHORTER, start=begin).parameters
     found = fit_over(horizon, start=begin, initial=first)
+    return _judged(study, data, placements, found, horizon, later, None)
+
+
+def _judged(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    placements: Sequence[Placement],
+    found: Fit,
+    horizon: int,
+    initial: FloatArray | None,
+    ended: Convergence | None,
+) -> Fitted:
+    """A fit with its error on the recordings held out."""
     beside = data.horizon if study.model.states else len(data.held_out)
-    judged = evaluate(found, data.held_out, beside, substeps, later)
+    substeps = study.file.substeps
+    judged = evaluate(found, data.held_out, beside, substeps, initial)
     calm = between_jumps(found, data.held_out, beside)
-    return Fitted(tuple(placements), found, judged, substeps, horizon, calm)
+    return Fitted(tuple(placements), found, judged, substeps, horizon, calm, ended)
 
 
 def may_be_better(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> bool:
@@ -211,4 +268,20 @@ def nodes(fitted: Fitted, recording: Recording) -> int:
     system = fitted.compiled.system
     if not system.states:
         return 1
-    return max(fitted.substeps, _even(system, recording, fitted.train.parameters))
+    even = max(fitted.substeps, _even(system, recording, fitted.train.parameters))
+    fastest = _fastest(fitted, recording) * recording.dt
+    return even if fastest <= FAST * even else math.ceil(fastest / SLOWED)
+
+
+def _fastest(fitted: Fitted, recording: Recording) -> float:
+    """Largest eigenvalue of the model at the beginning of its windows [1/s]."""
+    cut = windows(fitted.compiled.system, len(recording), fitted.horizon)
+    run = fitted.compiled.linearise(
+        recording.inputs, recording.dt, cut.starts[:LOOKED_AT], 2,
+        initial=fitted.train.initial[:LOOKED_AT], parameters=fitted.train.parameters,
+        substeps=fitted.substeps,
+    )  # fmt: skip
+    free, n = len(fitted.compiled.system.free), run.states.shape[2]
+    slopes = run.rate_slopes[:, 0, :, free : free + n]
+    finite = slopes[np.isfinite(slopes).all(axis=(1, 2))]
+    return float(np.abs(np.linalg.eigvals(finite)).max(initial=0.0))

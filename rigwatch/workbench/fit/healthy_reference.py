@@ -67,7 +67,7 @@ def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> tup
             " as this model leaves much unexplained on a healthy rig, too"
         )
     # Without the effects accepted so far: nothing is wrong there that they could explain.
-    bare = fit_model(study, alone, (), study.file.start, scale)
+    bare = fit_model(study, alone, (), study.file.start, scale, from_afar=True)
     periods = _matching(study, bare, data.train, data, "train")
     beside = _matching(study, bare, data.held_out, data, "held_out")
     remark = f"{name}: what it leaves of {len(beside.left)} healthy periods is added to it"

@@ -12,13 +12,15 @@ and m parameters.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
 
+from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.units import unit_of
 from rigwatch.workbench.fit.fitted_model import blocks
 
 CONFIDENCE = 0.95
@@ -43,6 +45,18 @@ class Value:
     unit: str
     interval: tuple[float, float] | None
     note: str = ""
+
+    def shown_in(self, text: str) -> "Value":
+        """The same, from SI to the unit `text`."""
+        unit = unit_of(text)
+        ends = self.interval and (unit.from_si(self.interval[0]), unit.from_si(self.interval[1]))
+        return replace(self, value=unit.from_si(self.value), unit=text, interval=ends)
+
+
+def as_written(found: Mapping[str, Value], system: System) -> dict[str, Value]:
+    """Every value of a system's parameters, from SI to the unit that people wrote."""
+    units = {name: system.parameters[name].shown for name in found}
+    return {n: value.shown_in(units[n]) if units[n] else value for n, value in found.items()}
 
 
 def covariance(fitted: Fit) -> tuple[FloatArray, int]:
@@ -71,7 +85,7 @@ def _moved(normal: FloatArray, jacobian: FloatArray, error: FloatArray) -> Float
 
 
 def values(fitted: Fit, beyond: Mapping[str, float] | None = None) -> dict[str, Value]:
-    """Every parameter of the model with its interval.
+    """Every parameter of the model with its interval, in SI.
 
     Args:
         fitted: the fit.

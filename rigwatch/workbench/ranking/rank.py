@@ -144,7 +144,7 @@ def candidates(study: Study, recording: Recording) -> list[Candidate]:
         for port, place in study.model.ports.items()
         for name, effect in study.effects.items()
         if (name, port) not in placed and suits(effect, place, study.model)
-        for candidate in shaped(name, effect.scaled(sizes[port]), port)
+        for candidate in shaped(name, study.effect_at(name, port).scaled(sizes[port]), port)
     ]
 
 
@@ -210,7 +210,7 @@ def rank(
         least = AGAIN * floor.above(base.train)
         likely = [row for row in chosen if row.explained > least]
         _try_again(study, data, base, likely, progress)
-    while double := _unfitted_double(rows):
+    while double := _unfitted_double(rows, floor):
         progress(f"fitting {double.label}, which looks like the best")
         refit(study, data, base, double, fit_model if enough else fit_twice)
     return sorted(rows, key=_order)
@@ -250,15 +250,20 @@ def _try_again(
         judge_fit(base, row)
 
 
-def _unfitted_double(rows: Sequence[Ranked]) -> Ranked | None:
-    """What looks like the best to first order and was not fitted: only its fit shows whether."""
+def _unfitted_double(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:
+    """What looks like the best to first order and was not fitted: only its fit shows whether.
+
+    One that looks the same altogether is fitted only where the best leaves more than noise.
+    """
     accepted = [row for row in rows if row.accepted]
     if not accepted:
         return None
     best = min(accepted, key=_order)
     waiting = {row.label: row for row in rows if row.fitted is None and not row.trouble}
     alike = (waiting[label] for label in best.alike if label in waiting)
-    return next((row for row in alike if best.cosines[row.label] <= SAME), None)
+    assert best.fitted is not None
+    enough = floor.reached(best.fitted.held_out)
+    return next((row for row in alike if best.cosines[row.label] <= SAME or not enough), None)
 
 
 def _leaves_nothing(row: Ranked, base: Fitted, floor: NoiseFloor) -> bool:
@@ -271,6 +276,11 @@ def left_over(base: Fitted, row: Ranked, floor: NoiseFloor, *, tolerant: bool = 
     assert row.fitted is not None
     before, after = base.held_out, row.fitted.held_out
     return floor.left_over(before, after, row.fitted.calm, tolerant=tolerant)
+
+
+def rank_all(study: Study, data: Data, base: Fitted) -> list[Ranked]:
+    """Every effect at every port by its score, none of them fitted."""
+    return _scored(study, data, base, candidates(study, data.train), every=True)
 
 
 def rank_only(study: Study, data: Data, base: Fitted, found: Sequence[Candidate]) -> Ranked:

@@ -6,12 +6,14 @@ from rigwatch.workbench.compare import Comparison, Region
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.fit import Value
 from rigwatch.workbench.steps import Change
+from rigwatch.workbench.study import GIVEN, Held
 
 VERDICTS = {
     "nothing_missing": "nothing is missing",
     "missing_effect": "an effect is missing",
     "undetermined": "undetermined: this recording cannot tell rivals apart",
     "unknown_effect": "something is missing that no known effect explains",
+    "model_inadequate": "the model cannot judge this recording: no effect is named",
 }
 
 
@@ -56,9 +58,37 @@ def comparison_lines(found: Comparison) -> list[str]:
         for name, c in found.channels.items()
         if c.free_run_error is not None
     ]
-    lines += [f"  noise floor from {found.noise_from}", "", "parameters, 95 % interval"]
+    lines += [f"  noise floor from {found.noise_from}", *fit_lines(found)]
+    lines += ["", "parameters, 95 % interval"]
     lines += table(["name", "value", "interval", "unit", ""], _parameters(found.parameters))
     return lines + [f"note: {remark}" for remark in found.remarks]
+
+
+def fit_lines(found: Comparison) -> list[str]:
+    """How the fit ended, and what inputs do between samples."""
+    lines = [f"  input {name}: {_held(held)}" for name, held in found.hold.items()]
+    ended = found.convergence
+    if ended is None:
+        return lines
+    word = "converged" if ended.converged else "did not converge"
+    lines += [f"  the fit {word}: {ended.reason}"]
+    for names, what in (
+        (ended.undetermined, "the data do not determine"),
+        (ended.at_bound, "on a bound:"),
+    ):
+        lines += [f"  {what} {', '.join(names)}"] if names else []
+    return lines
+
+
+def _held(held: Held) -> str:
+    """What an input does between samples, in words."""
+    what = "held from sample to sample" if held.hold == "zero" else "a line between samples"
+    if held.late:
+        time = f" ({1e3 * held.seconds:.3g} ms)" if held.seconds else ""
+        what += f", {held.late:.2g} of a sample late{time}"
+    if held.source in GIVEN:
+        return f"{what}, as {held.source} says"
+    return f"{what}, chosen from {held.source}"
 
 
 def _parameters(found: dict[str, Value]) -> list[list[str]]:
@@ -82,6 +112,7 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
         f"now: training {base.train_error:.4g}, held out {base.held_out_error:.4g},"
         f" noise floor {base.noise_floor:.4g} {base.unit}",
         f"  noise floor from {base.noise_from}",
+        *fit_lines(base),
         "",
         f"ranking ({len(found.ranking)} effects at ports)",
     ]

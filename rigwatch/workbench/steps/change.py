@@ -11,12 +11,14 @@ from rigwatch.physics.engine.equations import Placement, compose, load_effects
 from rigwatch.physics.engine.score import suits
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
+from rigwatch.workbench.fit import held_as
 from rigwatch.workbench.ranking import Ranked, accepted_from, candidates, rank_only, refit
 from rigwatch.workbench.study import (
     Study,
     append,
     append_effect,
     drop_effect,
+    keep_holds,
     nearest,
     use_effect_file,
 )
@@ -57,6 +59,8 @@ def add(study: Study, effect: str, port: str | None = None, *, anyway: bool = Fa
     """
     where = _port(study, effect, port)
     bench = open_bench(study)
+    # What is chosen now stays, so that errors before and after are of the same inputs.
+    study = held_as(study, bench.study.holds)
     row = _tried(bench, effect, where)
     before = comparison(bench)
     assert row.fitted is not None
@@ -73,7 +77,7 @@ def add(study: Study, effect: str, port: str | None = None, *, anyway: bool = Fa
     accepted = accepted_from(row)
     # Before the file is touched, so that a model that fails leaves the study as it is.
     after = comparison(open_bench(study.with_effects([*study.file.effects, accepted])))
-    changed = append_effect(study, accepted)
+    changed = append_effect(keep_holds(study), accepted)
     numbers = _numbers(after)
     append(changed, "add", effect=effect, port=where, parameters=accepted.parameters, **numbers)
     return Change("add", effect, where, before, after, errors, words)

@@ -30,7 +30,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.messages import SampleBlock
 from rigwatch.wire.session import open_session
-from rigwatch.workbench.compare import comparison, open_bench
+from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.data import find_period
 from rigwatch.workbench.study import Span, Study, model_hash
 
@@ -106,7 +106,7 @@ def _of_study(study: Study) -> dict[str, float]:
             f"{study.model.name}: found a model that is no inertia, expected one of"
             f" {', '.join(BASES)} as the rig's model is one"
         )
-    found = {name: v.value for name, v in comparison(open_bench(study)).parameters.items()}
+    found = open_bench(study).base.train.values()
     mass, viscous = BASES[study.model.name]
     learnt = {"mass": found[mass], "offset": 0.0, "viscous": found[viscous]}
     for accepted in study.file.effects:

@@ -3,9 +3,11 @@
 from rigwatch.workbench.study import ledger
 from rigwatch.workbench.study.ledger import append, check_data, lines, model_hash
 from rigwatch.workbench.study.study import (
+    GIVEN,
     Accepted,
     Derive,
     Derived,
+    Held,
     Kept,
     Span,
     Study,
@@ -13,15 +15,18 @@ from rigwatch.workbench.study.study import (
     append_effect,
     create,
     drop_effect,
+    keep_holds,
     nearest,
     open_study,
     use_effect_file,
 )
 
 __all__ = [
+    "GIVEN",
     "Accepted",
     "Derive",
     "Derived",
+    "Held",
     "Kept",
     "Span",
     "Study",
@@ -31,6 +36,7 @@ __all__ = [
     "check_data",
     "create",
     "drop_effect",
+    "keep_holds",
     "ledger",
     "lines",
     "model_hash",

@@ -11,8 +11,9 @@ import shutil
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from msgspec import Meta, field, structs
@@ -20,19 +21,31 @@ from numpy.typing import NDArray
 
 from rigwatch.physics.engine.equations import (
     Effect,
+    EffectParameter,
+    Hold,
     Model,
+    Parameter,
     library,
     load_effects,
     load_model,
     offered,
     shipped_models,
+    units_at,
 )
 from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError
 from rigwatch.wire.typed_files import Section, load
+from rigwatch.wire.units import Unit, unit_of
 
 FILE = "study.toml"
 LEDGER = "ledger.jsonl"
 _TABLE = "\n[[effects]]\n"
+GIVEN = ("the study", "the model file")
+"""Sources of holds that nothing was chosen for."""
+CHOSEN = "  # chosen from the data, with the first effect"
+"""Behind holds that were written with the first effect, and go with it."""
+
+
+Lateness = Annotated[float, Meta(ge=0, le=1)]
 
 
 class Span(Section, frozen=True, kw_only=True):
@@ -69,9 +82,9 @@ class Accepted(Section, frozen=True, kw_only=True):
 
     effect: Annotated[str, Meta(description="its name")]
     port: Annotated[str, Meta(description="where it enters")]
-    parameters: Annotated[dict[str, float], Meta(description="where its fit starts")] = field(
-        default_factory=dict
-    )
+    parameters: Annotated[
+        dict[str, float], Meta(description="where its fit starts, in the units that are shown")
+    ] = field(default_factory=dict)
 
 
 class StudyFile(Section, frozen=True, kw_only=True):
@@ -84,13 +97,29 @@ class StudyFile(Section, frozen=True, kw_only=True):
         tuple[Span, ...], Meta(description="recordings with nothing wrong, for the noise floor")
     ] = ()
     horizon: Annotated[float, Meta(gt=0, description="time between re-initialisations [s]")] = 0.5
+    prediction: Annotated[
+        Literal["auto", "measured motion", "free"],
+        Meta(
+            description="along the measured motion, or free runs over horizons; auto: along the"
+            " motion where channels show some of the model's states but not all"
+        ),
+    ] = "auto"
     substeps: Annotated[int, Meta(ge=1, description="integration steps a sample")] = 2
     period: Annotated[float, Meta(ge=0, description="period of the excitation [s], 0: look")] = 0.0
     channels: Annotated[
         dict[str, str], Meta(description="channel of a model's signal, where named otherwise")
     ] = field(default_factory=dict)
     start: Annotated[
-        dict[str, float], Meta(description="values of the model's parameters to start from")
+        dict[str, float],
+        Meta(description="values of the model's parameters to start from, in their units"),
+    ] = field(default_factory=dict)
+    hold: Annotated[
+        dict[str, Hold],
+        Meta(description="what inputs do between samples; the data choose where nothing says"),
+    ] = field(default_factory=dict)
+    late: Annotated[
+        dict[str, Lateness],
+        Meta(description="shares of a sample by which inputs that are kept are late"),
     ] = field(default_factory=dict)
     derive: Derive | None = None
     thin: Thin | None = None
@@ -114,8 +143,27 @@ class Kept:
 
 
 @dataclass(frozen=True)
+class Held:
+    """What an input does between samples, and how that is known.
+
+    Attributes:
+        hold: "linear" for a line, "zero" where it is kept.
+        late: share of a sample by which it changes late, where it is kept.
+        seconds: the same [s]; 0 where the time between samples is not known yet.
+        source: who says so.
+        error_ratio: error with it over that with a line, None where nothing was compared.
+    """
+
+    hold: Hold
+    late: float
+    seconds: float
+    source: str
+    error_ratio: float | None = None
+
+
+@dataclass(frozen=True)
 class Study:
-    """A study that has been opened.
+    """A study that has been opened; values of parameters are SI, whatever its file says.
 
     Attributes:
         folder: where it is.
@@ -124,6 +172,7 @@ class Study:
         effects: every effect that may be tried: shipped, from entry points, own; by name.
         own: names of those that are not shipped.
         kept: what the healthy recording told, None before it was asked.
+        holds: what inputs do between samples, by name, where that is known.
     """
 
     folder: Path
@@ -132,6 +181,7 @@ class Study:
     effects: Mapping[str, Effect]
     own: frozenset[str]
     kept: Kept | None = None
+    holds: Mapping[str, Held] = dataclass_field(default_factory=dict)
 
     @property
     def ledger(self) -> Path:
@@ -157,6 +207,17 @@ class Study:
             raise ModelError(f"found no effect {name!r}, expected {nearest(name, self.effects)}")
         return self.effects[name]
 
+    def effect_at(self, name: str, port: str) -> Effect:
+        """The effect called `name` with the units of a port, its numbers in SI.
+
+        Raises:
+            ModelError: it is unknown, or the port does not offer what its units name.
+        """
+        effect = self.effect(name)
+        if port not in self.model.ports:
+            return effect
+        return effect.at(units_at(self.model, port), f"effect {name} at {port}")
+
 
 def nearest(name: str, known: Mapping[str, object]) -> str:
     """Words for what `name` may have been meant to be."""
@@ -178,10 +239,36 @@ def open_study(folder: Path | str) -> Study:
     file = load(path, StudyFile)
     given = offered(folder / name for name in file.effect_files)
     effects = {**library(), **given}
-    study = Study(folder, file, _model(folder, file.model), effects, frozenset(given))
+    model, holds = _held(_model(folder, file.model), file)
+    study = Study(folder, file, model, effects, frozenset(given), holds=holds)
     for accepted in file.effects:
         study.effect(accepted.effect)
-    return study
+    return _in_si(study)
+
+
+def _in_si(study: Study) -> Study:
+    """The study with the values of its file in SI; there they stand in the parameters' units."""
+    start = {
+        name: _unit(study.model.parameters.get(name)).to_si(value)
+        for name, value in study.file.start.items()
+    }
+    effects = [_converted(study, a, "to_si") for a in study.file.effects]
+    return replace(study, file=structs.replace(study.file, start=start, effects=tuple(effects)))
+
+
+def _converted(study: Study, accepted: Accepted, way: Literal["to_si", "from_si"]) -> Accepted:
+    """The values of an accepted effect, from the units that people write to SI or back."""
+    known = study.effect_at(accepted.effect, accepted.port).parameters
+    values = {
+        name: float(getattr(_unit(known.get(name)), way)(value))
+        for name, value in accepted.parameters.items()
+    }
+    return structs.replace(accepted, parameters=values)
+
+
+def _unit(parameter: Parameter | EffectParameter | None) -> Unit:
+    """The unit in which people write a parameter's values."""
+    return unit_of((parameter.shown or parameter.unit) if parameter else "")
 
 
 def _model(folder: Path, name: str) -> Model:
@@ -191,6 +278,29 @@ def _model(folder: Path, name: str) -> Model:
     if name not in models:
         raise ModelError(f"{folder / FILE}: found model {name!r}, expected {nearest(name, models)}")
     return models[name]
+
+
+def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
+    """The model with the holds that the study gives it, and all that are given.
+
+    Raises:
+        ModelError: the study names an input that the model does not have.
+    """
+    for name in (*file.hold, *file.late):
+        if name not in model.inputs:
+            raise ModelError(f"hold: found input {name!r}, expected {nearest(name, model.inputs)}")
+    inputs, holds = {}, {}
+    for name, own in model.inputs.items():
+        hold, late = file.hold.get(name), file.late.get(name)
+        if late is not None:
+            hold = hold or "zero"
+        source = "the study" if hold else "the model file"
+        hold = hold or own.hold or model.hold
+        late = own.late if late is None else late
+        inputs[name] = structs.replace(own, hold=hold, late=late)
+        if hold:
+            holds[name] = Held(hold, late, 0.0, source)
+    return structs.replace(model, inputs=inputs), holds
 
 
 def create(folder: Path | str, template: Path | str, sessions: Path | str | None = None) -> Study:
@@ -231,8 +341,9 @@ def create(folder: Path | str, template: Path | str, sessions: Path | str | None
 
 
 def append_effect(study: Study, accepted: Accepted) -> Study:
-    """The study with one more effect in its file."""
-    numbers = ", ".join(f"{name} = {value!r}" for name, value in accepted.parameters.items())
+    """The study with one more effect in its file, its values in the units of its parameters."""
+    written = _converted(study, accepted, "from_si").parameters
+    numbers = ", ".join(f"{name} = {value!r}" for name, value in written.items())
     table = (
         f'effect = "{accepted.effect}"\nport = "{accepted.port}"\nparameters = {{ {numbers} }}\n'
     )
@@ -250,7 +361,10 @@ def drop_effect(study: Study) -> Study:
     at = text.rfind(_TABLE)
     if not study.file.effects or at < 0:
         raise ModelError(f"{study.folder}: found no effect to undo")
-    return _rewritten(study, text[:at].rstrip() + "\n")
+    text = text[:at].rstrip() + "\n"
+    if len(study.file.effects) == 1:
+        text = "".join(line for line in text.splitlines(True) if CHOSEN not in line)
+    return _rewritten(study, text)
 
 
 def use_effect_file(study: Study, path: Path) -> Study:
@@ -267,6 +381,17 @@ def use_effect_file(study: Study, path: Path) -> Study:
     line = f"effect_files = [{', '.join(repr(n).replace(chr(39), chr(34)) for n in names)}]\n"
     kept = [x for x in _text(study).splitlines(True) if not x.startswith("effect_files")]
     return _rewritten(study, line + "".join(kept))
+
+
+def keep_holds(study: Study) -> Study:
+    """The study with the holds that the data have chosen in its file, so that they stay."""
+    chosen = {n: h for n, h in study.holds.items() if h.source not in GIVEN}
+    if not chosen or study.file.hold:
+        return study
+    holds = ", ".join(f'{name} = "{held.hold}"' for name, held in chosen.items())
+    late = ", ".join(f"{name} = {held.late!r}" for name, held in chosen.items() if held.late)
+    lines = f"hold = {{ {holds} }}{CHOSEN}\n" + (f"late = {{ {late} }}{CHOSEN}\n" if late else "")
+    return _rewritten(study, lines + _text(study))
 
 
 def _text(study: Study) -> str:

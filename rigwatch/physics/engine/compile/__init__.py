@@ -10,21 +10,22 @@ from rigwatch.physics.engine.compile.compiled_system import (
     CompiledSystem,
     Linearisation,
     compile_system,
-    load_source,
-    numba_module,
 )
 from rigwatch.physics.engine.compile.derivatives import derivative
+from rigwatch.physics.engine.compile.integrator import across, call, lateness, place
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
 
 __all__ = [
     "CompiledSystem",
     "Linearisation",
+    "across",
+    "call",
     "compile_system",
     "derivative",
     "evaluated",
     "even_substeps",
-    "load_source",
-    "numba_module",
+    "lateness",
     "numpy_function",
+    "place",
 ]

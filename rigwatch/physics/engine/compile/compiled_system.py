@@ -1,24 +1,11 @@
-"""A system that can be simulated, and sources of numba kernels that are kept on disk.
+"""A system that can be simulated, with exact sensitivities, and linearised along a trajectory."""
 
-The source of a numba kernel is written to the cache folder under a name made from its own hash;
-numba keeps the machine code beside it. A system's own kernel is not kept: it is made anew in
-milliseconds.
-"""
-
-import hashlib
-import importlib.util
-import os
-import sys
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from rigwatch.physics.engine.compile.derivatives import source
 from rigwatch.physics.engine.compile.kernel import native_kernel
 from rigwatch.physics.engine.compile.static_kernel import StaticKernel
 from rigwatch.physics.engine.compile.step_size import FINEST
@@ -56,6 +43,8 @@ class Linearisation:
         rate_slopes: shape (windows, nodes, n, m + n + q): ∂rates.
         read_slopes: at the samples, shape (windows, samples, outputs, m + n + q): ∂outputs.
         outputs: at the samples, shape (windows, samples, outputs).
+        update_slopes: at the samples, shape (windows, samples, n, m + n + q): ∂states from there on
+            by those before; shape (windows, 0, …) where no state changes at samples.
     """
 
     spacing: float
@@ -64,6 +53,7 @@ class Linearisation:
     rate_slopes: FloatArray
     read_slopes: FloatArray
     outputs: FloatArray
+    update_slopes: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +105,15 @@ class CompiledSystem:
         return Simulation(outputs, slopes, last)
 
     @property
+    def hold(self) -> FloatArray:
+        """1 for an input that runs straight between samples, else less its lateness; (inputs,)."""
+        model = self.system.model
+        return np.array([
+            1.0 if model.held(name) == "linear" else -own.late
+            for name, own in model.inputs.items()
+        ])  # fmt: skip
+
+    @property
     def columns(self) -> int:
         """Free parameters and states: what outputs are differentiated by."""
         return len(self.system.free) + len(self.system.states)
@@ -137,8 +136,10 @@ class CompiledSystem:
         samples = (len(starts), length, len(self.system.outputs))
         states, rates = np.empty((*nodes, n)), np.zeros((*nodes, n, wide))
         outputs, reads = np.empty(samples), np.zeros((*samples, wide))
-        self.kernel.linearise(*arguments, states, rates, outputs, reads)
-        return Linearisation(dt / substeps, substeps, states, rates, reads, outputs)
+        count = length if self.system.updates else 0
+        updates = np.zeros((len(starts), count, n, wide))
+        self.kernel.linearise(*arguments, states, rates, outputs, reads, updates)
+        return Linearisation(dt / substeps, substeps, states, rates, reads, outputs, updates)
 
     def _arguments(  # noqa: PLR0917 -- they stand in the order of the kernel's
         self,
@@ -158,11 +159,10 @@ class CompiledSystem:
             )
         if len(starts) and (starts.min() < 0 or starts.max() + length > len(inputs)):
             raise ModelError(f"{model.name}: found a window beyond the recording's end")
-        hold = np.array([float(model.held(name) == "linear") for name in model.inputs])
         first = np.ascontiguousarray(initial, np.float64).reshape(len(starts), -1)
         values = np.ascontiguousarray(parameters, np.float64)
         driven = np.ascontiguousarray(inputs, np.float64)
-        return (driven, dt, substeps, hold, starts, first, values)
+        return (driven, dt, substeps, self.hold, starts, first, values)
 
     def vector(self, values: Mapping[str, float]) -> FloatArray:
         """All parameters, those in `values` replaced; shape (n_p,).
@@ -186,40 +186,3 @@ def compile_system(system: System) -> CompiledSystem:
     """`system` with its kernel; one without states is evaluated by NumPy."""
     kernel = native_kernel(system) if system.states else StaticKernel(system)
     return CompiledSystem(system, kernel)
-
-
-def numba_module(system: System) -> ModuleType:
-    """`rates`, `read` and `advance` of `system` as numba functions, for kernels of one's own."""
-    return load_source(source(system))
-
-
-def cache_folder() -> Path:
-    """Where kernels are kept: below $RIGWATCH_CACHE, else the user's cache folder."""
-    base = os.environ.get("RIGWATCH_CACHE") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(base).expanduser() / "rigwatch" / "kernels"
-
-
-def load_source(text: str) -> ModuleType:
-    """The text of a kernel module, imported from the cache folder where it is kept."""
-    name = f"kernel_{hashlib.sha256(text.encode()).hexdigest()[:24]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    path = cache_folder() / f"{name}.py"
-    if not path.exists():
-        _write_whole(path, text)
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ModelError(f"{path}: cannot be loaded as a kernel")
-    module = importlib.util.module_from_spec(spec)
-    # numba looks the module up by its name when it loads the machine code.
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write under another name first, so that a reader never sees half a file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False) as file:
-        file.write(text)
-    Path(file.name).replace(path)

@@ -20,6 +20,8 @@ from numba.extending import intrinsic
 from rigwatch.wire.arrays import FloatArray, IntArray
 
 _DOUBLE = ir.DoubleType()
+TINY = 1e-200
+"""Size below which what a sampled state holds is nothing."""
 WIDE = 1.5
 """How far a state may go in an interval, over what a step of Euler's says."""
 
@@ -44,38 +46,41 @@ call: Any = intrinsic(_call)
 
 @njit(cache=True, error_model="numpy")
 def place(  # noqa: PLR0917 -- a kernel
-    u: FloatArray, row: int, at: float, hold: FloatArray, rows: int, dt: float, us: FloatArray
-) -> None:
+    u: FloatArray, row: int, at: float, inside: float, hold: FloatArray, rows: int, dt: float,
+    us: FloatArray,
+) -> None:  # fmt: skip
     """Inputs between one sample and the next, and the time until those that are kept change.
 
-    An input whose `hold` is 1 goes on along a line, one whose `hold` is 0 is kept.
+    An input whose `hold` is 1 goes on along a line, one whose `hold` is 0 is kept; where `hold` is
+    -d it changes d of a sample late. A step that ends at a change is `inside` what was before it.
     """
     us[u.shape[1]] = 0.0
     for j in range(u.shape[1]):
         us[j] = u[row, j]
-        if hold[j] == 0.0:
-            us[u.shape[1]] = (rows - row % rows - at) * dt
+        if hold[j] < 0.0 and inside < -hold[j]:
+            us[j] = u[max(row - 1, 0), j]
+            us[u.shape[1]] = max(-hold[j] - at, 0.0) * dt
+        elif hold[j] <= 0.0:
+            us[u.shape[1]] = (rows - row % rows - at - hold[j]) * dt
         elif at > 0.0:
             us[j] += at * (u[row + 1, j] - u[row, j])
 
 
 @njit(cache=True, error_model="numpy")
 def advance(  # noqa: PLR0917 -- a kernel
-    rates: int, u: FloatArray, row: int, step: int, substeps: int, hold: FloatArray, rows: int,
+    rates: int, u: FloatArray, row: int, start: float, end: float, hold: FloatArray, rows: int,
     dt: float, pp: int,
     z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
 ) -> None:  # fmt: skip
-    """One step of the integration; z moves on."""
-    h = dt / substeps
-    start, middle = step / substeps, (step + 0.5) / substeps
-    end = (step + 1) / substeps
+    """One step of the integration, between shares of a sample; z moves on."""
+    h, middle = dt * (end - start), 0.5 * (start + end)
     zp, dp, up, size = zs.ctypes.data, dz.ctypes.data, us.ctypes.data, z.size
-    place(u, row, start, hold, rows, dt, us)
+    place(u, row, start, middle, hold, rows, dt, us)
     call(rates, (row + start) * dt, z.ctypes.data, up, pp, dp, dp)
     for i in range(size):
         acc[i] = h / 6.0 * dz[i]
         zs[i] = z[i] + 0.5 * h * dz[i]
-    place(u, row, middle, hold, rows, dt, us)
+    place(u, row, middle, middle, hold, rows, dt, us)
     call(rates, (row + middle) * dt, zp, up, pp, dp, dp)
     for i in range(size):
         acc[i] += h / 3.0 * dz[i]
@@ -84,10 +89,50 @@ def advance(  # noqa: PLR0917 -- a kernel
     for i in range(size):
         acc[i] += h / 3.0 * dz[i]
         zs[i] = z[i] + h * dz[i]
-    place(u, row, end, hold, rows, dt, us)
+    place(u, row, end, middle, hold, rows, dt, us)
     call(rates, (row + end) * dt, zp, up, pp, dp, dp)
     for i in range(size):
         z[i] += acc[i] + h / 6.0 * dz[i]
+
+
+@njit(cache=True, error_model="numpy")
+def lateness(hold: FloatArray) -> float:
+    """Share of a sample after which inputs that are kept change."""
+    late = 0.0
+    for held in hold:
+        late = max(late, -held)
+    return late
+
+
+@njit(cache=True, error_model="numpy")
+def across(  # noqa: PLR0917 -- a kernel
+    rates: int, u: FloatArray, row: int, steps: int, late: float, hold: FloatArray, rows: int,
+    dt: float, pp: int,
+    z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
+) -> None:  # fmt: skip
+    """From one sample to the next, in steps that end where an input changes."""
+    first = math.ceil(steps * late) if late < 1.0 else steps
+    for step in range(first):
+        start, end = late * step / first, late * (step + 1) / first
+        advance(rates, u, row, start, end, hold, rows, dt, pp, z, zs, dz, acc, us)
+    second = math.ceil(steps * (1.0 - late))
+    for step in range(second):
+        start = late + (1.0 - late) * step / second
+        end = late + (1.0 - late) * (step + 1) / second
+        advance(rates, u, row, start, end, hold, rows, dt, pp, z, zs, dz, acc, us)
+
+
+@njit(cache=True, error_model="numpy")
+def renew(  # noqa: PLR0917 -- a kernel
+    update: int, u: FloatArray, row: int, hold: FloatArray, rows: int, dt: float, pp: int,
+    z: FloatArray, dz: FloatArray, us: FloatArray,
+) -> None:  # fmt: skip
+    """States that change at samples take what they are from this one on."""
+    place(u, row, 0.0, 0.0, hold, rows, dt, us)
+    call(update, row * dt, z.ctypes.data, us.ctypes.data, pp, dz.ctypes.data, dz.ctypes.data)
+    for i in range(z.size):
+        # What has been forgotten is zero: numbers below the normal ones are slow.
+        z[i] = dz[i] if abs(dz[i]) > TINY else 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -114,7 +159,7 @@ def needed(  # noqa: PLR0917 -- a kernel
     come closest to zero.
     """
     n, up, ap = dx.size, us.ctypes.data, asked.ctypes.data
-    place(u, row, 0.0, hold, rows, dt, us)
+    place(u, row, 0.0, 0.0, hold, rows, dt, us)
     call(plain, row * dt, z.ctypes.data, up, pp, dx.ctypes.data, dx.ctypes.data)
     for i in range(n):
         near[i] = z[i]
@@ -125,7 +170,7 @@ def needed(  # noqa: PLR0917 -- a kernel
     worst = 0.0
     for at, share in ((z, 0.0), (near, 0.0), (end, 1.0)):
         if share > 0.0:
-            place(u, row, share, hold, rows, dt, us)
+            place(u, row, share, share, hold, rows, dt, us)
         call(pace, (row + share) * dt, at.ctypes.data, up, pp, ap, ap)
         for rate in asked:
             worst = max(worst, abs(rate))
@@ -134,10 +179,10 @@ def needed(  # noqa: PLR0917 -- a kernel
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def simulate(  # noqa: PLR0917 -- a kernel
-    rates: int, read: int, plain: int, pace: int, asked: int, crossing: IntArray, m: int,
-    rows: int, u: FloatArray, dt: float, substeps: int, finest: int, hold: FloatArray,
-    starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray, dy: FloatArray,
-    last: FloatArray,
+    rates: int, read: int, plain: int, pace: int, update: int, updated: bool, asked: int,
+    crossing: IntArray, m: int, rows: int, u: FloatArray, dt: float, substeps: int, finest: int,
+    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray,
+    dy: FloatArray, last: FloatArray,
 ) -> None:  # fmt: skip
     """Fill outputs y (windows, samples, outputs), slopes dy (…, m) and last states of each window.
 
@@ -147,13 +192,13 @@ def simulate(  # noqa: PLR0917 -- a kernel
     n, size = x0.shape[1], x0.shape[1] * (1 + m)
     dx, end, near, rate = np.empty(n), np.empty(n), np.empty(n), np.empty(asked)
     z, zs, dz, acc = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-    us, wanted = np.empty(u.shape[1] + 1), y.shape[2]
+    us, wanted, late = np.empty(u.shape[1] + 1), y.shape[2], lateness(hold)
     pp, out, slopes = p.ctypes.data, np.empty(wanted), np.empty(wanted * m)
     for w in range(starts.size):
         restart(z, x0, w, m)
         for k in range(y.shape[1]):
             row = starts[w] + k
-            place(u, row, 0.0, hold, rows, dt, us)
+            place(u, row, 0.0, 0.0, hold, rows, dt, us)
             call(
                 read, row * dt, z.ctypes.data, us.ctypes.data, pp, out.ctypes.data,
                 slopes.ctypes.data,
@@ -170,17 +215,18 @@ def simulate(  # noqa: PLR0917 -- a kernel
                         us,
                     )  # fmt: skip
                     steps = int(min(float(finest), max(float(substeps), math.ceil(wanted_steps))))
-                for step in range(steps):
-                    advance(rates, u, row, step, steps, hold, rows, dt, pp, z, zs, dz, acc, us)
+                across(rates, u, row, steps, late, hold, rows, dt, pp, z, zs, dz, acc, us)
+                if updated and (row + 1) % rows == 0:
+                    renew(update, u, row + 1, hold, rows, dt, pp, z, dz, us)
         for i in range(n):
             last[w, i] = z[i]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def linearise(  # noqa: C901, PLR0917 -- a kernel
-    rates: int, read_slopes: int, rate_slopes: int, u: FloatArray, dt: float, substeps: int,
-    hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, nodes: FloatArray,
-    slopes: FloatArray, y: FloatArray, dy: FloatArray,
+def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
+    rates: int, read_slopes: int, rate_slopes: int, update_slopes: int, u: FloatArray, dt: float,
+    substeps: int, hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray,
+    nodes: FloatArray, slopes: FloatArray, y: FloatArray, dy: FloatArray, jumps: FloatArray,
 ) -> None:  # fmt: skip
     """The trajectory without sensitivities, and the Jacobians at its nodes."""
     n, wide = x0.shape[1], slopes.shape[3]
@@ -195,7 +241,7 @@ def linearise(  # noqa: C901, PLR0917 -- a kernel
             row, last = starts[w] + k, k + 1 == y.shape[1]
             for step in range(1 if last else substeps):
                 share = step / substeps
-                place(u, row, share, hold, 1, dt, us)
+                place(u, row, share, share, hold, 1, dt, us)
                 if step == 0:
                     call(read_slopes, row * dt, zp, up, pp, op, fp)
                     for o in range(wanted):
@@ -209,4 +255,12 @@ def linearise(  # noqa: C901, PLR0917 -- a kernel
                     for j in range(wide):
                         slopes[w, node, i, j] = flat[i * wide + j]
                 if not last:
-                    advance(rates, u, row, step, substeps, hold, 1, dt, pp, z, zs, dz, acc, us)
+                    following = (step + 1) / substeps
+                    advance(rates, u, row, share, following, hold, 1, dt, pp, z, zs, dz, acc, us)
+            if jumps.shape[1] > 0 and not last:
+                place(u, row + 1, 0.0, 0.0, hold, 1, dt, us)
+                call(update_slopes, (row + 1) * dt, zp, up, pp, op, fp)
+                for i in range(n):
+                    z[i] = out[i]
+                    for j in range(wide):
+                        jumps[w, k + 1, i, j] = flat[i * wide + j]

@@ -9,6 +9,8 @@ of sensitivities and q probes; behind the inputs in u is the time until they cha
     pace         a = x, out = steps a second that are needed
     rate_slopes  a = x, out = dx/dt, slopes = ∂(dx/dt) by parameters, states, probes: (n, m + q)
     read_slopes  a = x, out = y, slopes = ∂y of shape (outputs, m + q)
+    update       a = [x | S] before a sample, out = [x | S] from there on
+    update_slopes  a = x, out = x from there on, slopes = ∂ of it, of shape (n, m + q)
 """
 
 import os
@@ -16,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import sympy
@@ -45,6 +47,7 @@ class Equations:
             outputs are differentiated.
         rates, reads: of the states, and of the outputs.
         pace: what the steps must follow.
+        updates: all states from a sample on; none where no state changes there.
     """
 
     states: tuple[str, ...]
@@ -55,6 +58,18 @@ class Equations:
     rates: tuple[sympy.Expr, ...]
     reads: tuple[sympy.Expr, ...]
     pace: Pace
+    updates: tuple[sympy.Expr, ...] = ()
+
+
+class Jacobians(NamedTuple):
+    """Addresses of a system's functions: rates alone, and with their Jacobians the outputs, the
+    rates and what states become at samples.
+    """
+
+    plain: int
+    reads: int
+    rates: int
+    updates: int
 
 
 def native_kernel(system: System) -> "NativeKernel":
@@ -63,9 +78,15 @@ def native_kernel(system: System) -> "NativeKernel":
         Equations(
             tuple(system.states), tuple(system.model.inputs), tuple(system.parameters),
             system.free, system.probes, tuple(system.derivatives.values()),
-            tuple(system.outputs.values()), pace(system),
+            tuple(system.outputs.values()), pace(system), _updates(system),
         )
     )  # fmt: skip
+
+
+def _updates(system: System) -> tuple[sympy.Expr, ...]:
+    if not system.updates:
+        return ()
+    return tuple(system.updates.get(name, symbol(name)) for name in system.states)
 
 
 @lru_cache(maxsize=256)
@@ -81,7 +102,10 @@ class NativeKernel:
         by = (system.states, system.free, system.probes)
         self._rates = differentiated(system.rates, *by)
         self._reads = differentiated(system.reads, *by)
-        self._kept, self._along, self._slopes = list[Any](), (0, 0, 0, 0), (0, 0, 0)
+        self._updates = differentiated(system.updates, *by)
+        self._kept, self._along = list[Any](), (0, 0, 0, 0, 0)
+        self._slopes: Jacobians | None = None
+        self._sweeps: dict[int, tuple[int, int]] = {}
         self._crossing = np.array(system.pace.crossing, np.int64)
 
     def _compiled(self, functions: Sequence[Function]) -> Any:
@@ -97,15 +121,18 @@ class NativeKernel:
         asked = self._system.pace.asked
         if not all(self._along):
             address = self._compiled([
-                _with_sensitivities(self._system, "rates", self._rates, behind=True),
-                _with_sensitivities(self._system, "read", self._reads, behind=False),
+                *self._sensitive(self._columns),
                 _plain(self._system, "plain", self._rates.values),
                 _plain(self._system, "pace", asked),
+                _with_sensitivities(
+                    self._system, "update", self._updates, self._columns, behind=True
+                ),
             ])  # fmt: skip
-            self._along = tuple(address(name) for name in ("rates", "read", "plain", "pace"))
+            names = ("rates", "read", "plain", "pace", "update")
+            self._along = tuple(address(name) for name in names)
         kernel = partial(
-            driver.simulate, *self._along, len(asked), self._crossing, self._columns, rows, u, dt,
-            substeps, finest, hold,
+            driver.simulate, *self._along, bool(self._system.updates), len(asked),
+            self._crossing, self._columns, rows, u, dt, substeps, finest, hold,
         )  # fmt: skip
         numbers = x0.shape[1] * (1 + self._columns)
         if starts.size * y.shape[1] * substeps * numbers < LARGE:
@@ -119,19 +146,50 @@ class NativeKernel:
             for each in running:
                 each.result()
 
-    def linearise(  # noqa: PLR0917 -- they stand in the order of the driver's
-        self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, nodes: Any,
-        slopes: Any, y: Any, dy: Any,
-    ) -> None:  # fmt: skip
-        """Fill the states at the nodes, the slopes of rates there, outputs and their slopes."""
-        if not all(self._slopes):
+    def _sensitive(self, columns: int) -> tuple[Function, Function]:
+        return (
+            _with_sensitivities(self._system, "rates", self._rates, columns, behind=True),
+            _with_sensitivities(self._system, "read", self._reads, columns, behind=False),
+        )
+
+    def with_sensitivities(self, columns: int) -> tuple[int, int]:
+        """Addresses of `rates` and `read` for so many columns of S; the first are free parameters.
+
+        For loops of one's own; they are called by `integrator.call`.
+        """
+        if columns not in self._sweeps:
+            address = self._compiled(self._sensitive(columns))
+            self._sweeps[columns] = (address("rates"), address("read"))
+        return self._sweeps[columns]
+
+    def jacobians(self) -> Jacobians:
+        """Addresses of the equations without sensitivities, and of their Jacobians."""
+        if self._slopes is None:
             address = self._compiled([
                 _plain(self._system, "plain", self._rates.values),
                 _jacobian(self._system, "read_slopes", self._reads),
                 _jacobian(self._system, "rate_slopes", self._rates),
+                _jacobian(self._system, "update_slopes", self._updates),
             ])  # fmt: skip
-            self._slopes = (address("plain"), address("read_slopes"), address("rate_slopes"))
-        driver.linearise(*self._slopes, u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy)
+            self._slopes = Jacobians(
+                plain=address("plain"),
+                reads=address("read_slopes"),
+                rates=address("rate_slopes"),
+                updates=address("update_slopes"),
+            )
+        return self._slopes
+
+    def linearise(  # noqa: PLR0917 -- they stand in the order of the driver's
+        self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, nodes: Any,
+        slopes: Any, y: Any, dy: Any, jumps: Any,
+    ) -> None:  # fmt: skip
+        """Fill the states at the nodes, the slopes of rates there, outputs and their slopes.
+
+        `jumps` takes the slopes of the states across each sample, where they change there.
+        """
+        driver.linearise(
+            *self.jacobians(), u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy, jumps
+        )
 
 
 def _function(system: Equations, name: str) -> Function:
@@ -155,11 +213,12 @@ def _values(function: Function, expressions: Sequence[sympy.Expr]) -> Iterator[s
 
 
 def _with_sensitivities(
-    system: Equations, name: str, found: Differentiated, *, behind: bool
+    system: Equations, name: str, found: Differentiated, m: int, *, behind: bool
 ) -> Function:
-    """Values, and J·S + ∂/∂p; the latter behind the values in `out`, or in `slopes`."""
-    function, n = _function(system, name), len(system.states)
-    m, k = len(system.free) + n, len(found.values)
+    """Values, and J·S + ∂/∂p in m columns, the latter behind the values or in `slopes`."""
+    function, n, k = _function(system, name), len(system.states), len(found.values)
+    if not k:
+        return function
     flat = [*found.values, *(e for r in found.by_state for e in r)]
     flat += [e for r in found.by_parameter for e in r]
     values = _values(function, flat)

@@ -124,7 +124,7 @@ class StaticKernel:
 
     def linearise(  # noqa: PLR0917 -- the arguments of a compiled kernel
         self, u: Any, dt: Any, substeps: Any, _h: Any, starts: Any, _x: Any, p: Any,
-        _nodes: Any, _slopes: Any, y: Any, dy: Any,
+        _nodes: Any, _slopes: Any, y: Any, dy: Any, _jumps: Any,
     ) -> None:  # fmt: skip
         """The same with the slopes by the probes behind those by the parameters."""
         del substeps

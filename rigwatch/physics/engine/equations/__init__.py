@@ -7,7 +7,14 @@
 """
 
 from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, library, load_effects
-from rigwatch.physics.engine.equations.expression import parse
+from rigwatch.physics.engine.equations.expression import FUNCTIONS, parse
+from rigwatch.physics.engine.equations.measured_motion import (
+    along_measured_motion,
+    balanced_states,
+    has_hidden_states,
+    measured_states,
+    predicted_outputs,
+)
 from rigwatch.physics.engine.equations.model import (
     Hold,
     Input,
@@ -26,17 +33,21 @@ from rigwatch.physics.engine.equations.system import (
     LEFT,
     PROBE,
     RATE,
+    STEP,
     TIME,
     UNTIL,
     Placement,
     System,
     compose,
+    units_at,
 )
 
 __all__ = [
+    "FUNCTIONS",
     "LEFT",
     "PROBE",
     "RATE",
+    "STEP",
     "TIME",
     "UNTIL",
     "Effect",
@@ -51,12 +62,18 @@ __all__ = [
     "State",
     "System",
     "Variable",
+    "along_measured_motion",
+    "balanced_states",
     "compose",
+    "has_hidden_states",
     "library",
     "load_effects",
     "load_model",
+    "measured_states",
     "offered",
     "parse",
+    "predicted_outputs",
     "shipped_models",
     "symbol",
+    "units_at",
 ]

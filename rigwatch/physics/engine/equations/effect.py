@@ -7,24 +7,30 @@ value.
 
 Values are numbers, or shares of the `scale` that a signal has in the recording at hand. Units are
 written with the port's own: `{F}`, `{x}`, `{v}` at a force, `{u}` at a signal, so that
-one declaration serves a mass on a table and an electronic oscillator.
+one declaration serves a mass on a table and an electronic oscillator. Numbers stand in the unit
+beside them and become SI: at once where the unit is fixed, by `Effect.at` where it is the port's.
 """
 
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import sympy
 from msgspec import Meta, field
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.equations.expression import parse as parse_expression
-from rigwatch.wire.errors import ConfigError
+from rigwatch.physics.engine.equations.in_si import into_si
+from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.typed_files import Section, load, parse
+from rigwatch.wire.units import UnitError
 
 Text = Annotated[str, Meta(min_length=1)]
+
+_VALUES = ("value", "low", "high", "tried", "neutral")
+"""Numbers of a parameter that has no scale; those that are shares of one are SI with it."""
 
 
 class EffectParameter(Section, frozen=True, kw_only=True):
@@ -49,16 +55,27 @@ class EffectParameter(Section, frozen=True, kw_only=True):
         str,
         Meta(description="what values and bounds are shares of: x, v, u, dt or a ratio of them"),
     ] = ""
+    shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
+
+    def __post_init__(self) -> None:
+        into_si(self, *(("neutral",) if self.scale else _VALUES))
 
 
 class EffectState(Section, frozen=True, kw_only=True):
-    """Memory of an effect."""
+    """Memory of an effect: it has a rate of change, or is updated at each sample."""
 
     unit: Annotated[str, Meta(description="its unit")]
-    derivative: Annotated[Text, Meta(description="its rate of change")]
+    derivative: Annotated[str, Meta(description="its rate of change")] = ""
+    update: Annotated[
+        str, Meta(description="value from each sample on, of what was held and what arrives")
+    ] = ""
     start: Annotated[float, Meta(description="value to start from")] = 0.0
     low: Annotated[float, Meta(description="least that it can hold")] = float("-inf")
     high: Annotated[float, Meta(description="most that it can hold")] = float("inf")
+    shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
+
+    def __post_init__(self) -> None:
+        into_si(self, "start", "low", "high")
 
 
 class Effect(Section, frozen=True, kw_only=True):
@@ -92,9 +109,28 @@ class Effect(Section, frozen=True, kw_only=True):
         return next(name for name, p in self.parameters.items() if p.role in roles)
 
     @property
+    def sampled(self) -> bool:
+        """Whether it works on samples, as a filter in a computer does."""
+        return any(state.update for state in self.states.values())
+
+    @property
     def free(self) -> int:
         """Parameters that a fit moves."""
         return sum(p.role in ("strength", "shape") for p in self.parameters.values())
+
+    def at(self, units: Mapping[str, str], where: str) -> "Effect":
+        """The effect at a port: braces in its units filled in, its numbers in SI.
+
+        Args:
+            units: the port's own units as people write them, by what stands in braces.
+            where: what is being placed, for errors.
+
+        Raises:
+            ModelError: a unit is unknown, or the port does not offer what stands in braces.
+        """
+        parameters = {name: _filled(p, units, where) for name, p in self.parameters.items()}
+        states = {name: _filled(s, units, where) for name, s in self.states.items()}
+        return replace(self, parameters=parameters, states=states)
 
     def scaled(self, sizes: Mapping[str, float]) -> "Effect":
         """The effect with its shares turned into numbers for signals of these sizes.
@@ -104,6 +140,31 @@ class Effect(Section, frozen=True, kw_only=True):
         """
         found = {name: _scaled(name, p, sizes) for name, p in self.parameters.items()}
         return replace(self, parameters=found)
+
+
+Numbers = TypeVar("Numbers", EffectParameter, EffectState)
+
+
+def _filled(item: Numbers, units: Mapping[str, str], where: str) -> Numbers:
+    if "{" not in item.unit:
+        return item
+    try:
+        return replace(item, unit=resolved(item.unit, units), shown=resolved(item.shown, units))
+    except KeyError as missing:
+        raise ModelError(
+            f"{where}: found a need for {missing}, which this port does not offer"
+        ) from None
+    except UnitError as error:
+        raise ModelError(f"{where}: {error}") from None
+
+
+def resolved(unit: str, units: Mapping[str, str]) -> str:
+    """A unit of an effect with the port's own units in place of braces."""
+    return unit.format_map({name: _bracketed(value) for name, value in units.items()})
+
+
+def _bracketed(unit: str) -> str:
+    return f"({unit})" if any(sign in unit for sign in " */^") else unit
 
 
 def _scaled(name: str, p: EffectParameter, sizes: Mapping[str, float]) -> EffectParameter:
@@ -127,12 +188,17 @@ def usable(name: str, effect: Effect, file: Path | str) -> Effect:
     """The effect, if its declaration makes sense.
 
     Raises:
-        ConfigError: it has no strength, or more than one.
+        ConfigError: it has no strength, or more than one, or a state that does not say how it
+            changes.
     """
     strengths = [key for key, p in effect.parameters.items() if p.role in ("strength", "switch")]
     if len(strengths) != 1:
         found = f"{len(strengths)} parameters with role strength or switch"
         raise ConfigError(file, f"effects.{name}.parameters", found, "one")
+    for key, state in effect.states.items():
+        if bool(state.derivative) == bool(state.update):
+            found = "both" if state.derivative else "neither"
+            raise ConfigError(file, f"effects.{name}.states.{key}", found, "derivative or update")
     return effect
 
 

@@ -96,7 +96,10 @@ class _Reader:
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
                 function = self._named(name, FUNCTIONS, "function")
                 return self._called(name, function, [self.value(arg) for arg in args])
-        raise ModelError(f"{self._where}: found {ast.unparse(node)!r}, which is no arithmetic")
+        hint = ": write ** for a power" if _is_caret(node) else ""
+        raise ModelError(
+            f"{self._where}: found {ast.unparse(node)!r}, which is no arithmetic{hint}"
+        )
 
     def _named(self, name: str, known: Mapping[str, Any], kind: str) -> Any:
         if name in known:
@@ -119,6 +122,10 @@ def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> 
         ModelError: it adds, compares or feeds to a function what does not have fitting units.
     """
     return _Measurer(dimensions, where).dim(ast.parse(text.strip(), mode="eval").body)
+
+
+def _is_caret(node: ast.AST) -> bool:
+    return isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor)
 
 
 class _Measurer:

@@ -10,8 +10,10 @@
     variables.x = { expression = "x", unit = "m" }
     variables.v = { expression = "v", unit = "m/s" }
 
-A port's name stands in the equations. A force port is a sum that is 0 until an effect is put there;
-an actuator port is its input as it arrives, and a sensor port is an output as it is read.
+Numbers stand in the unit beside them (mm, bar, kN/mm) and are SI once they are read; equations
+compute in SI. A port's name stands in the equations. A force port is a sum that is 0 until an
+effect is put there; an actuator port is its input as it arrives, and a sensor port is an output as
+it is read.
 """
 
 from functools import cache
@@ -21,6 +23,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
+from rigwatch.physics.engine.equations.in_si import into_si
 from rigwatch.wire.typed_files import Section, load, parse
 
 Text = Annotated[str, Meta(min_length=1)]
@@ -37,6 +40,13 @@ class Input(Section, frozen=True, kw_only=True):
     hold: Annotated[
         Hold | None, Meta(description="between samples, as the model's if not given")
     ] = None
+    shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
+    late: Annotated[
+        float, Meta(ge=0, le=1, description="share of a sample by which one that is kept is late")
+    ] = 0.0
+
+    def __post_init__(self) -> None:
+        into_si(self)
 
 
 class State(Section, frozen=True, kw_only=True):
@@ -49,6 +59,10 @@ class State(Section, frozen=True, kw_only=True):
     rate_of: Annotated[str, Meta(description="channel whose rate of change it is")] = ""
     low: Annotated[float, Meta(description="least initial value of a fit")] = float("-inf")
     high: Annotated[float, Meta(description="largest initial value of a fit")] = float("inf")
+    shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
+
+    def __post_init__(self) -> None:
+        into_si(self, "start", "low", "high")
 
 
 class Parameter(Section, frozen=True, kw_only=True):
@@ -63,6 +77,10 @@ class Parameter(Section, frozen=True, kw_only=True):
         bool, Meta(description="fitted to a healthy recording where there is one, then fixed")
     ] = False
     meaning: Annotated[str, Meta(description="what it is, in words")] = ""
+    shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
+
+    def __post_init__(self) -> None:
+        into_si(self, "value", "low", "high")
 
 
 class Output(Section, frozen=True, kw_only=True):
@@ -71,6 +89,10 @@ class Output(Section, frozen=True, kw_only=True):
     unit: Annotated[str, Meta(description="its unit")]
     expression: Annotated[Text, Meta(description="what it is, in states, inputs and parameters")]
     channel: Annotated[str, Meta(description="channel it is held against, its name if empty")] = ""
+    shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
+
+    def __post_init__(self) -> None:
+        into_si(self)
 
 
 class Variable(Section, frozen=True, kw_only=True):
@@ -78,6 +100,10 @@ class Variable(Section, frozen=True, kw_only=True):
 
     expression: Annotated[Text, Meta(description="what it is, in states, inputs and parameters")]
     unit: Annotated[str, Meta(description="its unit")]
+    shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
+
+    def __post_init__(self) -> None:
+        into_si(self)
 
 
 class Port(Section, frozen=True, kw_only=True):
@@ -94,6 +120,10 @@ class Port(Section, frozen=True, kw_only=True):
     variables: Annotated[
         dict[str, Variable], Meta(description="what effects here call x, v and so on")
     ] = field(default_factory=dict)
+    shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
+
+    def __post_init__(self) -> None:
+        into_si(self)
 
 
 class Model(Section, frozen=True, kw_only=True):
@@ -102,7 +132,10 @@ class Model(Section, frozen=True, kw_only=True):
     name: Text
     summary: Annotated[Text, Meta(description="what it describes, in a sentence")]
     source: Annotated[str, Meta(description="where its equations come from")] = ""
-    hold: Annotated[Hold, Meta(description="input between samples: a line, or kept")] = "linear"
+    hold: Annotated[
+        Hold | None,
+        Meta(description="input between samples: a line, or kept; the data choose if not given"),
+    ] = None
     rough: Annotated[
         bool, Meta(description="leaves much unexplained on a healthy rig, too; see the workbench")
     ] = False
@@ -113,15 +146,19 @@ class Model(Section, frozen=True, kw_only=True):
     ports: dict[str, Port] = field(default_factory=dict)
 
     def held(self, name: str) -> Hold:
-        """What an input does between samples."""
-        return self.inputs[name].hold or self.hold
+        """What an input does between samples: a line where nothing is said."""
+        return self.inputs[name].hold or self.hold or "linear"
+
+    def unheld(self) -> tuple[str, ...]:
+        """Inputs of which the model does not say what they do between samples."""
+        return tuple(n for n, own in self.inputs.items() if not (own.hold or self.hold))
 
 
 def load_model(path: Path | str) -> Model:
-    """The model file at `path`.
+    """The model file at `path`, its numbers in SI.
 
     Raises:
-        ConfigError: the file does not fit.
+        ConfigError: the file does not fit, or a unit is unknown.
     """
     return load(path, Model)
 

@@ -1,11 +1,18 @@
 """The names that an expression may use, each with its meaning and its dimension."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import sympy
 
-from rigwatch.physics.engine.equations.dimension import Dimension, describe, dimension
+from rigwatch.physics.engine.equations.dimension import (
+    GRAM,
+    Dimension,
+    describe,
+    dimension,
+    names_gram,
+)
 from rigwatch.physics.engine.equations.expression import dimension_of, parse
 from rigwatch.wire.errors import ModelError
 
@@ -21,11 +28,15 @@ class Scope:
 
     meanings: dict[str, sympy.Expr] = field(default_factory=dict)
     dimensions: dict[str, Dimension] = field(default_factory=dict)
+    grams: set[str] = field(default_factory=set)
+    """Names whose unit is written with g, which may be meant as standard gravity."""
 
     def define(self, name: str, meaning: sympy.Expr, unit: str | Dimension) -> None:
         """Let `name` stand for `meaning`, with its unit or dimension."""
         self.meanings[name] = meaning
         self.dimensions[name] = dimension(unit) if isinstance(unit, str) else unit
+        if isinstance(unit, str) and names_gram(unit):
+            self.grams.add(name)
 
     def define_all(self, units: Mapping[str, str], prefix: str = "") -> None:
         """Let each name stand for a symbol of its own, called with `prefix` in front."""
@@ -34,7 +45,7 @@ class Scope:
 
     def copy(self) -> "Scope":
         """A scope that can be added to without changing this one."""
-        return Scope(dict(self.meanings), dict(self.dimensions))
+        return Scope(dict(self.meanings), dict(self.dimensions), set(self.grams))
 
     def read(self, text: str, unit: str | Dimension, where: str) -> sympy.Expr:
         """The expression `text`, which must have the given unit or dimension.
@@ -43,10 +54,19 @@ class Scope:
             ModelError: it does not parse, names something unknown or has another unit.
         """
         expression = parse(text, self.meanings, where)
-        found = dimension_of(text, self.dimensions, where)
+        try:
+            found = dimension_of(text, self.dimensions, where)
+        except ModelError as error:
+            raise ModelError(f"{error}{self._hint(text)}") from None
         expected = dimension(unit) if isinstance(unit, str) else unit
         if found is not None and found != expected:
             raise ModelError(
                 f"{where}: found {text!r} in {describe(found)}, expected {describe(expected)}"
+                f"{self._hint(text, unit)}"
             )
         return expression
+
+    def _hint(self, text: str, unit: str | Dimension = "") -> str:
+        """What may be behind units that do not fit: gravity that was written as the gram."""
+        used = self.grams.intersection(re.findall(r"\w+", text))
+        return f" ({GRAM})" if used or (isinstance(unit, str) and names_gram(unit)) else ""

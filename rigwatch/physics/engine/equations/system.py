@@ -6,12 +6,12 @@ another in the order in which they were placed.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import sympy
 
 from rigwatch.physics.engine.equations.effect import Effect
-from rigwatch.physics.engine.equations.model import Model, Parameter, Port, State
+from rigwatch.physics.engine.equations.model import Input, Model, Output, Parameter, Port, State
 from rigwatch.physics.engine.equations.scope import Scope, symbol
 from rigwatch.wire.errors import ModelError
 
@@ -19,6 +19,8 @@ TIME = "t"
 PROBE = "probe_"
 RATE = "rate"
 """What an effect at a signal may call the signal's own rate of change."""
+STEP = "step"
+"""What the direction of an effect at a signal may call the signal's change over a sample."""
 UNTIL = "until_"
 LEFT = "left"
 """What an effect at a signal may call the time until an input that is kept changes; 0 elsewhere.
@@ -58,6 +60,7 @@ class System:
         ports: what each port is: the force that is added, the signal that leaves.
         probes: one a force or actuator port, added to what it is and always 0: derivatives by them
             say what any further effect there would do.
+        updates: values from each sample on of states that change there, by name; their rates are 0.
     """
 
     model: Model
@@ -68,6 +71,7 @@ class System:
     outputs: Mapping[str, sympy.Expr]
     ports: Mapping[str, sympy.Expr]
     probes: tuple[str, ...]
+    updates: Mapping[str, sympy.Expr] = field(default_factory=dict)
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -112,10 +116,11 @@ class _Composer:
         self._model, self._placements = model, placements
         self._states, self._parameters = dict(model.states), dict(model.parameters)
         self._rates: dict[str, sympy.Expr] = {}
+        self._updates: dict[str, sympy.Expr] = {}
         self._scope = Scope()
         self._scope.define(TIME, symbol(TIME), "s")
         for table in (model.inputs, model.states, model.parameters):
-            self._scope.define_all({name: item.unit for name, item in table.items()})
+            self._scope.define_all({n: item.shown or item.unit for n, item in table.items()})
 
     def system(self) -> System:
         ports = self._entered("actuator") | self._entered("force")
@@ -141,6 +146,7 @@ class _Composer:
             outputs,
             ports | sensors,
             tuple(PROBE + name for name in ports),
+            self._updates,
         )
 
     def _entered(self, kind: str) -> dict[str, sympy.Expr]:
@@ -179,57 +185,58 @@ class _Composer:
         """What one effect adds to a force port, or makes of the arriving signal."""
         scope = self._local_scope(placement, port, arriving, unit)
         for name, state in placement.effect.states.items():
-            rate_unit = f"({self._states[placement.prefix + name].unit})/s"
-            where = f"{placement}: state {name}"
-            self._rates[placement.prefix + name] = scope.read(state.derivative, rate_unit, where)
+            label, where = placement.prefix + name, f"{placement}: state {name}"
+            unit_of = self._states[label].unit
+            if state.update:
+                self._rates[label] = sympy.Integer(0)
+                self._updates[label] = scope.read(state.update, unit_of, where)
+            else:
+                self._rates[label] = scope.read(state.derivative, f"({unit_of})/s", where)
         return scope.read(placement.effect.expression, unit, str(placement))
 
     def _local_scope(
         self, placement: Placement, port: Port, arriving: sympy.Expr, unit: str
     ) -> Scope:
         """Names as the effect sees them; its own parameters and states join the system."""
-        scope, units = Scope(), {"F" if port.kind == "force" else "u": unit}
+        scope = Scope()
         scope.define(TIME, symbol(TIME), "s")
         for name, variable in port.variables.items():
             meaning = self._scope.read(variable.expression, variable.unit, f"port {placement.port}")
             scope.define(name, meaning, variable.unit)
-            units[name] = variable.unit
         if port.kind != "force":
             scope.define("u", arriving, unit)
             scope.define(LEFT, symbol(UNTIL), "s")
-        self._adopt(placement, units)
+        self._adopt(placement)
         for name in (*placement.effect.parameters, *placement.effect.states):
             label = placement.prefix + name
             own = self._parameters.get(label) or self._states[label]
-            scope.define(name, symbol(label), own.unit)
+            scope.define(name, symbol(label), own.shown or own.unit)
         return scope
 
-    def _adopt(self, placement: Placement, units: Mapping[str, str]) -> None:
-        for name, p in placement.effect.parameters.items():
+    def _adopt(self, placement: Placement) -> None:
+        effect = placement.effect.at(units_at(self._model, placement.port), str(placement))
+        for name, p in effect.parameters.items():
             self._parameters[placement.prefix + name] = Parameter(
                 value=1.0 if p.role == "switch" else p.value,
-                unit=_resolved(p.unit, units, placement),
+                unit=p.unit,
+                shown=p.shown,
                 low=p.low,
                 high=p.high,
                 fixed=p.role in ("constant", "switch"),
                 meaning=f"{placement.name}, {name}",
             )
-        for name, s in placement.effect.states.items():
-            unit = _resolved(s.unit, units, placement)
+        for name, s in effect.states.items():
             self._states[placement.prefix + name] = State(
-                unit=unit, derivative=s.derivative, start=s.start, low=s.low, high=s.high
-            )
+                unit=s.unit, derivative=s.derivative or s.update, start=s.start, low=s.low,
+                high=s.high, shown=s.shown,
+            )  # fmt: skip
 
 
-def _resolved(unit: str, units: Mapping[str, str], placement: Placement) -> str:
-    """A unit of an effect with the port's own units in place of braces."""
-    try:
-        return unit.format_map({name: _bracketed(value) for name, value in units.items()})
-    except KeyError as missing:
-        raise ModelError(
-            f"{placement}: found a need for {missing}, which this port does not offer"
-        ) from None
-
-
-def _bracketed(unit: str) -> str:
-    return f"({unit})" if any(sign in unit for sign in " */") else unit
+def units_at(model: Model, name: str) -> dict[str, str]:
+    """Units of a port as people write them, by what effects there call them in braces."""
+    port = model.ports[name]
+    own: Port | Input | Output = port
+    if port.kind != "force":
+        own = model.inputs[port.signal] if port.kind == "actuator" else model.outputs[port.signal]
+    units = {"F" if port.kind == "force" else "u": own.shown or own.unit}
+    return units | {name: v.shown or v.unit for name, v in port.variables.items()}

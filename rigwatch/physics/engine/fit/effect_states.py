@@ -43,19 +43,21 @@ class Memory:
         spacing: between the nodes [s].
         hold: what signals do between the nodes, see `held_at`.
         rows: nodes after which signals that are kept change.
+        late: share of the spacing by which they change late.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0917 -- they belong together
         self,
         effect: Effect,
         signals: Mapping[str, FloatArray],
         spacing: float,
         hold: Hold,
         rows: int = 1,
+        late: float = 0.0,
     ) -> None:
         inputs = [name for name in signals if name not in {TIME, LEFT}]
         self._driving = np.stack([signals[name] for name in inputs], axis=-1)
-        self._system = _alone(effect, inputs, hold)
+        self._system = _alone(effect, inputs, hold, late)
         self._compiled: CompiledSystem = compile_system(self._system)
         self._first = np.array([[state.start for state in effect.states.values()]])
         self._spacing, self._rows = spacing, rows
@@ -77,7 +79,13 @@ def held_at(model: Model, port: str) -> Hold:
     return model.held(place.signal) if place.kind == "actuator" else "linear"
 
 
-def _alone(effect: Effect, inputs: list[str], hold: Hold) -> System:
+def late_at(model: Model, port: str) -> float:
+    """Share of a sample by which signals at a port are late, where they are kept."""
+    place = model.ports[port]
+    return model.inputs[place.signal].late if place.kind == "actuator" else 0.0
+
+
+def _alone(effect: Effect, inputs: list[str], hold: Hold, late: float) -> System:
     """The states of one effect as a system of their own."""
     own = (*inputs, TIME, *effect.states, *effect.parameters)
     names = {LEFT: symbol(UNTIL)} | {name: symbol(name) for name in own}
@@ -85,14 +93,19 @@ def _alone(effect: Effect, inputs: list[str], hold: Hold) -> System:
         name="memory of an effect",
         summary="the states of one effect",
         hold=hold,
-        inputs={name: Input(unit="1") for name in inputs},
+        inputs={name: Input(unit="1", late=late) for name in inputs},
         parameters={n: Parameter(value=0.0, unit="1", fixed=True) for n in effect.parameters},
         outputs={name: Output(unit="1", expression=name) for name in effect.states},
     )
-    states = {n: State(unit="1", derivative=s.derivative) for n, s in effect.states.items()}
-    rates = {n: parse(s.derivative, names, f"state {n}") for n, s in effect.states.items()}
+    states = {
+        n: State(unit="1", derivative=s.derivative or s.update) for n, s in effect.states.items()
+    }
+    rates = {n: parse(s.derivative or "0", names, f"state {n}") for n, s in effect.states.items()}
+    updates = {
+        n: parse(s.update, names, f"state {n}") for n, s in effect.states.items() if s.update
+    }
     read = {name: symbol(name) for name in effect.states}
-    return System(model, (), states, model.parameters, rates, read, {}, ())
+    return System(model, (), states, model.parameters, rates, read, {}, (), updates)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +151,7 @@ class Recall:
                     seen(system, placement, inputs, states, dt, values),
                     dt,
                     held_at(system.model, placement.port),
+                    late=late_at(system.model, placement.port),
                 ),
                 [order.index(placement.prefix + name) for name in placement.effect.states],
             )

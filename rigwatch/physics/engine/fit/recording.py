@@ -20,12 +20,14 @@ class Recording:
         inputs: in the order of the model's inputs, shape (n, n_u).
         outputs: in the order of its outputs, shape (n, n_y); NaN where nothing valid was measured.
         thinning: how residuals and sensitivities are filtered and thinned, None where they are not.
+        parts: lengths of the recordings that lie one behind the other; one if empty.
     """
 
     dt: float
     inputs: FloatArray
     outputs: FloatArray
     thinning: Thinning | None = None
+    parts: tuple[int, ...] = ()
 
     def __len__(self) -> int:
         return len(self.inputs)
@@ -56,8 +58,14 @@ def windows(system: System, samples: int, horizon: int) -> Windows:
     return Windows(np.arange(0, samples - length + 1, length, dtype=np.int64), length)
 
 
-def initial_states(system: System, recording: Recording) -> FloatArray:
-    """States as the channels show them at every sample, shape (n, states): a start for the fit."""
+def initial_states(system: System, recording: Recording, smoothed: int = 11) -> FloatArray:
+    """States as the channels show them at every sample, shape (n, states): a start for the fit.
+
+    Args:
+        system: its states name the channels.
+        recording: the channels.
+        smoothed: samples that a rate of change is taken over, odd.
+    """
     channels = {
         output.channel or name: recording.outputs[:, index]
         for index, (name, output) in enumerate(system.model.outputs.items())
@@ -66,16 +74,16 @@ def initial_states(system: System, recording: Recording) -> FloatArray:
     for index, state in enumerate(system.states.values()):
         found[:, index] = state.start
         if state.measured in channels:
-            found[:, index] = _filled(channels[state.measured])
+            found[:, index] = filled(channels[state.measured])
         elif state.rate_of in channels:
-            signal = _filled(channels[state.rate_of])
-            width = min(11, len(signal) - 1 + len(signal) % 2)
+            signal = filled(channels[state.rate_of])
+            width = min(smoothed, len(signal) - 1 + len(signal) % 2)
             if width >= 5:
                 found[:, index] = savgol_filter(signal, width, 3, deriv=1, delta=recording.dt)
     return found
 
 
-def _filled(signal: FloatArray) -> FloatArray:
+def filled(signal: FloatArray) -> FloatArray:
     """The signal with gaps bridged by straight lines; zeros where there is nothing at all."""
     good = np.isfinite(signal)
     if not good.any():

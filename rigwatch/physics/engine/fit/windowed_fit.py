@@ -14,6 +14,7 @@ from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit.problem import Problem, Started
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.wire.errors import ModelError
 
 ROUNDS = 2
 """Solutions at most, each from where the last has led, while windows that went astray come back."""
@@ -102,7 +103,7 @@ def fit(
     """
     problem = Problem(compiled, recording, horizon, scale=scale, substeps=substeps, initial=initial)
     begin = compiled.parameters if start is None else start.copy()
-    theta = np.clip(begin[problem.free], *_bounds(compiled.system))
+    theta = np.clip(begin[problem.free], *bounds(compiled.system))
     problem.recall(problem.whole(begin, theta))
     found = problem.start_windows(problem.whole(begin, theta))
     for _ in range(ROUNDS if len(theta) else 0):
@@ -110,7 +111,7 @@ def fit(
         found = problem.start_windows(problem.whole(begin, theta))
         if not found.came_back:
             break
-    return _result(problem, found)
+    return result_of(problem, found)
 
 
 def _smallest_error(problem: Problem, begin: FloatArray, theta: FloatArray) -> FloatArray:
@@ -119,22 +120,29 @@ def _smallest_error(problem: Problem, begin: FloatArray, theta: FloatArray) -> F
     It moves them in deviations, as the data at the start tell them, and calls a step small by the
     size of all that it moves. So it begins at `FAR`, whence a step of `CLOSE` deviations is small.
     """
-    low, high = _bounds(problem.system)
+    low, high = bounds(problem.system)
     unit = _deviations(*problem.projected(problem.whole(begin, theta)), theta)
 
     def parameters(moved: FloatArray) -> FloatArray:
         return problem.whole(begin, np.clip(theta + unit * (moved - FAR), low, high))
 
-    found = least_squares(
-        lambda moved: problem.tried(parameters(moved)),
-        np.full(len(theta), FAR),
-        jac=lambda moved: problem.projected(parameters(moved))[1] * unit,
-        bounds=(FAR + (low - theta) / unit, FAR + (high - theta) / unit),
-        x_scale="jac",
-        ftol=CONVERGED,
-        xtol=CLOSE / FAR,
-        max_nfev=60,
-    )
+    try:
+        found = least_squares(
+            lambda moved: problem.tried(parameters(moved)),
+            np.full(len(theta), FAR),
+            jac=lambda moved: problem.projected(parameters(moved))[1] * unit,
+            bounds=(FAR + (low - theta) / unit, FAR + (high - theta) / unit),
+            x_scale="jac",
+            ftol=CONVERGED,
+            xtol=CLOSE / FAR,
+            max_nfev=60,
+        )
+    except (ValueError, np.linalg.LinAlgError) as error:
+        # Slopes that are finite may still be too large to be squared.
+        raise ModelError(
+            f"{problem.system.model.name}: the search leaves the finite numbers;"
+            " try other starting values"
+        ) from error
     return np.asarray(parameters(found.x)[problem.free])
 
 
@@ -160,21 +168,54 @@ def evaluate(
     )
     problem.recall(fitted.parameters)
     found = problem.start_windows(fitted.parameters)
-    return replace(_result(problem, found), covariance=fitted.covariance)
+    return replace(result_of(problem, found), covariance=fitted.covariance)
 
 
-def _bounds(system: System) -> tuple[FloatArray, FloatArray]:
+@_QUIET
+def error_at(  # noqa: PLR0917 -- they belong together
+    compiled: CompiledSystem,
+    recording: Recording,
+    horizon: int,
+    parameters: FloatArray,
+    scale: FloatArray,
+    substeps: int = 4,
+) -> float:
+    """Root mean square of the scaled error at given parameters; infinite where it blows up.
+
+    Args:
+        compiled, recording, horizon, substeps: as in `fit`.
+        parameters: all of them, shape (n_p,).
+        scale: divisor of each output's residuals, shape (outputs,).
+    """
+    problem = Problem(compiled, recording, horizon, scale=scale, substeps=substeps, initial=None)
+    try:
+        problem.recall(parameters)
+        error = problem.start_windows(parameters).error
+    except (ModelError, np.linalg.LinAlgError):
+        return float("inf")
+    size = float(np.sqrt(np.mean(error**2)))
+    return size if np.isfinite(size) else float("inf")
+
+
+def bounds(system: System) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper bounds of the free parameters, each of shape (m,)."""
     free = [system.parameters[name] for name in system.free]
     return np.array([p.low for p in free]), np.array([p.high for p in free])
 
 
-def _result(problem: Problem, found: Started) -> Fit:
+def result_of(problem: Problem, found: Started) -> Fit:
     """The fit at the parameters that have been found."""
     error, scale = found.error, problem.scale
     residual, jacobian = problem.cleaned(error, found.slopes)
+    curvature = jacobian.T @ jacobian
+    if not np.isfinite(curvature).all():
+        raise ModelError(
+            f"{problem.system.model.name}: the slopes leave the finite numbers; try other"
+            " starting values"
+        )
     used = residual.size - found.initial.size - len(problem.free)
     variance = float(residual @ residual) / max(used, 1)
-    covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian) * variance, np.float64)
+    covariance = np.asarray(np.linalg.pinv(curvature) * variance, np.float64)
     left = error.reshape(len(error), -1, problem.measured.shape[2]) * scale
     if problem.recording.thinning is None:
         left = np.where(np.isnan(problem.measured), np.nan, left)
@@ -186,5 +227,5 @@ def _result(problem: Problem, found: Started) -> Fit:
         left,
         scale,
         residual.reshape(len(error), -1),
-        jacobian.reshape(len(error), -1, len(problem.free)),
+        jacobian.reshape(*error.shape, len(problem.free)),
     )

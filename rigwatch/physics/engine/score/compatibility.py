@@ -12,6 +12,8 @@ def suits(effect: Effect, port: Port, model: Model) -> bool:
         return False
     if effect.states and port.kind != "force" and not model.states:
         return False
+    if effect.sampled and port.kind == "actuator" and model.held(port.signal) != "zero":
+        return False
     if port.passive and not _named(effect) & set(port.variables):
         return False
     return knows(effect, port)
@@ -32,7 +34,7 @@ def knows(effect: Effect, port: Port) -> bool:
 
 def _named(effect: Effect) -> set[str]:
     """Every name in an effect's equations that is no function."""
-    texts = [effect.expression, *(s.derivative for s in effect.states.values())]
+    texts = [effect.expression, *(s.derivative or s.update for s in effect.states.values())]
     used = {n.id for text in texts for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)}
     functions = {
         n.func.id

@@ -28,6 +28,7 @@ from rigwatch.physics.engine.equations import (
     LEFT,
     PROBE,
     RATE,
+    STEP,
     TIME,
     UNTIL,
     Effect,
@@ -102,7 +103,10 @@ def trajectory(
     following = np.minimum(rows + 1, len(inputs) - 1)
     model = compiled.system.model
     share = np.outer(place, [model.held(name) == "linear" for name in model.inputs])
-    at_nodes = inputs[rows] + share * (inputs[following] - inputs[rows])
+    late = np.array([own.late for own in model.inputs.values()])
+    before = (place[:, None] < late) & (share == 0.0) & (late > 0)
+    kept = np.where(before, inputs[np.maximum(rows - 1, 0)], inputs[rows])
+    at_nodes = kept + share * (inputs[following] - inputs[rows])
     return Trajectory(compiled, run, at_nodes, (rows + place) * dt, parameters)
 
 
@@ -171,8 +175,18 @@ def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
     if port.kind != "force":
         signals["u"] = _along(at, system.ports[port_name])
         signals[RATE] = np.gradient(signals["u"], at.run.spacing, axis=1)
+        signals[STEP] = _step(signals["u"], at.run.substeps)
         signals[LEFT] = _left(at)
     return signals
+
+
+def _step(signal: FloatArray, substeps: int) -> FloatArray:
+    """Change of a signal since a sample before, shape (windows, nodes)."""
+    changed = np.zeros_like(signal)
+    changed[:, substeps:] = signal[:, substeps:] - signal[:, :-substeps]
+    # What came before a window is not known: it goes on as it begins.
+    changed[:, :substeps] = changed[:, substeps : 2 * substeps][:, :substeps]
+    return changed
 
 
 def _symbols(system: System) -> dict[str, sympy.Expr]:
@@ -237,11 +251,16 @@ def _propagated(
     across = np.ascontiguousarray(run.rate_slopes[..., columns])
     reads = np.ascontiguousarray(run.read_slopes[..., free : free + n])
     direct = np.ascontiguousarray(run.read_slopes[..., columns])
+    carried = np.ascontiguousarray(run.update_slopes[..., free : free + n])
+    renewed = np.ascontiguousarray(run.update_slopes[..., columns])
     moved = np.empty((*run.outputs.shape, len(columns)))
     ending = pushes.copy()
     at = np.arange(run.substeps, pushes.shape[1], run.substeps)
     ending[:, at] = np.where(held, pushes[:, at - 1], pushes[:, at])
-    _propagate(along, across, reads, direct, pushes, ending, run.spacing, run.substeps, moved)
+    _propagate(
+        along, across, reads, direct, carried, renewed, pushes, ending, run.spacing, run.substeps,
+        moved,
+    )  # fmt: skip
     return moved
 
 
@@ -251,6 +270,8 @@ def _propagate(  # noqa: C901, PLR0917 -- a kernel
     across: FloatArray,
     reads: FloatArray,
     direct: FloatArray,
+    carried: FloatArray,
+    renewed: FloatArray,
     pushes: FloatArray,
     ending: FloatArray,
     h: float,
@@ -266,6 +287,9 @@ def _propagate(  # noqa: C901, PLR0917 -- a kernel
         for node in range(nodes):
             if node % substeps == 0:
                 k = node // substeps
+                if carried.shape[1] > 0 and k > 0:
+                    _slopes(carried[w, k], renewed[w, k], pushes[w, node], response, ahead)
+                    response[:] = ahead
                 for o in range(moved.shape[2]):
                     for c in range(candidates):
                         value = direct[w, k, o, c] * pushes[w, node, c]

@@ -43,13 +43,6 @@ class Scores:
     cosines: FloatArray
     units: FloatArray
 
-    def classes(self, alike: float = ALIKE) -> list[list[int]]:
-        """For each candidate the candidates that it cannot be told from, itself first."""
-        return [
-            [i, *(j for j in np.flatnonzero(row > alike).tolist() if j != i)]
-            for i, row in enumerate(self.cosines)
-        ]
-
 
 class Projector:
     """Takes out of signals what the fitted parameters and initial states could have made.

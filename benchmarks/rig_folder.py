@@ -1,0 +1,81 @@
+"""A folder of recordings in the layout of the rig that is not ours, played through the commands."""
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+CHANNELS = (
+    ("voltage", "voltage_V[V]"),
+    ("position", "position_m[m]"),
+    ("acceleration", "acceleration_m_s2[m/s^2]"),
+)
+
+
+@dataclass
+class Tally:
+    """How many of how many, by name."""
+
+    right: dict[str, int] = field(default_factory=dict)
+    of: dict[str, int] = field(default_factory=dict)
+
+    def count(self, name: str, right: bool) -> None:
+        """Counts one case."""
+        self.right[name] = self.right.get(name, 0) + int(right)
+        self.of[name] = self.of.get(name, 0) + 1
+
+    def add(self, other: "Tally") -> None:
+        """Counts all cases of another."""
+        for name, of in other.of.items():
+            self.right[name] = self.right.get(name, 0) + other.right[name]
+            self.of[name] = self.of.get(name, 0) + of
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {self.right[name]} of {of}" for name, of in self.of.items())
+
+
+@dataclass(frozen=True)
+class RigFolder:
+    """Recordings and their truth, and a folder for what the commands make of them.
+
+    Attributes:
+        recordings: has `truth.json` and a folder of CSV files for each part.
+        work: sessions, models and studies go there.
+    """
+
+    recordings: Path
+    work: Path
+
+    def truth(self, part: str) -> dict[str, dict[str, Any]]:
+        """What was done in each recording of `part`."""
+        told = json.loads((self.recordings / "truth.json").read_text(encoding="utf-8"))
+        return dict(told.get(part, {}))
+
+    def session(self, part: str, name: str) -> Path:
+        """The recording as a session, imported once."""
+        session = self.work / part / f"{name}.mcap"
+        if not session.exists():
+            session.parent.mkdir(parents=True, exist_ok=True)
+            maps = [word for to, column in CHANNELS for word in ("--map", f"{to}={column}")]
+            source = self.recordings / part / f"{name}.csv"
+            run = command("import", source, session, "--time", "time_s[s]", *maps)
+            if run.returncode:
+                raise RuntimeError(f"import {source}: {run.stderr.strip()}")
+        return session
+
+
+def command(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    """Runs `rigwatch` with these words."""
+    line = [sys.executable, "-m", "rigwatch", *map(str, words)]
+    return subprocess.run(line, capture_output=True, text=True, check=False)
+
+
+def answer(*words: str | Path) -> tuple[dict[str, Any], str]:
+    """What a command prints with --json, and what it says where it fails."""
+    run = command(*words, "--json")
+    try:
+        return dict(json.loads(run.stdout)), ""
+    except ValueError:
+        return {}, run.stderr.strip()[-200:] or f"exit {run.returncode}"

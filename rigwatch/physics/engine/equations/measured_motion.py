@@ -1,0 +1,146 @@
+"""Prediction along the measured motion: what sensors show drives the rest of a model.
+
+A model's states are split into those that a channel shows (`measured`, `rate_of`) and those that
+are hidden,
+
+    x = (x_m, x_h),   dx_h/dt = f_h(t, x_m, x_h, u, p),   y = g(t, x_m, x_h, u, p)
+
+and x_m is taken from the data. The transformed model simulates the hidden states alone, with x_m
+among its inputs, and predicts the outputs that are balances: an acceleration, a current, a flow.
+Hidden states that forget their start need no windows: a whole recording is one stable run, and the
+output's residual shows the missing force at every sample. The field calls it the series-parallel
+form, or teacher forcing (K. S. Narendra, K. Parthasarathy, IEEE Trans. Neural Networks 1, 1990).
+
+Where every output merely shows a measured state, the balance itself is predicted: the equation of
+a measured state's rate, held against the rate of the channel (see `measured_recording.py`),
+
+    dv/dt = (drive - k·x - c·v + load)/m   →   output v_rate, measured as d²(position)/dt²
+
+Two weaknesses: noise of the measured motion enters as an input and biases what multiplies v, or
+its sign near standstill; and an effect at the sensor of a measured state enters the equations
+wherever the state does, so that the transformed model has no port for it.
+"""
+
+import ast
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from msgspec.structs import replace
+
+from rigwatch.physics.engine.equations.expression import FUNCTIONS
+from rigwatch.physics.engine.equations.model import Input, Model, Output
+from rigwatch.wire.errors import ModelError
+
+RATE_SUFFIX = "_rate"
+"""What the output that is the balance of a state is called, behind the state's name."""
+
+
+@dataclass(frozen=True)
+class MeasuredState:
+    """A state that a channel shows, and an input of the transformed model.
+
+    Attributes:
+        name: of the state.
+        channel: that shows it.
+        order: 0 where the channel shows the state, 1 where the state is the channel's rate.
+    """
+
+    name: str
+    channel: str
+    order: int
+
+
+def measured_states(model: Model) -> tuple[MeasuredState, ...]:
+    """The states that channels of the model's outputs show, in the model's order."""
+    shown = {output.channel or name for name, output in model.outputs.items()}
+    found = []
+    for name, state in model.states.items():
+        if state.measured in shown:
+            found.append(MeasuredState(name, state.measured, 0))
+        elif state.rate_of in shown:
+            found.append(MeasuredState(name, state.rate_of, 1))
+    return tuple(found)
+
+
+def has_hidden_states(model: Model) -> bool:
+    """Whether channels show some of a model's states, and not all."""
+    return 0 < len(measured_states(model)) < len(model.states)
+
+
+def balanced_states(model: Model) -> tuple[MeasuredState, ...]:
+    """Measured states whose rate says more than that it is another measured state."""
+    measured = measured_states(model)
+    names = {state.name for state in measured}
+    return tuple(s for s in measured if not _named(model.states[s.name].derivative) <= names)
+
+
+def predicted_outputs(model: Model) -> tuple[str, ...]:
+    """Outputs that are more than a measured state, by name."""
+    given = {state.name for state in measured_states(model)} | set(model.parameters)
+    return tuple(
+        name for name, output in model.outputs.items() if not _named(output.expression) <= given
+    )
+
+
+def along_measured_motion(model: Model) -> Model:
+    """The model with its measured states as inputs; ports and effects work as before.
+
+    Raises:
+        ModelError: no channel shows any of its states, or nothing is left to predict.
+    """
+    motion = {state.name for state in measured_states(model)}
+    if not motion:
+        raise ModelError(
+            f"{model.name}: found no measured state, expected one with `measured` or `rate_of`"
+        )
+    outputs = _outputs(model)
+    if not outputs:
+        raise ModelError(f"{model.name}: found nothing to predict once the motion is given")
+    inputs = dict(model.inputs)
+    inputs |= {n: Input(unit=s.unit, hold="linear") for n, s in model.states.items() if n in motion}
+    states = {name: state for name, state in model.states.items() if name not in motion}
+    ports = {
+        name: port
+        for name, port in model.ports.items()
+        if port.kind != "sensor" or port.signal in outputs
+    }
+    return _with_unused_fixed(
+        replace(model, inputs=inputs, states=states, outputs=outputs, ports=ports)
+    )
+
+
+def _outputs(model: Model) -> dict[str, Output]:
+    """What is predicted: the outputs that remain or, where none does, the balances."""
+    kept = predicted_outputs(model)
+    if kept:
+        return {name: model.outputs[name] for name in kept}
+    states = [(balance.name, model.states[balance.name]) for balance in balanced_states(model)]
+    return {
+        name + RATE_SUFFIX: Output(unit=f"({state.unit})/s", expression=state.derivative)
+        for name, state in states
+    }
+
+
+def _with_unused_fixed(model: Model) -> Model:
+    """A parameter that stands in no equation any more cannot be fitted."""
+    used = _all_named(
+        [
+            *(state.derivative for state in model.states.values()),
+            *(output.expression for output in model.outputs.values()),
+        ]
+    )
+    parameters = {
+        name: p if name in used else replace(p, fixed=True, kept=False)
+        for name, p in model.parameters.items()
+    }
+    return replace(model, parameters=parameters)
+
+
+def _all_named(texts: Iterable[str]) -> set[str]:
+    return {name for text in texts for name in _named(text)}
+
+
+def _named(text: str) -> set[str]:
+    """Every name in an expression that is no function."""
+    tree = ast.walk(ast.parse(text.strip(), mode="eval"))
+    return {node.id for node in tree if isinstance(node, ast.Name)} - set(FUNCTIONS)

@@ -1,0 +1,148 @@
+"""Whether a fit converged, and how: what a verdict may be built on.
+
+The gradient is measured as J. Dennis and R. Schnabel do (Numerical Methods for Unconstrained
+Optimization, 1983, 7.2): by the share of the squared error that a Gauss-Newton step promises,
+
+    promise = |P·r|² / |r|²,   P: projection on the slopes of the parameters that are free to move
+
+which is free of units and of the size of the error.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigwatch.physics.engine.fit.windowed_fit import Fit, bounds
+from rigwatch.wire.arrays import FloatArray
+
+PROMISED = 0.02
+"""Share of the squared error that a further step may promise where a fit has converged."""
+AGREE = 1.02
+"""Ratio of errors up to which two fits have come to the same end."""
+UNDETERMINED = 1e-6
+"""Singular value over the largest below which the data do not determine a direction."""
+HEAVY = 0.3
+"""Share of an undetermined direction from which a parameter counts as a part of it."""
+TOUCHING = 1e-6
+"""Distance from a bound, over the parameter's size, at which it sits on the bound."""
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """How a fit ended.
+
+    Attributes:
+        converged: whether verdicts may be built on it.
+        gradient: share of the squared error that a further step promises.
+        starts: fits that were made, each from a start of its own.
+        agreeing: those that came to the same error as the best, itself among them.
+        undetermined: free parameters that the data do not determine.
+        at_bound: free parameters that sit on a bound.
+        begun: what the best fit began from.
+        reason: in words.
+    """
+
+    converged: bool
+    gradient: float
+    starts: int
+    agreeing: int
+    undetermined: tuple[str, ...]
+    at_bound: tuple[str, ...]
+    begun: str
+    reason: str
+
+
+def convergence(best: Fit, others: Sequence[Fit], begun: str, *, near_noise: bool) -> Convergence:
+    """How the best of several fits ended.
+
+    Args:
+        best: the fit that is kept.
+        others: fits of the same data from other starts.
+        begun: what the best one began from.
+        near_noise: whether its error is so small that no other end could be much better.
+    """
+    gradient = promise(best)
+    size = spread(best)
+    agreeing = 1 + sum(spread(other) <= AGREE * size for other in others)
+    alone = bool(others) and agreeing == 1 and not near_noise
+    steep = gradient > PROMISED
+    reason = f"a further step promises {gradient:.1%} of the squared error" if steep else ""
+    if alone:
+        also = f"none of {len(others) + 1} starts leads where another does"
+        reason = f"{reason}; {also}" if reason else also
+    return Convergence(
+        not (steep or alone),
+        gradient,
+        len(others) + 1,
+        agreeing,
+        _undetermined(best),
+        at_bound(best),
+        begun,
+        reason or _agreed(agreeing, len(others) + 1, near_noise=near_noise),
+    )
+
+
+def _agreed(agreeing: int, starts: int, *, near_noise: bool) -> str:
+    if agreeing > 1:
+        return f"{agreeing} of {starts} starts lead to the same error"
+    if near_noise:
+        return "the error is as small as the sensors' noise"
+    return "the gradient vanishes; no other start was tried"
+
+
+def spread(fitted: Fit) -> float:
+    """Root mean square of the scaled residuals."""
+    return float(np.sqrt(np.mean((fitted.rms / fitted.scale) ** 2)))
+
+
+def promise(fitted: Fit) -> float:
+    """Share of the squared error that a Gauss-Newton step promises, bounds respected."""
+    names = fitted.compiled.system.free
+    residual, jacobian = fitted.error.ravel(), _jacobian(fitted)
+    size = float(residual @ residual)
+    held = set(at_bound(fitted))
+    moving = [i for i, name in enumerate(names) if name not in held]
+    if not moving or size == 0:
+        return 0.0
+    columns = jacobian[:, moving]
+    length = np.sqrt(np.sum(columns**2, axis=0))
+    seen = columns[:, length > 0] / length[length > 0]
+    if not seen.shape[1]:
+        return 0.0
+    left, values, _ = np.linalg.svd(seen, full_matrices=False)
+    basis = left[:, values > UNDETERMINED * values[0]]
+    return float(np.sum((basis.T @ residual) ** 2) / size)
+
+
+def at_bound(fitted: Fit) -> tuple[str, ...]:
+    """Free parameters that sit on a bound."""
+    low, high = bounds(fitted.compiled.system)
+    values = fitted.values()
+    found = []
+    for name, lowest, highest in zip(fitted.compiled.system.free, low, high, strict=True):
+        value = values[name]
+        near = TOUCHING * max(abs(value), abs(fitted.compiled.system.parameters[name].value))
+        if value - lowest <= near or highest - value <= near:
+            found.append(name)
+    return tuple(found)
+
+
+def _undetermined(fitted: Fit) -> tuple[str, ...]:
+    """Parameters in directions that change the error by next to nothing, over their own sizes."""
+    names, jacobian = fitted.compiled.system.free, _jacobian(fitted)
+    if not names:
+        return ()
+    sizes = np.array([
+        max(abs(fitted.values()[name]), abs(fitted.compiled.system.parameters[name].value), 1e-12)
+        for name in names
+    ])  # fmt: skip
+    _, values, directions = np.linalg.svd(jacobian * sizes, full_matrices=False)
+    flat = directions[values <= UNDETERMINED * max(float(values[0]), 1e-300)]
+    return tuple(
+        name for i, name in enumerate(names) if flat.size and np.max(np.abs(flat[:, i])) > HEAVY
+    )
+
+
+def _jacobian(fitted: Fit) -> FloatArray:
+    return fitted.jacobian.reshape(-1, fitted.jacobian.shape[-1])

@@ -1,0 +1,65 @@
+"""The units that imported data may come in, and how they become SI.
+
+SI value = factor · value + offset
+"""
+
+from dataclasses import dataclass
+
+from rigwatch.wire.errors import ImportDataError
+from rigwatch.wire.units import UnitError, unit_of
+
+
+@dataclass(frozen=True, slots=True)
+class Conversion:
+    """From one unit to SI: `unit` is the SI unit, `factor` [SI per unit], `offset` [SI]."""
+
+    unit: str
+    factor: float
+    offset: float = 0.0
+
+
+CHANNEL_UNITS = {
+    "time": "s",
+    "voltage": "V",
+    "position": "m",
+    "velocity": "m/s",
+    "acceleration": "m/s^2",
+    "force": "N",
+    "pressure": "Pa",
+}
+"""SI units of the channel names that have a meaning here: no other unit is taken for them."""
+_USUAL = {
+    "s": "s, ms, us, min, h",
+    "V": "V, mV, kV",
+    "m": "m, mm, um, cm, in, ft",
+    "m/s": "m/s, mm/s, in/s, km/h",
+    "m/s^2": "m/s^2, mm/s^2, g0",
+    "N": "N, mN, kN, lbf, kgf",
+    "Pa": "Pa, kPa, MPa, bar, mbar, psi",
+}
+AMBIGUOUS = {
+    "g": "'g0' for standard gravity or 'gram'",
+    "mg": "'mg0' for standard gravity or 'mgram'",
+}
+"""Accelerometers are read in g and scales too: a recording has to say which."""
+
+
+def conversion(unit: str, channel: str) -> Conversion:
+    """How values of `channel` in `unit` become SI.
+
+    Raises:
+        ImportDataError: the unit is unknown, ambiguous, or not one of the channel's kind.
+    """
+    if unit in AMBIGUOUS:
+        raise ImportDataError(f"{channel}: found the unit {unit!r}, expected {AMBIGUOUS[unit]}")
+    try:
+        found = unit_of(unit)
+    except UnitError as error:
+        raise ImportDataError(f"{channel}: {error}") from None
+    wanted = CHANNEL_UNITS.get(channel)
+    if wanted is not None and found.dimension != unit_of(wanted).dimension:
+        raise ImportDataError(
+            f"{channel}: found the unit {unit!r}, expected one of {_USUAL[wanted]} or alike"
+        )
+    si = wanted or ("" if found.si == "1" else found.si)
+    return Conversion(si, float(found.factor), float(found.offset))

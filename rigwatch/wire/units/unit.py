@@ -1,0 +1,215 @@
+"""Units as people write them: their dimension, and how their values become SI.
+
+"N s/m", "kN/mm", "m/s^2", "N/(m/s)" and "l/min" are units: products by a space, * or ·, quotients
+by /, which holds for the next factor only, powers by ^. Every file is converted at the border with
+the same table; inside, all numbers are SI. A temperature that stands alone is absolute (degC has an
+offset); within a product it is a difference.
+"""
+
+import difflib
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.units.unit_table import BASES, ENTRIES, IN_OTHER_WORDS, Dimension, Entry
+
+NONE: Dimension = (Fraction(0),) * len(BASES)
+"""Of a pure number."""
+GRAM = "the unit g is the gram, write g0 for standard gravity"
+_EXPONENT = r"(?:(?:\^|\*\*)(?P<{0}>-?\d+(?:\.\d+)?))?"
+_TOKEN = re.compile(
+    rf"\s*(?:(?P<name>°?[A-Za-zµΩ%]+\d*|°|1){_EXPONENT.format('power')}"
+    rf"|(?P<close>\)){_EXPONENT.format('closed')}|(?P<sign>[*/(]))\s*"
+)
+_RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+_SAME = str.maketrans({"μ": "µ", "Ω": "Ω", "·": "*", "⋅": "*", "×": "*", "−": "-"})
+
+
+class UnitError(RigwatchError, ValueError):
+    """A unit is unknown or malformed; a ValueError, too, so that msgspec adds the place to it.
+
+    Args:
+        found: what stands there.
+        expected: what should stand there.
+    """
+
+    def __init__(self, found: str, expected: str) -> None:
+        self.found, self.expected = found, expected
+        super().__init__(f"found {found}, expected {expected}")
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit.
+
+    Attributes:
+        si: the SI unit that its values become.
+        dimension: exponents of the base units.
+        factor: SI value of one unit, exact.
+        offset: SI value of its zero.
+    """
+
+    si: str
+    dimension: Dimension
+    factor: Fraction
+    offset: Fraction = Fraction(0)
+
+    @property
+    def plain(self) -> bool:
+        """Whether values are SI as they stand."""
+        return self.factor == 1 and self.offset == 0
+
+    def to_si(self, value: float) -> float:
+        """The value in SI: 5.1 bar are 510000 Pa; a value that is SI already stays to the bit."""
+        if self.plain or not math.isfinite(value):
+            return value
+        return float(Fraction(repr(float(value))) * self.factor + self.offset)
+
+    def from_si(self, value: float) -> float:
+        """The SI value in this unit: 0.0007 m are 0.7 mm."""
+        if self.plain or not math.isfinite(value):
+            return value
+        return float((Fraction(repr(float(value))) - self.offset) / self.factor)
+
+
+@lru_cache(maxsize=4096)
+def unit_of(text: str) -> Unit:
+    """The unit that `text` names.
+
+    Raises:
+        UnitError: a part of it is unknown.
+    """
+    written = _plainly(text)
+    single = ENTRIES.get(written)
+    if single is not None:
+        return Unit(single.si, single.dimension, single.factor, single.offset)
+    tokens = _tokens(written)
+    si = _si_text(tokens)
+    dimension, factor = _product(tokens, text, depth=0)
+    return Unit(si, dimension, factor)
+
+
+def _plainly(text: str) -> str:
+    """The text with superscripts and look-alike characters written plainly."""
+    raised = re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda m: "^" + m[0].translate(_RAISED), text.strip())
+    return raised.translate(_SAME)
+
+
+@dataclass(frozen=True, slots=True)
+class _Token:
+    """A unit by its `entry`, or the sign `name`."""
+
+    name: str
+    entry: Entry | None
+    power: Fraction
+
+
+def _tokens(text: str) -> list[_Token]:
+    found, place = [], 0
+    while place < len(text):
+        match = _TOKEN.match(text, place)
+        if match is None:
+            broken = f"the unit {text!r}, which cannot be read from {text[place:]!r} on"
+            raise UnitError(broken, "one such as N s/m or kN/mm^2")
+        found.append(_token(match, text))
+        place = match.end()
+    return found
+
+
+def _token(match: re.Match[str], text: str) -> _Token:
+    name, power = match["name"], match["power"]
+    if name is None:
+        sign = ")" if match["close"] else match["sign"]
+        return _Token(sign, None, Fraction(match["closed"] or 1))
+    if name not in ENTRIES and power is None:
+        # "m/s2" is how many programs write a power.
+        letters = name.rstrip("0123456789")
+        name, power = letters, name[len(letters) :] or None
+    if name not in ENTRIES:
+        raise _unknown(name, text)
+    return _Token(name, ENTRIES[name], Fraction(power or 1))
+
+
+def _si_text(tokens: Sequence[_Token]) -> str:
+    """The same product in SI units."""
+    found, before = "", ""
+    for token in tokens:
+        si = token.entry.si if token.entry else token.name
+        if token.entry and re.search("[ /^]", si) and (before == "/" or token.power != 1):
+            si = f"({si})"
+        joined = token.name in (")", "*", "/") or before in ("", "(", "*", "/")
+        found += (
+            ("" if joined else " ") + si + (f"^{float(token.power):g}" if token.power != 1 else "")
+        )
+        before = token.name
+    return found
+
+
+def _product(tokens: list[_Token], unit: str, depth: int) -> tuple[Dimension, Fraction]:
+    """Left to right; a division holds for the next factor only, which may stand in brackets."""
+    dimension, factor, sign = NONE, Fraction(1), 1
+    while tokens:
+        token = tokens.pop(0)
+        if token.name in ("*", "/"):
+            sign = -1 if token.name == "/" else 1
+            continue
+        if token.name == ")" and depth:
+            return times(NONE, dimension, token.power), _raised(factor, token.power)
+        if token.name == ")":
+            depth = -1
+            break
+        if token.entry is None:
+            inner = _product(tokens, unit, depth + 1)
+        else:
+            size = _raised(token.entry.factor, token.power)
+            inner = times(NONE, token.entry.dimension, token.power), size
+        dimension, factor = times(dimension, inner[0], sign), factor * inner[1] ** sign
+        sign = 1
+    if depth:
+        raise UnitError(f"the unit {unit!r}", "as many '(' as ')'")
+    return dimension, factor
+
+
+def _raised(factor: Fraction, power: Fraction) -> Fraction:
+    return factor ** int(power) if power.denominator == 1 else Fraction(float(factor) ** power)
+
+
+def _unknown(name: str, text: str) -> UnitError:
+    within = "" if name == text else f" in {text!r}"
+    return UnitError(f"the unknown unit {name!r}{within}", f"a known one: {_meant(name)}")
+
+
+def _meant(name: str) -> str:
+    lower = name.lower()
+    if lower in IN_OTHER_WORDS:
+        return f"did you mean {IN_OTHER_WORDS[lower]!r}?"
+    same = [known for known in ENTRIES if known.lower() == lower]
+    same.sort(key=lambda known: sum(a != b for a, b in zip(name, known, strict=True)))
+    close = same or difflib.get_close_matches(name, ENTRIES, 1)
+    if close:
+        return f"did you mean {close[0]!r}?"
+    return "m, mm, kg, s, N, Pa, bar, V, A, ohm, rad or K, among others"
+
+
+def times(one: Dimension, other: Dimension, power: Fraction | int = 1) -> Dimension:
+    """The dimension of one·otherᵖᵒʷᵉʳ."""
+    return tuple(a + b * power for a, b in zip(one, other, strict=True))
+
+
+def describe(dim: Dimension) -> str:
+    """The dimension in base units, such as "kg m s^-2"; "1" for a pure number."""
+    parts = [
+        base if exponent == 1 else f"{base}^{exponent}"
+        for base, exponent in zip(BASES, dim, strict=True)
+        if exponent
+    ]
+    return " ".join(parts) or "1"
+
+
+def names_gram(text: str) -> bool:
+    """Whether a unit names the gram by its symbol, which many read as standard gravity."""
+    return bool(re.search(r"(?<![A-Za-z])m?g(?![A-Za-z0-9])", text))

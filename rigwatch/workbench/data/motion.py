@@ -1,0 +1,85 @@
+"""A study along its measured motion, where its model has states that no channel shows.
+
+Guessed pressures, fluxes or temperatures make free runs drift; driven by the measured motion they
+are known within a fraction of a second, and a whole recording is one run without windows. So that
+form is taken wherever channels show some of a model's states but not all and an output is left to
+predict; a study may ask for either (`prediction`).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rigwatch.physics.engine.equations import (
+    along_measured_motion,
+    has_hidden_states,
+    measured_states,
+    predicted_outputs,
+)
+from rigwatch.physics.engine.fit import Recording, motion_recording, motion_widths
+from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.study import Study
+
+SETTLING = 1.0
+"""What hidden states are given to forget their start [s]; at most a tenth of a part."""
+BEYOND = 1.2
+"""Range of a motion over that of the healthy recording from which it is said to be beyond it."""
+FORM = "predicted along the measured motion: {shown} drive the model, {hidden} are simulated"
+
+
+def goes_along_motion(study: Study) -> bool:
+    """Whether a study is predicted along its measured motion."""
+    if study.file.prediction != "auto":
+        return study.file.prediction == "measured motion"
+    model = study.model
+    return not model.rough and has_hidden_states(model) and bool(predicted_outputs(model))
+
+
+def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
+    """The study with its model along the measured motion, and its recordings for that.
+
+    Args:
+        study: as it was opened.
+        data: its recordings, for the model as it was written.
+
+    Raises:
+        ModelError: no channel shows any of the model's states, or nothing is left to predict.
+    """
+    model = along_measured_motion(study.model)
+    # One width for all recordings: the smoothing is part of the model that is fitted to one.
+    widths = motion_widths(study.model, data.healthy or data.train)
+
+    def made(recording: Recording) -> Recording:
+        shortest = min(recording.parts or (len(recording),)) * recording.dt
+        settling = min(SETTLING, shortest / 10)
+        return motion_recording(study.model, recording, settling=settling, widths=widths)
+
+    healthy = made(data.healthy) if data.healthy is not None else None
+    train, held_out = made(data.train), made(data.held_out)
+    longest = max(len(r) for r in (train, held_out, healthy) if r is not None)
+    shown = ", ".join(state.name for state in measured_states(study.model))
+    form = FORM.format(shown=shown, hidden=", ".join(model.states) or "no states")
+    remarks = (*data.remarks, form, *beyond_healthy_motion(study, train, held_out, healthy))
+    along = Data(train, held_out, healthy, longest, remarks, along_motion=True)
+    return replace(study, model=model), along
+
+
+def beyond_healthy_motion(
+    study: Study, train: Recording, held_out: Recording, healthy: Recording | None
+) -> list[str]:
+    """In words, where a motion goes beyond what the healthy recording has shown."""
+    found: list[str] = []
+    if healthy is None:
+        return found
+    first = len(study.model.inputs)
+    for column, state in enumerate(measured_states(study.model), start=first):
+        for use, recording in (("train", train), ("held_out", held_out)):
+            reach = np.ptp(recording.inputs[:, column])
+            known = np.ptp(healthy.inputs[:, column])
+            if reach > BEYOND * known:
+                unit = study.model.states[state.name].unit
+                found.append(
+                    f"{use}: {state.name} goes over {reach:.3g} {unit}, and the healthy recording"
+                    f" shows {known:.3g} {unit}: record a healthy motion as wide"
+                )
+    return found

@@ -1,0 +1,165 @@
+"""How inputs go on between samples, chosen from the data where neither model nor study says.
+
+A converter keeps what it was told until it is told anew; a signal that was itself measured goes on
+along a line. The one taken for the other is half a sample late, which looks like a slow sensor. So
+the model is fitted with each, and with inputs that are kept and change a part of a sample late, as
+those of a converter that is written to after the sensors were read. Another hold than a line needs
+an error that falls block by block beyond chance, on recordings held out where there are some.
+
+A healthy recording is asked where there is one: a fault cannot pass for a hold there.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from msgspec import structs
+from scipy.optimize import minimize_scalar
+
+from rigwatch.physics.engine.equations import Hold, Model, Placement
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.data import Data, parameters_of, quiet_scale
+from rigwatch.workbench.fit.fitted_model import Fitted, block_errors, fit_model, placements_of
+from rigwatch.workbench.study import Held, Study
+
+BEYOND_CHANCE = 3.0
+"""Standard deviations by which the error must fall."""
+MATERIAL = 0.01
+"""Share of the squared error that it must fall by."""
+AT_NOISE = 1.03
+"""Error over the sensors' noise below which no lateness is looked for."""
+LATENESSES = (0.25, 0.5, 0.75, 1.0)
+"""Shares of a sample that are tried before the best is refined."""
+FINE = 5e-4
+"""Shares of a sample to which lateness is told."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """One hold and the model fitted with it."""
+
+    hold: Hold
+    late: float
+    fitted: Fitted
+
+
+def with_hold(study: Study, data: Data, scale: FloatArray | None = None) -> Study:
+    """The study with a model that says what every input does between samples.
+
+    Args:
+        study: as it was opened.
+        data: its recordings.
+        scale: divisor of each output's residuals, shape (outputs,).
+
+    Raises:
+        ModelError: the model cannot be fitted whatever its inputs do.
+    """
+    model = study.model
+    names = model.unheld()
+    if not names:
+        return study
+    if not model.states:
+        return replace(study, model=holding(model, dict.fromkeys(names, ("linear", 0.0))))
+    told = data.of_healthy or data
+    placements = () if data.healthy is not None else placements_of(study, data.train)
+    source = "the healthy recording" if data.healthy is not None else "the recordings"
+    best, line = _chosen(study, told, placements, scale)
+    before, after = (float(np.mean(_blocks(each.fitted))) for each in (line, best))
+    held = Held(best.hold, best.late, told.train.dt * best.late, source, (after / before) ** 0.5)
+    return replace(
+        study,
+        model=holding(model, dict.fromkeys(names, (best.hold, best.late))),
+        holds={**study.holds, **dict.fromkeys(names, held)},
+    )
+
+
+def holding(model: Model, holds: Mapping[str, tuple[Hold, float]]) -> Model:
+    """The model with some inputs told what they do between samples."""
+    inputs = {
+        name: structs.replace(own, hold=holds[name][0], late=holds[name][1])
+        if name in holds
+        else own
+        for name, own in model.inputs.items()
+    }
+    return structs.replace(model, inputs=inputs)
+
+
+def held_as(study: Study, holds: Mapping[str, Held]) -> Study:
+    """The study with inputs that do what was found for another opening of it."""
+    new = {n: (held.hold, held.late) for n, held in holds.items() if n in study.model.inputs}
+    return replace(study, model=holding(study.model, new), holds=dict(holds))
+
+
+def _chosen(
+    study: Study, data: Data, placements: tuple[Placement, ...], scale: FloatArray | None
+) -> tuple[_Tried, _Tried]:
+    """The best hold, and a line."""
+    try_one = partial(_tried, study, data, placements, scale)
+    line = try_one("linear", 0.0, parameters_of(study.file), None)
+    kept = try_one("zero", 0.0, line.fitted.train.values(), line.fitted)
+    best = kept if _better(kept, line) else line
+    if data.along_motion or _at_noise(best, data, scale):
+        return best, line
+    late = _refined(partial(try_one, "zero"), kept)
+    return (late if late is not None and _better(late, best) else best), line
+
+
+def _tried(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    placements: tuple[Placement, ...],
+    scale: FloatArray | None,
+    hold: Hold,
+    late: float,
+    start: Mapping[str, float],
+    base: Fitted | None,
+) -> _Tried:
+    model = holding(study.model, dict.fromkeys(study.model.unheld(), (hold, late)))
+    fitted = fit_model(
+        replace(study, model=model), data, placements, start, scale,
+        base=base, from_afar=base is None,
+    )  # fmt: skip
+    return _Tried(hold, late, fitted)
+
+
+def _refined(try_late: "partial[_Tried]", kept: _Tried) -> _Tried | None:
+    """The best lateness; None where none can be fitted."""
+    start, found = kept.fitted.train.values(), dict[float, _Tried]()
+
+    def size(late: float) -> float:
+        late = float(late)
+        try:
+            found[late] = try_late(late, start, kept.fitted)
+        except ModelError:
+            return float("inf")
+        return float(np.mean(block_errors(found[late].fitted.train)))
+
+    sizes = [size(late) for late in LATENESSES]
+    if not found:
+        return None
+    # Where the coarse steps show nothing, no fine one does.
+    if min(sizes) < float(np.mean(block_errors(kept.fitted.train))):
+        near = LATENESSES[int(np.argmin(sizes))]
+        ends = (max(near - 0.25, 1e-3), min(near + 0.25, 1.0))
+        minimize_scalar(size, bounds=ends, method="bounded", options={"xatol": FINE})
+    return min(found.values(), key=lambda each: float(np.mean(block_errors(each.fitted.train))))
+
+
+def _better(one: _Tried, other: _Tried) -> bool:
+    """Whether the error falls beyond chance from the other to the one."""
+    before, after = _blocks(other.fitted), _blocks(one.fitted)
+    fall = before - after
+    spread = float(np.std(fall, ddof=1) / np.sqrt(len(fall))) if len(fall) > 1 else 0.0
+    mean = float(np.mean(fall))
+    return mean > BEYOND_CHANCE * spread and mean > MATERIAL * float(np.mean(before))
+
+
+def _blocks(fitted: Fitted) -> FloatArray:
+    return block_errors(fitted.held_out)
+
+
+def _at_noise(tried: _Tried, data: Data, scale: FloatArray | None) -> bool:
+    noise = quiet_scale(data.train) if scale is None else scale
+    return float(np.sqrt(np.mean((tried.fitted.train.rms / noise) ** 2))) < AT_NOISE

@@ -1,0 +1,82 @@
+"""Prints docs/file-formats.md from the structs that read the files: `make docs` writes it."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from rigwatch.physics.engine.equations import Effect, Model
+from rigwatch.replay.cases import CaseFile
+from rigwatch.structures.model import Structure
+from rigwatch.wire.exchange import ImportMapping
+from rigwatch.wire.typed_files import Section
+from rigwatch.workbench.study import StudyFile
+from tools.config_docs import sections
+
+TARGET = Path(__file__).parent.parent / "docs" / "file-formats.md"
+HEAD = """<!-- Printed by `make docs` from the descriptions in the code. -->
+
+# File formats
+
+TOML files that people write besides the [configuration of a rig](configuration.md). A key that is
+misspelt, missing or out of range is refused with one line that names file, line and key.
+"""
+FILES: tuple[tuple[str, str, type[Section]], ...] = (
+    (
+        "Model",
+        "Equations with ports where effects may enter; `model` in a study names one. Tables by "
+        "name: `[inputs.voltage]`, `[states.x]`, `[parameters.m]`, `[outputs.position]`, "
+        "`[ports.load]`. Examples: `rigwatch/physics/models/`.",
+        Model,
+    ),
+    (
+        "Effect",
+        "An expression at a port, `[effects.NAME]` in a file of effects; `rigwatch add STUDY "
+        "--effect-file FILE` copies it into a study. Examples: `rigwatch/physics/effects/`, "
+        "[own effects](workbench.md#own-effects).",
+        Effect,
+    ),
+    (
+        "Study",
+        "`study.toml` in the folder of a study; `rigwatch study new` makes it from a template. "
+        "Examples: `configs/studies/`, [study files](workbench.md#study-files).",
+        StudyFile,
+    ),
+    (
+        "Structure",
+        "Masses, springs, dampers and loads: `[nodes.6]`, `[springs.k1_6]`. "
+        "Examples: `configs/structures/`, [structures](structures.md#a-structure-file).",
+        Structure,
+    ),
+    (
+        "Import mapping",
+        "Columns of a table as channels of a session, for `rigwatch import --mapping`. "
+        "Examples: `configs/imports/`, [import](sessions.md#import).",
+        ImportMapping,
+    ),
+    (
+        "Verification cases",
+        "Recordings and references for `rigwatch verify`. Example: `tests/verify/cases.toml`, "
+        "[verify](sessions.md#verify).",
+        CaseFile,
+    ),
+)
+
+
+def page() -> str:
+    """The whole page."""
+    return HEAD + "\n".join(part for file in FILES for part in _file(*file))
+
+
+def _file(title: str, text: str, kind: type[Section]) -> Iterator[str]:
+    yield f"\n## {title}\n\n{text}\n"
+    yield from sections(kind, 3)
+
+
+def main() -> int:
+    """Write the page."""
+    TARGET.write_text(page(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

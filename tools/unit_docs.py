@@ -1,0 +1,68 @@
+"""Prints docs/units.md from the table that every file is read with: `make docs` writes it."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from rigwatch.wire.units import describe, unit_of
+from rigwatch.wire.units.unit_table import PREFIXES, QUANTITIES
+
+TARGET = Path(__file__).parent.parent / "docs" / "units.md"
+HEAD = """<!-- Printed by `make docs` from the table in the code. -->
+
+# Units
+
+Models, effects, studies and imports take the same units. Values are SI inside: they are converted
+where a file is read, and `compare`, `explain`, `add`, `report` and `study.toml` have a parameter in
+the unit that its model or effect is written in (`shown = "mm"` beside `unit` takes another one).
+Equations compute in SI. The errors of an output are in its SI unit.
+
+* Products by a space, `*` or `·`; quotients by `/`, which holds for the next factor only: `N s/m`,
+  `m/(s V)`, `kN/mm`. Powers by `^`, also broken ones: `m/s^2`, `l/(min bar^0.5)`; `m/s2` and `m/s²`
+  are read, too. In equations a power is `**`.
+* `g` is the gram; standard gravity is `g0` or `gn`. Accelerometers are often labelled g, so an
+  import refuses `g` and asks for `g0` or `gram`.
+* A temperature that stands alone is absolute: 20 degC are 293.15 K. Within a product it is a
+  difference: W/degC is W/K. A difference by itself is written in K.
+* Angles are pure numbers (rad). Hz counts turns and rad/s angles: a channel in one is refused where
+  the model has the other.
+* A channel of a recording whose unit measures something else than the model's signal is refused;
+  one without a unit is taken in SI.
+
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    return HEAD + "\n".join(_rows()) + f"\n\nPrefixes: {_prefixes()}.\n"
+
+
+def _rows() -> Iterator[str]:
+    yield "| quantity | SI unit | in base units | others, in SI | with prefixes |"
+    yield "| --- | --- | --- | --- | --- |"
+    for q in QUANTITIES:
+        others = ", ".join(_other(name) for name in q.units if name not in (q.si, ""))
+        prefixed = ", ".join(f"`{name}`" for name in q.prefixed)
+        base = describe(unit_of(q.si).dimension)
+        yield f"| {q.name} | `{q.si}` | {base} | {others} | {prefixed} |"
+
+
+def _other(name: str) -> str:
+    unit = unit_of(name)
+    offset = f" + {float(unit.offset):.6g}" if unit.offset else ""
+    factor = "" if unit.factor == 1 and offset else f" × {float(unit.factor):.10g}"
+    return f"`{name}`" if unit.plain else f"`{name}`{factor}{offset}"
+
+
+def _prefixes() -> str:
+    return ", ".join(f"`{name}` {float(size):g}" for name, size in PREFIXES.items())
+
+
+def main() -> int:
+    """Write the page."""
+    TARGET.write_text(page(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
