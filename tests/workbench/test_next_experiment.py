@@ -25,11 +25,11 @@ def bench_under(force: FloatArray, seed: int) -> Bench:
     return bench_of(study(), data, 2e-3 * np.nanstd(train.outputs, axis=0))
 
 
-def test_the_proposed_experiment_tells_a_lopsided_spring_from_a_sensor_s_offset() -> None:
+def test_the_proposed_experiment_tells_a_lopsided_spring_from_the_fault_of_a_signal() -> None:
     bench = bench_under(SINE, seed=3)
     rows, verdict = ranking(bench)
     assert verdict.word == "undetermined", "one sine must not be enough"
-    assert "offset@position_sensor" in verdict.rivals
+    assert any("@load" not in rival for rival in verdict.rivals), "a signal's fault does the same"
     proposed = explanation(bench, rows, verdict).next_experiment
     assert proposed is not None
     _, after = ranking(bench_under(excitation(bench, proposed)[:, 0], seed=13))
