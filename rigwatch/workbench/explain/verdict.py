@@ -89,6 +89,8 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     assert best.fitted is not None
     trusted = floor.reached(best.fitted.held_out)
     members, rivals = _undistinguished(best, rows, trusted=trusted)
+    if not trusted and floor.method == "healthy motion":
+        rivals = (*rivals, *_elsewhere(best, rows, (*members, *rivals)))
     evidence = Evidence(
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
@@ -161,6 +163,22 @@ def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
     if cosine > ALIKE and not trusted and row.held_out_error < MUCH_WORSE * best.held_out_error:
         return True
     return cosine > SIMILAR and _equal(best, row, cosine)
+
+
+def _elsewhere(best: Ranked, rows: Sequence[Ranked], known: tuple[str, ...]) -> tuple[str, ...]:
+    """Labels of what looks similar at another kind of port, where more than noise is left.
+
+    A sensor that is late in a way that no effect describes is met nearly as well by a late drive.
+    """
+    return tuple(
+        row.label
+        for row in rows
+        if row.accepted
+        and row.label not in known
+        and row.kind != best.kind
+        and best.cosines.get(row.label, 0.0) > SIMILAR
+        and row.held_out_error < MUCH_WORSE * best.held_out_error
+    )
 
 
 def _kin(best: Ranked, row: Ranked) -> bool:
