@@ -50,6 +50,11 @@ class Pair:
         """Parameters that a fit of both moves."""
         return self.one.free + self.other.free
 
+    @property
+    def sampled(self) -> int:
+        """How many of both work on samples."""
+        return sum(row.placement.effect.sampled for row in (self.one, self.other))
+
 
 def two_effects(
     bench: Bench, rows: Sequence[Ranked], verdict: Verdict, progress: Progress
@@ -81,7 +86,8 @@ def likely_pairs(bench: Bench, rows: Sequence[Ranked]) -> list[Pair]:
     every = [_pair(one, other) for one, other in combinations(rows, 2)]
     likely = [pair for pair in every if pair is not None and pair.explained > least]
     chosen: list[Pair] = []
-    for pair in sorted(likely, key=lambda pair: -pair.explained):
+    # Of those that explain the same, what a computer does to samples comes last.
+    for pair in sorted(likely, key=lambda pair: (-round(pair.explained, 2), pair.sampled)):
         if len(chosen) < MOST_PAIRS and not any(_same(pair, other) for other in chosen):
             chosen.append(pair)
     return chosen

@@ -145,4 +145,4 @@ def _undetermined(fitted: Fit) -> tuple[str, ...]:
 
 
 def _jacobian(fitted: Fit) -> FloatArray:
-    return fitted.jacobian.reshape(-1, fitted.jacobian.shape[-1])
+    return fitted.jacobian.reshape(fitted.error.size, fitted.jacobian.shape[-1])

@@ -72,8 +72,9 @@ def equation_error_starts(
     system = compiled.system
     if not system.free or not system.model.states or not _shown(system):
         return []
-    found = [_solved(system, recording, begin, width) for width in WIDTHS]
-    return [vector for vector in found if vector is not None]
+    with np.errstate(all="ignore"):
+        found = [_solved(system, recording, begin, width) for width in WIDTHS]
+    return [vector for vector in found if vector is not None and np.isfinite(vector).all()]
 
 
 def _shown(system: System) -> bool:
@@ -95,9 +96,13 @@ def _solved(
         return None
     signals = _signals(system, recording, begin, width)
     start = begin
-    if all(balance.columns for balance in balances):
-        start = _linear(system, balances, signals, begin)
-    return _nonlinear(system, balances, signals, start)
+    try:
+        if all(balance.columns for balance in balances):
+            start = _linear(system, balances, signals, begin)
+        return _nonlinear(system, balances, signals, start)
+    except (ValueError, np.linalg.LinAlgError):
+        # Signals too large to be squared balance nothing.
+        return None
 
 
 def _balances(system: System, recording: Recording, width: int) -> list[Balance]:

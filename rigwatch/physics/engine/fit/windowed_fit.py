@@ -150,8 +150,10 @@ def _deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -
     """Each parameter's deviation while the others are known; its size where it shows nowhere."""
     slope = np.sqrt(np.sum(jacobian**2, axis=0))
     noise = np.sqrt(np.mean(residual**2))
-    size = np.maximum(np.abs(theta), 1e-12)
-    return np.where(slope > noise / (1e6 * size), noise / np.where(slope > 0, slope, 1.0), size)
+    # What begins at zero has no size of its own, and moves as the data tell it.
+    size = np.where(theta != 0, np.abs(theta), np.inf)
+    told = slope > noise / (1e6 * size)
+    return np.where(told, noise / np.where(slope > 0, slope, 1.0), np.where(theta != 0, size, 1.0))
 
 
 @_QUIET
