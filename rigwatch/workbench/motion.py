@@ -18,11 +18,15 @@ from rigwatch.physics.engine.measured_motion import (
     predicted_outputs,
 )
 from rigwatch.physics.engine.measured_recording import motion_recording, motion_widths
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.study import Study
 
 SETTLING = 1.0
 """What hidden states are given to forget their start [s]; at most a tenth of a part."""
+SLOW = 0.05
+"""Speed over its rms below which samples are not counted: there a smoothed motion does not show
+which way the rig slides, or whether it sticks."""
 BEYOND = 1.2
 """Range of a motion over that of the healthy recording from which it is said to be beyond it."""
 FORM = "predicted along the measured motion: {shown} drive the model, {hidden} are simulated"
@@ -48,12 +52,15 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     """
     model = along_measured_motion(study.model)
     # One width for all recordings: the smoothing is part of the model that is fitted to one.
-    widths = motion_widths(study.model, data.healthy or data.train)
+    shown_by = data.healthy or data.train
+    widths = motion_widths(study.model, shown_by)
+    slow = SLOW * _rms(motion_recording(study.model, shown_by, widths=widths).inputs)
 
     def made(recording: Recording) -> Recording:
         shortest = min(recording.parts or (len(recording),)) * recording.dt
         settling = min(SETTLING, shortest / 10)
-        return motion_recording(study.model, recording, settling=settling, widths=widths)
+        whole = motion_recording(study.model, recording, settling=settling, widths=widths)
+        return _while_moving(study, whole, slow)
 
     healthy = made(data.healthy) if data.healthy is not None else None
     train, held_out = made(data.train), made(data.held_out)
@@ -63,6 +70,21 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     remarks = (*data.remarks, form, *beyond_healthy_motion(study, train, held_out, healthy))
     along = Data(train, held_out, healthy, longest, remarks, along_motion=True)
     return replace(study, model=model), along
+
+
+def _while_moving(study: Study, recording: Recording, slow: FloatArray) -> Recording:
+    """The recording without samples at which a measured rate is slower than `slow`, (inputs,)."""
+    measured = enumerate(measured_states(study.model), start=len(study.model.inputs))
+    rates = [column for column, state in measured if state.order == 1]
+    if not rates or recording.thinning is not None:
+        return recording
+    still = np.any(np.abs(recording.inputs[:, rates]) < slow[rates], axis=1)
+    return replace(recording, outputs=np.where(still[:, None], np.nan, recording.outputs))
+
+
+def _rms(signals: FloatArray) -> FloatArray:
+    """Of each column, shape (columns,)."""
+    return np.asarray(np.sqrt(np.mean(signals**2, axis=0)))
 
 
 def beyond_healthy_motion(

@@ -10,12 +10,13 @@ from rigwatch.workbench.compare.compare import (
     prepared,
 )
 from rigwatch.workbench.compare.locate import Region, locate, motion, sample_numbers
-from rigwatch.workbench.compare.uncertainty_budget import beyond
+from rigwatch.workbench.compare.uncertainty_budget import apparent_strength, beyond
 
 __all__ = [
     "Bench",
     "Comparison",
     "Region",
+    "apparent_strength",
     "bench_of",
     "beyond",
     "compare",

@@ -93,7 +93,15 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
         ModelError: data have changed, or do not suit the model.
     """
     check_data(study)
-    data = prepare(study)
+    return told_by_healthy(study, prepare(study))
+
+
+def told_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:
+    """The same of recordings that are in memory, for the study's model as it was written.
+
+    Raises:
+        ModelError: the model cannot be fitted to the healthy recording.
+    """
     if learns_from_healthy(study):
         return *with_healthy_remainder(study, data), None
     if goes_along_motion(study):
@@ -129,7 +137,8 @@ def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> Nois
     fits = [bare]
     if base.placements:
         fits.append(fit_base(study, healthy, base.train.scale))
-    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, "healthy")
+    method = "healthy motion" if healthy.along_motion else "healthy"
+    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, method)
 
 
 def compare(study: Study, *, profiled: bool = False) -> Comparison:
@@ -172,8 +181,8 @@ def comparison(bench: Bench) -> Comparison:
 
 
 def _free(bench: Bench) -> list[float | None]:
-    """Errors of a free run; none for a model without states or a recording in several parts."""
+    """Errors of a free run; none without states, along the motion or of several recordings."""
     model, file = bench.study.model, bench.study.file
-    if not model.states or len(file.held_out) > 1:
+    if not model.states or bench.data.along_motion or len(file.held_out) > 1:
         return [None] * len(model.outputs)
     return [float(error) for error in free_run(bench.base, bench.data.held_out)]

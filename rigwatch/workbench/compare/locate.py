@@ -97,9 +97,10 @@ def motion(bench: Bench, rows: IntArray) -> tuple[FloatArray, FloatArray] | None
     """Position and velocity at a force port, as measured."""
     recording, model = bench.data.train, bench.study.model
     names = list(model.inputs)
-    if "position" in names and "velocity" in names:
-        columns = recording.inputs[rows]
-        return columns[:, names.index("position")], columns[:, names.index("velocity")]
+    for x, v in (("position", "velocity"), ("x", "v")):
+        if x in names and v in names:
+            columns = recording.inputs[rows]
+            return columns[:, names.index(x)], columns[:, names.index(v)]
     states = initial_states(bench.base.compiled.system, recording)[rows]
     known = list(model.states)
     if "x" in known and "v" in known:

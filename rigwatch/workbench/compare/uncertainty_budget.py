@@ -40,7 +40,7 @@ def beyond(study: Study, data: Data, bare: Fitted | None, fitted: Fitted) -> dic
     for placement in fitted.placements:
         name = placement.prefix + placement.effect.strength
         if name in found:
-            found[name] += _apparent(healthy, bare, placement, fitted) ** 2
+            found[name] += apparent_strength(healthy, bare, placement, fitted) ** 2
     return found
 
 
@@ -61,7 +61,7 @@ def _from_kept(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str
     return dict(zip(own, variances.tolist(), strict=True))
 
 
-def _apparent(healthy: Data, bare: Fitted, placement: Placement, fitted: Fitted) -> float:
+def apparent_strength(healthy: Data, bare: Fitted, placement: Placement, fitted: Fitted) -> float:
     """Strength that an effect seems to have on the healthy recording, to first order."""
     effect, values = placement.effect, fitted.train.values()
     shape = {n: values[placement.prefix + n] for n in effect.parameters if n != effect.strength}

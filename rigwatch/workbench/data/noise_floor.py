@@ -17,9 +17,10 @@ from rigwatch.wire.arrays import BoolArray, FloatArray
 METHODS = {
     "periods": "what differs between repeated periods of the excitation",
     "healthy": "the error of the model on a recording with nothing wrong",
+    "healthy motion": "the error of the model along the motion of a recording with nothing wrong",
     "quiet band": "the quietest band of the residual, taken for white noise: a lower limit",
 }
-ALLOWED = {"periods": 1.1, "healthy": 1.1, "quiet band": 1.25}
+ALLOWED = {"periods": 1.1, "healthy": 1.1, "healthy motion": 1.05, "quiet band": 1.25}
 """Error over noise floor up to which nothing is left to explain, by how the floor is known."""
 BANDS = 8
 FEWEST_PERIODS = 3
@@ -116,8 +117,13 @@ def _repeats(signal: FloatArray, lag: int) -> bool:
 
 def _between(series: FloatArray, samples: int, count: int) -> FloatArray:
     periods = series[: count * samples].reshape(count, samples, -1)
-    variance = np.nanvar(periods, axis=0, ddof=1)
-    return np.array([float(np.sqrt(np.nanmean(column))) for column in variance.T])
+    there = np.isfinite(periods)
+    counted = there.sum(axis=0)
+    mean = np.where(there, periods, 0.0).sum(axis=0) / np.maximum(counted, 1)
+    squares = np.where(there, periods - mean, 0.0) ** 2
+    variance = squares.sum(axis=0) / np.maximum(counted - 1, 1)
+    known = counted > 1
+    return np.array([float(np.sqrt(v[k].mean())) for v, k in zip(variance.T, known.T, strict=True)])
 
 
 def _quiet(series: FloatArray, rate: float, top: float) -> float:

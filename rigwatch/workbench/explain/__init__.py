@@ -11,7 +11,7 @@ from rigwatch.workbench.explain.explain import (
     explanation,
     ranking,
 )
-from rigwatch.workbench.explain.verdict import MUCH_WORSE, Verdict
+from rigwatch.workbench.explain.verdict import MUCH_WORSE, Verdict, judge
 
 __all__ = [
     "MUCH_WORSE",
@@ -21,5 +21,6 @@ __all__ = [
     "as_data",
     "explain",
     "explanation",
+    "judge",
     "ranking",
 ]

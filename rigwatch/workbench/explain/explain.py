@@ -3,13 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from rigwatch.workbench.adequacy import inadequacy
+from rigwatch.workbench.believed import believed
 from rigwatch.workbench.compare import Bench, Comparison, beyond, comparison, open_bench
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
-from rigwatch.workbench.explain.verdict import Verdict, judge
+from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.explain.verdict_calibration import seen
 from rigwatch.workbench.fit import Value, values
-from rigwatch.workbench.ranking import Progress, Ranked, rank, unheard
+from rigwatch.workbench.ranking import Progress, Ranked, rank, rank_all, unheard
 from rigwatch.workbench.rough_verdict import modest
 from rigwatch.workbench.study import Study
 
@@ -44,7 +46,7 @@ class Explanation:
     """What a study learns from its recordings.
 
     Attributes:
-        verdict: nothing_missing, missing_effect, undetermined or unknown_effect.
+        verdict: nothing_missing, missing_effect, undetermined, unknown_effect or model_inadequate.
         text: the verdict in a sentence.
         comparison: the model as it is.
         ranking: best first.
@@ -84,8 +86,12 @@ def explain(study: Study, progress: Progress = unheard) -> Explanation:
 
 def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], Verdict]:
     """The ranking, what the verdict names in front, and the verdict."""
+    inadequate = inadequacy(bench)
+    if inadequate:
+        rows = rank_all(bench.study, bench.data, bench.base)
+        return rows, Verdict("model_inadequate", None, (), (), inadequate)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
-    verdict = judge(bench.base, rows, bench.floor)
+    verdict = believed(bench, rows)
     if verdict.word == "unknown_effect" and verdict.best is not None:
         progress(f"{verdict.best.label} leaves much: trying two effects at once")
         verdict = two_effects(bench, rows, verdict, progress)
@@ -100,7 +106,8 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     """The same for people and programs."""
     members, rivals = [*verdict.members, *verdict.rivals], list(verdict.rivals)
     experiment = None
-    if verdict.best is not None and rivals:
+    # An excitation is tried by simulating the motion, which a model along it does not.
+    if verdict.best is not None and rivals and not bench.data.along_motion:
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
     more: dict[str, float] = {}
     if verdict.best is not None and verdict.best.fitted is not None:

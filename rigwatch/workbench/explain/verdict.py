@@ -1,8 +1,9 @@
-"""The verdict: what the ranking means, in one of four words.
+"""The verdict: what the ranking means, in one of five words.
 
 `nothing_missing`, `missing_effect`, `undetermined` (rivals of different physics that this recording
 cannot tell apart) or `unknown_effect` (the error stays above the noise floor, and no known effect
-brings it down). All four are results.
+brings it down). All of these are results. `model_inadequate` is said before any of them, where the
+model does not describe what it should (see `adequacy.py`): then nothing is named.
 
 Of effects that do equally well on the recordings held out, the one with the fewest parameters is
 named first; the others of its kind form its class.
@@ -20,7 +21,9 @@ from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, doub
 from rigwatch.workbench.fit import Fitted, block_errors
 from rigwatch.workbench.ranking import EXPLAINED, SAME, SIMILAR, Ranked, left_over
 
-Word = Literal["nothing_missing", "missing_effect", "undetermined", "unknown_effect"]
+Word = Literal[
+    "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
+]
 EQUAL = 2.0
 """Standard deviations of a paired difference below which two effects do equally well."""
 NO_DIFFERENCE = 1e-4
@@ -38,7 +41,7 @@ class Verdict:
     """What is missing.
 
     Attributes:
-        word: one of four.
+        word: one of five.
         best: what is named, None where nothing is.
         members: labels that the best cannot be told from, itself first.
         rivals: labels of other physics that this recording cannot tell from it.

@@ -1,5 +1,6 @@
 """A model with some effects, fitted to the training recordings and judged on those held out."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -8,7 +9,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem, compile_system, even_substeps
 from rigwatch.physics.engine.equations import Placement, System, compose
-from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states
+from rigwatch.physics.engine.fit import Fit, Recording, evaluate, fit, initial_states, windows
 from rigwatch.physics.engine.motion_fit import fit_along_motion
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
@@ -24,6 +25,10 @@ WELL_ABOVE = 1.5
 """Error over the channels' noise from which a fit may have ended in a local minimum."""
 FROM_AFAR = 5
 """Free parameters from which a fit along the measured motion searches from several starts."""
+FAST, SLOWED = 1.0, 0.5
+"""Eigenvalue times step from which a linearisation takes finer ones, and what it then takes."""
+LOOKED_AT = 20
+"""Windows at most whose eigenvalues are looked at."""
 BLOCKS = 40
 """Blocks that a recording of a model without states is cut into for statistics."""
 
@@ -218,4 +223,20 @@ def nodes(fitted: Fitted, recording: Recording) -> int:
     system = fitted.compiled.system
     if not system.states:
         return 1
-    return max(fitted.substeps, _even(system, recording, fitted.train.parameters))
+    even = max(fitted.substeps, _even(system, recording, fitted.train.parameters))
+    fastest = _fastest(fitted, recording) * recording.dt
+    return even if fastest <= FAST * even else math.ceil(fastest / SLOWED)
+
+
+def _fastest(fitted: Fitted, recording: Recording) -> float:
+    """Largest eigenvalue of the model at the beginning of its windows [1/s]."""
+    cut = windows(fitted.compiled.system, len(recording), fitted.horizon)
+    run = fitted.compiled.linearise(
+        recording.inputs, recording.dt, cut.starts[:LOOKED_AT], 2,
+        initial=fitted.train.initial[:LOOKED_AT], parameters=fitted.train.parameters,
+        substeps=fitted.substeps,
+    )  # fmt: skip
+    free, n = len(fitted.compiled.system.free), run.states.shape[2]
+    slopes = run.rate_slopes[:, 0, :, free : free + n]
+    finite = slopes[np.isfinite(slopes).all(axis=(1, 2))]
+    return float(np.abs(np.linalg.eigvals(finite)).max(initial=0.0))

@@ -273,6 +273,11 @@ def left_over(base: Fitted, row: Ranked, floor: NoiseFloor, *, tolerant: bool = 
     return floor.left_over(before, after, row.fitted.calm, tolerant=tolerant)
 
 
+def rank_all(study: Study, data: Data, base: Fitted) -> list[Ranked]:
+    """Every effect at every port by its score, none of them fitted."""
+    return _scored(study, data, base, candidates(study, data.train), every=True)
+
+
 def rank_only(study: Study, data: Data, base: Fitted, found: Sequence[Candidate]) -> Ranked:
     """The row of one effect at one port, whatever its score; `found` are its shapes."""
     return _scored(study, data, base, found, every=True)[0]

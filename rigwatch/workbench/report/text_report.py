@@ -12,6 +12,7 @@ VERDICTS = {
     "missing_effect": "an effect is missing",
     "undetermined": "undetermined: this recording cannot tell rivals apart",
     "unknown_effect": "something is missing that no known effect explains",
+    "model_inadequate": "the model does not describe the healthy rig: nothing can be named",
 }
 
 

@@ -1,0 +1,91 @@
+"""A rig that nobody here built: its healthy fit, what is hidden in it, and when nobody can say."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.workbench.compare.compare import Bench, bench_of, told_by_healthy
+from rigwatch.workbench.data.noise_floor import from_residual
+from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.study.study import Span, Study, StudyFile
+from tests.workbench.conftest import measured
+
+RATE = 256
+SETTLED, HALF = 8 * RATE, 24 * RATE
+
+
+@cache
+def recorded(case: str) -> Recording:
+    """A recording from its second period on."""
+    path = measured("foreign_rig", "explain", f"{case}.csv")
+    time, *signals = np.loadtxt(path, delimiter=",", skiprows=1).T
+    columns = np.stack(signals, axis=1)
+    return Recording(float(np.median(np.diff(time))), columns[:, :1], columns[:, 1:])
+
+
+def part(whole: Recording, begin: int, end: int | None = None) -> Recording:
+    return Recording(whole.dt, whole.inputs[begin:end], whole.outputs[begin:end])
+
+
+def bench(case: str, healthy: Recording | None = None) -> Bench:
+    """The analytic model told by a healthy recording, beside a recording with something hidden."""
+    span = (Span(session="recorded"),)
+    file = StudyFile(model="servo-pneumatic", train=span, held_out=span)
+    study = Study(Path(), file, shipped_models()["servo-pneumatic"], library(), frozenset())
+    whole, known = recorded(case), healthy or part(recorded("healthy"), SETTLED)
+    data = Data(part(whole, SETTLED, HALF), part(whole, HALF), known, RATE // 2, ())
+    return bench_of(*told_by_healthy(study, data))
+
+
+def test_healthy_fit_comes_near_to_what_repeated_periods_allow() -> None:
+    found = bench("none")
+
+    healthy = found.data.of_healthy
+    assert healthy is not None
+    assert found.bare is not None
+    noise = from_residual(found.bare.train, healthy.train, 0.0, healthy.horizon)
+    assert noise.method == "periods"
+    assert noise.ratio(found.bare.train) < 1.5
+    assert ranking(found)[1].word == "nothing_missing"
+
+
+@pytest.mark.parametrize(
+    ("case", "named", "parameter", "truth"),
+    [
+        ("spring", "linear_stiffness@load", "k", None),
+        ("deadband", "dead_band@drive", "b", 0.03),
+        ("saturation", "saturation@drive", "us", 0.5),
+        ("coulomb_strong", "coulomb@load", "Fc", None),
+    ],
+)
+def test_what_is_hidden_is_named(
+    case: str, named: str, parameter: str, truth: float | None
+) -> None:
+    _, verdict = ranking(bench(case))
+
+    assert verdict.word == "missing_effect"
+    assert verdict.best is not None
+    assert verdict.best.label == named
+    assert verdict.best.fitted is not None
+    value = verdict.best.fitted.train.values()[verdict.best.placement.prefix + parameter]
+    assert truth is None or value == pytest.approx(truth, rel=0.05)
+
+
+def test_model_that_does_not_describe_the_healthy_rig_names_nothing() -> None:
+    healthy = part(recorded("healthy"), SETTLED)
+    other = replace(healthy, outputs=healthy.outputs * [1.0, -1.0])
+
+    rows, verdict = ranking(bench("coulomb_strong", other))
+
+    assert verdict.word == "model_inadequate"
+    assert verdict.best is None
+    assert "times its noise" in verdict.text
+    assert rows
+    assert all(row.fitted is None for row in rows)
