@@ -34,7 +34,7 @@ def beyond(study: Study, data: Data, bare: Fitted | None, fitted: Fitted) -> dic
         fitted: the model with some effects.
     """
     healthy = data.of_healthy
-    if study.kept is None or bare is None or healthy is None:
+    if study.kept is None or bare is None or healthy is None or not fitted.compiled.system.free:
         return {}
     found = _from_kept(study, study.kept, data, fitted)
     for placement in fitted.placements:

@@ -96,7 +96,7 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     if verdict.word == "unknown_effect" and verdict.best is not None:
         progress(f"{verdict.best.label} leaves much: trying two effects at once")
         verdict = two_effects(bench, rows, verdict, progress)
-    if bench.study.model.rough:
+    if bench.study.model.rough and bench.data.along_motion:
         verdict = modest(bench.base, rows, bench.floor, verdict)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]

@@ -93,7 +93,8 @@ def with_healthy_remainder(study: Study, data: Data) -> tuple[Study, Data]:
     healthy = driven.healthy
     assert healthy is not None
     every = (driven.train, driven.held_out, healthy)
-    whole = all(part % horizon == 0 for recording in every for part in recording.parts)
+    lengths = [n for recording in every for n in recording.parts or (len(recording),)]
+    whole = all(length % horizon == 0 for length in lengths)
     driven = replace(driven, horizon=horizon if whole else data.horizon)
     study = replace(study, file=structs.replace(study.file, substeps=SUBSTEPS))
     found = learn(study, healthy, driven.horizon)

@@ -110,6 +110,8 @@ def values(fitted: Fit, beyond: Mapping[str, float] | None = None) -> dict[str, 
 def identifiability(fitted: Fit) -> dict[str, str]:
     """What this recording cannot tell, in words, by parameter."""
     names, m = fitted.compiled.system.free, fitted.jacobian.shape[-1]
+    if m == 0:
+        return {}
     jacobian = fitted.jacobian.reshape(-1, m)
     sizes = np.linalg.norm(jacobian, axis=0)
     notes = {

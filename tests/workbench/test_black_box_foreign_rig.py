@@ -1,0 +1,68 @@
+"""The black box on a rig that nobody here built: what is hidden in it, and what cannot be said."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.workbench.compare.compare import Bench, bench_of, told_by_healthy
+from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.explain.rough_verdict import TRANSFERS, modest
+from rigwatch.workbench.study.study import Span, Study, StudyFile
+from tests.workbench.conftest import measured
+
+RATE = 256
+SETTLED, HALF = 8 * RATE, 24 * RATE
+
+
+def recorded(case: str, begin: int, end: int | None = None) -> Recording:
+    """A part of a recording [samples]."""
+    table = np.loadtxt(measured("foreign_rig", "explain", f"{case}.csv"), delimiter=",", skiprows=1)
+    rows = table[begin:end]
+    return Recording(1 / RATE, rows[:, 1:2], rows[:, 2:], parts=(len(rows),))
+
+
+@cache
+def bench(case: str) -> Bench:
+    """The black box that a healthy recording has taught, beside one with something hidden."""
+    span = (Span(session="recorded"),)
+    file = StudyFile(model="fourth-order", train=span, held_out=span)
+    study = Study(Path(), file, shipped_models()["fourth-order"], library(), frozenset())
+    data = Data(
+        recorded(case, SETTLED, HALF), recorded(case, HALF), recorded("healthy", SETTLED),
+        RATE // 2, (),
+    )  # fmt: skip
+    return bench_of(*told_by_healthy(study, data))
+
+
+def test_nothing_is_missing_where_nothing_is_hidden() -> None:
+    found = bench("none")
+
+    assert found.base.held_out_error == pytest.approx(found.floor.rms[0], rel=0.05)
+    assert ranking(found)[1].word == "nothing_missing"
+
+
+@pytest.mark.parametrize(
+    ("case", "named"),
+    [("deadband", "dead_band@drive"), ("coulomb_other_excitation", "coulomb@load")],
+)
+def test_what_is_hidden_is_named_under_any_excitation(case: str, named: str) -> None:
+    _, verdict = ranking(bench(case))
+
+    assert verdict.word == "missing_effect"
+    assert named in verdict.members
+
+
+def test_what_another_motion_may_leave_is_not_named() -> None:
+    found = bench("pressure")
+
+    rows, verdict = ranking(found)
+
+    assert found.floor.ratio(found.base.held_out) < TRANSFERS
+    assert verdict.word != "missing_effect"
+    assert modest(found.base, rows, found.floor, verdict).word != "missing_effect"
