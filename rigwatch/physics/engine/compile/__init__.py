@@ -9,6 +9,7 @@ is stepped.
 from rigwatch.physics.engine.compile.compiled_system import (
     CompiledSystem,
     Linearisation,
+    Simulation,
     compile_system,
     load_source,
     numba_module,
@@ -20,6 +21,7 @@ from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_funct
 __all__ = [
     "CompiledSystem",
     "Linearisation",
+    "Simulation",
     "compile_system",
     "derivative",
     "evaluated",
