@@ -215,11 +215,7 @@ def check_model(model: RigModel, path: Path | str) -> None:
     Raises:
         ConfigError: the parts of the model do not fit together.
     """
-    for index, reference in enumerate(model.reference):
-        lengths = {len(getattr(reference, name)) for name in _COLUMNS}
-        if len(lengths) != 1 or 0 in lengths:
-            key = f"reference[{index}]"
-            raise ConfigError(path, key, f"columns of {sorted(lengths)} samples", "one length")
+    _check_references(model, path)
     if isinstance(model.plant, EquationsPlant):
         _check_equations(model, path)
         return
@@ -239,6 +235,14 @@ def check_model(model: RigModel, path: Path | str) -> None:
         if any(by_direction):
             found = "friction that differs by direction"
             raise ConfigError(path, "promoted", found, "it with an inertia only")
+
+
+def _check_references(model: RigModel, path: Path | str) -> None:
+    for index, reference in enumerate(model.reference):
+        lengths = {len(getattr(reference, name)) for name in _COLUMNS}
+        if len(lengths) != 1 or 0 in lengths:
+            key = f"reference[{index}]"
+            raise ConfigError(path, key, f"columns of {sorted(lengths)} samples", "one length")
 
 
 def _check_equations(model: RigModel, path: Path | str) -> None:

@@ -36,10 +36,9 @@ TRAINED = 2.0 / 3.0
 SKIPPED = 1.0
 """Beginning of each recording that limits are not taken from [s]."""
 WORST = 0.2
-"""Residual of held-out healthy data, over what is measured, above which a model describes nothing.
-"""
+"""Residual of held-out healthy data, over what is measured, above which nothing is described."""
 SLOW, TURNS = 0.02, 4.0
-"""Share of the speed's rms, and deviations of its noise, below which it cannot be told from rest."""
+"""Share of the speed's rms, and deviations of its noise, that cannot be told from rest."""
 
 
 def commission_equations(
@@ -75,10 +74,8 @@ def _fitted(used: Sequence[Recording], name: str, corner: float, rate: float) ->
     layout = layout_of(model, port)
     lag = EquationsPlant(model=name, names=(), values=(), port=port).half_width
     moved = [_motion(one, layout, lag, rate) for one in used]
-    known = fit_sensor(
-        model, [(m[:, : layout.inputs], m[:, layout.inputs], m[:, layout.inputs + 1]) for m in moved],
-        rate,
-    )  # fmt: skip
+    n = layout.inputs
+    known = fit_sensor(model, [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved], rate)
     stretches = [
         Stretch(*_cut(m, layout, round((CHIRP if one.role == "chirp" else FITTED) * rate)))
         for one, m in zip(used, moved, strict=True)
@@ -173,7 +170,7 @@ def _rms(signal: FloatArray) -> float:
     return float(np.sqrt(np.mean(signal**2)))
 
 
-def _model(
+def _model(  # noqa: PLR0917 -- all that was found
     used: Sequence[Recording],
     plant: EquationsPlant,
     remainder: RemainderSection,

@@ -5,8 +5,9 @@
     two views of the measured output ─────────────┘
 
 Energies are in the healthy variance n² + κ·A, with A mean squares and fourth powers of the motion
-and of what is predicted, as what equations leave grows with the motion. A departure is friction where, since its onset, dry
-friction explains what is seen, a reversal is among it, and the sensors agree with each other.
+and of what is predicted, as what equations leave grows with the motion. A departure is friction
+where, since its onset, dry friction explains what is seen, a reversal is among it, and the sensors
+agree with each other.
 """
 
 # Compiled functions are untyped to mypy.
@@ -64,8 +65,7 @@ LOOKS = 3
 LEAST_LOOK = 12
 """Samples from the onset on before friction is named [samples]."""
 FITS, DRY_PART = 0.75, 0.5
-"""Share of the missing force that friction explains, and that its dry part stands for, beyond noise.
-"""
+"""Share of the missing force, beyond noise, that friction explains and its dry part stands for."""
 FITS_LATER = 0.6
 """The same over a whole long window, where onsets and edges have faded."""
 AT_REST, STUCK = 0.25, 0.5
@@ -102,28 +102,28 @@ def decide(  # noqa: PLR0917 -- a kernel
 
 @njit(cache=True)
 def _restart(kept: DecisionState) -> None:
-    for place in range(kept.count.size):
-        kept.count[place] = 0
-    kept.count[ONSET] = -1
+    for place in range(kept.counts.size):
+        kept.counts[place] = 0
+    kept.counts[ONSET] = -1
     kept.value[0] = UNNAMED
 
 
 @njit(cache=True)
 def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray) -> None:
-    """e, g1, g2, predicted, disagreement and measured stand in the order of the residual's columns."""
-    head = kept.count[HEAD]
+    """The first columns stand in the order of the residual's."""
+    head = kept.counts[HEAD]
     for c in range(6):
         kept.rows[head, c] = row[c]
     kept.rows[head, SPEED] = speed
     for c in range(levels.size):
         kept.rows[head, LEVELS + c] = levels[c]
-    kept.count[HEAD] = (head + 1) % HISTORY
-    kept.count[FILLED] = min(kept.count[FILLED] + 1, HISTORY)
+    kept.counts[HEAD] = (head + 1) % HISTORY
+    kept.counts[FILLED] = min(kept.counts[FILLED] + 1, HISTORY)
 
 
 @njit(cache=True)
 def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: FloatArray) -> None:
-    count = kept.count
+    count = kept.counts
     count[SINCE_START] += 1
     count[OUTSIDE] = 0 if not inside else min(count[OUTSIDE] + 1, LONG)
     out[AMPLITUDE, k] = _mean_square(kept, LEVEL, MEDIUM)
@@ -154,12 +154,12 @@ def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: F
 @njit(cache=True)
 def _variance(kept: DecisionState, rules: DecisionRules) -> float:
     """What a healthy rig leaves under the motion of the medium window."""
-    n = min(MEDIUM, kept.count[FILLED])
+    n = min(MEDIUM, kept.counts[FILLED])
     total = rules.noise**2
     for c in range(rules.growth.size):
         level = 0.0
         for ago in range(1, n + 1):
-            level += kept.rows[(kept.count[HEAD] - ago) % HISTORY, LEVELS + c]
+            level += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, LEVELS + c]
         total += rules.growth[c] * level / max(n, 1)
     return total
 
@@ -167,7 +167,7 @@ def _variance(kept: DecisionState, rules: DecisionRules) -> float:
 @njit(cache=True)
 def _mode(kept: DecisionState, rules: DecisionRules) -> float:
     """Armed once everything has settled and is quiet, or has had time enough to be."""
-    count = kept.count
+    count = kept.counts
     if count[OUTSIDE] < LONG and count[OUTSIDE] < count[SINCE_START]:
         return BEYOND
     settled = count[SINCE_START] >= rules.settle
@@ -186,7 +186,7 @@ def _follow(  # noqa: PLR0917 -- a kernel
     out: FloatArray,
 ) -> None:
     """Begin, carry on or end an episode, and name it."""
-    count = kept.count
+    count = kept.counts
     if away:
         count[DEPARTURE_AGO] = 0
         if count[ONSET] < 0:
@@ -209,7 +209,7 @@ def _follow(  # noqa: PLR0917 -- a kernel
 def _verdict(
     k: int, spread: float, rules: DecisionRules, kept: DecisionState, out: FloatArray
 ) -> float:
-    count, before = kept.count, kept.value[0]
+    count, before = kept.counts, kept.value[0]
     count[DISAGREED] = count[DISAGREED] + 1 if out[SENSORS, k] > 1.0 else 0
     if before == OTHER or count[DISAGREED] >= VIOLATED:
         return OTHER
@@ -232,10 +232,10 @@ def _verdict(
 
 @njit(cache=True)
 def _mean_square(kept: DecisionState, column: int, length: int) -> float:
-    n = min(length, kept.count[FILLED])
+    n = min(length, kept.counts[FILLED])
     total = 0.0
     for ago in range(1, n + 1):
-        total += kept.rows[(kept.count[HEAD] - ago) % HISTORY, column] ** 2
+        total += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, column] ** 2
     return total / max(n, 1)
 
 
@@ -246,10 +246,10 @@ def _friction(
     """Coulomb force, viscous coefficient, the former in deviations, and the shares of the residual,
     beyond its healthy spread, that both explain and that the dry part stands for.
     """
-    n = min(length, kept.count[FILLED])
+    n = min(length, kept.counts[FILLED])
     a = b = c = p = q = yy = 0.0
     for ago in range(1, n + 1):
-        row = kept.rows[(kept.count[HEAD] - ago) % HISTORY]
+        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         a += row[DRY] * row[DRY]
         b += row[DRY] * row[WET]
         c += row[WET] * row[WET]
@@ -273,22 +273,22 @@ def _friction(
 @njit(cache=True)
 def _rest(kept: DecisionState, length: int, slow: float) -> float:
     """Share of the time at which the motion cannot be told from rest."""
-    n = min(length, kept.count[FILLED])
+    n = min(length, kept.counts[FILLED])
     still = 0
     for ago in range(1, n + 1):
-        still += abs(kept.rows[(kept.count[HEAD] - ago) % HISTORY, SPEED]) < slow
+        still += abs(kept.rows[(kept.counts[HEAD] - ago) % HISTORY, SPEED]) < slow
     return still / max(n, 1)
 
 
 @njit(cache=True)
 def _reversals(kept: DecisionState, length: int, slow: float) -> int:
     """How often the motion turns, beyond what noise does."""
-    n = min(length, kept.count[FILLED])
+    n = min(length, kept.counts[FILLED])
     found, side = 0, 0
     for ago in range(n, 0, -1):
-        speed = kept.rows[(kept.count[HEAD] - ago) % HISTORY, SPEED]
+        speed = kept.rows[(kept.counts[HEAD] - ago) % HISTORY, SPEED]
         now = 1 if speed > slow else (-1 if speed < -slow else 0)
         if now != 0:
-            found += side != 0 and now != side
+            found += side == -now
             side = now
     return found

@@ -31,7 +31,7 @@ ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, SPEED, LEVELS = range(8)
 
 
 class Counts(NamedTuple):
-    """Places in `DecisionState.count`."""
+    """Places in `DecisionState.counts`."""
 
     head: int = 0
     filled: int = 1
@@ -52,12 +52,12 @@ class DecisionState(NamedTuple):
 
     Args:
         rows: the last samples, shape (HISTORY, LEVELS + levels).
-        count: see `Counts`; since_onset is -1 without an episode.
+        counts: see `Counts`; since_onset is -1 without an episode.
         value: verdict and named force.
     """
 
     rows: FloatArray
-    count: NDArray[np.int64]
+    counts: NDArray[np.int64]
     value: FloatArray
 
 
@@ -88,8 +88,8 @@ class DecisionRules(NamedTuple):
     patience: int
 
 
-MARGIN = 1.6
-"""How far beyond the largest that healthy recordings have shown a statistic must be: in amplitude."""
+MARGIN = 2.0
+"""How far a statistic must be beyond the largest of healthy recordings, in amplitude."""
 
 
 def rules_of(limits: HealthyLimits, rate: float) -> DecisionRules:
@@ -111,4 +111,4 @@ def rules_of(limits: HealthyLimits, rate: float) -> DecisionRules:
 
 
 SETTLE, PATIENCE = 1.0, 0.75
-"""Time until hidden states and filters have settled, and time in which friction shows itself [s]."""
+"""Time until hidden states and filters settle, and in which friction shows itself [s]."""

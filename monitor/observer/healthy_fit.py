@@ -27,8 +27,8 @@ from rigwatch.physics.engine.equations import Model, compose
 from rigwatch.wire.arrays import FloatArray
 
 SPREAD, UNBOUND = 0.15, 2.0
-"""How far parameters lie from the file's values: in their logarithm, as a share of what their bounds
-allow or, without those, by so much; in their size where they have a sign.
+"""How far parameters lie from the file's values: in their logarithm, as a share of what their
+bounds allow or, without those, by so much; in their size where they have a sign.
 """
 PULL = 0.1
 """Weight of that against the data: a sum over n samples pulls as this share of √n does."""

@@ -1,4 +1,4 @@
-"""Limits from healthy recordings: how large the residual is, how it grows, how far it ever strays."""
+"""Limits from healthy recordings: the residual's size, its growth, and how far it ever strays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -17,7 +17,7 @@ from monitor.signals import DEAD, GOOD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import FloatArray
 
 DELAY, MATCHED = -1, -2
-"""Orders of columns that are delayed only, and smoothed just as one that is differentiated twice."""
+"""Orders of columns that are only delayed, or smoothed as one that is differentiated twice is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def _kernel(order: int, half_width: int, rate: float) -> FloatArray:
         # The kernel of the second derivative is a second difference of a smoothing one.
         second = savgol_coeffs(width, 3, deriv=2, delta=1.0, use="dot")
         smoothing = np.cumsum(np.cumsum(second))[:-2]
-        return np.concatenate([[0.0], smoothing, [0.0]])
+        return np.asarray(np.concatenate([[0.0], smoothing, [0.0]]), np.float64)
     return np.asarray(savgol_coeffs(width, 3, deriv=order, delta=1.0 / rate, use="dot"))
 
 

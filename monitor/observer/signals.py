@@ -1,4 +1,4 @@
-"""From admitted samples to what is decided on: motion, prediction and residual in one running stage.
+"""From admitted samples to what is decided on: motion, prediction, residual in one stage.
 
 Which channel is an input, which shows the motion and which is predicted follows from the model of
 equations; nothing here knows what a rig measures.

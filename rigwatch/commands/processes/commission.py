@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("auto", "transfer", "equations"),
         default="auto",
         help="what the rig is watched by: a transfer function and its healthy average, equations "
-        "along the measured motion (needs no --friction), or the one that describes the healthy rig",
+        "along the measured motion (no --friction needed), or whichever describes the healthy rig",
     )
     parser.add_argument(
         "--equations",
