@@ -1,7 +1,8 @@
 """Which scheme a rig is watched by: the one that describes its healthy recordings.
 
-The thesis's scheme needs no equations of the rig and stays the reference, where it arms on the
-healthy recordings as they are and raises nothing. Else the equations are run along the motion.
+Equations that describe held-out healthy data are run along the motion, as they do so for any
+excitation. Where they do not, the thesis's scheme is taken, which needs no equations of the rig, if
+it arms on the healthy recordings as they are and raises nothing there.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,23 +40,22 @@ def commission_best(
     """
     if scheme == "transfer":
         return commission(recordings, settings)
-    why = ""
+    transfer, why = (None, "equations were asked for")
     if scheme == "auto":
-        model, why = _transfer(recordings, settings)
-        if model is not None:
-            return _with_reason(model, why)
-        say(f"transfer function: {why}; fitting the equations of {equations}")
+        transfer, why = _transfer(recordings, settings)
+        say(f"{why}; fitting the equations of {equations}")
     try:
         found = commission_equations(recordings, equations)
     except ModelError as error:
-        raise ModelError(f"{why}; {error}" if why else str(error)) from error
+        if transfer is None:
+            raise ModelError(f"{why}; {error}" if scheme == "auto" else str(error)) from error
+        return _with_reason(transfer, f"{why}; {error}")
     assert found.scheme is not None
     left = (
         f"equations of {equations}: {found.scheme.held_out:.3g} left of held-out healthy data,"
-        f" {100 * found.scheme.share:.1f} % of what is measured at worst"
+        f" {100 * found.scheme.share:.1f} % of what is measured at worst, whatever the excitation"
     )
-    asked = "asked for" if scheme == "equations" else f"transfer function: {why}"
-    return _with_reason(found, f"{left}; {asked}")
+    return _with_reason(found, f"{left}; {why}")
 
 
 def _with_reason(model: RigModel, why: str) -> RigModel:
@@ -69,16 +69,20 @@ def _transfer(
     try:
         model = commission(recordings, settings)
     except ModelError as error:
-        return None, str(error)
+        return None, f"transfer function: {error}"
     shares = []
     for one in recordings:
         if one.role == "healthy":
             armed, raised = _watched(one, model)
             if raised:
-                return None, f"it raises {raised} on the healthy recording {one.name}"
+                return (
+                    None,
+                    f"transfer function: it raises {raised} on the healthy recording {one.name}",
+                )
             shares.append(armed)
     if min(shares) < LEAST_ARMED:
-        return None, f"it is armed over {100 * min(shares):.0f} % of a healthy recording only"
+        armed = 100 * min(shares)
+        return None, f"transfer function: it is armed over {armed:.0f} % of a healthy recording"
     return model, f"transfer function: armed over {100 * min(shares):.0f} % of healthy recordings"
 
 

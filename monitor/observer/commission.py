@@ -17,7 +17,7 @@ from monitor.observer.healthy_fit import Stretch, fit_healthy
 from monitor.observer.limits import HealthyPart, healthy_limits
 from monitor.observer.motion import EMPTY, FixedLag
 from monitor.observer.prediction import base_model, force_port
-from monitor.observer.range_seen import range_of, range_signals
+from monitor.observer.range_seen import drive_energy, range_of, range_signals
 from monitor.observer.remainder import fit_remainder, no_remainder
 from monitor.observer.residual import MEASURED, PREDICTED, E, high_pass, levels
 from monitor.observer.sections import EquationsPlant, RemainderSection, SchemeSection
@@ -181,19 +181,19 @@ def _model(  # noqa: PLR0917 -- all that was found
     layout = layout_of(base_model(plant.model), plant.port)
     speeds = np.concatenate([o.rows[:, layout.speed] for o in parts])
     slow = max(SLOW * _rms(speeds), plant.turn)
+    seen = range_of(layout.signals, [range_signals(o)[o.state != EMPTY] for o in parts])
     healthy = [
         HealthyPart(
             o.judged,
             np.ascontiguousarray(o.rows[:, layout.speed]),
             levels(o.rows[:, list(layout.motions)], o.judged[:, PREDICTED], remainder),
+            drive_energy(o.rows, seen, layout.motions),
             o.state,
         )
         for o in parts
     ]
     skip = round(SKIPPED * rate)
     limits = healthy_limits(healthy, slow, skip)
-    names = layout.signals
-    whole = [range_signals(o)[o.state != EMPTY] for o in parts]
     return RigModel(
         sample_rate=rate,
         channels=layout.channels,
@@ -201,7 +201,7 @@ def _model(  # noqa: PLR0917 -- all that was found
         friction=FrictionSection(b=(1.0,), a=(1.0,), gamma=0.0),
         noise=NoiseSection(residual=limits.noise),
         remainder=remainder,
-        motion_range=range_of(names, whole),
+        motion_range=seen,
         healthy=limits,
         scheme=scheme,
         recording=tuple(

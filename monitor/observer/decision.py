@@ -58,7 +58,9 @@ from monitor.observer.motion import EMPTY, FIRST, TAINTED
 from monitor.signals import Codes
 from rigwatch.wire.arrays import FloatArray
 
-HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED = range(9)
+HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED = range(
+    10
+)
 """Places of `decision_state.Counts`, as the kernel needs constants."""
 LOOKS = 3
 """Samples in a row that must agree on friction."""
@@ -76,6 +78,10 @@ RIDGE = 1e-3
 """Of the viscous regressor against the dry one, where the two cannot be told apart."""
 VIOLATED = 16
 """Samples in a row in which the sensors disagree."""
+SUDDEN, LATE, BEFORE = 8.0, 16.0, 256.0
+"""A drive whose energy over `LATE` samples is so many times that over `BEFORE` has just begun, or
+grown; what follows is no steady motion.
+"""
 
 
 @njit(cache=True)
@@ -83,6 +89,7 @@ def decide(  # noqa: PLR0917 -- a kernel
     judged: FloatArray,
     speed: FloatArray,
     levels: FloatArray,
+    drive: FloatArray,
     inside: NDArray[np.bool_],
     state: Codes,
     rules: DecisionRules,
@@ -95,6 +102,7 @@ def decide(  # noqa: PLR0917 -- a kernel
             continue
         if state[k] == FIRST:
             _restart(kept)
+        _follow_drive(drive[k], kept)
         if state[k] != TAINTED:
             _remember(kept, judged[k], speed[k], levels[k])
         _one(k, inside[k], rules, kept, out)
@@ -105,7 +113,20 @@ def _restart(kept: DecisionState) -> None:
     for place in range(kept.counts.size):
         kept.counts[place] = 0
     kept.counts[ONSET] = -1
+    kept.value[:] = 0.0
     kept.value[0] = UNNAMED
+
+
+@njit(cache=True)
+def _follow_drive(energy: float, kept: DecisionState) -> None:
+    """Notice that the drive begins or grows suddenly."""
+    late, before = kept.value[2], kept.value[3]
+    late += (energy - late) / LATE
+    before += (energy - before) / BEFORE
+    kept.counts[CHANGED] += 1
+    if late > SUDDEN * before + 1e-4:
+        kept.counts[CHANGED] = 0
+    kept.value[2], kept.value[3] = late, before
 
 
 @njit(cache=True)
@@ -170,6 +191,8 @@ def _mode(kept: DecisionState, rules: DecisionRules) -> float:
     count = kept.counts
     if count[OUTSIDE] < LONG and count[OUTSIDE] < count[SINCE_START]:
         return BEYOND
+    if count[CHANGED] < rules.settle and count[ONSET] < 0:
+        return ARMING
     settled = count[SINCE_START] >= rules.settle
     if settled and (count[QUIET] >= MEDIUM or count[SINCE_START] >= 2 * rules.settle):
         return JUDGING
@@ -215,7 +238,8 @@ def _verdict(
         return OTHER
     since = count[ONSET]
     length = min(since + SHORT, LONG)
-    force, _, _, share, dry = _friction(kept, length, spread)
+    _, _, _, share, dry = _friction(kept, length, spread)
+    force = _dry_force(kept, length)
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
     fits = share > (FITS if since < LONG else FITS_LATER) and dry > DRY_PART and force > 0.0
     turned = _reversals(kept, length, rules.speed_noise) > 0
@@ -268,6 +292,20 @@ def _friction(
     beyond = max(yy - n * spread * spread, 0.2 * yy)
     dry_alone = p * p / a if p > 0.0 else 0.0
     return force, viscous, deviations, explained / beyond, dry_alone / beyond
+
+
+@njit(cache=True)
+def _dry_force(kept: DecisionState, length: int) -> float:
+    """Force of dry friction alone [N]: viscous friction beside it is hardly told from it by a
+    steady motion, and takes from it what smoothing and presliding round off.
+    """
+    n = min(length, kept.counts[FILLED])
+    a = p = 0.0
+    for ago in range(1, n + 1):
+        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        a += row[DRY] * row[DRY]
+        p += row[DRY] * row[ERROR]
+    return p / a if a > 0.0 else 0.0
 
 
 @njit(cache=True)

@@ -42,6 +42,7 @@ class Counts(NamedTuple):
     since_departed: int = 6
     agreed: int = 7
     disagreed: int = 8
+    since_change: int = 9
 
 
 AT = Counts()
@@ -53,7 +54,7 @@ class DecisionState(NamedTuple):
     Args:
         rows: the last samples, shape (HISTORY, LEVELS + levels).
         counts: see `Counts`; since_onset is -1 without an episode.
-        value: verdict and named force.
+        value: verdict, named force, and energies of the drive of late and before.
     """
 
     rows: FloatArray
@@ -69,7 +70,7 @@ def new_state(levels: int) -> DecisionState:
     """
     count = np.zeros(len(AT), np.int64)
     count[AT.since_onset] = -1
-    return DecisionState(np.zeros((HISTORY, LEVELS + levels)), count, np.zeros(2))
+    return DecisionState(np.zeros((HISTORY, LEVELS + levels)), count, np.zeros(4))
 
 
 class DecisionRules(NamedTuple):
@@ -88,7 +89,7 @@ class DecisionRules(NamedTuple):
     patience: int
 
 
-MARGIN = 2.0
+MARGIN = 1.6
 """How far a statistic must be beyond the largest of healthy recordings, in amplitude."""
 
 

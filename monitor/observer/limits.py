@@ -28,11 +28,12 @@ LOW, HIGH = 5.0, 90.0
 
 @dataclass(frozen=True, eq=False)
 class HealthyPart:
-    """A healthy recording: judged columns, speed, levels of the motion, and states."""
+    """A healthy recording: judged columns, speed, levels of the motion, drive, and states."""
 
     judged: FloatArray
     speed: FloatArray
     levels: FloatArray
+    drive: FloatArray
     state: Codes
 
     def energies(self, column: int, skip: int) -> FloatArray:
@@ -123,6 +124,8 @@ def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
     out = np.zeros((len(OUTPUTS), len(part.state)))
     inside = np.ones(len(part.state), np.bool_)
     kept = new_state(part.levels.shape[1])
-    decide(part.judged, part.speed, part.levels, inside, part.state, rules, kept, out)
+    decide(
+        part.judged, part.speed, part.levels, part.drive, inside, part.state, rules, kept, out
+    )  # fmt: skip
     out[SPREAD] = np.maximum(out[SPREAD], rules.noise)
     return out

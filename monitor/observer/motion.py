@@ -63,7 +63,7 @@ def _kernel(order: int, half_width: int, rate: float) -> FloatArray:
     """Weights, oldest sample first, shape (2·half_width + 1,)."""
     width = 2 * half_width + 1
     if order == DELAY:
-        return np.eye(width)[half_width]
+        return np.asarray(np.eye(width)[half_width], np.float64)
     if order == MATCHED:
         # The kernel of the second derivative is a second difference of a smoothing one.
         second = savgol_coeffs(width, 3, deriv=2, delta=1.0, use="dot")

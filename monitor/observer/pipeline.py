@@ -15,7 +15,7 @@ from monitor.model import RigModel
 from monitor.observer import decision_state as d
 from monitor.observer.decision import decide
 from monitor.observer.motion import EMPTY
-from monitor.observer.range_seen import RangeSeen
+from monitor.observer.range_seen import RangeSeen, drive_energy
 from monitor.observer.residual import PREDICTED, E, levels
 from monitor.observer.sections import EquationsPlant
 from monitor.observer.signals import Observed, ObserverSignals
@@ -77,7 +77,10 @@ class ObserverMonitor:
         grown = levels(seen.rows[:, list(layout.motions)], seen.judged[:, PREDICTED], remainder)
         speed = np.ascontiguousarray(seen.rows[:, layout.speed])
         inside = far <= 1.0
-        decide(seen.judged, speed, grown, inside, seen.state, self.rules, self._state, out)
+        known = self.model.motion_range
+        assert known is not None
+        drive = drive_energy(seen.rows, known, layout.motions)
+        decide(seen.judged, speed, grown, drive, inside, seen.state, self.rules, self._state, out)
         conditions = self._conditions(admitted, seen, far, out)
         clipping = self._clipping.update(admitted)
         return Result(self._estimates(block, admitted, seen, out), (*conditions, *clipping))

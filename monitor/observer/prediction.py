@@ -151,9 +151,8 @@ class AlongMotion:
 
     def update(self, rows: FloatArray, state: Codes) -> Predicted:
         """The next rows of inputs and motion, shape (n, inputs); those without a kernel give 0."""
-        out = Predicted(
-            *(np.zeros(len(rows)) for _ in range(3)), np.zeros((len(rows), self.hidden))
-        )
+        n = len(rows)
+        out = Predicted(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((n, self.hidden)))
         for begin, end in _stretches(state):
             if state[begin] == FIRST:
                 self._begin(rows[begin])

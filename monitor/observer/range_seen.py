@@ -38,6 +38,14 @@ def range_signals(seen: Observed) -> FloatArray:
     return np.column_stack([seen.rows, seen.judged[:, PREDICTED]])
 
 
+def drive_energy(rows: FloatArray, seen: RangeSection, motions: Sequence[int]) -> FloatArray:
+    """Square of the inputs that are no motion, 1 at the edge of their range, shape (n,)."""
+    inputs = [place for place in range(rows.shape[1]) if place not in motions]
+    low, high = np.array(seen.low)[inputs], np.array(seen.high)[inputs]
+    scaled = (rows[:, inputs] - 0.5 * (low + high)) / np.maximum(0.5 * (high - low), 1e-12)
+    return np.asarray((scaled**2).sum(axis=1))
+
+
 def range_of(names: Sequence[str], parts: Sequence[FloatArray]) -> RangeSection:
     """The range of healthy signals, each part of shape (n, signals)."""
     every = np.concatenate(parts)
