@@ -189,14 +189,16 @@ def _variance(kept: DecisionState, rules: DecisionRules) -> float:
 def _mode(kept: DecisionState, rules: DecisionRules) -> float:
     """Armed once everything has settled and is quiet, or has had time enough to be."""
     count = kept.counts
+    if count[SINCE_START] < rules.settle:
+        count[OUTSIDE] = min(count[SINCE_START], LONG)
+        return ARMING
     if count[OUTSIDE] < LONG and count[OUTSIDE] < count[SINCE_START]:
         return BEYOND
     if count[CHANGED] < rules.settle and count[ONSET] < 0:
         return ARMING
-    settled = count[SINCE_START] >= rules.settle
-    if settled and (count[QUIET] >= MEDIUM or count[SINCE_START] >= 2 * rules.settle):
+    if count[QUIET] >= MEDIUM or count[SINCE_START] >= 2 * rules.settle:
         return JUDGING
-    return ARMING if count[SINCE_START] < 2 * rules.settle else JUDGING
+    return ARMING
 
 
 @njit(cache=True)
