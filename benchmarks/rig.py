@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from monitor.commissioning.commission import commission
 from monitor.model.model_file import RigModel
-from monitor.pipeline.pipeline import Monitor, Result
+from monitor.pipeline.pipeline import Monitor
+from monitor.pipeline.result import Result
 from monitor.signals.conditions import SENSOR_CLIPPED
 from monitor.signals.recordings import Recording, Role, recording_of
 from rigwatch.wire.messages.message_types import Column, SampleBlock

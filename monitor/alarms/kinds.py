@@ -255,6 +255,21 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         _REMARK,
     ),
     AlarmKind(
+        "not_armed",
+        "info",
+        "the model's hidden states have not settled yet; nothing is judged",
+        "Wait for two seconds of samples without a gap.",
+        _REMARK,
+    ),
+    AlarmKind(
+        "not_judged",
+        "warning",
+        "the motion is beyond the range that the model was fitted to; nothing is judged",
+        "Go back to a motion that commissioning has seen, or commission again with a healthy "
+        "recording of this one.",
+        _PASSING,
+    ),
+    AlarmKind(
         "not_observable",
         "info",
         "too little motion to estimate friction; estimates are frozen",

@@ -1,5 +1,6 @@
 """A model file from recordings: transfer function, friction filter, signature, thresholds."""
 
 from monitor.commissioning.commission import CommissionSettings, commission
+from monitor.commissioning.scheme_choice import commission_best
 
-__all__ = ["CommissionSettings", "commission"]
+__all__ = ["CommissionSettings", "commission", "commission_best"]

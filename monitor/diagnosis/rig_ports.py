@@ -32,6 +32,7 @@ from monitor.signals import (
 from rigwatch.physics.engine.equations import Input, Model, Output, Port, Variable
 from rigwatch.physics.transfer import velocity_filter
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
 
 MOST = 2.0
 """Rms of an effect over that of the signal it enters at."""
@@ -70,6 +71,8 @@ def rig_ports(model: RigModel, signals: FloatArray) -> RigPorts:
     """
     if isinstance(model.plant, InertiaPlant):
         return _inertia(model, model.plant, signals)
+    if not isinstance(model.plant, TransferPlant):
+        raise ModelError("the model is one of equations: rank effects with rigwatch explain")
     return _transfer(model, model.plant, signals)
 
 

@@ -18,17 +18,29 @@ from monitor.model.model_file import (
     model_text,
     parse_model,
 )
+from monitor.model.observer_sections import (
+    EquationsPlant,
+    HealthyLimits,
+    RangeSection,
+    RemainderSection,
+    SchemeSection,
+)
 
 __all__ = [
     "BandSection",
     "DecisionSection",
+    "EquationsPlant",
     "FrictionSection",
+    "HealthyLimits",
     "InertiaPlant",
     "NoiseSection",
     "PromotedSection",
+    "RangeSection",
     "RecordingSection",
     "ReferenceSection",
+    "RemainderSection",
     "RigModel",
+    "SchemeSection",
     "TransferPlant",
     "VelocitySection",
     "WindowSection",

@@ -10,6 +10,13 @@ from typing import Annotated
 
 from msgspec import Meta, field, structs
 
+from monitor.model.observer_sections import (
+    EquationsPlant,
+    HealthyLimits,
+    RangeSection,
+    RemainderSection,
+    SchemeSection,
+)
 from rigwatch.physics.transfer import TransferFunction
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.typed_files import Section, load, parse
@@ -49,7 +56,7 @@ class InertiaPlant(Section, frozen=True, kw_only=True, tag="inertia", tag_field=
     ] = 20
 
 
-Plant = TransferPlant | InertiaPlant
+Plant = TransferPlant | InertiaPlant | EquationsPlant
 
 
 class VelocitySection(Section, frozen=True, kw_only=True):
@@ -167,6 +174,10 @@ class RigModel(Section, frozen=True, kw_only=True):
     decision: DecisionSection = field(default_factory=DecisionSection)
     band: BandSection | None = None
     promoted: PromotedSection | None = None
+    remainder: RemainderSection | None = None
+    motion_range: RangeSection | None = None
+    healthy: HealthyLimits | None = None
+    scheme: SchemeSection | None = None
     reference: tuple[ReferenceSection, ...] = ()
     recording: tuple[RecordingSection, ...] = ()
 
@@ -204,11 +215,10 @@ def check_model(model: RigModel, path: Path | str) -> None:
     Raises:
         ConfigError: the parts of the model do not fit together.
     """
-    for index, reference in enumerate(model.reference):
-        lengths = {len(getattr(reference, name)) for name in _COLUMNS}
-        if len(lengths) != 1 or 0 in lengths:
-            key = f"reference[{index}]"
-            raise ConfigError(path, key, f"columns of {sorted(lengths)} samples", "one length")
+    _check_references(model, path)
+    if isinstance(model.plant, EquationsPlant):
+        _check_equations(model, path)
+        return
     wanted = 3 if isinstance(model.plant, TransferPlant) else 2
     if len(model.channels) != wanted:
         raise ConfigError(path, "channels", f"{len(model.channels)} names", f"{wanted} names")
@@ -225,6 +235,26 @@ def check_model(model: RigModel, path: Path | str) -> None:
         if any(by_direction):
             found = "friction that differs by direction"
             raise ConfigError(path, "promoted", found, "it with an inertia only")
+
+
+def _check_references(model: RigModel, path: Path | str) -> None:
+    for index, reference in enumerate(model.reference):
+        lengths = {len(getattr(reference, name)) for name in _COLUMNS}
+        if len(lengths) != 1 or 0 in lengths:
+            key = f"reference[{index}]"
+            raise ConfigError(path, key, f"columns of {sorted(lengths)} samples", "one length")
+
+
+def _check_equations(model: RigModel, path: Path | str) -> None:
+    for key in ("remainder", "motion_range", "healthy"):
+        if getattr(model, key) is None:
+            raise ConfigError(path, key, "nothing", "a section beside a plant of equations")
+    assert isinstance(model.plant, EquationsPlant)
+    if len(model.plant.names) != len(model.plant.values):
+        found = f"{len(model.plant.names)} names, {len(model.plant.values)} values"
+        raise ConfigError(path, "plant.values", found, "one value a name")
+    if model.promoted or model.band:
+        raise ConfigError(path, "promoted", "it, or a band", "neither with a plant of equations")
 
 
 _COLUMNS = ("voltage", "position", "acceleration", "modelled")

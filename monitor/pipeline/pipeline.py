@@ -7,7 +7,7 @@ It knows no clock, bus or file, and every stage goes sample by sample with carri
 samples give the same numbers to the last bit, live or replayed, however they are cut into blocks.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,17 @@ from monitor.decision import kernel_state as w
 from monitor.decision import rules_for, watch_block
 from monitor.model import InertiaPlant, RigModel
 from monitor.pipeline.promoted import PromotedFriction, check_can_follow
+from monitor.pipeline.result import Result
 from monitor.reference import ReferenceRules, new_reference
-from monitor.signals import Admission, Admitted, Condition, InertiaResidual, TransferResidual
+from monitor.signals import (
+    Admission,
+    Admitted,
+    Condition,
+    InertiaResidual,
+    TransferResidual,
+    above,
+    below,
+)
 from monitor.signals import conditions as kinds
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
@@ -45,21 +54,6 @@ PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("together", "", w.TOGETHER),
 )
 """Columns of an estimate block: name, unit, place in the kernel's output."""
-
-
-@dataclass(frozen=True)
-class Result:
-    """What one sample block gave.
-
-    Args:
-        estimates: the published columns, one row a sample of the block that had not been seen
-            before.
-        conditions: one of each of `conditions.CONDITION_KINDS`, and one of clipping for each
-            channel that the model can judge, of the same length.
-    """
-
-    estimates: EstimateBlock
-    conditions: tuple[Condition, ...]
 
 
 class Monitor:
@@ -146,55 +140,41 @@ class Monitor:
         sticks = verdict == w.STICKING
         moving = ~armed | (out[w.SPEED_RMS] >= decision.least_velocity)
         return (
-            _above(
+            above(
                 kinds.DEPARTURE,
                 armed & (out[w.DEVIATION] > rules.factor),
                 out[w.DEVIATION],
                 rules.factor,
             ),
-            _above(
+            above(
                 kinds.DRY_FRICTION, armed & ((verdict == w.FRICTION) | sticks), out[w.THETA1], 0.0
             ),
-            _above(kinds.STICTION, armed & sticks, out[w.REST], 0.5),
-            _above(kinds.OTHER_FAULT, armed & (verdict == w.OTHER), out[w.EXPLAINED], np.inf),
-            _above(
+            above(kinds.STICTION, armed & sticks, out[w.REST], 0.5),
+            above(kinds.OTHER_FAULT, armed & (verdict == w.OTHER), out[w.EXPLAINED], np.inf),
+            above(
                 kinds.EXCITATION_CHANGED,
                 armed & (verdict == w.NEW_EXCITATION),
                 out[w.MOVED_VOLTAGE],
                 0.1,
             ),
-            _above(
+            above(
                 kinds.REFERENCE_LEARNT,
                 armed & (out[w.LEARNT_HERE] > 0.0),
                 out[w.LEARNT_HERE] / self.model.sample_rate,
                 0.0,
             ),
-            _below(kinds.NOT_OBSERVABLE, ~moving, out[w.SPEED_RMS], decision.least_velocity),
-            _above(
+            below(kinds.NOT_OBSERVABLE, ~moving, out[w.SPEED_RMS], decision.least_velocity),
+            above(
                 kinds.ILL_CONDITIONED,
                 armed & (out[w.CONDITION] > decision.worst_condition),
                 out[w.CONDITION],
                 decision.worst_condition,
             ),
-            _above(kinds.GAP, lost != 0.0, lost, 0.0),
-            _above(
+            above(kinds.GAP, lost != 0.0, lost, 0.0),
+            above(
                 kinds.SENSOR_INVALID, run > decision.longest_hold, invalid, decision.longest_hold
             ),
         )
-
-
-def _above(name: str, active: NDArray[np.bool_], value: FloatArray, high: float) -> Condition:
-    n = active.size
-    return Condition(
-        name, active.astype(np.uint8), value.copy(), np.full(n, -np.inf), np.full(n, float(high))
-    )
-
-
-def _below(name: str, active: NDArray[np.bool_], value: FloatArray, low: float) -> Condition:
-    n = active.size
-    return Condition(
-        name, active.astype(np.uint8), value.copy(), np.full(n, low), np.full(n, np.inf)
-    )
 
 
 def _arming_rules(model: RigModel) -> ReferenceRules:

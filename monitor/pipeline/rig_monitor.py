@@ -15,7 +15,8 @@ import numpy as np
 
 from monitor.alarms import AlarmManager, Announcement, quality_conditions
 from monitor.detectors import Detector
-from monitor.model import RigModel
+from monitor.model import EquationsPlant, RigModel
+from monitor.pipeline.observer_pipeline import ObserverMonitor
 from monitor.pipeline.pipeline import Monitor
 from monitor.signals import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, cut
@@ -58,7 +59,7 @@ class RigMonitor:
     ) -> None:
         self.alarms = AlarmManager(settings, file)
         self._friction = friction
-        self._pipeline = Monitor(model)
+        self._pipeline = scheme_of(model)
         self._detectors = tuple(detectors)
 
     def update(self, block: SampleBlock) -> Watched | None:
@@ -112,6 +113,15 @@ class RigMonitor:
         self._pipeline.update(block)
         for detector in self._detectors:
             detector.update(block)
+
+
+def scheme_of(model: RigModel) -> Monitor | ObserverMonitor:
+    """The scheme that a model's plant asks for.
+
+    Raises:
+        ModelError: its equations do not fit.
+    """
+    return ObserverMonitor(model) if isinstance(model.plant, EquationsPlant) else Monitor(model)
 
 
 def compile_kernels(model: RigModel, detectors: Sequence[Detector] = ()) -> None:

@@ -11,7 +11,18 @@ from monitor.signals.admission import (
     Admitted,
     Codes,
 )
-from monitor.signals.conditions import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition
+from monitor.signals.conditions import (
+    DEPARTURE,
+    DRY_FRICTION,
+    GAP,
+    OTHER_FAULT,
+    SENSOR_CLIPPED,
+    SENSOR_INVALID,
+    STICTION,
+    Condition,
+    above,
+    below,
+)
 from monitor.signals.inertia import InertiaResidual, commission_inertia
 from monitor.signals.recordings import Recording, Role, joined
 from monitor.signals.residual import (
@@ -29,6 +40,8 @@ from monitor.signals.residual import (
 __all__ = [
     "ACCELERATION",
     "DEAD",
+    "DEPARTURE",
+    "DRY_FRICTION",
     "G1",
     "G2",
     "GAP",
@@ -36,10 +49,12 @@ __all__ = [
     "HELD",
     "MODELLED",
     "NEW_BOOT",
+    "OTHER_FAULT",
     "POSITION",
     "RESTART",
     "SENSOR_CLIPPED",
     "SENSOR_INVALID",
+    "STICTION",
     "VELOCITY",
     "VOLTAGE",
     "Admission",
@@ -50,6 +65,8 @@ __all__ = [
     "Recording",
     "Role",
     "TransferResidual",
+    "above",
+    "below",
     "commission_inertia",
     "conditions",
     "joined",

@@ -17,6 +17,8 @@ EXCITATION_CHANGED = "excitation_changed"
 REFERENCE_LEARNT = "reference_learnt"
 NOT_OBSERVABLE = "not_observable"
 ILL_CONDITIONED = "ill_conditioned"
+NOT_ARMED = "not_armed"
+NOT_JUDGED = "not_judged"
 GAP = "gap"
 SENSOR_INVALID = "sensor_invalid"
 SENSOR_CLIPPED = "sensor_clipped"
@@ -107,6 +109,24 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
     ),
 )
 
+OBSERVER_KINDS: tuple[ConditionKind, ...] = (
+    ConditionKind(
+        NOT_ARMED,
+        "time since the start",
+        "s",
+        "hidden states and filters have not settled yet, nothing is judged",
+        False,
+    ),
+    ConditionKind(
+        NOT_JUDGED,
+        "how far the motion is from the middle of what was fitted, in half its width",
+        "1",
+        "the motion is beyond what the model was fitted to, nothing is judged",
+        False,
+    ),
+)
+"""What only the observer says, beside all of `CONDITION_KINDS`."""
+
 
 @dataclass(frozen=True)
 class Condition:
@@ -125,3 +145,23 @@ class Condition:
     value: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+
+
+def above(
+    name: str, active: NDArray[np.bool_], value: NDArray[np.float64], high: float
+) -> Condition:
+    """A condition whose value may not be above a limit."""
+    n = active.size
+    return Condition(
+        name, active.astype(np.uint8), value.copy(), np.full(n, -np.inf), np.full(n, float(high))
+    )
+
+
+def below(
+    name: str, active: NDArray[np.bool_], value: NDArray[np.float64], low: float
+) -> Condition:
+    """A condition whose value may not be below a limit."""
+    n = active.size
+    return Condition(
+        name, active.astype(np.uint8), value.copy(), np.full(n, low), np.full(n, np.inf)
+    )

@@ -45,7 +45,7 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
         scenario = find_config(RECORDINGS[role])
         _run(["plant", "--session", session, scenario], say)
     roles = [part for role, session in sessions.items() for part in (f"--{role}", session)]
-    _run(["commission", *roles, "--output", model], say)
+    _run(["commission", *roles, "--scheme", "transfer", "--output", model], say)
     # Trying it also compiles the monitor's kernels, so that it is quick to start on the live rig.
     say("the model is tried on the recording with known friction")
     _run(["replay", sessions["friction"], "--model", model], say)

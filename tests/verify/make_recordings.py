@@ -35,7 +35,10 @@ def make() -> None:
             path = Path(folder, f"{role}.mcap")
             write_session(path, SCENARIOS / f"{scenario}.toml")
             arguments += [f"--{role}", str(path)]
-        main(["commission", *arguments, "--output", str(FOLDER / "model.toml")])
+        main([
+            "commission", *arguments, "--scheme", "transfer",
+            "--output", str(FOLDER / "model.toml"),
+        ])  # fmt: skip
     for name, scenario in (("friction", "experiment_2"), ("stiction", "experiment_7")):
         path = FOLDER / f"{name}.mcap"
         path.unlink(missing_ok=True)

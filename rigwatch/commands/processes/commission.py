@@ -39,6 +39,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="inertia: force and position only, M q'' = force + offset, from one --healthy",
     )
     parser.add_argument(
+        "--scheme",
+        choices=("auto", "transfer", "equations"),
+        default="auto",
+        help="what the rig is watched by: a transfer function and its healthy average, equations "
+        "along the measured motion (no --friction needed), or whichever describes the healthy rig",
+    )
+    parser.add_argument(
+        "--equations",
+        default="servo-pneumatic",
+        metavar="MODEL",
+        help="name of a shipped model or a model file, for --scheme equations and auto",
+    )
+    parser.add_argument(
         "--band", type=float, nargs=2, default=(1.0, 14.0), metavar=("LOW", "HIGH"),
         help="frequencies the transfer function is fitted to [Hz]",
     )  # fmt: skip
@@ -48,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when the model file is written."""
-    from monitor.commissioning import CommissionSettings, commission
+    from monitor.commissioning import CommissionSettings, commission_best
     from monitor.model import model_text
     from monitor.signals import commission_inertia
 
@@ -59,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
         settings = CommissionSettings(
             band=tuple(arguments.band), window=arguments.window or 32, hop=arguments.hop
         )
-        model = commission(recordings, settings)
+        model = commission_best(recordings, settings, arguments.scheme, arguments.equations, say)
     _write(arguments.output, model_text(model))
     if arguments.json:
         print_json(_summary(model, arguments.output))
@@ -94,9 +107,11 @@ def _write(path: Path, text: str) -> None:
 
 
 def _summary(model: "RigModel", output: Path) -> dict[str, Any]:
+    why = {"scheme": model.scheme.why} if model.scheme and model.scheme.why else {}
     return {
         "model": str(output),
         "plant": type(model.plant).__struct_config__.tag,
+        **why,
         "signature": list(model.signature),
         "friction_explained": model.friction.explained,
         "residual_noise": model.noise.residual,

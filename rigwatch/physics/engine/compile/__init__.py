@@ -9,6 +9,7 @@ is stepped.
 from rigwatch.physics.engine.compile.compiled_system import (
     CompiledSystem,
     Linearisation,
+    Simulation,
     compile_system,
 )
 from rigwatch.physics.engine.compile.derivatives import derivative
@@ -19,6 +20,7 @@ from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_funct
 __all__ = [
     "CompiledSystem",
     "Linearisation",
+    "Simulation",
     "across",
     "call",
     "compile_system",

@@ -1,0 +1,232 @@
+"""Commissioning of the observer: healthy recordings in, one model file out.
+
+    chirp, healthy ─▶ motion ─▶ sensor behind the balance ─▶ parameters of the equations ─▶
+    remainder ─▶ range of motion, healthy spread and limits
+
+The equations are fitted to the earlier part of each recording; what they leave of the later part is
+what says whether they describe the rig at all. No recording of a fault is needed.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import savgol_coeffs
+
+from monitor.commissioning.healthy_fit import Stretch, fit_healthy
+from monitor.commissioning.healthy_limits import HealthyPart, healthy_limits
+from monitor.commissioning.sensor_chain import fit_sensor
+from monitor.model import (
+    EquationsPlant,
+    FrictionSection,
+    NoiseSection,
+    RecordingSection,
+    RemainderSection,
+    RigModel,
+    SchemeSection,
+)
+from monitor.observer import (
+    EMPTY,
+    MEASURED,
+    PREDICTED,
+    E,
+    FixedLag,
+    Layout,
+    Observed,
+    ObserverSignals,
+    base_model,
+    drive_energy,
+    fit_remainder,
+    force_port,
+    high_pass,
+    layout_of,
+    levels,
+    no_remainder,
+    range_of,
+    range_signals,
+    remainder_signals,
+)
+from monitor.signals import GOOD, NEW_BOOT, Codes, Recording
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
+
+EQUATIONS = "servo-pneumatic"
+"""Shipped model that is fitted where none is named."""
+FITTED, CHIRP = 6.0, 14.0
+"""Beginning of a recording, and of one that sweeps through frequencies, that is fitted [s]."""
+TRAINED = 2.0 / 3.0
+"""Share of each recording from which the remainder is learnt before it is judged on the rest."""
+SKIPPED = 1.0
+"""Beginning of each recording that limits are not taken from [s]."""
+WORST = 0.2
+"""Residual of held-out healthy data, over what is measured, above which nothing is described."""
+SLOW, TURNS = 0.02, 4.0
+"""Share of the speed's rms, and deviations of its noise, that cannot be told from rest."""
+
+
+def commission_equations(
+    recordings: Sequence[Recording], name: str = EQUATIONS, corner: float = 2.0
+) -> RigModel:
+    """The model file of the observer scheme.
+
+    Args:
+        recordings: chirps and healthy ones; others are not used.
+        name: of a shipped model, or its file.
+        corner: of the high-pass of all that is judged [Hz].
+
+    Raises:
+        ModelError: there is no healthy recording, rates differ, or the equations do not describe
+            the rig.
+    """
+    used = [one for one in recordings if one.role != "friction"]
+    if not any(one.role == "healthy" for one in used):
+        raise ModelError("commissioning: found no healthy recording, expected at least one")
+    rates = {one.sample_rate for one in used}
+    if len(rates) != 1:
+        raise ModelError(f"commissioning: found sample rates {sorted(rates)} Hz, expected one")
+    rate = rates.pop()
+    plant = _fitted(used, name, corner, rate)
+    parts, remainder, scheme = _remainder(used, plant, rate)
+    return _model(used, plant, remainder, scheme, parts, rate)
+
+
+def _fitted(used: Sequence[Recording], name: str, corner: float, rate: float) -> EquationsPlant:
+    """The equations with parameters from the earlier part of each recording."""
+    model = base_model(name)
+    port = force_port(model)
+    layout = layout_of(model, port)
+    lag = EquationsPlant(model=name, names=(), values=(), port=port).half_width
+    moved = [_motion(one, layout, lag, rate) for one in used]
+    n = layout.inputs
+    known = fit_sensor(model, [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved], rate)
+    stretches = [
+        Stretch(*_cut(m, layout, round((CHIRP if one.role == "chirp" else FITTED) * rate)))
+        for one, m in zip(used, moved, strict=True)
+    ]
+    turn = TURNS * _speed_noise(used, layout, lag, rate)
+    noise = min(_noise(one.channel(layout.channels[-1])) for one in used)
+    found = fit_healthy(
+        name, port, stretches, turn=turn, corner=corner, rate=rate, noise=noise, known=known
+    )
+    return EquationsPlant(
+        model=name, names=found.names, values=found.values, port=port, coulomb=found.coulomb,
+        turn=turn, half_width=lag, corner=corner,
+    )  # fmt: skip
+
+
+def _motion(one: Recording, layout: Layout, lag: int, rate: float) -> FloatArray:
+    columns, state = FixedLag(layout.columns, lag, rate).update(*_admitted(one, layout))
+    return np.ascontiguousarray(columns[state != EMPTY])
+
+
+def _admitted(one: Recording, layout: Layout) -> tuple[FloatArray, Codes]:
+    signals = np.column_stack([one.channel(name) for name in layout.channels])
+    code = np.full(len(signals), GOOD, np.int64)
+    code[0] = NEW_BOOT
+    return signals, code
+
+
+def _cut(moved: FloatArray, layout: Layout, n: int) -> tuple[FloatArray, FloatArray]:
+    inputs = layout.inputs
+    return np.ascontiguousarray(moved[:n, :inputs]), np.ascontiguousarray(moved[:n, inputs])
+
+
+def _noise(signal: FloatArray) -> float:
+    """White noise of a signal, from its third differences, rms."""
+    return max(float(np.std(np.diff(signal, 3)) / np.sqrt(20.0)), 1e-12)
+
+
+def _speed_noise(used: Sequence[Recording], layout: Layout, lag: int, rate: float) -> float:
+    column = layout.columns[layout.speed]
+    channel = layout.channels[column.channel]
+    kernel = savgol_coeffs(2 * lag + 1, 3, deriv=column.order, delta=1.0 / rate)
+    noises = [_noise(one.channel(channel)) for one in used]
+    return max(min(noises) * float(np.linalg.norm(kernel)), 1e-9)
+
+
+def _observed(
+    used: Sequence[Recording], plant: EquationsPlant, remainder: RemainderSection, rate: float
+) -> list[Observed]:
+    found = []
+    for one in used:
+        signals = ObserverSignals(plant, remainder, rate)
+        found.append(signals.update(*_admitted(one, signals.layout)))
+    return found
+
+
+def _remainder(
+    used: Sequence[Recording], plant: EquationsPlant, rate: float
+) -> tuple[list[Observed], RemainderSection, SchemeSection]:
+    """The remainder, and how much is left of the part of each recording that it has not seen.
+
+    Raises:
+        ModelError: too much.
+    """
+    layout = layout_of(base_model(plant.model), plant.port)
+    size = ObserverSignals(plant, no_remainder(0), rate).remainder_size
+    bare = _observed(used, plant, no_remainder(size), rate)
+    filters, skip = high_pass(plant.corner, rate), round(SKIPPED * rate)
+    pairs = [(remainder_signals(o.rows, o.predicted, layout), o.judged[:, E]) for o in bare]
+    earlier = [(z[: _split(z)], e[: _split(z)]) for z, e in pairs]
+    learnt = fit_remainder(earlier, filters, skip)
+    later = _observed(used, plant, learnt, rate)
+    left = [o.judged[_split(o.judged) :] for o in later]
+    shares = [_rms(part[:, E]) / max(_rms(part[:, MEASURED]), 1e-12) for part in left]
+    worst = int(np.argmax(shares))
+    if shares[worst] > WORST or not np.isfinite(shares[worst]):
+        raise ModelError(
+            f"{used[worst].name}: the equations of {plant.model} leave {100 * shares[worst]:.0f} %"
+            f" of a healthy recording, expected at most {100 * WORST:.0f} %: the model cannot judge"
+            " this rig; try another model, or check that the recording is healthy"
+        )
+    held_out = _rms(np.concatenate([part[:, E] for part in left]))
+    scheme = SchemeSection(why="", held_out=held_out, share=float(max(shares)))
+    remainder = fit_remainder(pairs, filters, skip)
+    return _observed(used, plant, remainder, rate), remainder, scheme
+
+
+def _split(rows: FloatArray) -> int:
+    return round(TRAINED * len(rows))
+
+
+def _rms(signal: FloatArray) -> float:
+    return float(np.sqrt(np.mean(signal**2)))
+
+
+def _model(  # noqa: PLR0917 -- all that was found
+    used: Sequence[Recording],
+    plant: EquationsPlant,
+    remainder: RemainderSection,
+    scheme: SchemeSection,
+    parts: Sequence[Observed],
+    rate: float,
+) -> RigModel:
+    layout = layout_of(base_model(plant.model), plant.port)
+    speeds = np.concatenate([o.rows[:, layout.speed] for o in parts])
+    slow = max(SLOW * _rms(speeds), plant.turn)
+    seen = range_of(layout.signals, [range_signals(o)[o.state != EMPTY] for o in parts])
+    healthy = [
+        HealthyPart(
+            o.judged,
+            np.ascontiguousarray(o.rows[:, layout.speed]),
+            levels(o.rows[:, list(layout.motions)], o.judged[:, PREDICTED], remainder),
+            drive_energy(o.rows, seen, layout.motions),
+            o.state,
+        )
+        for o in parts
+    ]
+    skip = round(SKIPPED * rate)
+    limits = healthy_limits(healthy, slow, skip)
+    return RigModel(
+        sample_rate=rate,
+        channels=layout.channels,
+        plant=plant,
+        friction=FrictionSection(b=(1.0,), a=(1.0,), gamma=0.0),
+        noise=NoiseSection(residual=limits.noise),
+        remainder=remainder,
+        motion_range=seen,
+        healthy=limits,
+        scheme=scheme,
+        recording=tuple(
+            RecordingSection(role=one.role, name=one.name, sha256=one.sha256) for one in used
+        ),
+    )

@@ -1,0 +1,133 @@
+"""Limits from healthy recordings: the residual's size, its growth, and how far it ever strays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from monitor.model import HealthyLimits
+from monitor.observer import (
+    DEVIATIONS,
+    DISAGREE,
+    MEASURED,
+    MEDIUM,
+    OUTPUTS,
+    SHORT,
+    SPREAD,
+    DecisionRules,
+    E,
+    decide,
+    new_state,
+)
+from monitor.signals import Codes
+from rigwatch.wire.arrays import FloatArray
+
+NEVER = 1 << 40
+LOW, HIGH = 5.0, 90.0
+"""Percentiles of windows that stand for the spread at rest, and for its growth with the motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class HealthyPart:
+    """A healthy recording: judged columns, speed, levels of the motion, drive, and states."""
+
+    judged: FloatArray
+    speed: FloatArray
+    levels: FloatArray
+    drive: FloatArray
+    state: Codes
+
+    def energies(self, column: int, skip: int) -> FloatArray:
+        """Mean squares of a judged column over medium windows."""
+        return _energies(self.judged[skip:, column], MEDIUM)
+
+    def grown(self, skip: int) -> FloatArray:
+        """Mean levels over medium windows, shape (windows, levels)."""
+        return np.column_stack([_means(level[skip:], MEDIUM) for level in self.levels.T])
+
+
+def healthy_limits(parts: Sequence[HealthyPart], speed_noise: float, skip: int) -> HealthyLimits:
+    """Limits from healthy recordings.
+
+    Args:
+        parts: the recordings.
+        speed_noise: speed that cannot be told from rest.
+        skip: samples of each beginning that are not counted.
+    """
+    errors = [part.energies(E, skip) for part in parts]
+    noise, growth = variance(errors, [part.grown(skip) for part in parts])
+    gaps = [part.energies(DISAGREE, skip) for part in parts]
+    sizes = [part.energies(MEASURED, skip) for part in parts]
+    sensor_noise, sensor_growth = spread(np.concatenate(gaps), np.concatenate(sizes))
+    sensor = max(
+        float(np.max(gap / (sensor_noise**2 + sensor_growth**2 * size)))
+        for gap, size in zip(gaps, sizes, strict=True)
+    )
+    rules = DecisionRules(
+        noise, growth, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, speed_noise, NEVER, 1
+    )  # fmt: skip
+    short = medium = friction = 0.0
+    for part in parts:
+        out = _tried(part, rules)
+        allowed = out[SPREAD] ** 2
+        short = max(short, _largest(part.judged[:, E], SHORT, allowed, skip))
+        medium = max(medium, _largest(part.judged[:, E], MEDIUM, allowed, skip))
+        friction = max(friction, float(np.abs(out[DEVIATIONS][skip:]).max()))
+    return HealthyLimits(
+        noise=noise, growth=tuple(growth.tolist()), short=short, medium=medium, friction=friction,
+        sensor_noise=sensor_noise, sensor_growth=sensor_growth, sensor=sensor,
+        speed_noise=speed_noise,
+    )  # fmt: skip
+
+
+def variance(
+    errors: Sequence[FloatArray], levels: Sequence[FloatArray]
+) -> tuple[float, FloatArray]:
+    """Noise n and growth κ ≥ 0 of a variance n² + κ·A, fitted in shares of what is there.
+
+    Args:
+        errors: mean squares over windows, one array a recording.
+        levels: mean levels over the same windows, shape (windows, levels).
+    """
+    error, level = np.concatenate(errors), np.concatenate(levels)
+    least = float(np.percentile(error, LOW))
+    columns = np.column_stack([np.full(error.size, least), level]) / (error + least)[:, None]
+    found, _ = nnls(columns, error / (error + least))
+    return float(np.sqrt(max(found[0], 0.5) * least)), found[1:]
+
+
+def spread(errors: FloatArray, levels: FloatArray) -> tuple[float, float]:
+    """n and κ of a variance n² + κ²·A² from mean squares over windows."""
+    noise = float(np.percentile(errors, LOW))
+    moving = levels > 1e-3 * levels.max()
+    growth = float(np.percentile(np.maximum(errors - noise, 0.0)[moving] / levels[moving], HIGH))
+    return float(np.sqrt(noise)), float(np.sqrt(growth))
+
+
+def _means(signal: FloatArray, length: int) -> FloatArray:
+    """Means over all windows of a length."""
+    total = np.cumsum(np.concatenate([[0.0], signal]))
+    return np.asarray((total[length:] - total[:-length]) / length)
+
+
+def _energies(signal: FloatArray, length: int) -> FloatArray:
+    """Mean squares over all windows of a length."""
+    return _means(signal**2, length)
+
+
+def _largest(signal: FloatArray, length: int, allowed: FloatArray, skip: int) -> float:
+    energy = _energies(signal, length)
+    return float(np.max((energy / allowed[length - 1 :])[skip:]))
+
+
+def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
+    """The decision's columns, whatever it would say."""
+    out = np.zeros((len(OUTPUTS), len(part.state)))
+    inside = np.ones(len(part.state), np.bool_)
+    kept = new_state(part.levels.shape[1])
+    decide(
+        part.judged, part.speed, part.levels, part.drive, inside, part.state, rules, kept, out
+    )  # fmt: skip
+    out[SPREAD] = np.maximum(out[SPREAD], rules.noise)
+    return out

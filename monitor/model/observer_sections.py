@@ -1,0 +1,74 @@
+"""What the model file holds for the observer scheme."""
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from rigwatch.wire.typed_files import Section
+
+Floats = tuple[float, ...]
+
+
+class EquationsPlant(Section, frozen=True, kw_only=True, tag="equations", tag_field="kind"):
+    """[plant] kind = "equations": a model of equations, driven along the measured motion."""
+
+    model: Annotated[str, Meta(min_length=1, description="name of a shipped model, or its file")]
+    names: Annotated[tuple[str, ...], Meta(description="parameters of the model")]
+    values: Annotated[Floats, Meta(description="their fitted values, in the model's units")]
+    port: Annotated[str, Meta(description="force port at which friction enters")]
+    coulomb: Annotated[float, Meta(description="dry friction of the healthy rig [N]")] = 0.0
+    turn: Annotated[
+        float, Meta(gt=0, description="speed over which the sign of the motion turns [m/s]")
+    ] = 1e-3
+    half_width: Annotated[
+        int, Meta(ge=2, le=32, description="lag of the smoothed motion [samples]")
+    ] = 4
+    corner: Annotated[
+        float, Meta(gt=0, description="corner of the high-pass of residual and regressors [Hz]")
+    ] = 2.0
+
+
+class RemainderSection(Section, frozen=True, kw_only=True):
+    """What the equations leave of a healthy rig, as a polynomial of second degree in its states."""
+
+    centre: Annotated[Floats, Meta(description="mean of each signal")]
+    scale: Annotated[Floats, Meta(description="standard deviation of each signal")]
+    weights: Annotated[Floats, Meta(description="of each signal, then of each product of two")]
+
+
+class RangeSection(Section, frozen=True, kw_only=True):
+    """The motion that the model has seen."""
+
+    names: Annotated[tuple[str, ...], Meta(description="inputs, motion, and what is predicted")]
+    low: Annotated[Floats, Meta(description="least value of each")]
+    high: Annotated[Floats, Meta(description="largest value of each")]
+
+
+class HealthyLimits(Section, frozen=True, kw_only=True):
+    """What the healthy rig leaves, and how far it strays."""
+
+    noise: Annotated[float, Meta(gt=0, description="residual at standstill, rms")]
+    growth: Annotated[
+        Floats,
+        Meta(
+            description="of the residual's variance: with the predicted output's mean square, with "
+            "each motion's, scaled as for the remainder, and with each motion's fourth power"
+        ),
+    ]
+    short: Annotated[float, Meta(gt=0, description="largest energy of a short window")]
+    medium: Annotated[float, Meta(gt=0, description="largest energy of a medium window")]
+    friction: Annotated[float, Meta(gt=0, description="largest Coulomb estimate in deviations")]
+    sensor_noise: Annotated[float, Meta(gt=0, description="sensors' disagreement at rest, rms")]
+    sensor_growth: Annotated[float, Meta(ge=0, description="of it with the measured output")]
+    sensor: Annotated[float, Meta(gt=0, description="largest energy of their disagreement")]
+    speed_noise: Annotated[float, Meta(gt=0, description="speed that cannot be told from rest")]
+
+
+class SchemeSection(Section, frozen=True, kw_only=True):
+    """[scheme] — why the file's plant was chosen, and what was left of healthy recordings."""
+
+    why: Annotated[str, Meta(description="why this scheme was chosen, with figures")]
+    held_out: Annotated[
+        float, Meta(ge=0, description="residual on held-out healthy data, rms, high-passed")
+    ] = 0.0
+    share: Annotated[float, Meta(ge=0, description="of the measured output that it is")] = 0.0

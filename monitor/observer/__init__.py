@@ -1,0 +1,83 @@
+"""The observer scheme: fitted equations run along the measured motion, whatever drives it.
+
+    samples ─▶ motion ─▶ prediction ─▶ residual ─▶ decision ─▶ estimates, conditions
+               (lag)     (equations)   (remainder,  (range, window,
+                                        high-pass)   episode, verdict)
+
+A model of equations is driven by what the sensors show, so that its hidden states need no initial
+values and its residual is the missing force at every sample: no period, no phase, and no recording
+of a known fault. Its part of the model file is declared in `monitor.model`, and
+`monitor.commissioning` makes it from healthy recordings.
+"""
+
+from monitor.observer import decision_state
+from monitor.observer.decision_state import (
+    DEVIATIONS,
+    MEDIUM,
+    OUTPUTS,
+    SHORT,
+    SPREAD,
+    DecisionRules,
+    new_state,
+)
+from monitor.observer.lagged_motion import EMPTY, FixedLag
+from monitor.observer.missing_force import DISAGREE, MEASURED, PREDICTED, E, high_pass, levels
+from monitor.observer.model_signals import (
+    Layout,
+    Observed,
+    ObserverSignals,
+    layout_of,
+    remainder_signals,
+)
+from monitor.observer.observer_decision import decide
+from monitor.observer.prediction import (
+    SETTLING,
+    SUBSTEPS,
+    balanced,
+    base_model,
+    driven,
+    force_port,
+    friction_at,
+    rate_columns,
+)
+from monitor.observer.range_seen import RangeSeen, drive_energy, range_of, range_signals
+from monitor.observer.remainder import fit_remainder, no_remainder
+
+__all__ = [
+    "DEVIATIONS",
+    "DISAGREE",
+    "EMPTY",
+    "MEASURED",
+    "MEDIUM",
+    "OUTPUTS",
+    "PREDICTED",
+    "SETTLING",
+    "SHORT",
+    "SPREAD",
+    "SUBSTEPS",
+    "DecisionRules",
+    "E",
+    "FixedLag",
+    "Layout",
+    "Observed",
+    "ObserverSignals",
+    "RangeSeen",
+    "balanced",
+    "base_model",
+    "decide",
+    "decision_state",
+    "drive_energy",
+    "driven",
+    "fit_remainder",
+    "force_port",
+    "friction_at",
+    "high_pass",
+    "layout_of",
+    "levels",
+    "new_state",
+    "no_remainder",
+    "range_of",
+    "range_signals",
+    "rate_columns",
+    "remainder_signals",
+]

@@ -1,0 +1,115 @@
+"""What the observer's decision carries from sample to sample, and what it puts out."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from monitor.model import HealthyLimits
+from rigwatch.wire.arrays import FloatArray
+
+SHORT, MEDIUM, LONG = 8, 32, 128
+"""Windows [samples]: a jump, one estimate, one name."""
+HISTORY = LONG
+
+ARMING, JUDGING, BEYOND = 0.0, 1.0, 2.0
+"""Modes: hidden states settle; everything is judged; the motion is beyond what was fitted."""
+UNNAMED, FRICTION, STICKING, OTHER = 0.0, 1.0, 2.0, 3.0
+"""Verdicts."""
+
+OUTPUTS = (
+    "mode", "deviation", "force", "viscous", "named_force", "share", "dry_share", "rest",
+    "verdict", "sensors", "spread", "departed", "amplitude", "deviations",
+)  # fmt: skip
+(
+    MODE, DEVIATION, FORCE, VISCOUS, NAMED_FORCE, SHARE, DRY_SHARE, REST,
+    VERDICT, SENSORS, SPREAD, DEPARTED, AMPLITUDE, DEVIATIONS,
+) = range(len(OUTPUTS))  # fmt: skip
+
+ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, SPEED, LEVELS = range(8)
+"""Columns of the history; from `LEVELS` on, what the healthy variance grows with."""
+
+
+class Counts(NamedTuple):
+    """Places in `DecisionState.counts`."""
+
+    head: int = 0
+    filled: int = 1
+    since_start: int = 2
+    quiet: int = 3
+    beyond: int = 4
+    since_onset: int = 5
+    since_departed: int = 6
+    agreed: int = 7
+    disagreed: int = 8
+    since_change: int = 9
+
+
+AT = Counts()
+
+
+class DecisionState(NamedTuple):
+    """Carried state.
+
+    Args:
+        rows: the last samples, shape (HISTORY, LEVELS + levels).
+        counts: see `Counts`; since_onset is -1 without an episode.
+        value: verdict, named force, and energies of the drive of late and before.
+    """
+
+    rows: FloatArray
+    counts: NDArray[np.int64]
+    value: FloatArray
+
+
+def new_state(levels: int) -> DecisionState:
+    """Before the first sample.
+
+    Args:
+        levels: what the healthy variance grows with.
+    """
+    count = np.zeros(len(AT), np.int64)
+    count[AT.since_onset] = -1
+    return DecisionState(np.zeros((HISTORY, LEVELS + levels)), count, np.zeros(4))
+
+
+class DecisionRules(NamedTuple):
+    """What is decided by; energies are in the healthy variance, see `HealthyLimits`."""
+
+    noise: float
+    growth: FloatArray
+    short: float
+    medium: float
+    friction: float
+    sensor_noise: float
+    sensor_growth: float
+    sensor: float
+    speed_noise: float
+    settle: int
+    patience: int
+
+
+MARGIN = 1.6
+"""How far a statistic must be beyond the largest of healthy recordings, in amplitude."""
+
+
+def rules_of(limits: HealthyLimits, rate: float) -> DecisionRules:
+    """Rules for a rate [Hz]."""
+    energy = MARGIN**2
+    return DecisionRules(
+        limits.noise,
+        np.array(limits.growth),
+        limits.short * energy,
+        limits.medium * energy,
+        limits.friction * MARGIN,
+        limits.sensor_noise,
+        limits.sensor_growth,
+        limits.sensor * energy,
+        limits.speed_noise,
+        round(SETTLE * rate),
+        round(PATIENCE * rate),
+    )
+
+
+SETTLE, PATIENCE = 1.0, 0.75
+"""Time until hidden states and filters settle, and in which friction shows itself [s]."""

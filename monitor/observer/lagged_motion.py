@@ -1,0 +1,107 @@
+"""The measured motion, live: every signal through one short symmetric kernel, with a fixed lag.
+
+Signals that are not differentiated are delayed by the same lag, so that all columns belong to the
+same instant. The kernels are polynomials of third order fitted to the samples about each instant
+(A. Savitzky, M. Golay, Analytical Chemistry 36, 1964).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.signal import savgol_coeffs
+
+from monitor.signals import DEAD, GOOD, NEW_BOOT, RESTART, Codes
+from rigwatch.wire.arrays import FloatArray
+
+DELAY, MATCHED = -1, -2
+"""Orders of columns that are only delayed, or smoothed as one that is differentiated twice is."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionColumn:
+    """One column: a channel by its place, smoothed and differentiated `order` times, or delayed."""
+
+    channel: int
+    order: int
+
+
+class FixedLag:
+    """Carries the last samples from block to block.
+
+    Args:
+        columns: what is made of the channels.
+        half_width: lag [samples].
+        rate: samples a second [Hz].
+    """
+
+    def __init__(self, columns: Sequence[MotionColumn], half_width: int, rate: float) -> None:
+        self._kernels = np.array([_kernel(column.order, half_width, rate) for column in columns])
+        self._channels = np.array([column.channel for column in columns])
+        self._ring = np.zeros((2 * half_width + 1, int(self._channels.max()) + 1))
+        self._count = np.zeros(3, np.int64)
+
+    def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes]:
+        """The next samples, shape (n, channels), to columns, shape (n, columns), and their state.
+
+        The state of a sample is 0 without a whole kernel, 1 for the first with one after a start, 2
+        for a good one, 3 where a reading in its kernel is held.
+        """
+        out = np.zeros((code.size, self._channels.size))
+        state = np.zeros(code.size, np.int64)
+        _advance(signals, code, self._kernels, self._channels, self._ring, self._count, out, state)
+        return out, state
+
+
+EMPTY, FIRST, WHOLE, TAINTED = 0, 1, 2, 3
+"""States of a sample, see `FixedLag.update`."""
+
+
+def _kernel(order: int, half_width: int, rate: float) -> FloatArray:
+    """Weights, oldest sample first, shape (2·half_width + 1,)."""
+    width = 2 * half_width + 1
+    if order == DELAY:
+        return np.asarray(np.eye(width)[half_width], np.float64)
+    if order == MATCHED:
+        # The kernel of the second derivative is a second difference of a smoothing one.
+        second = savgol_coeffs(width, 3, deriv=2, delta=1.0, use="dot")
+        smoothing = np.cumsum(np.cumsum(second))[:-2]
+        return np.asarray(np.concatenate([[0.0], smoothing, [0.0]]), np.float64)
+    return np.asarray(savgol_coeffs(width, 3, deriv=order, delta=1.0 / rate, use="dot"))
+
+
+@njit(cache=True)
+def _advance(  # noqa: PLR0917 -- a kernel
+    signals: FloatArray,
+    code: Codes,
+    kernels: FloatArray,
+    channels: NDArray[np.int64],
+    ring: FloatArray,
+    count: Codes,
+    out: FloatArray,
+    state: Codes,
+) -> None:
+    """`count` holds the ring's head, the samples since the start, and those since one was held."""
+    width = ring.shape[0]
+    for k in range(code.size):
+        if code[k] == RESTART or code[k] == NEW_BOOT:
+            count[1] = 0
+            count[2] = width
+        if code[k] == DEAD:
+            continue
+        for c in range(ring.shape[1]):
+            ring[count[0], c] = signals[k, c]
+        count[0] = (count[0] + 1) % width
+        count[1] += 1
+        good = code[k] == GOOD or code[k] == RESTART or code[k] == NEW_BOOT
+        count[2] = min(count[2] + 1, width) if good else 0
+        if count[1] < width:
+            continue
+        state[k] = FIRST if count[1] == width else (WHOLE if count[2] >= width else TAINTED)
+        for c in range(channels.size):
+            total = 0.0
+            for j in range(width):
+                total += kernels[c, j] * ring[(count[0] + j) % width, channels[c]]
+            out[k, c] = total

@@ -1,0 +1,115 @@
+"""The residual of the observer: what is measured less what equations and remainder predict.
+
+    e  = H[ y - ŷ - w·φ(z) ],   φ(z) = (z_i, z_i·z_j),   z = (motion, hidden states), scaled
+    g1 = H[ŷ with one newton of dry friction - ŷ],   g2 = the same for viscous friction
+
+Where a plant integrates, small errors of its flows add up to slow ones of its forces, so that
+everything is judged above a corner: H is a Butterworth high-pass of second order, the same for all.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from scipy.signal import butter
+
+from monitor.model import RemainderSection
+from monitor.observer.lagged_motion import EMPTY, FIRST
+from rigwatch.physics.transfer import filter_sample
+from rigwatch.wire.arrays import FloatArray
+
+COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured")
+E, G1, G2, PREDICTED, DISAGREE, MEASURED = range(6)
+
+
+class Polynomial(NamedTuple):
+    """The remainder as arrays."""
+
+    centre: FloatArray
+    scale: FloatArray
+    weights: FloatArray
+
+
+def polynomial(section: RemainderSection) -> Polynomial:
+    """The remainder of a model file."""
+    return Polynomial(*map(np.array, (section.centre, section.scale, section.weights)))
+
+
+def terms(signals: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
+    """φ of signals, shape (n, signals), as columns, shape (n, terms)."""
+    z = (signals - centre) / scale
+    products = [z[:, i] * z[:, j] for i in range(z.shape[1]) for j in range(i, z.shape[1])]
+    return np.column_stack([z, *products])
+
+
+def levels(motion: FloatArray, predicted: FloatArray, known: RemainderSection) -> FloatArray:
+    """What the healthy variance grows with, shape (n, 1 + 2·motions).
+
+    Args:
+        motion: shape (n, motions).
+        predicted: the high-passed prediction, shape (n,).
+        known: centre and scale of the motion, which comes first in it.
+    """
+    count = motion.shape[1]
+    z = (motion - np.array(known.centre[:count])) / np.array(known.scale[:count])
+    return np.ascontiguousarray(np.column_stack([predicted**2, z**2, z**4]))
+
+
+def high_pass(corner: float, rate: float) -> tuple[FloatArray, FloatArray]:
+    """Numerator and denominator of H."""
+    b, a = butter(2, 2.0 * corner / rate, "high")
+    return np.asarray(b), np.asarray(a)
+
+
+class HighPassed:
+    """Carries the high-passes of all columns from block to block."""
+
+    def __init__(self, corner: float, rate: float, remainder: RemainderSection) -> None:
+        self._b, self._a = high_pass(corner, rate)
+        self._state = np.zeros((len(COLUMNS), 2))
+        self._remainder = polynomial(remainder)
+
+    def update(self, columns: FloatArray, z: FloatArray, state: np.ndarray) -> FloatArray:
+        """High-passed columns, shape (n, 6), from raw ones and the signals of the remainder."""
+        out = np.zeros_like(columns)
+        _advance(columns, z, state, self._remainder, self._b, self._a, self._state, out)
+        return out
+
+
+@njit(cache=True)
+def _advance(  # noqa: PLR0917 -- a kernel
+    columns: FloatArray,
+    z: FloatArray,
+    state: np.ndarray,
+    known: Polynomial,
+    b: FloatArray,
+    a: FloatArray,
+    kept: FloatArray,
+    out: FloatArray,
+) -> None:
+    count = z.shape[1]
+    scaled = np.zeros(count)
+    for k in range(state.size):
+        if state[k] == EMPTY:
+            continue
+        if state[k] == FIRST:
+            _at_rest(columns[k], kept, b)
+        for i in range(count):
+            scaled[i] = (z[k, i] - known.centre[i]) / known.scale[i]
+        remainder, place = 0.0, count
+        for i in range(count):
+            remainder += known.weights[i] * scaled[i]
+            for j in range(i, count):
+                remainder += known.weights[place] * scaled[i] * scaled[j]
+                place += 1
+        for c in range(columns.shape[1]):
+            value = columns[k, c] - (remainder if c == E else 0.0)
+            out[k, c] = filter_sample(b, a, kept[c], value)
+
+
+@njit(cache=True)
+def _at_rest(row: FloatArray, kept: FloatArray, b: FloatArray) -> None:
+    """States of a high-pass that has seen this row for ever, in transposed direct form II."""
+    for c in range(kept.shape[0]):
+        kept[c, 0] = -b[0] * row[c]
+        kept[c, 1] = b[2] * row[c]

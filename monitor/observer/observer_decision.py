@@ -1,0 +1,334 @@
+"""Sample by sample: estimates, departure, episode and verdict of the observer.
+
+    e ─▶ energies of a short and a medium window ─┐
+    e, g ─▶ Coulomb and viscous force (window) ───┼▶ departure ─▶ episode ─▶ verdict
+    two views of the measured output ─────────────┘
+
+Energies are in the healthy variance n² + κ·A, with A mean squares and fourth powers of the motion
+and of what is predicted, as what equations leave grows with the motion. A departure is friction
+where, since its onset, dry friction explains what is seen, a reversal is among it, and the sensors
+agree with each other.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from monitor.observer.decision_state import (
+    AMPLITUDE,
+    ARMING,
+    BEYOND,
+    DEPARTED,
+    DEVIATION,
+    DEVIATIONS,
+    DISAGREE,
+    DRY,
+    DRY_SHARE,
+    ERROR,
+    FORCE,
+    FRICTION,
+    HISTORY,
+    JUDGING,
+    LEVEL,
+    LEVELS,
+    LONG,
+    MEASURED,
+    MEDIUM,
+    MODE,
+    NAMED_FORCE,
+    OTHER,
+    REST,
+    SENSORS,
+    SHARE,
+    SHORT,
+    SPEED,
+    SPREAD,
+    STICKING,
+    UNNAMED,
+    VERDICT,
+    VISCOUS,
+    WET,
+    DecisionRules,
+    DecisionState,
+)
+from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
+from monitor.signals import Codes
+from rigwatch.wire.arrays import FloatArray
+
+HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED = range(
+    10
+)
+"""Places of `decision_state.Counts`, as the kernel needs constants."""
+LOOKS = 3
+"""Samples in a row that must agree on friction."""
+LEAST_LOOK = 12
+"""Samples from the onset on before friction is named [samples]."""
+FITS, DRY_PART = 0.75, 0.5
+"""Share of the missing force, beyond noise, that friction explains and its dry part stands for."""
+FITS_LATER = 0.6
+"""The same over a whole long window, where onsets and edges have faded."""
+AT_REST, STUCK = 0.25, 0.5
+"""Share of the time at rest that makes it sticking."""
+OVER = 256
+"""Samples without a departure after which an episode is over."""
+RIDGE = 1e-3
+"""Of the viscous regressor against the dry one, where the two cannot be told apart."""
+VIOLATED = 16
+"""Samples in a row in which the sensors disagree."""
+SUDDEN, LATE, BEFORE = 8.0, 16.0, 256.0
+"""A drive whose energy over `LATE` samples is so many times that over `BEFORE` has just begun, or
+grown; what follows is no steady motion.
+"""
+
+
+@njit(cache=True)
+def decide(  # noqa: PLR0917 -- a kernel
+    judged: FloatArray,
+    speed: FloatArray,
+    levels: FloatArray,
+    drive: FloatArray,
+    inside: NDArray[np.bool_],
+    state: Codes,
+    rules: DecisionRules,
+    kept: DecisionState,
+    out: FloatArray,
+) -> None:
+    """Fill the columns of `OUTPUTS`, shape (outputs, n), sample by sample."""
+    for k in range(state.size):
+        if state[k] == EMPTY:
+            continue
+        if state[k] == FIRST:
+            _restart(kept)
+        _follow_drive(drive[k], kept)
+        if state[k] != TAINTED:
+            _remember(kept, judged[k], speed[k], levels[k])
+        _one(k, inside[k], rules, kept, out)
+
+
+@njit(cache=True)
+def _restart(kept: DecisionState) -> None:
+    for place in range(kept.counts.size):
+        kept.counts[place] = 0
+    kept.counts[ONSET] = -1
+    kept.value[:] = 0.0
+    kept.value[0] = UNNAMED
+
+
+@njit(cache=True)
+def _follow_drive(energy: float, kept: DecisionState) -> None:
+    """Notice that the drive begins or grows suddenly."""
+    late, before = kept.value[2], kept.value[3]
+    late += (energy - late) / LATE
+    before += (energy - before) / BEFORE
+    kept.counts[CHANGED] += 1
+    if late > SUDDEN * before + 1e-4:
+        kept.counts[CHANGED] = 0
+    kept.value[2], kept.value[3] = late, before
+
+
+@njit(cache=True)
+def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray) -> None:
+    """The first columns stand in the order of the residual's."""
+    head = kept.counts[HEAD]
+    for c in range(6):
+        kept.rows[head, c] = row[c]
+    kept.rows[head, SPEED] = speed
+    for c in range(levels.size):
+        kept.rows[head, LEVELS + c] = levels[c]
+    kept.counts[HEAD] = (head + 1) % HISTORY
+    kept.counts[FILLED] = min(kept.counts[FILLED] + 1, HISTORY)
+
+
+@njit(cache=True)
+def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: FloatArray) -> None:
+    count = kept.counts
+    count[SINCE_START] += 1
+    count[OUTSIDE] = 0 if not inside else min(count[OUTSIDE] + 1, LONG)
+    out[AMPLITUDE, k] = _mean_square(kept, LEVEL, MEDIUM)
+    spread = np.sqrt(_variance(kept, rules))
+    out[SPREAD, k] = spread
+    force, viscous, deviations, _, _ = _friction(kept, MEDIUM, spread)
+    out[FORCE, k], out[VISCOUS, k], out[DEVIATIONS, k] = force, viscous, deviations
+    out[REST, k] = _rest(kept, LONG, rules.speed_noise)
+    sensor_variance = rules.sensor_noise**2 + rules.sensor_growth**2 * _mean_square(
+        kept, MEASURED, MEDIUM
+    )
+    out[SENSORS, k] = _mean_square(kept, DISAGREE, MEDIUM) / sensor_variance / rules.sensor
+    short = _mean_square(kept, ERROR, SHORT) / spread**2 / rules.short
+    medium = _mean_square(kept, ERROR, MEDIUM) / spread**2 / rules.medium
+    largest = max(np.sqrt(short), np.sqrt(medium), deviations / rules.friction)
+    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]))
+    away = out[DEVIATION, k] > 1.0
+    count[QUIET] = 0 if away else count[QUIET] + 1
+    mode = _mode(kept, rules)
+    out[MODE, k] = mode
+    if mode != JUDGING:
+        count[ONSET] = -1
+        kept.value[0] = UNNAMED
+        return
+    _follow(k, away, spread, rules, kept, out)
+
+
+@njit(cache=True)
+def _variance(kept: DecisionState, rules: DecisionRules) -> float:
+    """What a healthy rig leaves under the motion of the medium window."""
+    n = min(MEDIUM, kept.counts[FILLED])
+    total = rules.noise**2
+    for c in range(rules.growth.size):
+        level = 0.0
+        for ago in range(1, n + 1):
+            level += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, LEVELS + c]
+        total += rules.growth[c] * level / max(n, 1)
+    return total
+
+
+@njit(cache=True)
+def _mode(kept: DecisionState, rules: DecisionRules) -> float:
+    """Armed once everything has settled and is quiet, or has had time enough to be."""
+    count = kept.counts
+    if count[SINCE_START] < rules.settle:
+        count[OUTSIDE] = min(count[SINCE_START], LONG)
+        return ARMING
+    if count[OUTSIDE] < LONG and count[OUTSIDE] < count[SINCE_START]:
+        return BEYOND
+    if count[CHANGED] < rules.settle and count[ONSET] < 0:
+        return ARMING
+    if count[QUIET] >= MEDIUM or count[SINCE_START] >= 2 * rules.settle:
+        return JUDGING
+    return ARMING
+
+
+@njit(cache=True)
+def _follow(  # noqa: PLR0917 -- a kernel
+    k: int,
+    away: bool,
+    spread: float,
+    rules: DecisionRules,
+    kept: DecisionState,
+    out: FloatArray,
+) -> None:
+    """Begin, carry on or end an episode, and name it."""
+    count = kept.counts
+    if away:
+        count[DEPARTURE_AGO] = 0
+        if count[ONSET] < 0:
+            count[ONSET], count[AGREED], count[DISAGREED] = 0, 0, 0
+            kept.value[0], kept.value[1] = UNNAMED, 0.0
+    elif count[ONSET] >= 0:
+        count[DEPARTURE_AGO] += 1
+        if count[DEPARTURE_AGO] > OVER:
+            count[ONSET] = -1
+            kept.value[0] = UNNAMED
+    out[DEPARTED, k] = 1.0 if away else 0.0
+    if count[ONSET] >= 0:
+        count[ONSET] += 1
+        kept.value[0] = _verdict(k, spread, rules, kept, out)
+    out[VERDICT, k] = kept.value[0]
+    out[NAMED_FORCE, k] = kept.value[1]
+
+
+@njit(cache=True)
+def _verdict(
+    k: int, spread: float, rules: DecisionRules, kept: DecisionState, out: FloatArray
+) -> float:
+    count, before = kept.counts, kept.value[0]
+    count[DISAGREED] = count[DISAGREED] + 1 if out[SENSORS, k] > 1.0 else 0
+    if before == OTHER or count[DISAGREED] >= VIOLATED:
+        return OTHER
+    since = count[ONSET]
+    length = min(since + SHORT, LONG)
+    _, _, _, share, dry = _friction(kept, length, spread)
+    force = _dry_force(kept, length)
+    out[SHARE, k], out[DRY_SHARE, k] = share, dry
+    fits = share > (FITS if since < LONG else FITS_LATER) and dry > DRY_PART and force > 0.0
+    turned = _reversals(kept, length, rules.speed_noise) > 0
+    rest = _rest(kept, length, rules.speed_noise)
+    sticks = since >= LONG // 2 and rest > AT_REST and out[DEPARTED, k] > 0.0
+    agrees = since >= LEAST_LOOK and ((fits and turned) or sticks)
+    count[AGREED] = count[AGREED] + 1 if agrees and count[DISAGREED] == 0 else 0
+    if fits:
+        kept.value[1] = force
+    if count[AGREED] >= LOOKS or before in (FRICTION, STICKING):
+        return STICKING if rest > STUCK or before == STICKING else FRICTION
+    return OTHER if since > rules.patience else UNNAMED
+
+
+@njit(cache=True)
+def _mean_square(kept: DecisionState, column: int, length: int) -> float:
+    n = min(length, kept.counts[FILLED])
+    total = 0.0
+    for ago in range(1, n + 1):
+        total += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, column] ** 2
+    return total / max(n, 1)
+
+
+@njit(cache=True)
+def _friction(
+    kept: DecisionState, length: int, spread: float
+) -> tuple[float, float, float, float, float]:
+    """Coulomb force, viscous coefficient, the former in deviations, and the shares of the residual,
+    beyond its healthy spread, that both explain and that the dry part stands for.
+    """
+    n = min(length, kept.counts[FILLED])
+    a = b = c = p = q = yy = 0.0
+    for ago in range(1, n + 1):
+        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        a += row[DRY] * row[DRY]
+        b += row[DRY] * row[WET]
+        c += row[WET] * row[WET]
+        p += row[DRY] * row[ERROR]
+        q += row[WET] * row[ERROR]
+        yy += row[ERROR] * row[ERROR]
+    if a <= 0.0 or c <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    c_ridged = c * (1.0 + RIDGE)
+    left = max(a - b * b / c_ridged, 1e-9 * a)
+    force = (p - b * q / c_ridged) / left
+    viscous = (q - b * force) / c_ridged
+    deviations = force * np.sqrt(left) / spread
+    explained = 2.0 * (force * p + viscous * q)
+    explained -= force * force * a + 2.0 * force * viscous * b + viscous * viscous * c
+    beyond = max(yy - n * spread * spread, 0.2 * yy)
+    dry_alone = p * p / a if p > 0.0 else 0.0
+    return force, viscous, deviations, explained / beyond, dry_alone / beyond
+
+
+@njit(cache=True)
+def _dry_force(kept: DecisionState, length: int) -> float:
+    """Force of dry friction alone [N]: viscous friction beside it is hardly told from it by a
+    steady motion, and takes from it what smoothing and presliding round off.
+    """
+    n = min(length, kept.counts[FILLED])
+    a = p = 0.0
+    for ago in range(1, n + 1):
+        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        a += row[DRY] * row[DRY]
+        p += row[DRY] * row[ERROR]
+    return p / a if a > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _rest(kept: DecisionState, length: int, slow: float) -> float:
+    """Share of the time at which the motion cannot be told from rest."""
+    n = min(length, kept.counts[FILLED])
+    still = 0
+    for ago in range(1, n + 1):
+        still += abs(kept.rows[(kept.counts[HEAD] - ago) % HISTORY, SPEED]) < slow
+    return still / max(n, 1)
+
+
+@njit(cache=True)
+def _reversals(kept: DecisionState, length: int, slow: float) -> int:
+    """How often the motion turns, beyond what noise does."""
+    n = min(length, kept.counts[FILLED])
+    found, side = 0, 0
+    for ago in range(n, 0, -1):
+        speed = kept.rows[(kept.counts[HEAD] - ago) % HISTORY, SPEED]
+        now = 1 if speed > slow else (-1 if speed < -slow else 0)
+        if now != 0:
+            found += side == -now
+            side = now
+    return found

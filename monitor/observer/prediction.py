@@ -1,0 +1,237 @@
+"""Equations driven along the measured motion, block by block, with hidden states carried along.
+
+Beside the prediction itself two more run, with a unit of dry and of viscous friction at the force
+port: what they add is what friction of one newton, or of one newton over one metre a second, makes
+of the predicted output, through whatever lies between (an inertia, the sensor's own high-pass). As
+the motion is given, that is linear in the force.
+"""
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from msgspec.structs import replace
+
+from monitor.model import EquationsPlant
+from monitor.observer.lagged_motion import EMPTY, FIRST
+from monitor.signals import Codes
+from rigwatch.physics.engine.compile import CompiledSystem, Simulation, compile_system
+from rigwatch.physics.engine.equations import (
+    Effect,
+    Model,
+    Output,
+    Placement,
+    System,
+    along_measured_motion,
+    compose,
+    library,
+    load_model,
+    measured_states,
+    predicted_outputs,
+    shipped_models,
+)
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
+
+SETTLING = 8.0
+"""Time for which the first sample is held, so that hidden states begin in balance [s]."""
+SUBSTEPS = 4
+"""Runge-Kutta steps between samples."""
+DRY, VISCOUS = "coulomb", "viscous"
+"""Effects of the library that stand for friction."""
+
+
+def base_model(name: str) -> Model:
+    """The model of equations that a plant names.
+
+    Raises:
+        ModelError: there is none of this name.
+    """
+    if name.endswith(".toml"):
+        return load_model(Path(name))
+    known = shipped_models()
+    if name not in known:
+        raise ModelError(f"found model {name!r}, expected one of {', '.join(known)}, or a file")
+    return known[name]
+
+
+def force_port(model: Model) -> str:
+    """The port at which friction enters.
+
+    Raises:
+        ModelError: no force port offers a speed.
+    """
+    for name, port in model.ports.items():
+        if port.kind == "force" and not port.passive and "v" in port.variables:
+            return name
+    raise ModelError(f"{model.name}: found no force port with a speed v, expected one for friction")
+
+
+def speed_state(model: Model, port: str) -> str:
+    """The measured state that is the speed at a port."""
+    return model.ports[port].variables["v"].expression
+
+
+def rate_columns(model: Model) -> list[int]:
+    """Places, among inputs and motion, of the states that are rates of change."""
+    first = len(model.inputs)
+    return [first + k for k, state in enumerate(measured_states(model)) if state.order]
+
+
+def driven(model: Model, free: frozenset[str]) -> Model:
+    """The model along its measured motion, its hidden states among the outputs.
+
+    Args:
+        model: as it was written.
+        free: parameters that a fit moves.
+    """
+    along = along_measured_motion(model)
+    outputs = {name: along.outputs[name] for name in list(along.outputs)[:1]}
+    outputs |= {
+        f"state_{name}": Output(unit=state.unit, expression=name)
+        for name, state in along.states.items()
+    }
+    kept = {n: p for n, p in along.ports.items() if p.kind != "sensor" or p.signal in outputs}
+    parameters = {n: replace(p, fixed=n not in free) for n, p in along.parameters.items()}
+    return replace(along, outputs=outputs, ports=kept, parameters=parameters)
+
+
+def friction_at(port: str, turn: float) -> list[Placement]:
+    """Dry and viscous friction at the port, both of no strength."""
+    sizes = {"v": turn * 1e3, "x": 1.0}
+    known = library()
+    return [Placement(name, _fixed(known[name].scaled(sizes)), port) for name in (DRY, VISCOUS)]
+
+
+def _fixed(effect: Effect) -> Effect:
+    """The effect with everything but its strength constant, beginning with none of it."""
+    parameters = {
+        name: p if p.role == "strength" else replace(p, role="constant")
+        for name, p in effect.parameters.items()
+    }
+    return replace(effect, parameters=parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Columns of the prediction, each of shape (n,) or (n, hidden states)."""
+
+    output: FloatArray
+    dry: FloatArray
+    viscous: FloatArray
+    hidden: FloatArray
+
+
+class AlongMotion:
+    """The running prediction of one plant.
+
+    Raises:
+        ModelError: the plant names parameters that its model does not have.
+    """
+
+    def __init__(self, plant: EquationsPlant, rate: float) -> None:
+        base = base_model(plant.model)
+        model = driven(base, frozenset())
+        self._rates = rate_columns(base)
+        frictions = friction_at(plant.port, plant.turn)
+        system = compose(model, frictions)
+        self._compiled, self._dt = compile_system(_without_fit(system)), 1.0 / rate
+        self.hidden = len(system.states)
+        strengths = [f"{p.prefix}{p.effect.strength}" for p in frictions]
+        values = dict(zip(plant.names, plant.values, strict=True))
+        healthy = values | {strengths[0]: plant.coulomb, strengths[1]: 0.0}
+        cases = [healthy, *(healthy | {name: healthy[name] + 1.0} for name in strengths)]
+        self._parameters = [self._compiled.vector(case) for case in cases]
+        self._states = [np.zeros(0)] * len(cases)
+        self._row = np.zeros(0)
+
+    def update(self, rows: FloatArray, state: Codes) -> Predicted:
+        """The next rows of inputs and motion, shape (n, inputs); those without a kernel give 0."""
+        n = len(rows)
+        out = Predicted(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((n, self.hidden)))
+        for begin, end in _stretches(state):
+            if state[begin] == FIRST:
+                self._begin(rows[begin])
+            done = begin
+            while done < end:
+                done += self._run(rows[done:end], done, out)
+        return out
+
+    def _begin(self, row: FloatArray) -> None:
+        """Hidden states in balance with a row, the motion at rest there."""
+        self._row = row.copy()
+        still = np.repeat(row[None, :], round(SETTLING / self._dt), axis=0)
+        still[:, self._rates] = 0.0
+        for case, parameters in enumerate(self._parameters):
+            self._states[case] = balanced(self._compiled, parameters, still, self._dt)
+
+    def _run(self, rows: FloatArray, first: int, out: Predicted) -> int:
+        """Run along the rows until they end or a state diverges; how many were done."""
+        inputs = np.concatenate([self._row[None, :], rows])
+        made = [self._simulated(case, inputs) for case in range(len(self._parameters))]
+        outputs = np.stack([one.outputs[0, 1:] for one in made])
+        finite = np.isfinite(outputs).all(axis=(0, 2))
+        if good := bool(finite.all()):
+            self._states, self._row = [one.last[0] for one in made], rows[-1].copy()
+        done = len(rows) if good else int(np.argmin(finite)) + 1
+        at, outputs = slice(first, first + done), np.nan_to_num(outputs[:, :done])
+        out.output[at], out.hidden[at] = outputs[0, :, 0], outputs[0, :, 1:]
+        out.dry[at] = outputs[1, :, 0] - outputs[0, :, 0]
+        out.viscous[at] = outputs[2, :, 0] - outputs[0, :, 0]
+        if not good:
+            self._begin(rows[done - 1])
+        return done
+
+    def _simulated(self, case: int, inputs: FloatArray) -> Simulation:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._compiled.simulate(
+                inputs, self._dt, np.zeros(1, np.int64), len(inputs),
+                initial=self._states[case][None, :], parameters=self._parameters[case],
+                substeps=SUBSTEPS,
+            )  # fmt: skip
+
+
+def _stretches(state: Codes) -> Iterator[tuple[int, int]]:
+    """Runs of samples with a whole kernel; a start begins a run of its own."""
+    begin = -1
+    for k in range(state.size):
+        if begin >= 0 and state[k] in (EMPTY, FIRST):
+            yield begin, k
+            begin = -1
+        if begin < 0 and state[k] != EMPTY:
+            begin = k
+    if begin >= 0:
+        yield begin, state.size
+
+
+def _without_fit(system: System) -> System:
+    """The system with nothing to fit, so that no sensitivity is carried along."""
+    fixed = {name: replace(p, fixed=True) for name, p in system.parameters.items()}
+    return dataclasses.replace(system, parameters=fixed)
+
+
+def balanced(
+    compiled: CompiledSystem, parameters: FloatArray, still: FloatArray, dt: float
+) -> FloatArray:
+    """Hidden states after rows of rest, shape (states,); the model's own where they diverge."""
+    start = np.array([state.start for state in compiled.system.states.values()])
+    with np.errstate(over="ignore", invalid="ignore"):
+        made = compiled.simulate(
+            still, dt, np.zeros(1, np.int64), len(still),
+            initial=start[None, :], parameters=parameters, substeps=SUBSTEPS,
+        )  # fmt: skip
+    return made.last[0] if np.isfinite(made.last).all() else start
+
+
+def predicted_channel(model: Model) -> str:
+    """The channel that the prediction is held against.
+
+    Raises:
+        ModelError: nothing measured is left to predict.
+    """
+    names = predicted_outputs(model)
+    if not names:
+        raise ModelError(f"{model.name}: found no output to predict along the measured motion")
+    return model.outputs[names[0]].channel or names[0]

@@ -1,0 +1,55 @@
+"""The range of motion that a model was fitted to, and how far a sample lies beyond it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from monitor.model import RangeSection, RigModel
+from monitor.observer.lagged_motion import EMPTY
+from monitor.observer.missing_force import PREDICTED
+from monitor.observer.model_signals import Observed
+from rigwatch.wire.arrays import FloatArray
+
+ALLOWED = 1.2
+"""Half width of what is judged, in half the width of what was fitted."""
+PREDICTION = "predicted"
+"""What the high-passed prediction is called among the signals of a range."""
+
+
+class RangeSeen:
+    """Judges samples by the range in the model file."""
+
+    def __init__(self, model: RigModel) -> None:
+        assert model.motion_range is not None
+        low, high = np.array(model.motion_range.low), np.array(model.motion_range.high)
+        self._middle = 0.5 * (low + high)
+        self._half = ALLOWED * np.maximum(0.5 * (high - low), 1e-12)
+
+    def distance(self, seen: Observed) -> FloatArray:
+        """Largest distance of any signal from the middle, 1 at the limit, shape (n,)."""
+        signals = range_signals(seen)
+        far = (np.abs(signals - self._middle) / self._half).max(axis=1)
+        return np.where(seen.state == EMPTY, 0.0, far)
+
+
+def range_signals(seen: Observed) -> FloatArray:
+    """Inputs, motion and prediction, shape (n, signals)."""
+    return np.column_stack([seen.rows, seen.judged[:, PREDICTED]])
+
+
+def drive_energy(rows: FloatArray, seen: RangeSection, motions: Sequence[int]) -> FloatArray:
+    """Square of the inputs that are no motion, 1 at the edge of their range, shape (n,)."""
+    inputs = [place for place in range(rows.shape[1]) if place not in motions]
+    low, high = np.array(seen.low)[inputs], np.array(seen.high)[inputs]
+    scaled = (rows[:, inputs] - 0.5 * (low + high)) / np.maximum(0.5 * (high - low), 1e-12)
+    return np.asarray((scaled**2).sum(axis=1))
+
+
+def range_of(names: Sequence[str], parts: Sequence[FloatArray]) -> RangeSection:
+    """The range of healthy signals, each part of shape (n, signals)."""
+    every = np.concatenate(parts)
+    return RangeSection(
+        names=(*names, PREDICTION),
+        low=tuple(every.min(axis=0).tolist()),
+        high=tuple(every.max(axis=0).tolist()),
+    )

@@ -1,0 +1,48 @@
+"""What the equations leave of healthy recordings, as a polynomial in motion and hidden states.
+
+It is smooth and fixed once it is fitted, so that what a fault adds later is not in it. Ridge
+regression keeps terms small that the recordings do not tell apart.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import lfilter
+
+from monitor.model import RemainderSection
+from monitor.observer.missing_force import terms
+from rigwatch.wire.arrays import FloatArray
+
+RIDGE = 3e-3
+"""Weight of the terms' size against the error, both in their deviations."""
+
+
+def no_remainder(signals: int) -> RemainderSection:
+    """Nothing is left."""
+    count = signals + signals * (signals + 1) // 2
+    return RemainderSection(centre=(0.0,) * signals, scale=(1.0,) * signals, weights=(0.0,) * count)
+
+
+def fit_remainder(
+    parts: Sequence[tuple[FloatArray, FloatArray]],
+    filters: tuple[FloatArray, FloatArray],
+    skip: int,
+) -> RemainderSection:
+    """The remainder of healthy recordings.
+
+    Args:
+        parts: signals, shape (n, signals), and high-passed residual, shape (n,), of each recording.
+        filters: of the high-pass.
+        skip: samples of each beginning that are not counted.
+    """
+    every = np.concatenate([signals[skip:] for signals, _ in parts])
+    centre, scale = every.mean(axis=0), np.maximum(every.std(axis=0), 1e-12)
+    columns = [lfilter(*filters, terms(z, centre, scale), axis=0)[skip:] for z, _ in parts]
+    phi, left = np.concatenate(columns), np.concatenate([e[skip:] for _, e in parts])
+    size = np.maximum(phi.std(axis=0), 1e-12)
+    phi = phi / size
+    gram = phi.T @ phi + RIDGE * len(phi) * np.eye(phi.shape[1])
+    weights = np.linalg.solve(gram, phi.T @ left) / size
+    return RemainderSection(
+        centre=tuple(centre.tolist()), scale=tuple(scale.tolist()), weights=tuple(weights.tolist())
+    )

@@ -1,0 +1,174 @@
+"""The observer scheme as one pure object: sample blocks in, estimates and conditions out.
+
+    SampleBlock ─▶ admission ─▶ signals ─▶ range ─▶ decision ─▶ Result
+                       └─▶ clipping of each channel ─▶ Result
+
+As with the other scheme, every stage carries its state from sample to sample, so that live and
+replay agree to the last bit however the samples are cut. What is judged lies `half_width` samples
+back, and is published with the sample that completes it.
+"""
+
+import numpy as np
+
+from monitor.clipping import Clipping
+from monitor.model import EquationsPlant, RigModel
+from monitor.observer import (
+    EMPTY,
+    PREDICTED,
+    E,
+    Observed,
+    ObserverSignals,
+    RangeSeen,
+    decide,
+    drive_energy,
+    levels,
+)
+from monitor.observer import decision_state as d
+from monitor.pipeline.promoted import check_can_follow
+from monitor.pipeline.result import Result
+from monitor.signals import Admission, Admitted, Condition, above, below
+from monitor.signals import conditions as kinds
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+
+
+class ObserverMonitor:
+    """The observer scheme, running.
+
+    Args:
+        model: with a plant of equations.
+
+    Raises:
+        ModelError: its equations do not fit.
+        KeyError: at `update`, where a block lacks one of the model's channels.
+    """
+
+    def __init__(self, model: RigModel) -> None:
+        plant, remainder = model.plant, model.remainder
+        assert isinstance(plant, EquationsPlant)
+        assert remainder is not None
+        self._admission = Admission(model.channels, model.channels, model.decision.longest_hold)
+        self._signals = ObserverSignals(plant, remainder, model.sample_rate)
+        self._range = RangeSeen(model)
+        self._state = d.new_state(1 + 2 * len(self._signals.layout.motions))
+        self._since = 0
+        self._follow(model)
+
+    def adopt(self, model: RigModel) -> None:
+        """Go on with another model from the next sample: filters run on.
+
+        Raises:
+            ModelError: the equations of the new model are others.
+        """
+        check_can_follow(self.model, model)
+        self._follow(model)
+
+    def _follow(self, model: RigModel) -> None:
+        assert model.healthy is not None
+        self.model = model
+        self.rules = d.rules_of(model.healthy, model.sample_rate)
+        self._clipping = Clipping(model)
+
+    def update(self, block: SampleBlock) -> Result | None:
+        """Take the next block; None where it holds nothing new."""
+        admitted = self._admission.admit(block)
+        if admitted is None:
+            return None
+        seen = self._signals.update(admitted.signals, admitted.code)
+        far = self._range.distance(seen)
+        out = np.zeros((len(d.OUTPUTS), len(far)))
+        layout, remainder = self._signals.layout, self.model.remainder
+        assert remainder is not None
+        grown = levels(seen.rows[:, list(layout.motions)], seen.judged[:, PREDICTED], remainder)
+        speed = np.ascontiguousarray(seen.rows[:, layout.speed])
+        inside = far <= 1.0
+        known = self.model.motion_range
+        assert known is not None
+        drive = drive_energy(seen.rows, known, layout.motions)
+        decide(seen.judged, speed, grown, drive, inside, seen.state, self.rules, self._state, out)
+        conditions = self._conditions(admitted, seen, far, out)
+        clipping = self._clipping.update(admitted)
+        return Result(self._estimates(block, admitted, seen, out), (*conditions, *clipping))
+
+    def _estimates(
+        self, block: SampleBlock, admitted: Admitted, seen: Observed, out: FloatArray
+    ) -> EstimateBlock:
+        at = admitted.padding
+        speed = seen.rows[:, self._signals.layout.speed]
+        spread = out[d.SPREAD]
+        armed = (out[d.MODE] == d.JUDGING) & (seen.state != EMPTY)
+        columns: tuple[tuple[str, str, FloatArray], ...] = (
+            ("modelled_acceleration", "m/s^2", seen.predicted.output),
+            ("residual", "m/s^2", seen.measured - seen.predicted.output),
+            ("change", "m/s^2", seen.judged[:, E]),
+            ("velocity", "m/s", speed),
+            ("theta1", "N", out[d.FORCE]),
+            ("theta2", "N s/m", out[d.VISCOUS]),
+            ("theta1_low", "N", -self._force_limit(out)),
+            ("theta1_high", "N", self._force_limit(out)),
+            ("observable", "", (np.abs(speed) > self.rules.speed_noise).astype(np.float64)),
+            ("armed", "", armed.astype(np.float64)),
+            ("deviation", "", out[d.DEVIATION]),
+            ("friction_fit", "", out[d.SHARE]),
+            ("friction_share", "", out[d.DRY_SHARE]),
+            ("rest", "", out[d.REST]),
+            ("verdict", "", out[d.VERDICT]),
+            ("friction_force", "N", out[d.NAMED_FORCE]),
+            ("healthy_spread", "m/s^2", spread),
+            ("sensors", "", out[d.SENSORS]),
+        )
+        return EstimateBlock(
+            device=block.device,
+            boot=block.boot,
+            seq=int(admitted.seq[at]),
+            t_ns=block.t_ns[len(block) - (len(admitted.seq) - at) :],
+            columns=tuple(
+                Column(name, unit, np.ascontiguousarray(values[at:], np.float64))
+                for name, unit, values in columns
+            ),
+        )
+
+    def _force_limit(self, out: FloatArray) -> FloatArray:
+        """Coulomb force at which the rig has departed [N]; 0 where nothing moves."""
+        sizes = np.abs(out[d.DEVIATIONS])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = np.abs(out[d.FORCE]) / sizes * self.rules.friction
+        return np.where(sizes > 0.0, found, 0.0)
+
+    def _conditions(
+        self, admitted: Admitted, seen: Observed, far: FloatArray, out: FloatArray
+    ) -> tuple[Condition, ...]:
+        at = admitted.padding
+        kept, run = out[:, at:], admitted.invalid_run[at:]
+        started = seen.state[at:] != EMPTY
+        mode, verdict = kept[d.MODE], kept[d.VERDICT]
+        armed = started & (mode == d.JUDGING)
+        sticks = verdict == d.STICKING
+        force, longest = kept[d.NAMED_FORCE], self.model.decision.longest_hold
+        never = np.zeros(len(run), np.bool_)
+        lost = np.zeros(len(run))
+        lost[0] = admitted.missing
+        moving = ~armed | (kept[d.REST] < 1.0)
+        waited = self._waited(seen)[at:]
+        return (
+            above(kinds.DEPARTURE, armed & (kept[d.DEPARTED] > 0.0), kept[d.DEVIATION], 1.0),
+            above(kinds.DRY_FRICTION, armed & ((verdict == d.FRICTION) | sticks), force, 0.0),
+            above(kinds.STICTION, armed & sticks, kept[d.REST], 0.5),
+            above(kinds.OTHER_FAULT, armed & (verdict == d.OTHER), kept[d.SHARE], np.inf),
+            above(kinds.EXCITATION_CHANGED, never, lost * 0.0, 0.0),
+            above(kinds.REFERENCE_LEARNT, never, lost * 0.0, 0.0),
+            below(kinds.NOT_OBSERVABLE, ~moving, 1.0 - kept[d.REST], 0.0),
+            above(kinds.ILL_CONDITIONED, never, lost * 0.0, 0.0),
+            above(kinds.NOT_ARMED, ~started | (mode == d.ARMING), waited, 0.0),
+            above(kinds.NOT_JUDGED, started & (mode == d.BEYOND), far[at:], 1.0),
+            above(kinds.GAP, lost != 0.0, lost, 0.0),
+            above(kinds.SENSOR_INVALID, run > longest, run.astype(np.float64), longest),
+        )
+
+    def _waited(self, seen: Observed) -> FloatArray:
+        """Time since the start at each sample [s]."""
+        found = np.zeros(seen.state.size)
+        for k, state in enumerate(seen.state):
+            self._since = 0 if state == EMPTY else self._since + 1
+            found[k] = self._since / self.model.sample_rate
+        return found

@@ -1,0 +1,139 @@
+"""The observer scheme on the simulated rig: any excitation, no recording of a known fault."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from observed_rig import (
+    FAULTS,
+    FREE,
+    RATE,
+    SINE,
+    block,
+    coulomb,
+    model,
+    raised,
+    run,
+    watched,
+)
+
+from monitor.model.model_file import model_text, parse_model
+from monitor.observer.lagged_motion import DELAY, FixedLag, MotionColumn
+from monitor.pipeline.observer_pipeline import ObserverMonitor
+from monitor.pipeline.rig_monitor import RigMonitor
+from monitor.signals.recordings import recording_of
+from rigwatch.wire.errors import ConfigError, ModelError
+
+pytestmark = pytest.mark.long
+
+
+@pytest.mark.parametrize("drive", [SINE, FREE], ids=["locked", "free"])
+def test_healthy_start_raises_nothing(drive) -> None:
+    assert not FAULTS & raised(watched(run(drive, 10.0, seed=3))).keys()
+
+
+@pytest.mark.parametrize("drive", [SINE, FREE], ids=["locked", "free"])
+def test_friction_is_named_in_newtons(drive) -> None:
+    found = watched(run(drive, 10.0, coulomb(6.0), seed=4))
+
+    times = raised(found)
+    assert 6.0 <= times["departure"] < 6.1
+    assert 6.0 <= times["dry_friction"] < 6.5
+    force = found.estimates.column("friction_force").values[round(8.0 * RATE) :]
+    assert np.median(force) == pytest.approx(0.6, rel=0.2)
+
+
+def test_accelerometer_fault_is_not_called_friction() -> None:
+    channels = run(SINE, 10.0, seed=5)
+    channels["acceleration"][round(6.0 * RATE) :] *= 1.5
+
+    names = raised(watched(channels)).keys()
+
+    assert "other_fault" in names
+    assert not names & {"dry_friction", "stiction"}
+
+
+def test_block_sizes_change_no_bit() -> None:
+    channels = run(SINE, 5.0, coulomb(3.0), seed=6)
+    whole = ObserverMonitor(model()).update(block(channels))
+    assert whole is not None
+    monitor, n = ObserverMonitor(model()), len(channels["voltage"])
+    cuts = [0, 1, 2, 9, 40, 41, 300, 301, 777, n]
+    parts = [monitor.update(block(channels, a, b)) for a, b in pairwise(cuts)]
+
+    for column in whole.estimates.columns:
+        pieces = [part.estimates.column(column.name).values for part in parts if part]
+        assert np.array_equal(np.concatenate(pieces), column.values), column.name
+
+
+def test_gap_restarts_and_says_that_it_is_not_armed() -> None:
+    channels = run(SINE, 8.0, seed=7)
+    monitor = RigMonitor(model())
+    monitor.update(block(channels, 0, 1000))
+    after = monitor.update(block(channels, 1100))
+    assert after is not None
+
+    flags = {c.name: c.active for c in after.conditions}
+    assert flags["not_armed"][:200].all()
+    assert not flags["not_armed"][600:].any()
+    assert not any(flags[name].any() for name in FAULTS)
+
+
+def test_motion_beyond_the_range_is_said_and_not_judged() -> None:
+    channels = run(SINE, 8.0, seed=8)
+    late = slice(round(5.0 * RATE), None)
+    for name in channels:
+        channels[name][late] *= 8.0
+
+    names = raised(watched(channels)).keys()
+
+    assert "not_judged" in names
+    assert not names & {"dry_friction", "stiction"}
+
+
+def test_model_file_keeps_every_bit() -> None:
+    text = model_text(model())
+
+    assert parse_model(text, "model.toml") == model()
+
+
+def test_model_file_without_limits_is_refused() -> None:
+    text = model_text(model())
+    cut = text[: text.index("[healthy]")] + text[text.index("[scheme]") :]
+
+    with pytest.raises(ConfigError, match="healthy"):
+        parse_model(cut, "model.toml")
+
+
+def test_rig_that_the_equations_do_not_describe_is_refused() -> None:
+    from monitor.commissioning.equations_commission import commission_equations
+
+    rng = np.random.default_rng(1)
+    channels = run(SINE, 10.0, seed=9)
+    channels["acceleration"] = rng.permutation(channels["acceleration"])
+
+    with pytest.raises(ModelError, match="cannot judge"):
+        commission_equations([recording_of("healthy", "shuffled", RATE, channels)])
+
+
+def test_no_healthy_recording_is_refused() -> None:
+    from monitor.commissioning.equations_commission import commission_equations
+
+    with pytest.raises(ModelError, match="no healthy recording"):
+        commission_equations([])
+
+
+def test_motion_is_late_by_half_the_kernel() -> None:
+    t = np.arange(200) / RATE
+    x = np.column_stack([0.01 * t**3, t])
+    code = np.zeros(200, np.int64)
+    code[0] = 4
+    lag = FixedLag([MotionColumn(0, 0), MotionColumn(0, 1), MotionColumn(1, DELAY)], 4, RATE)
+
+    columns, state = lag.update(x, code)
+
+    assert state[:8].max() == 0
+    assert state[8] == 1
+    assert np.allclose(columns[8:, 0], 0.01 * t[4:-4] ** 3, atol=1e-12)
+    assert np.allclose(columns[8:, 1], 0.03 * t[4:-4] ** 2, atol=1e-9)
+    assert np.array_equal(columns[8:, 2], t[4:-4])
