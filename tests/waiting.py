@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from rigwatch.wire.bus.bus import wait_until
 
-PATIENCE = 90.0
+PATIENCE = 180.0
 """Longest that anything may take before a test fails; machines are slow at times [s]."""
 
 
