@@ -78,8 +78,13 @@ class Narrator:
             self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
             self._say(f"            what to do: {alarm.guidance}")
         elif alarm.state in ("normal", "cleared_unacknowledged"):
-            name = alarm.name.replace("_", " ")
-            self._say(f"{self._time(alarm.seq)} {name}: the condition has gone")
+            self._say(f"{self._time(alarm.seq)} {_spoken(alarm.name)}: {self._ended(alarm)}")
+
+    def _ended(self, alarm: Alarm) -> str:
+        """Why an alarm ends: a departure whose fault has got its name stands on under that name."""
+        last = self.alarms[-1] if self.alarms else alarm
+        named = alarm.name == NAMELESS != last.name and last.onset_seq <= alarm.onset_seq
+        return f"now called {_spoken(last.name)}" if named else "the condition has gone"
 
     def _delay(self, alarm: Alarm) -> str:
         if self._last is None or alarm.seq < self._last.seq:
@@ -94,3 +99,7 @@ class Narrator:
 
     def _time(self, seq: int) -> str:
         return f"{seq / self._rate:8.2f} s " if seq >= 0 else " " * 10 + " "
+
+
+def _spoken(name: str) -> str:
+    return name.replace("_", " ")

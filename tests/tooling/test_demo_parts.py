@@ -116,6 +116,17 @@ def test_an_alarm_is_told_with_its_cause_and_its_delay_after_what_was_done() -> 
     assert "raised after 125 ms" in said[3]
 
 
+def test_a_departure_that_gets_a_name_has_not_gone() -> None:
+    said: list[str] = []
+    narrator = Narrator(load_scenario(find_config("scenarios/demo.toml")), said.append)
+    narrator.alarm(alarm("departure", 5200))
+    narrator.alarm(alarm("dry_friction", 5210))
+    narrator.alarm(alarm("departure", 5210, "normal"))
+    assert "departure: now called dry friction" in said[-1]
+    narrator.alarm(alarm("dry_friction", 5900, "normal"))
+    assert "dry friction: the condition has gone" in said[-1]
+
+
 def test_a_whole_recording_with_the_alarm_has_nothing_to_complain_about(
     recorded: Recorded,
 ) -> None:
