@@ -1,6 +1,6 @@
 """Ranks in a process of its own, started by the monitor.
 
-    python -m monitor.diagnosis.ranking_job FOLDER
+    python -m monitor.diagnosis FOLDER
 
 A thread would share the interpreter with the monitor's loop, and make samples wait while it imports
 and computes. The folder holds what is asked, and takes the answer.
@@ -22,7 +22,7 @@ from rigwatch.wire.errors import RigwatchError
 LONGEST = 300
 """A job that takes longer is given up [s]; the first on a machine compiles what effects need."""
 NICENESS = 10
-MODULE = "monitor.diagnosis.ranking_job"
+MODULE = "monitor.diagnosis"
 _EVIDENCE, _MODEL, _EFFECTS, _ANSWER = "evidence.npz", "model.toml", "effects.json", "answer.txt"
 
 
@@ -78,7 +78,3 @@ def main() -> int:
     beside.write_text(text, encoding="utf-8")
     beside.replace(folder / _ANSWER)
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

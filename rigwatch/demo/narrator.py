@@ -61,9 +61,12 @@ class Narrator:
         self._acts = acts(scenario)
         self._next = next(self._acts, None)
         self._last: Act | None = None
+        self._ended: Alarm | None = None
 
     def samples(self, seq: int) -> None:
         """The rig has come to this sample."""
+        if self._ended is not None and seq > self._ended.seq + self._rate:
+            self._tell_end()
         while self._next is not None and seq >= self._next.seq:
             self._last = self._next
             self._say(f"{self._time(self._last.seq)} the rig: {self._last.text}")
@@ -74,17 +77,23 @@ class Narrator:
         if alarm.seq >= 0:
             self.samples(alarm.seq)
         if alarm.state == "unacknowledged":
+            if self._ended is not None and alarm.onset_seq <= self._ended.onset_seq:
+                self._ended = None  # the fault stands on, under its name
             self.alarms.append(alarm)
             self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
             self._say(f"            what to do: {alarm.guidance}")
         elif alarm.state in ("normal", "cleared_unacknowledged"):
-            self._say(f"{self._time(alarm.seq)} {_spoken(alarm.name)}: {self._ended(alarm)}")
+            self._tell_end()
+            self._ended = alarm
+            if alarm.name != NAMELESS:
+                self._tell_end()
 
-    def _ended(self, alarm: Alarm) -> str:
-        """Why an alarm ends: a departure whose fault has got its name stands on under that name."""
-        last = self.alarms[-1] if self.alarms else alarm
-        named = alarm.name == NAMELESS != last.name and last.onset_seq <= alarm.onset_seq
-        return f"now called {_spoken(last.name)}" if named else "the condition has gone"
+    def _tell_end(self) -> None:
+        """An alarm has ended; a departure is told only once no name has taken its place."""
+        if self._ended is not None:
+            name = self._ended.name.replace("_", " ")
+            self._say(f"{self._time(self._ended.seq)} {name}: the condition has gone")
+            self._ended = None
 
     def _delay(self, alarm: Alarm) -> str:
         if self._last is None or alarm.seq < self._last.seq:
@@ -99,7 +108,3 @@ class Narrator:
 
     def _time(self, seq: int) -> str:
         return f"{seq / self._rate:8.2f} s " if seq >= 0 else " " * 10 + " "
-
-
-def _spoken(name: str) -> str:
-    return name.replace("_", " ")

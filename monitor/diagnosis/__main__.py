@@ -1,0 +1,8 @@
+"""`python -m monitor.diagnosis FOLDER` ranks what is asked in a folder; the monitor starts it."""
+
+import sys
+
+from monitor.diagnosis.ranking_job import main
+
+if __name__ == "__main__":
+    sys.exit(main())
