@@ -52,3 +52,10 @@ def test_the_pneumatic_rig_oscillates_as_its_air_spring_says_and_a_leak_shows():
     moved = (other.outputs[0, :, 0] - position) / step
     expected = run.slopes[0, :, 0, leak]
     assert np.abs(moved - expected).max() < 0.05 * np.abs(expected).max()
+
+
+def test_what_the_equations_hold_already_is_no_candidate_there():
+    model = shipped_models()["servo-pneumatic"]
+    ac_coupled = library()["ac_coupling"]
+    assert not suits(ac_coupled, model.ports["acceleration_sensor"], model)
+    assert suits(ac_coupled, model.ports["position_sensor"], model)

@@ -117,6 +117,10 @@ class Port(Section, frozen=True, kw_only=True):
     passive: Annotated[
         bool, Meta(description="nothing enters but what its variables drive, as through a leak")
     ] = False
+    described: Annotated[
+        tuple[str, ...],
+        Meta(description="families of effects that the equations hold here already: no candidates"),
+    ] = ()
     variables: Annotated[
         dict[str, Variable], Meta(description="what effects here call x, v and so on")
     ] = field(default_factory=dict)

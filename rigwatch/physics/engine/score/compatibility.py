@@ -8,7 +8,7 @@ from rigwatch.physics.engine.score.effect_sensitivities import Candidate
 
 def suits(effect: Effect, port: Port, model: Model) -> bool:
     """Whether the effect can stand at the port and finds all that its equations name there."""
-    if not effect.fits(port.kind):
+    if not effect.fits(port.kind) or effect.family in port.described:
         return False
     if effect.states and port.kind != "force" and not model.states:
         return False
