@@ -20,7 +20,7 @@ _REST_S = 6.0
 _TUNED_VOLTS, _TUNED_HZ = 1.4, 8.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Member:
     """A rig of the family.
 
