@@ -11,9 +11,9 @@ from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import compose
 from rigwatch.simulated import write_session
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench import healthy_remainder
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.fit import healthy_remainder
 from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_products
 from rigwatch.workbench.study.study import Study, create
 from sim_plant.excitation import Multisine
