@@ -27,9 +27,12 @@ from benchmarks.hidden_effects import NOISE, excitation, explained, noisy
 from benchmarks.table import Row
 from rigwatch.physics.engine.equations.effect import load_effects
 from rigwatch.physics.engine.score.significance import corrected_p_values
-from rigwatch.workbench.compare.compare import Bench, bench_of, comparison
+from rigwatch.workbench.compare.compare import comparison
+from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
-from rigwatch.workbench.ranking.rank import candidates, rank_only, refit, score_all
+from rigwatch.workbench.ranking.candidates import candidates
+from rigwatch.workbench.ranking.refitting import refit
+from rigwatch.workbench.ranking.scoring import rank_only, score_all
 from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.simulated import HORIZON, study
 

@@ -26,14 +26,14 @@ from benchmarks.hidden import asked, collected, confusion, counted, share_row, w
 from benchmarks.table import Row, as_text
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.compare.compare import Bench, bench_of
+from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain import verdict_calibration as calibration
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.explain.verdict_calibration import Evidence, cell_of
 from rigwatch.workbench.fit.intervals import values
-from rigwatch.workbench.ranking.rank import Ranked, accepted_from
+from rigwatch.workbench.ranking.ranked import Ranked, accepted_from
 from rigwatch.workbench.study.study import Study
 from sim_plant.oscillator import (
     DAMPING,

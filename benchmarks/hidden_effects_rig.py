@@ -42,14 +42,14 @@ from benchmarks.table import Row, as_text
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
-from rigwatch.workbench.compare.compare import Bench, bench_of
+from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.noise_floor import quiet_scale
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit.healthy_parameters import commissioned
 from rigwatch.workbench.fit.healthy_reference import referenced
-from rigwatch.workbench.ranking.rank import Ranked, accepted_from
+from rigwatch.workbench.ranking.ranked import Ranked, accepted_from
 from rigwatch.workbench.study.study import Span, Study, StudyFile
 
 HORIZON = 128

@@ -13,11 +13,13 @@ from benchmarks.hidden import counted, share_row
 from benchmarks.hidden_effects_rig import Case, simulated, study_of
 from benchmarks.rig_hidden import settings
 from benchmarks.table import Row
-from rigwatch.workbench.compare.compare import bench_of
+from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.compare.uncertainty_budget import beyond
 from rigwatch.workbench.data.noise_floor import quiet_scale
 from rigwatch.workbench.fit.intervals import values
-from rigwatch.workbench.ranking.rank import candidates, rank_only, refit
+from rigwatch.workbench.ranking.candidates import candidates
+from rigwatch.workbench.ranking.refitting import refit
+from rigwatch.workbench.ranking.scoring import rank_only
 
 STRENGTHS = {
     "viscous": ("viscous", "load", "d"),

@@ -3,7 +3,6 @@
 Started by `rigwatch daq CONFIG` or `python -m daq CONFIG`.
 """
 
-import signal
 import sys
 import threading
 import time
@@ -17,7 +16,7 @@ from daq.supervisor import Supervisor
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.host import DAQ, Heartbeat, prepare_for_real_time, raise_priority
+from rigwatch.wire.host import DAQ, Heartbeat, prepare_for_real_time, raise_priority, set_at_signal
 from rigwatch.wire.rig_config import RigConfig, load_rig
 
 
@@ -62,10 +61,7 @@ def run(path: Path | str, stop: threading.Event) -> None:
 
 def main(path: Path | str) -> int:
     """`run` until a signal ends it; the exit code."""
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    run(path, stop)
+    run(path, set_at_signal())
     return 0
 
 

@@ -3,14 +3,13 @@
 Started by `rigwatch plant CONFIG` or `python -m sim_plant CONFIG`.
 """
 
-import signal
 import sys
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.wire.errors import ConfigError, RigwatchError
-from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.host import Heartbeat, set_at_signal
 from rigwatch.wire.rig_config import PlantSection, RigConfig, load_rig, section_or_error
 from sim_plant.effects import CHANNELS, EFFECTS
 from sim_plant.scenario import ScenarioRun, load_scenario
@@ -86,9 +85,7 @@ def main(path: Path | str) -> int:
     """Serve the rig configured at `path` until a signal ends it; the exit code."""
     config = load_rig(path)
     section_or_error(config, "plant", path)
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stop = set_at_signal()
     if config.plant is not None:
         serve(config, config.plant, stop)
     return 0

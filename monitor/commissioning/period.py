@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigwatch.physics.transfer import shortest_period
 from rigwatch.wire.arrays import FloatArray
 
 MATCH = 0.006
@@ -16,10 +17,8 @@ def period_of(voltage: FloatArray, longest: int, noise: float = 1e-3) -> int:
     if swing < 10.0 * noise:
         return 0
     tolerance = (MATCH * swing) ** 2 + (3.0 * noise) ** 2
-    for period in range(4, min(voltage.size // 2, longest) + 1):
-        if np.mean((voltage[period:] - voltage[:-period]) ** 2) <= tolerance:
-            return period
-    return 0
+    lags = range(4, min(voltage.size // 2, longest) + 1)
+    return shortest_period(voltage, lags, lambda _: tolerance)
 
 
 @dataclass(frozen=True, eq=False)

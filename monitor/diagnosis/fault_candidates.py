@@ -17,16 +17,19 @@ from monitor.model import RigModel
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Effect, Port, compose
 from rigwatch.physics.engine.score import (
-    ALIKE,
     Candidate,
     Projector,
     Scores,
+    Standing,
+    candidates,
     corrected_p_values,
     directions,
     knows,
     possible,
+    root_mean_square,
     score,
-    shaped,
+    sizes_at_port,
+    standings,
     trajectory,
 )
 from rigwatch.wire.arrays import FloatArray
@@ -106,8 +109,9 @@ def suspects(evidence: Evidence, model: RigModel, effects: Mapping[str, Effect])
         residual[None], moved[rows][None] / scale, Projector(nothing, nothing), variance=1.0
     )
     p_values = corrected_p_values(scores, residual, 1)
-    best = _best_shapes(found, scores, _allowed(ports, found, scores, pushes[rows]))
-    return _named(_rows(found, scores, p_values, best), residual, scores.units)
+    allowed = _allowed(ports, found, scores, pushes[rows])
+    ranked = standings([c.label for c in found], scores, p_values, allowed)
+    return _named([(_suspect(found[s.index], s), s.index) for s in ranked], residual, scores.units)
 
 
 def _counted(evidence: Evidence, model: RigModel) -> NDArray[np.bool_]:
@@ -134,34 +138,26 @@ def _bridged(signals: FloatArray) -> FloatArray:
 
 def _candidates(ports: RigPorts, effects: Mapping[str, Effect], model: RigModel) -> list[Candidate]:
     columns = dict(zip(ports.model.inputs, ports.inputs.T, strict=True))
-    return [
-        candidate
-        for port, place in ports.model.ports.items()
-        for name, effect in effects.items()
-        if effect.fits(place.kind) and knows(effect, place)
-        for candidate in shaped(name, effect.scaled(_sizes(place, columns, model)), port)
-    ]
+    places = ports.model.ports
+    sizes = {name: _sizes(port, columns, 1 / model.sample_rate) for name, port in places.items()}
+
+    def effect_at(name: str, port: str) -> Effect | None:
+        effect, place = effects[name], places[port]
+        stands = effect.fits(place.kind) and knows(effect, place)
+        return effect.scaled(sizes[port]) if stands else None
+
+    return candidates(places, effects, effect_at)
 
 
-def _sizes(port: Port, columns: Mapping[str, FloatArray], model: RigModel) -> dict[str, float]:
+def _sizes(port: Port, columns: Mapping[str, FloatArray], dt: float) -> dict[str, float]:
     """Root mean squares of what effects at the port see; their values are shares of these."""
-    sizes = {"dt": 1 / model.sample_rate}
-    for name, variable in port.variables.items():
-        sizes[name] = _rms(columns[variable.expression])
-    if port.signal:
-        signal = _signal(port, columns)
-        sizes |= {"u": _rms(signal), "rate": _rms(np.gradient(signal, sizes["dt"]))}
-    return sizes
+    variables = {name: columns[v.expression] for name, v in port.variables.items()}
+    return sizes_at_port(variables, _signal(port, columns) if port.signal else None, dt)
 
 
 def _signal(port: Port, columns: Mapping[str, FloatArray]) -> FloatArray:
     name = port.signal.removesuffix("_read")
     return columns[name if name in columns else "measured"]
-
-
-def _rms(signal: FloatArray) -> float:
-    size = float(np.sqrt(np.mean(np.square(signal))))
-    return size if size > 0 else 1.0
 
 
 def _pushes(ports: RigPorts, found: Sequence[Candidate], onset: int, dt: float) -> FloatArray:
@@ -185,44 +181,16 @@ def _allowed(
     allowed = []
     for index, candidate in enumerate(found):
         strength = float(scores.strength[index])
-        size = abs(strength) * _rms(pushes[:, index])
+        size = abs(strength) * root_mean_square(pushes[:, index])
         likely = scores.score[index] > 0 and possible(candidate, strength)
         allowed.append(bool(likely and size <= ports.limits.get(candidate.port, np.inf)))
     return allowed
 
 
-def _best_shapes(
-    found: Sequence[Candidate], scores: Scores, allowed: Sequence[bool]
-) -> dict[tuple[str, str], int]:
-    """The place of the best shape of each effect at each port."""
-    best: dict[tuple[str, str], int] = {}
-    for index, candidate in enumerate(found):
-        key = candidate.name, candidate.port
-        better = key not in best or scores.score[index] > scores.score[best[key]]
-        if allowed[index] and better:
-            best[key] = index
-    return best
-
-
-def _rows(
-    found: Sequence[Candidate],
-    scores: Scores,
-    p_values: FloatArray,
-    best: Mapping[tuple[str, str], int],
-) -> list[tuple[Suspect, int]]:
-    """Suspects with the place of their direction, those that explain most first."""
-    rows = [
-        (
-            Suspect(
-                *key, float(p_values[i]), float(scores.explained[i]), found[i].effect.free,
-                tuple(f"{n}@{p}" for (n, p), j in best.items() if j != i
-                      and scores.cosines[i, j] > ALIKE),
-            ),
-            i,
-        )
-        for key, i in best.items()
-    ]  # fmt: skip
-    return sorted(rows, key=lambda row: -row[0].explained)
+def _suspect(best: Candidate, found: Standing) -> Suspect:
+    return Suspect(
+        best.name, best.port, found.p_value, found.explained, best.effect.free, tuple(found.alike)
+    )
 
 
 def _named(

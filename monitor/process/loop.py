@@ -4,7 +4,6 @@ samples ─▶ RigMonitor ─▶ estimates, alarms, events
 commands ─▶ alarms ─┘          link, silence, losses ─▶ alarms
 """
 
-import signal
 import threading
 import time
 from collections.abc import Iterable
@@ -23,7 +22,13 @@ from monitor.process.startup_grace import Patience
 from rigwatch.wire.bus import Bus, connect, serve_alarm_list
 from rigwatch.wire.delivery import SampleReader
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.host import MONITOR, Heartbeat, prepare_for_real_time, raise_priority
+from rigwatch.wire.host import (
+    MONITOR,
+    Heartbeat,
+    prepare_for_real_time,
+    raise_priority,
+    set_at_signal,
+)
 from rigwatch.wire.messages import (
     ALARMS,
     ALIVE_KEY,
@@ -264,9 +269,7 @@ def run(path: Path | str) -> int:
     Raises:
         RigwatchError: configuration, model, journal or bus are not as they should be.
     """
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stop = set_at_signal()
     config = load_rig(path)
     model = suitable_model(config, path)
     # Before the bus is joined, so that one who is seen there is ready to judge.

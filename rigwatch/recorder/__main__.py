@@ -1,16 +1,13 @@
 """`python -m rigwatch.recorder CONFIG`: the recording process by itself."""
 
-import signal
 import sys
-import threading
 
 from rigwatch.recorder.process import run
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.host import set_at_signal
 
 if __name__ == "__main__":
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stop = set_at_signal()
     try:
         run(sys.argv[1], stop)
     except RigwatchError as error:

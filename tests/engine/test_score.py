@@ -10,13 +10,9 @@ from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording, windows
 from rigwatch.physics.engine.fit.windowed_fit import fit
+from rigwatch.physics.engine.score.candidates import Candidate, shaped
 from rigwatch.physics.engine.score.compatibility import suits
-from rigwatch.physics.engine.score.effect_sensitivities import (
-    Candidate,
-    directions,
-    shaped,
-    trajectory,
-)
+from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
 from rigwatch.physics.engine.score.score_test import Projector, score
 
 MODEL = shipped_models()["mass-spring-damper"]

@@ -9,7 +9,8 @@ from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
-from rigwatch.physics.engine.score.effect_sensitivities import directions, shaped, trajectory
+from rigwatch.physics.engine.score.candidates import shaped
+from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
 from rigwatch.wire.typed_files.loading import parse
 
 DT, N, HORIZON, RATE, FAST = 1 / 256, 1024, 128, 60.0, 50.0

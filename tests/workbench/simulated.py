@@ -8,7 +8,7 @@ from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.compare.compare import Bench, bench_of
+from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.study.study import Accepted, Span, Study, StudyFile
 from sim_plant.oscillator import DAMPING, MASS, RATE, STIFFNESS, Hidden, oscillate, strength_for

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigwatch.workbench.compare.compare import open_bench
+from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.compare.uncertainty_budget import beyond
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.fit.intervals import values

@@ -6,7 +6,7 @@ import pytest
 
 from rigwatch.simulated import write_session
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare.compare import open_bench
+from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.study.study import Accepted, Study, create
 from sim_plant.excitation import Multisine

@@ -10,7 +10,7 @@ import pytest
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
-from rigwatch.workbench.compare.compare import Bench, bench_of, told_by_healthy
+from rigwatch.workbench.compare.preparation import Bench, bench_of, told_by_healthy
 from rigwatch.workbench.data.noise_floor import from_residual
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking

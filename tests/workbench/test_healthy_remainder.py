@@ -11,7 +11,7 @@ from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import compose
 from rigwatch.simulated import write_session
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.compare.compare import open_bench
+from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit import healthy_remainder
 from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_products

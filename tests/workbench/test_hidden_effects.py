@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from rigwatch.workbench.compare.compare import Bench, bench_of
+from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.verdict import Verdict
-from rigwatch.workbench.ranking.rank import accepted_from
+from rigwatch.workbench.ranking.ranked import accepted_from
 from rigwatch.workbench.study.study import Study
 from sim_plant.oscillator import UNKNOWN, Hidden, strength_for
 from tests.workbench.simulated import HORIZON, multisine, recorded, size_of, study

@@ -12,7 +12,8 @@ from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording
-from rigwatch.workbench.compare.compare import bench_of, comparison
+from rigwatch.workbench.compare.compare import comparison
+from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit.input_hold import holding, with_hold

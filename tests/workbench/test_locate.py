@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rigwatch.workbench.compare.compare import Bench
 from rigwatch.workbench.compare.locate import Region, locate
+from rigwatch.workbench.compare.preparation import Bench
 from tests.workbench.simulated import multisine, opened
 
 MANY = np.arange(0.25, 6.0, 0.25)

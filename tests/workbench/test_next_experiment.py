@@ -3,7 +3,7 @@
 import numpy as np
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.compare.compare import Bench, bench_of
+from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import explanation, ranking
 from rigwatch.workbench.explain.next_experiment import excitation

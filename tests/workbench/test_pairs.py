@@ -8,7 +8,9 @@ import pytest
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.pairs import Pair, _pair, likely_pairs, two_effects
 from rigwatch.workbench.explain.verdict import judge
-from rigwatch.workbench.ranking.rank import SIMILAR, Ranked, rank, unheard
+from rigwatch.workbench.ranking.rank import rank
+from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
+from rigwatch.workbench.ranking.refitting import unheard
 from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.simulated import fitted, multisine
 

@@ -3,7 +3,6 @@
 import argparse
 import json
 import os
-import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,6 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     os.environ.setdefault("RUST_LOG", "off")
     from rigwatch.dashboard.process import LiveDashboard
     from rigwatch.wire.bus import connect
+    from rigwatch.wire.host import set_at_signal
 
     settings = config.dashboard or DashboardSection()
     bus = connect(config, "dashboard")
@@ -46,8 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     live = LiveDashboard(bus, settings, choice, _say_json if arguments.json else _say)
     if config.monitor is not None:
         _know_model(live.facts, config.monitor.model)
-    for ending in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(ending, lambda *_: live.stop.set())
+    set_at_signal(live.stop)
     try:
         live.run()
     finally:

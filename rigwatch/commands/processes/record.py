@@ -1,8 +1,6 @@
 """`rigwatch record`: keeps everything that a rig says in session files."""
 
 import argparse
-import signal
-import threading
 from pathlib import Path
 
 from rigwatch.commands.common import print_json
@@ -21,11 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Record until a signal ends it, then say where."""
     from rigwatch.recorder import run as record
+    from rigwatch.wire.host import set_at_signal
 
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
-    folder = record(arguments.config, stop, arguments.notes)
+    folder = record(arguments.config, set_at_signal(), arguments.notes)
     if arguments.json:
         print_json({"session": folder})
     else:

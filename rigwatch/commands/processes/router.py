@@ -1,8 +1,6 @@
 """`rigwatch router`: the bus that the processes of a rig meet on."""
 
 import argparse
-import signal
-import threading
 from pathlib import Path
 
 HELP = "run the router of a rig's bus"
@@ -19,13 +17,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Route until a signal ends it."""
     from rigwatch.wire.bus import open_router
-    from rigwatch.wire.host import ROUTER, Heartbeat, raise_priority
+    from rigwatch.wire.host import ROUTER, Heartbeat, raise_priority, set_at_signal
     from rigwatch.wire.rig_config import load_rig
 
     config = load_rig(arguments.config)
-    stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: stop.set())
+    stop = set_at_signal()
     heartbeat = Heartbeat("router")
     raise_priority(ROUTER)
     close = open_router(config)

@@ -1,7 +1,8 @@
 """Linear models of the rig: transfer functions, their frequency responses and their fits.
 
 The thesis's friction-free model is `fit_transfer_function` over a measured frequency response
-(5.19); its friction filter is the output-error model (5.29).
+(5.19); its friction filter is the output-error model (5.29). `period` says when an excitation
+repeats.
 """
 
 from rigwatch.physics.transfer.frequency_fit import fit_transfer_function
@@ -11,6 +12,7 @@ from rigwatch.physics.transfer.output_error import (
     OutputErrorOrders,
     fit_output_error,
 )
+from rigwatch.physics.transfer.period import period_by_correlation, shortest_period
 from rigwatch.physics.transfer.transfer_function import TransferFunction, filter_sample
 from rigwatch.physics.transfer.velocity import velocity_filter
 
@@ -23,5 +25,7 @@ __all__ = [
     "fit_output_error",
     "fit_transfer_function",
     "frequency_response",
+    "period_by_correlation",
+    "shortest_period",
     "velocity_filter",
 ]

@@ -14,7 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from rigwatch.physics.engine.score import ALIKE, Projector, Scores, score
+from rigwatch.physics.engine.score import (
+    ALIKE,
+    Projector,
+    Scores,
+    Standing,
+    cosines_with,
+    freed,
+    score,
+    standings,
+)
 from rigwatch.structures.damage.refit import STEPS, Refit, Stretch
 from rigwatch.structures.damage.spring_model import SpringModel, split
 from rigwatch.wire.arrays import FloatArray
@@ -110,7 +119,8 @@ def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Rank
     residual, rows, fitted, scores = scored(stretch, path)
     shifts = first_states(residual, rows, np.diag(scores.strength))
     state = model.shown_state(path, stretch.first)
-    listed = [_first_pass(stretch, scores, i) for i in np.argsort(-scores.score).tolist()]
+    ranked = standings(model.candidates, scores, scores.corrected)
+    listed = [_first_pass(stretch, standing) for standing in ranked]
     chosen = [c for c in listed[:refitted] if c.score >= WORTH * listed[0].score]
     places = {name: i for i, name in enumerate(model.candidates)}
     done = [_refitted(stretch, c, state + shifts[places[c.name]], SCREENING) for c in chosen]
@@ -155,16 +165,15 @@ def first_states(residual: FloatArray, rows: FloatArray, changes: FloatArray) ->
     return np.asarray(np.linalg.lstsq(rows[:, count:], left, rcond=1e-10)[0].T)
 
 
-def _first_pass(stretch: Stretch, scores: Scores, index: int) -> Candidate:
-    model = stretch.model
-    name = model.candidates[index]
+def _first_pass(stretch: Stretch, found: Standing) -> Candidate:
+    model, name = stretch.model, found.label
     names = list(model.problem.sweeper.compiled.system.parameters)
     before = float(stretch.parameters[names.index(name)])
-    after = before + float(scores.strength[index])
     spring, kind = split(name, model.structure)
-    numbers = float(scores.score[index]), float(scores.corrected[index])
-    nan = float("nan")
-    return Candidate(name, spring, kind, *numbers, before, after, nan, nan, (), None)
+    after, nan = before + found.strength, float("nan")
+    return Candidate(
+        name, spring, kind, found.score, found.p_value, before, after, nan, nan, (), None
+    )
 
 
 def _refitted(
@@ -194,7 +203,7 @@ def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) 
     count, place = len(model.candidates), model.candidates.index(best.name)
     slopes = best.refit.slopes
     unit = freed(slopes[:, :count], slopes[:, count:])
-    cosines = np.minimum(np.abs(unit.T @ unit[:, place]), 1.0)
+    cosines = cosines_with(unit, place)
     # What is lost, to first order, where the best's direction is replaced by another.
     shares = (1.0 - cosines**2) * ((best.after - best.before) / max(best.deviation, 1e-300)) ** 2
     alike = []
@@ -204,14 +213,6 @@ def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) 
         if i != place and cosines[i] > ALIKE and worse < CHANCE:
             alike.append(name)
     return replace(best, alike=tuple(alike))
-
-
-def freed(candidates: FloatArray, states: FloatArray) -> FloatArray:
-    """Unit directions without what the first states could have made."""
-    basis = np.linalg.qr(states).Q
-    rest = candidates - basis @ (basis.T @ candidates)
-    length = np.linalg.norm(rest, axis=0)
-    return np.asarray(rest / np.where(length > 0, length, 1.0))
 
 
 def _unseen(

@@ -11,14 +11,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from rigwatch.physics.engine.score import ALIKE
+from rigwatch.physics.engine.score import ALIKE, best_of, cosines_with, freed
 from rigwatch.structures.damage.location import (
     CHANCE,
     SCREENING,
     Candidate,
     Ranking,
     first_states,
-    freed,
     scored,
 )
 from rigwatch.structures.damage.refit import STEPS, Refit, Stretch
@@ -114,13 +113,13 @@ def _member(single: Candidate, refit: Refit, count: int) -> Candidate:
     """One of a pair; its chance is that of its change beside the other, as the best of all."""
     after, deviation = refit.values[single.name], refit.deviations[single.name]
     score = ((after - single.before) / max(deviation, 1e-300)) ** 2
-    alone = float(chi2.sf(score, 1))
+    alone = chi2.sf(score, 1)
     return replace(
         single,
         after=after,
         deviation=deviation,
         score=float(score),
-        p_value=float(-np.expm1(count * np.log1p(-min(alone, 1 - 1e-16)))),
+        p_value=float(best_of(alone, count)),
         chi2=refit.chi2 / max(refit.freedom, 1),
         refit=refit,
     )
@@ -137,7 +136,7 @@ def _alike(
     for side, member in enumerate(members):
         other = refit.slopes[:, [pair[1 - side]]]
         unit = freed(refit.slopes[:, :count], np.hstack([refit.slopes[:, count:], other]))
-        cosines = np.minimum(np.abs(unit.T @ unit[:, pair[side]]), 1.0)
+        cosines = cosines_with(unit, pair[side])
         lost = (1.0 - cosines**2) * member.score
         found[side] |= set(np.flatnonzero((cosines > ALIKE) & (lost < CHANCE)).tolist())
     for rival, rest in left.items():

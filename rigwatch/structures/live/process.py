@@ -1,13 +1,12 @@
 """A structure watched on a rig's bus: the loop around `live.LiveDamage`."""
 
-import signal
-import threading
 import time
 
 from rigwatch.structures.live.live_watch import LiveDamage
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.delivery import SampleReader
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.host import set_at_signal
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
@@ -79,9 +78,7 @@ def watch_rig(config: RigConfig, watched: LiveDamage) -> None:
     Raises:
         BusError: the bus cannot be joined.
     """
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stop = set_at_signal()
     watched.prepare()
     bus = connect(config, PROCESS)
     try:

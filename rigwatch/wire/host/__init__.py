@@ -1,5 +1,8 @@
-"""What a process asks of its machine: heartbeat to systemd, real-time priority, ports."""
+"""What a process asks of its machine: heartbeat to systemd, real-time priority, ports, and
+the signals that end it.
+"""
 
+from rigwatch.wire.host.ending import set_at_signal
 from rigwatch.wire.host.heartbeat import Heartbeat
 from rigwatch.wire.host.ports import endpoint_address, free_port, is_free
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
@@ -14,4 +17,5 @@ __all__ = [
     "is_free",
     "prepare_for_real_time",
     "raise_priority",
+    "set_at_signal",
 ]

@@ -1,15 +1,14 @@
 """The model beside the measurements: errors against the noise floor, and where they arise."""
 
-from rigwatch.workbench.compare.compare import (
+from rigwatch.workbench.compare.compare import Comparison, compare, comparison
+from rigwatch.workbench.compare.locate import Region, locate, motion, sample_numbers
+from rigwatch.workbench.compare.preparation import (
     Bench,
-    Comparison,
     bench_of,
-    compare,
-    comparison,
     open_bench,
     prepared,
+    told_by_healthy,
 )
-from rigwatch.workbench.compare.locate import Region, locate, motion, sample_numbers
 from rigwatch.workbench.compare.uncertainty_budget import apparent_strength, beyond
 
 __all__ = [
@@ -26,4 +25,5 @@ __all__ = [
     "open_bench",
     "prepared",
     "sample_numbers",
+    "told_by_healthy",
 ]

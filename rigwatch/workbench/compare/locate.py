@@ -13,7 +13,7 @@ from scipy.stats import t as student
 
 from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.wire.arrays import FloatArray, IntArray
-from rigwatch.workbench.compare.compare import Bench
+from rigwatch.workbench.compare.preparation import Bench
 from rigwatch.workbench.data import find_period
 
 PIECES = {"time": 12, "grid": 6, "amplitude": 5, "frequency": 12}

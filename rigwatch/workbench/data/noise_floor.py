@@ -12,6 +12,7 @@ import numpy as np
 from scipy.signal import welch
 
 from rigwatch.physics.engine.fit import Fit, Recording
+from rigwatch.physics.transfer import period_by_correlation
 from rigwatch.wire.arrays import BoolArray, FloatArray
 
 METHODS = {
@@ -24,6 +25,8 @@ ALLOWED = {"periods": 1.1, "healthy": 1.1, "healthy motion": 1.05, "quiet band":
 """Error over noise floor up to which nothing is left to explain, by how the floor is known."""
 BANDS = 8
 FEWEST_PERIODS = 3
+REPEATED = 2e-4
+"""Mean square by which an input may differ a period later, over its own: rms 1 % of each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,27 +95,7 @@ def find_period(recording: Recording) -> int:
     if recording.inputs.shape[1] == 0:
         return 0
     signal = recording.inputs[:, 0] - recording.inputs[:, 0].mean()
-    n, energy = len(signal), float(signal @ signal)
-    if energy == 0 or n < 16:
-        return 0
-    spectrum = np.fft.rfft(signal, 2 * n)
-    together = np.fft.irfft(spectrum * spectrum.conj())[:n]
-    overlap = np.maximum(np.cumsum(signal[::-1] ** 2)[::-1], 1e-300)
-    alike = together[: n // 2] / overlap[: n // 2]
-    falls = np.flatnonzero(alike < 0.5)
-    if not falls.size:
-        return 0
-    for lag in falls[0] + np.argsort(-alike[falls[0] :])[:3]:
-        if _repeats(signal, lag):
-            # Two periods are alike, too: the shortest counts.
-            parts = (lag // count for count in range(8, 0, -1) if lag % count == 0)
-            return int(next(part for part in parts if _repeats(signal, part)))
-    return 0
-
-
-def _repeats(signal: FloatArray, lag: int) -> bool:
-    difference = signal[lag:] - signal[:-lag]
-    return bool(difference @ difference < 2e-4 * (signal[lag:] @ signal[lag:]))
+    return period_by_correlation(signal, lambda part: REPEATED * float(np.mean(part**2)))
 
 
 def _between(series: FloatArray, samples: int, count: int) -> FloatArray:

@@ -5,6 +5,7 @@ import numpy as np
 from rigwatch.physics.engine.compile import evaluated
 from rigwatch.physics.engine.equations import Model, Port, compose
 from rigwatch.physics.engine.fit import Recording, initial_states
+from rigwatch.physics.engine.score import sizes_at_port
 from rigwatch.wire.arrays import FloatArray
 
 Sizes = dict[str, float]
@@ -32,15 +33,8 @@ def _measured(model: Model, recording: Recording) -> dict[str, FloatArray]:
 
 def _sizes(port: Port, model: Model, signals: dict[str, FloatArray], recording: Recording) -> Sizes:
     values = {name: p.value for name, p in model.parameters.items()}
-    sizes = {"dt": recording.dt}
-    for name, variable in port.variables.items():
-        sizes[name] = _rms(evaluated(variable.expression, signals, values, f"port variable {name}"))
-    if port.signal:
-        sizes["u"] = _rms(signals[port.signal])
-        sizes["rate"] = _rms(np.gradient(signals[port.signal], recording.dt))
-    return sizes
-
-
-def _rms(signal: FloatArray) -> float:
-    size = float(np.sqrt(np.nanmean(np.square(signal))))
-    return size if size > 0 else 1.0
+    variables = {
+        name: evaluated(variable.expression, signals, values, f"port variable {name}")
+        for name, variable in port.variables.items()
+    }
+    return sizes_at_port(variables, signals[port.signal] if port.signal else None, recording.dt)

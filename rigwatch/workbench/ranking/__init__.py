@@ -1,22 +1,15 @@
-"""Ranks every effect at every port: score test, refit of the best, held-out error, classes."""
+"""Ranks every effect at every port: score test, refit of the best, held-out error, classes.
 
-from rigwatch.workbench.ranking.rank import (
-    EXPLAINED,
-    SAME,
-    SIMILAR,
-    Progress,
-    Ranked,
-    accepted_from,
-    candidates,
-    judge_fit,
-    left_over,
-    rank,
-    rank_all,
-    rank_only,
-    refit,
-    score_all,
-    unheard,
-)
+`candidates` are scored (`scoring`) and become rows (`ranked`); those `worth_a_fit` are fitted
+(`refitting`) and judged on the recordings held out (`acceptance`). `rank` is all of it.
+"""
+
+from rigwatch.workbench.ranking.acceptance import EXPLAINED, judge_fit, left_over
+from rigwatch.workbench.ranking.candidates import candidates
+from rigwatch.workbench.ranking.rank import rank
+from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from
+from rigwatch.workbench.ranking.refitting import Progress, refit, unheard
+from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all
 
 __all__ = [
     "EXPLAINED",

@@ -1,17 +1,21 @@
 """Which effect is missing, to first order: the score test of candidates along a fitted model.
 
-`effect_sensitivities` computes what each candidate would do, `score_test` how much of the
-residual it explains, `significance` corrects for the number of candidates.
+`candidates` says which effects may stand where, `effect_sensitivities` computes what each would do,
+`score_test` how much of the residual it explains, `significance` corrects for the number of
+candidates, `ranking` orders them: best shapes, and classes that look alike.
 """
 
-from rigwatch.physics.engine.score.compatibility import knows, possible, suits
-from rigwatch.physics.engine.score.effect_sensitivities import (
+from rigwatch.physics.engine.score.candidates import (
     Candidate,
-    directions,
+    candidates,
+    root_mean_square,
     shaped,
-    trajectory,
+    sizes_at_port,
 )
-from rigwatch.physics.engine.score.score_test import ALIKE, Projector, Scores, score
+from rigwatch.physics.engine.score.compatibility import knows, possible, suits
+from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
+from rigwatch.physics.engine.score.ranking import Standing, cosines_with, freed, standings
+from rigwatch.physics.engine.score.score_test import ALIKE, Projector, Scores, best_of, score
 from rigwatch.physics.engine.score.significance import corrected_p_values
 
 __all__ = [
@@ -19,12 +23,20 @@ __all__ = [
     "Candidate",
     "Projector",
     "Scores",
+    "Standing",
+    "best_of",
+    "candidates",
     "corrected_p_values",
+    "cosines_with",
     "directions",
+    "freed",
     "knows",
     "possible",
+    "root_mean_square",
     "score",
     "shaped",
+    "sizes_at_port",
+    "standings",
     "suits",
     "trajectory",
 ]

@@ -3,7 +3,7 @@
 import ast
 
 from rigwatch.physics.engine.equations import LEFT, RATE, Effect, Model, Port
-from rigwatch.physics.engine.score.effect_sensitivities import Candidate
+from rigwatch.physics.engine.score.candidates import Candidate
 
 
 def suits(effect: Effect, port: Port, model: Model) -> bool:

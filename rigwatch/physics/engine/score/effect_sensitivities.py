@@ -10,7 +10,7 @@ At a sensor the effect moves its own output alone.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -31,36 +31,13 @@ from rigwatch.physics.engine.equations import (
     STEP,
     TIME,
     UNTIL,
-    Effect,
     System,
     parse,
     symbol,
 )
 from rigwatch.physics.engine.fit import Memory, held_at
+from rigwatch.physics.engine.score.candidates import Candidate
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """An effect that may be missing at a port, with values for its shape parameters."""
-
-    name: str
-    effect: Effect
-    port: str
-    shape: dict[str, float] = field(default_factory=dict, hash=False)
-
-
-def shaped(name: str, effect: Effect, port: str) -> list[Candidate]:
-    """The candidates of one effect at one port: one a combination of the shapes that are tried."""
-    grids = [
-        [(key, value) for value in (p.tried or (p.value,))]
-        for key, p in effect.parameters.items()
-        if p.role not in ("strength", "switch")
-    ]
-    combinations: list[list[tuple[str, float]]] = [[]]
-    for grid in grids:
-        combinations = [[*c, choice] for c in combinations for choice in grid]
-    return [Candidate(name, effect, port, dict(c)) for c in combinations]
 
 
 @dataclass(frozen=True, eq=False)

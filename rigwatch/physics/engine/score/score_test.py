@@ -67,6 +67,11 @@ class Projector:
         return np.asarray(flat - self._parameters @ (self._parameters.T @ flat))
 
 
+def best_of(alone: FloatArray, count: int) -> FloatArray:
+    """p-values of the best of `count` candidates, from those of each of them alone (Šidák)."""
+    return np.asarray(-np.expm1(max(count, 1) * np.log1p(-np.minimum(alone, 1 - 1e-16))))
+
+
 def score(
     residuals: FloatArray, candidates: FloatArray, fitted: Projector, variance: float
 ) -> Scores:
@@ -88,7 +93,7 @@ def score(
     return Scores(
         along**2 / variance,
         alone,
-        -np.expm1(max(int(seen.sum()), 1) * np.log1p(-np.minimum(alone, 1 - 1e-16))),
+        best_of(alone, int(seen.sum())),
         along / size,
         along**2 / max(float(r @ r), 1e-300),
         np.abs(unit.T @ unit),

@@ -7,7 +7,7 @@ candidates looks good without being so: the p-values of the score test allow for
 import numpy as np
 from scipy.stats import chi2
 
-from rigwatch.physics.engine.score.score_test import Scores
+from rigwatch.physics.engine.score.score_test import Scores, best_of
 from rigwatch.wire.arrays import FloatArray
 
 
@@ -33,8 +33,7 @@ def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> F
     swollen = np.maximum(1.0, own[0] * other[0] + 2 * np.sum(own[1:] * other[1:], axis=0))
     spread = np.maximum(np.sum(left**2, axis=0), 1e-300) / max(len(residual) - 1, 1)
     alone = chi2.sf(along**2 / (spread * swollen), 1)
-    tests = max(int(np.sum(scores.score > 0)), 1)
-    return np.asarray(-np.expm1(tests * np.log1p(-np.minimum(alone, 1 - 1e-16))))
+    return best_of(alone, int(np.sum(scores.score > 0)))
 
 
 def _autocorrelation(signals: FloatArray) -> FloatArray:

@@ -1,0 +1,26 @@
+"""What a study tries: every effect at every port where it makes sense and does not stand yet."""
+
+from rigwatch.physics.engine.equations import Effect
+from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.score import Candidate, suits
+from rigwatch.physics.engine.score import candidates as every_candidate
+from rigwatch.workbench.data import port_sizes
+from rigwatch.workbench.study import Study
+
+
+def candidates(study: Study, recording: Recording) -> list[Candidate]:
+    """Every effect at every port where it makes sense and does not stand yet.
+
+    Args:
+        study: its model, its effects and those already accepted.
+        recording: shows how large the signals at the ports are.
+    """
+    ports, sizes = study.model.ports, port_sizes(study.model, recording)
+    placed = {(a.effect, a.port) for a in study.file.effects}
+
+    def effect_at(name: str, port: str) -> Effect | None:
+        if (name, port) in placed or not suits(study.effects[name], ports[port], study.model):
+            return None
+        return study.effect_at(name, port).scaled(sizes[port])
+
+    return every_candidate(ports, study.effects, effect_at)

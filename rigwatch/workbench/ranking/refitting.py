@@ -1,0 +1,70 @@
+"""Fits the model with an effect in it, and judges the fit on the recordings held out."""
+
+from collections.abc import Callable, Sequence
+
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.data import Data, NoiseFloor
+from rigwatch.workbench.fit import Fitted, fit_again, fit_model, fit_twice, may_be_better
+from rigwatch.workbench.ranking.acceptance import judge_fit, leaves_nothing
+from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
+from rigwatch.workbench.study import Study
+
+Progress = Callable[[str], None]
+Fitting = Callable[..., Fitted]
+
+
+def unheard(_: str) -> None:
+    """Progress that nobody asked for."""
+
+
+def refit(
+    study: Study, data: Data, base: Fitted, row: Ranked, fitting: Fitting = fit_twice
+) -> None:
+    """Fit the model with the row's effect and judge it on the recordings held out.
+
+    Args:
+        study, data, base: the model and what it was fitted to.
+        row: the effect; the fit and what is made of it are added.
+        fitting: `fit_model` to be content with the first minimum.
+    """
+    placements, start = (*base.placements, row.placement), base.train.values() | row.begin()
+    try:
+        row.fitted = fitting(study, data, placements, start, base.train.scale, base=base)
+    except ModelError as error:
+        row.reason, row.trouble = "cannot be fitted", str(error)
+        return
+    judge_fit(base, row)
+
+
+def fit_each(  # noqa: PLR0917 -- they belong together
+    study: Study,
+    data: Data,
+    base: Fitted,
+    floor: NoiseFloor,
+    rows: Sequence[Ranked],
+    progress: Progress,
+) -> list[Ranked]:
+    """Fit rows in turn; those that leave nothing, after which only what is like them is fitted."""
+    enough: list[Ranked] = []
+    for number, row in enumerate(rows, start=1):
+        if any(other.cosines[row.label] < SIMILAR for other in enough):
+            row.reason = f"unlike {enough[0].label}, which leaves nothing to explain; not fitted"
+            continue
+        progress(f"fitting {row.label}, {number} of at most {len(rows)}")
+        refit(study, data, base, row, fit_model)
+        if row.accepted and leaves_nothing(row, base, floor):
+            enough.append(row)
+    return enough
+
+
+def try_again(
+    study: Study, data: Data, base: Fitted, rows: Sequence[Ranked], progress: Progress
+) -> None:
+    """Fit again what may have ended in a local minimum, as nothing explains the error."""
+    for row in rows:
+        start = base.train.values() | row.begin()
+        if row.fitted is None or not may_be_better(study, data, row.fitted, start):
+            continue
+        progress(f"fitting {row.label} again, by way of short horizons")
+        row.fitted = fit_again(study, data, row.fitted, start)
+        judge_fit(base, row)

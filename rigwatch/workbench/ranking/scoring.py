@@ -1,0 +1,96 @@
+"""Scores candidates along the fitted model: what each explains of the residual, to first order."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigwatch.physics.engine.fit import windows
+from rigwatch.physics.engine.score import (
+    Candidate,
+    Projector,
+    Scores,
+    corrected_p_values,
+    directions,
+    possible,
+    score,
+    standings,
+    trajectory,
+)
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.data import Data
+from rigwatch.workbench.fit import Fitted, nodes
+from rigwatch.workbench.ranking.candidates import candidates
+from rigwatch.workbench.ranking.ranked import Ranked, row_of
+from rigwatch.workbench.study import Study
+
+
+def score_all(data: Data, base: Fitted, found: Sequence[Candidate]) -> Scores:
+    """Scores of all candidates along the fitted base model.
+
+    Args:
+        data, base: the model and what it was fitted to.
+        found: the candidates.
+    """
+    fitted, recording = base.train, data.train
+    cut = windows(base.compiled.system, len(recording), base.horizon)
+    moved, slopes = _along(data, base, found)
+    measured = np.isfinite(recording.outputs)[cut.starts[:, None] + np.arange(cut.length)]
+    moved, slopes = moved * measured[..., None], slopes * measured[..., None]
+    if recording.thinning:
+        moved, slopes = recording.thinning.apply(moved), recording.thinning.apply(slopes)
+    flat = (len(cut.starts), -1)
+    moved = moved.reshape(*flat, len(found))
+    slopes = slopes.reshape(*flat, slopes.shape[-1])
+    m = len(base.compiled.system.free)
+    residual = np.nan_to_num(fitted.residuals / fitted.scale).reshape(flat)
+    fixed = Projector(slopes[..., :m], slopes[..., m:])
+    return score(residual, moved, fixed, float(np.mean(residual**2)))
+
+
+def _along(data: Data, base: Fitted, found: Sequence[Candidate]) -> tuple[FloatArray, FloatArray]:
+    """Scaled directions of the candidates and slopes of the model, at every sample."""
+    fitted, recording = base.train, data.train
+    cut = windows(base.compiled.system, len(recording), base.horizon)
+    substeps = nodes(base, recording)
+    at = trajectory(
+        base.compiled, recording.inputs, recording.dt, cut.starts, cut.length,
+        initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
+    )  # fmt: skip
+    run = base.compiled.simulate(
+        recording.inputs, recording.dt, cut.starts, cut.length,
+        initial=fitted.initial, parameters=fitted.parameters, substeps=substeps,
+    )  # fmt: skip
+    scale = fitted.scale[:, None]
+    return directions(at, found) / scale, run.slopes / scale
+
+
+def rank_all(study: Study, data: Data, base: Fitted) -> list[Ranked]:
+    """Every effect at every port by its score, none of them fitted."""
+    return scored(study, data, base, candidates(study, data.train), every=True)
+
+
+def rank_only(study: Study, data: Data, base: Fitted, found: Sequence[Candidate]) -> Ranked:
+    """The row of one effect at one port, whatever its score; `found` are its shapes."""
+    return scored(study, data, base, found, every=True)[0]
+
+
+def scored(
+    study: Study, data: Data, base: Fitted, found: Sequence[Candidate], *, every: bool = False
+) -> list[Ranked]:
+    """One row an effect and port, scored and not yet fitted, the likeliest first.
+
+    Args:
+        study, data, base: the model and what it was fitted to.
+        found: the candidates; each row has the shape that the residual looks like most.
+        every: also those whose strength would be on the wrong side of its bounds.
+    """
+    scores = score_all(data, base, found)
+    residual = np.nan_to_num(base.train.residuals / base.train.scale).ravel()
+    p_values = corrected_p_values(scores, residual, len(base.train.residuals))
+    strengths = scores.strength.tolist()
+    allowed = [every or possible(c, at) for c, at in zip(found, strengths, strict=True)]
+    ports = study.model.ports
+    return [
+        row_of(found[row.index], row, ports[found[row.index].port].kind)
+        for row in standings([c.label for c in found], scores, p_values, allowed)
+    ]
