@@ -258,4 +258,5 @@ def parameters_of(file: StudyFile) -> dict[str, float]:
     for accepted in file.effects:
         prefix = f"{accepted.port}_{accepted.effect}_"
         found |= {prefix + name: value for name, value in accepted.parameters.items()}
-    return found
+    # The last effect keeps the whole fit that it was accepted with.
+    return found | dict(file.effects[-1].model if file.effects else {})
