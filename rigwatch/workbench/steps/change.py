@@ -5,8 +5,8 @@ no evidence, as every further parameter lets it.
 """
 
 from dataclasses import dataclass
-from typing import Any
 from pathlib import Path
+from typing import Any
 
 from msgspec import structs
 
