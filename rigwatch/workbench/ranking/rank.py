@@ -40,6 +40,7 @@ from rigwatch.workbench.fit import (
     may_be_better,
     nodes,
 )
+from rigwatch.workbench.ranking.recordings import part_by_part
 from rigwatch.workbench.study import Accepted, Study
 
 LEVEL = 0.01
@@ -157,7 +158,7 @@ def score_all(data: Data, base: Fitted, found: Sequence[Candidate]) -> Scores:
     """
     fitted, recording = base.train, data.train
     cut = windows(base.compiled.system, len(recording), base.horizon)
-    moved, slopes = _along(data, base, found)
+    moved, slopes = part_by_part(_along, data, base, found)
     measured = np.isfinite(recording.outputs)[cut.starts[:, None] + np.arange(cut.length)]
     moved, slopes = moved * measured[..., None], slopes * measured[..., None]
     if recording.thinning:
