@@ -1,4 +1,4 @@
-"""`rigwatch import`: makes a session of a CSV, MAT or Parquet file."""
+"""`rigwatch import`: makes a session of a CSV, MAT, Parquet or JSON file."""
 
 import argparse
 from pathlib import Path
@@ -9,7 +9,7 @@ from rigwatch.commands.common import print_json, say
 if TYPE_CHECKING:
     from rigwatch.wire.exchange import ImportMapping
 
-HELP = "make a session of a CSV, MAT or Parquet file"
+HELP = "make a session of a CSV, MAT, Parquet or JSON file"
 EXAMPLE = """\
   rigwatch import DATA_EMPS.mat emps.mcap --mapping configs/imports/emps.toml
   rigwatch import run.csv run.mcap --time 't[ms]' --map 'position=qm[mm]' --map 'force=u*35.15[N]'

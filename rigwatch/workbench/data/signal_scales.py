@@ -1,6 +1,7 @@
 """How large the signals at each port are: starts and bounds of effects are shares of that."""
 
 import numpy as np
+from scipy.signal import detrend
 
 from rigwatch.physics.engine.compile import evaluated
 from rigwatch.physics.engine.equations import Model, Port, compose
@@ -30,11 +31,22 @@ def _measured(model: Model, recording: Recording) -> dict[str, FloatArray]:
     return found
 
 
+def _travel(speed: FloatArray, recording: Recording) -> FloatArray:
+    """Distance that a speed goes to and fro in, its drift left out; shape (n,)."""
+    ends = np.cumsum(recording.parts or (len(recording),))[:-1]
+    there = np.nan_to_num(speed)
+    pieces = np.split(there, ends)
+    return np.concatenate([detrend(np.cumsum(piece)) * recording.dt for piece in pieces])
+
+
 def _sizes(port: Port, model: Model, signals: dict[str, FloatArray], recording: Recording) -> Sizes:
     values = {name: p.value for name, p in model.parameters.items()}
     sizes = {"dt": recording.dt}
     for name, variable in port.variables.items():
         sizes[name] = _rms(evaluated(variable.expression, signals, values, f"port variable {name}"))
+    if "v" in port.variables and "x" not in port.variables:
+        speed = evaluated(port.variables["v"].expression, signals, values, "port variable v")
+        sizes["x"] = _rms(_travel(speed, recording))
     if port.signal:
         sizes["u"] = _rms(signals[port.signal])
         sizes["rate"] = _rms(np.gradient(signals[port.signal], recording.dt))

@@ -40,7 +40,7 @@ from rigwatch.workbench.fit import (
     may_be_better,
     nodes,
 )
-from rigwatch.workbench.ranking.recordings import part_by_part
+from rigwatch.workbench.ranking.recordings import check_ports, part_by_part
 from rigwatch.workbench.study import Accepted, Study
 
 LEVEL = 0.01
@@ -138,6 +138,7 @@ class Ranked:
 
 def candidates(study: Study, recording: Recording) -> list[Candidate]:
     """Every effect at every port where it makes sense and does not stand yet."""
+    check_ports(study)
     sizes = port_sizes(study.model, recording)
     placed = {(a.effect, a.port) for a in study.file.effects}
     return [
@@ -229,7 +230,7 @@ def _fit_each(  # noqa: PLR0917 -- they belong together
     enough: list[Ranked] = []
     for number, row in enumerate(rows, start=1):
         if any(other.cosines[row.label] < SIMILAR for other in enough):
-            row.reason = f"unlike {enough[0].label}, which leaves nothing to explain; not fitted"
+            row.reason = f"unlike {enough[0].label}, which explains {EXPLAINED:.0%}; not fitted"
             continue
         progress(f"fitting {row.label}, {number} of at most {len(rows)}")
         refit(study, data, base, row, fit_model)

@@ -11,9 +11,12 @@ import numpy as np
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.score import Candidate
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted
+from rigwatch.workbench.study import Study
 
+PLACE = """[ports.load], kind = "force", unit, variables, and `+ load` in the equation of a rate"""
 Along = Callable[[Data, Fitted, Sequence[Candidate]], tuple[FloatArray, FloatArray]]
 
 
@@ -58,6 +61,18 @@ def _apart(
         slopes[:, rows, :, at : at + states] = own[..., free:]
         first += own.shape[1]
     return moved, slopes
+
+
+def check_ports(study: Study) -> None:
+    """Refuse to rank effects in a model that they cannot enter.
+
+    Raises:
+        ModelError: it has no port.
+    """
+    if not study.model.ports:
+        raise ModelError(
+            f"{study.file.model}: found no port, expected one where effects may enter: {PLACE}"
+        )
 
 
 def _pieces(recording: Recording) -> list[Recording]:

@@ -25,6 +25,7 @@ from rigwatch.physics.engine.equations import (
     Hold,
     Model,
     Parameter,
+    check_model,
     library,
     load_effects,
     load_model,
@@ -108,6 +109,10 @@ class StudyFile(Section, frozen=True, kw_only=True):
             " motion where channels show some of the model's states but not all"
         ),
     ] = "auto"
+    rate: Annotated[
+        Annotated[float, Meta(gt=0)] | None,
+        Meta(description="rate that all recordings are put on [Hz]; their own if not given"),
+    ] = None
     substeps: Annotated[int, Meta(ge=1, description="integration steps a sample")] = 2
     period: Annotated[float, Meta(ge=0, description="period of the excitation [s], 0: look")] = 0.0
     channels: Annotated[
@@ -291,7 +296,10 @@ def _unit(parameter: Parameter | EffectParameter | None) -> Unit:
 
 def _model(folder: Path, name: str) -> Model:
     if name.endswith(".toml"):
-        return load_model(folder / name)
+        path = folder / name
+        model = load_model(path)
+        check_model(model, str(path))
+        return model
     models = shipped_models()
     if name not in models:
         raise ModelError(f"{folder / FILE}: found model {name!r}, expected {nearest(name, models)}")
