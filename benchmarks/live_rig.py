@@ -13,10 +13,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rigwatch.demo.commissioning import ensure_model
-from rigwatch.demo.rig_file import find_config, write_rig_file
+from rigwatch.demo.rig_file import write_rig_file
 from rigwatch.wire.bus.bus import wait_until
 from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.typed_files import find_config
 
 ROOT = Path(__file__).parents[1]
 START_TIMEOUT = 60.0

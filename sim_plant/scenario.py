@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Meta, field, structs
 
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.typed_files import Section, load
+from rigwatch.wire.typed_files import Section, find_file, load
 from sim_plant.effects import complaint
 from sim_plant.excitation import Excitation, drive
 from sim_plant.parameters import RigParameters
@@ -76,11 +76,14 @@ class Scenario(Section, frozen=True, kw_only=True):
 
 
 def load_scenario(path: Path | str) -> Scenario:
-    """The scenario at `path`; a recorded drive's file is looked for beside it.
+    """The scenario at `path`, or the shipped one of that name.
+
+    A recorded drive's file is looked for beside it.
 
     Raises:
         ConfigError: the file does not fit, names an unknown effect, or its events do not fit in.
     """
+    path = find_file(path, "scenarios")
     scenario = load(path, Scenario)
     for index, event in enumerate(scenario.events):
         _check_effect(path, f"events[{index}]", event.effect, event.value)

@@ -30,6 +30,7 @@ from rigwatch.wire.errors import RigwatchError
 COMMANDS: dict[str, str] = {
     # name on the command line: module below rigwatch.commands
     "demo": "processes.demo",
+    "init": "processes.init",
     "up": "processes.up",
     "router": "processes.router",
     "plant": "processes.plant",

@@ -7,7 +7,7 @@ verdict.py       whether the fault was found and named, and whether the recordin
 """
 
 from rigwatch.demo.commissioning import ensure_model
-from rigwatch.demo.rig_file import find_config, forget_alarms, write_rig_file
+from rigwatch.demo.rig_file import forget_alarms, write_rig_file
 from rigwatch.demo.show import Show
 
-__all__ = ["Show", "ensure_model", "find_config", "forget_alarms", "write_rig_file"]
+__all__ = ["Show", "ensure_model", "forget_alarms", "write_rig_file"]

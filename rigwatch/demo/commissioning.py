@@ -15,8 +15,9 @@ import daq
 import monitor
 import sim_plant
 from rigwatch import physics, wire
-from rigwatch.demo.rig_file import MODEL, find_config, relative
+from rigwatch.demo.rig_file import MODEL, relative
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.typed_files import find_config
 
 RECORDINGS = {
     "chirp": "scenarios/commissioning_chirp.toml",

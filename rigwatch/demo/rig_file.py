@@ -22,25 +22,12 @@ from rigwatch.wire.rig_config import (
     SerialSection,
     load_rig,
 )
+from rigwatch.wire.typed_files import find_file
 
 NAME = "rig.toml"
 MODEL = "model.toml"
 JOURNAL = "alarms.jsonl"
 _HOST = "127.0.0.1"
-
-
-def find_config(name: str) -> Path:
-    """The file `name` of the folder configs: here, in the checkout, or as the wheel brought it.
-
-    Raises:
-        ConfigError: there is none.
-    """
-    package = Path(__file__).parents[1]
-    for root in (Path(), package.parent, package):
-        path = root / "configs" / name
-        if path.is_file():
-            return path
-    raise ConfigError(f"configs/{name}", "", "no such file", "a folder with rigwatch's configs")
 
 
 def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
@@ -104,9 +91,7 @@ def _serial(daq: DaqSection, folder: Path) -> DaqSection:
 
 
 def _plant(plant: PlantSection, folder: Path) -> PlantSection:
-    scenario = Path(plant.scenario)
-    if not scenario.is_file() and scenario.parts[0] == "configs":
-        scenario = find_config(str(scenario.relative_to("configs")))
+    scenario = find_file(plant.scenario, "scenarios")
     return structs.replace(plant, serve="serial", port=_line(folder), scenario=str(scenario))
 
 

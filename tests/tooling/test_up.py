@@ -15,9 +15,10 @@ from typing import Any
 
 import pytest
 
-from rigwatch.demo.rig_file import find_config, write_rig_file
+from rigwatch.demo.rig_file import write_rig_file
 from rigwatch.wire.host.ports import endpoint_address
 from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.typed_files.shipped import find_config
 from tests.waiting import eventually
 
 pytestmark = pytest.mark.xdist_group("rig")

@@ -1,5 +1,9 @@
 """The wheel: every module and data file, and the example configurations that the demo needs."""
 
+import math
+import os
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -29,3 +33,69 @@ def test_it_holds_every_module_and_data_file(contents: set[str]) -> None:
 def test_it_holds_the_example_configurations(contents: set[str]) -> None:
     files = (ROOT / "configs").rglob("*.toml")
     assert {f"rigwatch/{path.relative_to(ROOT)}" for path in files} <= contents
+
+
+LINE = """
+name = "damper"
+summary = "A force that grows with speed."
+inputs.v = { unit = "m/s" }
+parameters.c = { unit = "N*s/m" }
+outputs.f = { unit = "N", expression = "c*v - load" }
+ports.load = { kind = "force", unit = "N", variables.v = { expression = "v", unit = "m/s" } }
+"""
+STUDY = """
+model = "line.toml"
+train = [{ session = "run.mcap", end = 2.0 }]
+held_out = [{ session = "run.mcap", start = 2.0 }]
+"""
+DO = """
+import sys
+site, *command = sys.argv[1:]
+sys.path.insert(0, site)
+import rigwatch
+assert rigwatch.__file__.startswith(site), rigwatch.__file__
+from rigwatch.commands import main
+sys.exit(main(command))
+"""
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel alone, unpacked as an installer does; no checkout is on the path."""
+    folder = tmp_path_factory.mktemp("installed")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        name = build_wheel(str(folder))
+    with zipfile.ZipFile(folder / name) as wheel:
+        wheel.extractall(folder / "site")
+    return folder / "site"
+
+
+def run(site: Path, folder: Path, *command: str) -> str:
+    """What a command of the installed wheel prints in a folder; Python looks nowhere near."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    arguments = [sys.executable, "-P", "-c", DO, str(site), *command]
+    done = subprocess.run(
+        arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_installed_alone_it_finds_what_its_commands_need(installed: Path, tmp_path: Path) -> None:
+    for seed, name in enumerate("ab"):
+        run(installed, tmp_path, "plant", "healthy_sine_8hz_1v5", "--session", f"{name}.mcap",
+            "--seconds", "4", "--seed", str(seed))  # fmt: skip
+    assert "most to suspect" in run(installed, tmp_path, "structure", "modes", "shear_frame")
+    speeds = [math.sin(0.06 * i + 0.002 * i * (i % 3)) for i in range(400)]
+    rows = (f"{i / 100},{v},{3 * v + math.copysign(2, v)}" for i, v in enumerate(speeds))
+    (tmp_path / "run.csv").write_text("t,v,f\n" + "\n".join(rows) + "\n")
+    run(installed, tmp_path, "import", "run.csv", "run.mcap", "--time", "t[s]",
+        "--map", "v=v[m/s]", "--map", "f=f[N]")  # fmt: skip
+    (tmp_path / "line.toml").write_text(LINE)
+    (tmp_path / "own.toml").write_text(STUDY)
+    run(installed, tmp_path, "study", "new", "own", "--template", "own.toml")
+    assert "held out" in run(installed, tmp_path, "compare", "own")
+    assert "coulomb" in run(installed, tmp_path, "explain", "own", "--json")
+    assert "files copied" in run(installed, tmp_path, "init", "mine")
+    assert (tmp_path / "mine" / "configs" / "demo.toml").is_file()

@@ -320,3 +320,33 @@ def test_pneumatic_cylinder(tmp_path: Path, bar: int, pressure: float) -> None:
     raw = np.loadtxt(source)[15:]
     position = np.interp(block.t_ns / 1e6, raw[:, 0], raw[:, 4]) * 1e-3
     np.testing.assert_allclose(block.channel("position").values, position, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"t": [0, 1, 2], "qm": [1.0, 2.0, 3.0], "gain": 2, "rig": {"name": "a"}}',
+        '[{"t": 0, "qm": 1.0}, {"t": 1, "qm": 2.0}, {"t": 2, "qm": 3.0}]',
+    ],
+)
+def test_json_of_columns_or_of_rows_is_read(tmp_path: Path, text: str) -> None:
+    source = tmp_path / "run.json"
+    source.write_text(text)
+    import_file(source, tmp_path / "run.mcap", simple())
+    (block,) = open_session(tmp_path / "run.mcap").samples(size=1 << 30)
+    np.testing.assert_allclose(block.channel("position").values, [1e-3, 2e-3, 3e-3], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"t": [0, 1', "run.json: not readable as JSON"),
+        ("3", "run.json: found no table"),
+        ('{"t": [0, 1], "qm": [1, null]}', "run.json, row 2, column qm: found 'nan'"),
+    ],
+)
+def test_json_that_is_no_table_is_told(tmp_path: Path, text: str, message: str) -> None:
+    source = tmp_path / "run.json"
+    source.write_text(text)
+    with pytest.raises(ImportDataError, match=message):
+        import_file(source, tmp_path / "run.mcap", simple())

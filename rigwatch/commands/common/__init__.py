@@ -13,11 +13,13 @@ from rigwatch.commands.common.session_files import (
     span_of,
     unix_time,
 )
+from rigwatch.commands.common.shipped_argument import file_or_name
 
 __all__ = [
     "add_session_and_target",
     "add_span",
     "damage_lines",
+    "file_or_name",
     "marks_of",
     "print_json",
     "ready_to_draw",

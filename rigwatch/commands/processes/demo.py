@@ -31,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when the demonstration did what it is for."""
-    from rigwatch.demo import Show, ensure_model, find_config, forget_alarms, write_rig_file
+    from rigwatch.demo import Show, ensure_model, forget_alarms, write_rig_file
+    from rigwatch.wire.typed_files import find_config
 
     folder: Path = arguments.folder
     folder.mkdir(parents=True, exist_ok=True)

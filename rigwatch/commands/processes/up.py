@@ -2,8 +2,8 @@
 
 import argparse
 import time
-from pathlib import Path
 
+from rigwatch.commands.common import file_or_name
 from rigwatch.supervisor import PROCESSES, Console, Flow, Supervisor, plan
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import Heartbeat, endpoint_address, is_free
@@ -16,7 +16,9 @@ EXAMPLE = """  rigwatch up configs/demo.toml
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
+    parser.add_argument(
+        "config", type=file_or_name(""), metavar="CONFIG", help="configuration of the rig"
+    )
     parser.add_argument(
         "--without",
         action="append",

@@ -1,17 +1,17 @@
-"""`rigwatch import`: makes a session of a CSV, MAT or Parquet file."""
+"""`rigwatch import`: makes a session of a CSV, MAT, Parquet or JSON file."""
 
 import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import file_or_name, print_json, say
 
 if TYPE_CHECKING:
     from rigwatch.wire.exchange import ImportMapping
 
-HELP = "make a session of a CSV, MAT or Parquet file"
+HELP = "make a session of a CSV, MAT, Parquet or JSON file"
 EXAMPLE = """\
-  rigwatch import DATA_EMPS.mat emps.mcap --mapping configs/imports/emps.toml
+  rigwatch import DATA_EMPS.mat emps.mcap --mapping emps
   rigwatch import run.csv run.mcap --time 't[ms]' --map 'position=qm[mm]' --map 'force=u*35.15[N]'
   rigwatch import exported.csv run.mcap"""
 
@@ -20,7 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("source", type=Path, help="the file to import")
     parser.add_argument("target", type=Path, help="the new session file (.mcap)")
-    parser.add_argument("--mapping", type=Path, metavar="TOML", help="file that says what is what")
+    parser.add_argument(
+        "--mapping",
+        type=file_or_name("imports"),
+        metavar="TOML",
+        help="file that says what is what, or the name of one that comes with rigwatch",
+    )
     parser.add_argument(
         "--map",
         action="append",

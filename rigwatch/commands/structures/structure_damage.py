@@ -2,10 +2,9 @@
 
 import argparse
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import file_or_name, print_json, say
 from rigwatch.commands.structures.structure_files import (
     add_record,
     add_report,
@@ -28,7 +27,11 @@ EXAMPLE = """\
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
-    parser.add_argument("structure", type=Path, help="structure file of the undamaged structure")
+    parser.add_argument(
+        "structure",
+        type=file_or_name("structures"),
+        help="structure file of the undamaged structure",
+    )
     add_record(parser)
     parser.add_argument(
         "--undamaged", type=float, metavar="SECONDS", help="start that is sure to be undamaged"

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import say
+from rigwatch.commands.common import file_or_name, say
 from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:
@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 def add_problem(parser: argparse.ArgumentParser) -> None:
     """Arguments that say what is identified from what."""
-    parser.add_argument("structure", type=Path, help="structure or model file (.toml)")
+    parser.add_argument(
+        "structure", type=file_or_name("structures"), help="structure or model file (.toml)"
+    )
     add_record(parser)
     parser.add_argument(
         "--unknown",

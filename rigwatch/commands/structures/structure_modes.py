@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import file_or_name, print_json
 from rigwatch.commands.structures.structure_files import add_report, write_page
 from rigwatch.wire.errors import ConfigError
 
@@ -16,7 +16,7 @@ EXAMPLE = """\
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
-    parser.add_argument("structure", type=Path, help="structure file (.toml)")
+    parser.add_argument("structure", type=file_or_name("structures"), help="structure file (.toml)")
     parser.add_argument(
         "--families", action="store_true", help="count k1_6, k1_7, ... together as k1"
     )

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import say
+from rigwatch.commands.common import file_or_name, say
 from rigwatch.wire.errors import ModelError
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ EXAMPLE = """\
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
-    parser.add_argument("structure", type=Path, help="structure file (.toml)")
+    parser.add_argument("structure", type=file_or_name("structures"), help="structure file (.toml)")
     parser.add_argument("record", type=Path, help="the new record (.csv or .npz)")
     parser.add_argument("--dt", type=float, default=0.01, help="time between samples [s]")
     parser.add_argument("--duration", type=float, default=10.0, help="length [s]")

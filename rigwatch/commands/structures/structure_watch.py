@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import file_or_name, print_json
 from rigwatch.commands.structures.structure_files import add_test
 
 if TYPE_CHECKING:
@@ -18,7 +18,11 @@ EXAMPLE = """\
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
-    parser.add_argument("structure", type=Path, help="structure file of the undamaged structure")
+    parser.add_argument(
+        "structure",
+        type=file_or_name("structures"),
+        help="structure file of the undamaged structure",
+    )
     parser.add_argument(
         "source", type=Path, help="configuration of the rig (.toml) whose bus to read, or a session"
     )

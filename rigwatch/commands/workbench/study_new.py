@@ -3,17 +3,21 @@
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import file_or_name, print_json
 
 HELP = "make a study of a model and recordings, after a template"
-EXAMPLE = "  rigwatch study new emps --template configs/studies/emps.toml --sessions recordings/"
+EXAMPLE = "  rigwatch study new emps --template emps --sessions recordings/"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
     parser.add_argument("study", type=Path, help="the study's folder")
     parser.add_argument(
-        "--template", type=Path, required=True, metavar="TOML", help="study file to start from"
+        "--template",
+        type=file_or_name("studies"),
+        required=True,
+        metavar="TOML",
+        help="study file to start from, or the name of one that comes with rigwatch",
     )
     parser.add_argument(
         "--sessions", type=Path, metavar="FOLDER", help="where the template's sessions are"

@@ -38,7 +38,8 @@ class ImportMapping(Section, frozen=True):
         Meta(description="sample rate [Hz]; needed where there is no time"),
     ] = None
     format: Annotated[
-        Literal["auto", "csv", "mat", "parquet"], Meta(description="auto: by the file's ending")
+        Literal["auto", "csv", "mat", "parquet", "json"],
+        Meta(description="auto: by the file's ending"),
     ] = "auto"
     rig: Annotated[Name, Meta(description="the rig's id in the session")] = "imported"
     device: Annotated[Name, Meta(description="the device's name in the session")] = "rig"

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from rigwatch.wire.arrays import FloatArray, IntArray
@@ -16,6 +17,7 @@ from rigwatch.wire.exchange.mat5 import MatError, Value, read_mat5
 FORMATS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv"} | {
     ".mat": "mat",
     ".parquet": "parquet",
+    ".json": "json",
 }
 _DELIMITERS = ",;\t"
 
@@ -190,6 +192,26 @@ def _titles(found: Value | None, arrays: dict[str, Any]) -> dict[str, str]:
     return {name: title for name, _, title in pairs if name in arrays}
 
 
+def _read_json(path: Path, _: ImportMapping) -> Table:
+    """An object of columns, with numbers beside them, or a list of rows that are objects."""
+    try:
+        found = msgspec.json.decode(path.read_bytes())
+    except msgspec.DecodeError as error:
+        raise ImportDataError(f"{path}: not readable as JSON: {error}") from error
+    if isinstance(found, list) and found and all(isinstance(row, dict) for row in found):
+        names = list(dict.fromkeys(name for row in found for name in row))
+        found = {name: [row.get(name) for row in found] for name in names}
+    if not isinstance(found, dict):
+        raise ImportDataError(f"{path}: found no table, expected columns by name or a list of rows")
+    columns: dict[str, Sequence[str] | np.ndarray[Any, Any]] = {
+        name: np.array([np.nan if cell is None else cell for cell in value])
+        for name, value in found.items()
+        if isinstance(value, list) and not any(isinstance(cell, list | dict) for cell in value)
+    }
+    scalars = {n: float(v) for n, v in found.items() if isinstance(v, int | float)}
+    return Table(path, columns, scalars)
+
+
 def _read_parquet(path: Path, _: ImportMapping) -> Table:
     try:
         from pyarrow import parquet
@@ -211,4 +233,5 @@ _READERS: dict[str, Callable[[Path, ImportMapping], Table]] = {
     "csv": _read_csv,
     "mat": _read_mat,
     "parquet": _read_parquet,
+    "json": _read_json,
 }

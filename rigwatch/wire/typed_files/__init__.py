@@ -1,5 +1,6 @@
 """Typed TOML files: loaded into declared sections, with errors that name file, key and value."""
 
 from rigwatch.wire.typed_files.loading import Section, load, parse
+from rigwatch.wire.typed_files.shipped import copy_out, find_config, find_file, shipped_names
 
-__all__ = ["Section", "load", "parse"]
+__all__ = ["Section", "copy_out", "find_config", "find_file", "load", "parse", "shipped_names"]

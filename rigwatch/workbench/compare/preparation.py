@@ -109,6 +109,6 @@ def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> Nois
     """
     fits = [bare]
     if base.placements:
-        fits.append(fit_base(study, healthy, base.train.scale))
+        fits.append(fit_base(study, healthy, base.train.scale, afar=True))
     method = "healthy motion" if healthy.along_motion else "healthy"
     return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, method)

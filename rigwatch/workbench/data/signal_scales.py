@@ -1,6 +1,7 @@
 """How large the signals at each port are: starts and bounds of effects are shares of that."""
 
 import numpy as np
+from scipy.signal import detrend
 
 from rigwatch.physics.engine.compile import evaluated
 from rigwatch.physics.engine.equations import Model, Port, compose
@@ -37,4 +38,14 @@ def _sizes(port: Port, model: Model, signals: dict[str, FloatArray], recording: 
         name: evaluated(variable.expression, signals, values, f"port variable {name}")
         for name, variable in port.variables.items()
     }
-    return sizes_at_port(variables, signals[port.signal] if port.signal else None, recording.dt)
+    signal = signals[port.signal] if port.signal else None
+    if "v" in variables and "x" not in variables:
+        variables["x"] = _travel(variables["v"], recording)
+    return sizes_at_port(variables, signal, recording.dt)
+
+
+def _travel(speed: FloatArray, recording: Recording) -> FloatArray:
+    """Distance that a speed goes to and fro in, its drift left out; shape (n,)."""
+    ends = np.cumsum(recording.parts or (len(recording),))[:-1]
+    pieces = np.split(np.nan_to_num(speed), ends)
+    return np.concatenate([detrend(np.cumsum(piece)) * recording.dt for piece in pieces])

@@ -5,7 +5,7 @@ simulation needs it everywhere, and the outputs beside it are not counted.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -15,29 +15,13 @@ from rigwatch.physics.engine.fit import Recording, Thinning
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.session import open_session
+from rigwatch.workbench.data.columns import Columns, bridged
+from rigwatch.workbench.data.one_rate import on_one_rate
 from rigwatch.workbench.data.signal_units import check_unit, in_si
 from rigwatch.workbench.study import Derive, Span, Study, StudyFile, nearest
 
 MOST_MISSING = 0.2
 """Share of samples that may be missing from an input."""
-
-
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """Channels over equally spaced samples.
-
-    Attributes:
-        dt: time between samples [s].
-        values: by channel, each of shape (n,), in SI; NaN where nothing valid was measured.
-        units: of the channels as they were recorded.
-    """
-
-    dt: float
-    values: Mapping[str, FloatArray]
-    units: Mapping[str, str] = field(default_factory=dict)
-
-    def __len__(self) -> int:
-        return len(next(iter(self.values.values())))
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,15 +119,6 @@ def _derived_units(columns: Columns, derive: Derive) -> dict[str, str]:
     }
 
 
-def bridged(signal: FloatArray) -> FloatArray:
-    """The signal with straight lines over what is missing."""
-    good = np.isfinite(signal)
-    if good.all() or not good.any():
-        return signal
-    at = np.arange(len(signal))
-    return np.interp(at, at[good], signal[good])
-
-
 def prepare(study: Study) -> Data:
     """The recordings of a study, ready to be fitted.
 
@@ -159,8 +134,8 @@ def prepare(study: Study) -> Data:
             ("healthy", file.healthy),
         )
     }
+    tables = _on_one_rate(study, tables, remarks)
     dt = tables["train"][0].dt
-    _check_rates(study, [c for group in tables.values() for c in group], dt)
     horizon = max(round(file.horizon / dt), 2)
     made = {
         use: _recording(study, group, horizon, use, remarks) if group else None
@@ -171,14 +146,20 @@ def prepare(study: Study) -> Data:
     return Data(made["train"], made["held_out"], made["healthy"], horizon, tuple(remarks))
 
 
-def _check_rates(study: Study, tables: Sequence[Columns], dt: float) -> None:
+def _on_one_rate(
+    study: Study, tables: Mapping[str, Sequence[Columns]], remarks: list[str]
+) -> dict[str, list[Columns]]:
     spans = (*study.file.train, *study.file.held_out, *study.file.healthy)
-    for span, table in zip(spans, tables, strict=True):
-        if abs(table.dt / dt - 1) > 1e-3:
-            raise ModelError(
-                f"{span.session}: found {1 / table.dt:g} Hz, expected {1 / dt:g} Hz as in"
-                f" {spans[0].session}"
-            )
+    whole = [table for group in tables.values() for table in group]
+    kept = frozenset(
+        study.file.channels.get(name, own.channel or name)
+        for name, own in study.model.inputs.items()
+        if study.model.held(name) == "zero"
+    )
+    made, said = on_one_rate(whole, [span.session for span in spans], study.file.rate, kept)
+    remarks += said
+    rest = iter(made)
+    return {use: [next(rest) for _ in group] for use, group in tables.items()}
 
 
 def _recording(
@@ -191,6 +172,12 @@ def _recording(
         if length == 0:
             raise ModelError(
                 f"{use}: found {len(table)} samples, expected at least one horizon of {horizon}"
+            )
+        if length < len(table):
+            beyond = (len(table) - length) * table.dt
+            remarks.append(
+                f"{use}: the last {beyond:.3g} s of a recording are not counted, since they fill no"
+                f" horizon of {horizon * table.dt:g} s"
             )
         u, y = _matched(study, table)
         inputs.append(u[:length])
@@ -258,4 +245,5 @@ def parameters_of(file: StudyFile) -> dict[str, float]:
     for accepted in file.effects:
         prefix = f"{accepted.port}_{accepted.effect}_"
         found |= {prefix + name: value for name, value in accepted.parameters.items()}
-    return found
+    # The last effect keeps the whole fit that it was accepted with.
+    return found | dict(file.effects[-1].model if file.effects else {})

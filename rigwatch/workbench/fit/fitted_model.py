@@ -117,17 +117,23 @@ def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
     )
 
 
-def fit_base(study: Study, data: Data, scale: FloatArray | None = None) -> Fitted:
+def fit_base(
+    study: Study, data: Data, scale: FloatArray | None = None, *, afar: bool = False
+) -> Fitted:
     """The model of a study with the effects accepted so far.
 
-    Where that cannot be simulated from the study's own starting values, it is fitted effect by
-    effect, as it was built.
+    It begins at the fit that the last of them was accepted with, and stays in its valley unless it
+    is told to look `afar`: another valley may be deeper in training, and was not accepted. Where it
+    cannot be simulated from the study's own starting values, it is fitted effect by effect, as it
+    was built.
 
     Raises:
         ModelError: it cannot be simulated that way either.
     """
     placements, start = placements_of(study, data.train), parameters_of(study.file)
     try:
+        if not afar and study.file.effects and study.file.effects[-1].model:
+            return _kept(fit_model(study, data, placements, start, scale))
         return fit_twice(study, data, placements, start, scale, from_afar=True)
     except ModelError:
         if not placements:
@@ -137,6 +143,13 @@ def fit_base(study: Study, data: Data, scale: FloatArray | None = None) -> Fitte
         begin = start | found.train.values()
         found = fit_twice(study, data, placements[:count], begin, scale, from_afar=True)
     return found
+
+
+def _kept(found: Fitted) -> Fitted:
+    """A fit that began at the accepted one, with how it ended."""
+    return replace(
+        found, convergence=convergence(found.train, [], "the accepted fit", near_noise=False)
+    )
 
 
 def fit_twice(

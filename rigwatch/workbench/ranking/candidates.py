@@ -5,6 +5,7 @@ from rigwatch.physics.engine.fit import Recording
 from rigwatch.physics.engine.score import Candidate, suits
 from rigwatch.physics.engine.score import candidates as every_candidate
 from rigwatch.workbench.data import port_sizes
+from rigwatch.workbench.ranking.separate_recordings import check_ports
 from rigwatch.workbench.study import Study
 
 
@@ -15,6 +16,7 @@ def candidates(study: Study, recording: Recording) -> list[Candidate]:
         study: its model, its effects and those already accepted.
         recording: shows how large the signals at the ports are.
     """
+    check_ports(study)
     ports, sizes = study.model.ports, port_sizes(study.model, recording)
     placed = {(a.effect, a.port) for a in study.file.effects}
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit import Fitted, fit_again, fit_model, fit_twice, may_be_better
-from rigwatch.workbench.ranking.acceptance import judge_fit, leaves_nothing
+from rigwatch.workbench.ranking.acceptance import EXPLAINED, judge_fit, leaves_nothing
 from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
 from rigwatch.workbench.study import Study
 
@@ -48,7 +48,7 @@ def fit_each(  # noqa: PLR0917 -- they belong together
     enough: list[Ranked] = []
     for number, row in enumerate(rows, start=1):
         if any(other.cosines[row.label] < SIMILAR for other in enough):
-            row.reason = f"unlike {enough[0].label}, which leaves nothing to explain; not fitted"
+            row.reason = f"unlike {enough[0].label}, which explains {EXPLAINED:.0%}; not fitted"
             continue
         progress(f"fitting {row.label}, {number} of at most {len(rows)}")
         refit(study, data, base, row, fit_model)

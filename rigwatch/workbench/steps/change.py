@@ -6,6 +6,9 @@ no evidence, as every further parameter lets it.
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from msgspec import structs
 
 from rigwatch.physics.engine.equations import Placement, compose, load_effects
 from rigwatch.physics.engine.score import suits
@@ -14,6 +17,7 @@ from rigwatch.workbench.compare import Bench, Comparison, comparison, open_bench
 from rigwatch.workbench.fit import held_as
 from rigwatch.workbench.ranking import Ranked, accepted_from, candidates, rank_only, refit
 from rigwatch.workbench.study import (
+    Accepted,
     Study,
     append,
     append_effect,
@@ -22,6 +26,9 @@ from rigwatch.workbench.study import (
     nearest,
     use_effect_file,
 )
+
+WORSE = 1.01
+"""Held-out error over that of the accepted fit up to which a fit once more has led back to it."""
 
 
 @dataclass(frozen=True)
@@ -69,18 +76,39 @@ def add(study: Study, effect: str, port: str | None = None, *, anyway: bool = Fa
         f"{row.label}: held-out error {before.held_out_error:.4g} → {errors[1]:.4g} {before.unit}"
     )
     if not row.accepted and not anyway:
-        text = f"{words}: {row.reason}; not added"
-        tried = {"tried_train_error": errors[0], "tried_held_out_error": errors[1]}
-        numbers = _numbers(before) | tried
-        append(study, "refused", effect=effect, port=where, reason=row.reason, **numbers)
-        return Change("refused", effect, where, before, before, errors, text)
-    accepted = accepted_from(row)
+        return _refused(study, row, before, f"{words}: {row.reason}")
+    accepted = _whole(row)
     # Before the file is touched, so that a model that fails leaves the study as it is.
     after = comparison(open_bench(study.with_effects([*study.file.effects, accepted])))
+    if after.held_out_error > WORSE * errors[1] and not anyway:
+        row.reason = f"fitted once more it leaves {after.held_out_error:.4g} {after.unit}"
+        return _refused(study, row, before, f"{words}, but {row.reason}")
     changed = append_effect(keep_holds(study), accepted)
-    numbers = _numbers(after)
+    numbers = _numbers(after) | {"model_parameters": accepted.model}
     append(changed, "add", effect=effect, port=where, parameters=accepted.parameters, **numbers)
     return Change("add", effect, where, before, after, errors, words)
+
+
+def _whole(row: Ranked) -> Accepted:
+    """The effect as a study's file lists it, with the values of the whole fit beside its own."""
+    assert row.fitted is not None
+    own, fit = accepted_from(row), row.fitted.train
+    free = set(fit.compiled.system.free)
+    rest = {
+        name: value
+        for name, value in fit.values().items()
+        if name in free and not name.startswith(row.placement.prefix)
+    }
+    return structs.replace(own, model=rest)
+
+
+def _refused(study: Study, row: Ranked, before: Comparison, words: str) -> Change:
+    assert row.fitted is not None
+    errors = (row.fitted.train_error, row.fitted.held_out_error)
+    tried: dict[str, Any] = {"tried_train_error": errors[0], "tried_held_out_error": errors[1]}
+    numbers = _numbers(before) | tried
+    append(study, "refused", effect=row.effect, port=row.port, reason=row.reason, **numbers)
+    return Change("refused", row.effect, row.port, before, before, errors, f"{words}; not added")
 
 
 def learn(study: Study, path: Path) -> tuple[Study, list[str]]:

@@ -32,7 +32,10 @@ def replay(study: Study, progress: Callable[[str], None] = lambda _: None) -> li
     for line in lines(study):
         if line["step"] == "add":
             accepted[f"{line['effect']}@{line['port']}"] = Accepted(
-                effect=line["effect"], port=line["port"], parameters=line["parameters"]
+                effect=line["effect"],
+                port=line["port"],
+                parameters=line["parameters"],
+                model=line.get("model_parameters", {}),
             )
         if line["step"] not in ("add", "undo"):
             continue

@@ -71,7 +71,7 @@ def signals(stage: Stage, *, held_out: bool = True) -> Signals:
     """Outputs at every sample: of the recordings held out, or of those fitted to."""
     data, base = stage.bench.data, stage.bench.base
     whole = data.held_out if held_out else data.train
-    recording = Recording(whole.dt, whole.inputs, whole.outputs)
+    recording = Recording(whole.dt, whole.inputs, whole.outputs, parts=whole.parts)
     horizon = data.horizon if stage.bench.study.model.states else len(recording)
     residual = evaluate(base.train, recording, horizon, base.substeps).residuals
     flat = residual.reshape(-1, residual.shape[-1])

@@ -25,6 +25,7 @@ from rigwatch.physics.engine.equations import (
     Hold,
     Model,
     Parameter,
+    check_model,
     library,
     load_effects,
     load_model,
@@ -85,6 +86,10 @@ class Accepted(Section, frozen=True, kw_only=True):
     parameters: Annotated[
         dict[str, float], Meta(description="where its fit starts, in the units that are shown")
     ] = field(default_factory=dict)
+    model: Annotated[
+        dict[str, float],
+        Meta(description="where the rest of the model starts: the fit that it was accepted with"),
+    ] = field(default_factory=dict)
 
 
 class StudyFile(Section, frozen=True, kw_only=True):
@@ -104,6 +109,10 @@ class StudyFile(Section, frozen=True, kw_only=True):
             " motion where channels show some of the model's states but not all"
         ),
     ] = "auto"
+    rate: Annotated[
+        Annotated[float, Meta(gt=0)] | None,
+        Meta(description="rate that all recordings are put on [Hz]; their own if not given"),
+    ] = None
     substeps: Annotated[int, Meta(ge=1, description="integration steps a sample")] = 2
     period: Annotated[float, Meta(ge=0, description="period of the excitation [s], 0: look")] = 0.0
     channels: Annotated[
@@ -263,7 +272,21 @@ def _converted(study: Study, accepted: Accepted, way: Literal["to_si", "from_si"
         name: float(getattr(_unit(known.get(name)), way)(value))
         for name, value in accepted.parameters.items()
     }
-    return structs.replace(accepted, parameters=values)
+    rest = {
+        name: float(getattr(_unit(_named(study, name)), way)(value))
+        for name, value in accepted.model.items()
+    }
+    return structs.replace(accepted, parameters=values, model=rest)
+
+
+def _named(study: Study, name: str) -> Parameter | EffectParameter | None:
+    """The parameter that a system calls `name`: the model's, or one of an accepted effect."""
+    for accepted in study.file.effects:
+        prefix = f"{accepted.port}_{accepted.effect}_"
+        own = study.effect_at(accepted.effect, accepted.port).parameters
+        if name.startswith(prefix) and name[len(prefix) :] in own:
+            return own[name[len(prefix) :]]
+    return study.model.parameters.get(name)
 
 
 def _unit(parameter: Parameter | EffectParameter | None) -> Unit:
@@ -273,7 +296,10 @@ def _unit(parameter: Parameter | EffectParameter | None) -> Unit:
 
 def _model(folder: Path, name: str) -> Model:
     if name.endswith(".toml"):
-        return load_model(folder / name)
+        path = folder / name
+        model = load_model(path)
+        check_model(model, str(path))
+        return model
     models = shipped_models()
     if name not in models:
         raise ModelError(f"{folder / FILE}: found model {name!r}, expected {nearest(name, models)}")
@@ -342,13 +368,18 @@ def create(folder: Path | str, template: Path | str, sessions: Path | str | None
 
 def append_effect(study: Study, accepted: Accepted) -> Study:
     """The study with one more effect in its file, its values in the units of its parameters."""
-    written = _converted(study, accepted, "from_si").parameters
-    numbers = ", ".join(f"{name} = {value!r}" for name, value in written.items())
-    table = (
-        f'effect = "{accepted.effect}"\nport = "{accepted.port}"\nparameters = {{ {numbers} }}\n'
-    )
+    written = _converted(study, accepted, "from_si")
+    table = f'effect = "{accepted.effect}"\nport = "{accepted.port}"\n'
+    table += f"parameters = {_inline(written.parameters)}\n"
+    if written.model:
+        table += f"model = {_inline(written.model)}\n"
     text = _text(study).rstrip() + "\n" + _TABLE + table
     return _rewritten(study, text)
+
+
+def _inline(values: Mapping[str, float]) -> str:
+    """Numbers by name as an inline table."""
+    return f"{{ {', '.join(f'{name} = {value!r}' for name, value in values.items())} }}"
 
 
 def drop_effect(study: Study) -> Study:

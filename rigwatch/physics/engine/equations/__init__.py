@@ -27,6 +27,7 @@ from rigwatch.physics.engine.equations.model import (
     load_model,
     shipped_models,
 )
+from rigwatch.physics.engine.equations.model_check import check_model, unused_ports
 from rigwatch.physics.engine.equations.plugins import offered
 from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import (
@@ -64,6 +65,7 @@ __all__ = [
     "Variable",
     "along_measured_motion",
     "balanced_states",
+    "check_model",
     "compose",
     "has_hidden_states",
     "library",
@@ -76,4 +78,5 @@ __all__ = [
     "shipped_models",
     "symbol",
     "units_at",
+    "unused_ports",
 ]

@@ -16,12 +16,14 @@ effect is put there; an actuator port is its input as it arrives, and a sensor p
 it is read.
 """
 
+import math
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
 
 from msgspec import Meta, field
+from msgspec.structs import force_setattr
 
 from rigwatch.physics.engine.equations.in_si import into_si
 from rigwatch.wire.typed_files import Section, load, parse
@@ -68,7 +70,10 @@ class State(Section, frozen=True, kw_only=True):
 class Parameter(Section, frozen=True, kw_only=True):
     """A number of the model, fitted unless it is fixed."""
 
-    value: Annotated[float, Meta(description="value, or where a fit starts")]
+    value: Annotated[
+        float,
+        Meta(description="value, or where a fit starts: within its bounds if not given"),
+    ] = math.nan
     unit: Annotated[str, Meta(description="its unit")]
     low: Annotated[float, Meta(description="lower bound of a fit")] = float("-inf")
     high: Annotated[float, Meta(description="upper bound of a fit")] = float("inf")
@@ -80,7 +85,20 @@ class Parameter(Section, frozen=True, kw_only=True):
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
     def __post_init__(self) -> None:
+        if math.isnan(self.value):
+            if self.fixed:
+                raise ValueError("a value, as it is fixed")
+            force_setattr(self, "value", _within(self.low, self.high))
         into_si(self, "value", "low", "high")
+
+
+def _within(low: float, high: float) -> float:
+    """A value to start from: between two bounds, else 1 of its unit or one beyond the bound."""
+    if math.isfinite(low) and math.isfinite(high):
+        return math.sqrt(low * high) if low > 0 else (low + high) / 2
+    if low >= 1:
+        return low + max(low, 1.0)
+    return high - max(abs(high), 1.0) if high <= 1 else 1.0
 
 
 class Output(Section, frozen=True, kw_only=True):

@@ -239,4 +239,8 @@ def units_at(model: Model, name: str) -> dict[str, str]:
     if port.kind != "force":
         own = model.inputs[port.signal] if port.kind == "actuator" else model.outputs[port.signal]
     units = {"F" if port.kind == "force" else "u": own.shown or own.unit}
-    return units | {name: v.shown or v.unit for name, v in port.variables.items()}
+    units |= {name: v.shown or v.unit for name, v in port.variables.items()}
+    # A distance is a speed over a time, also where no equation has a use for it.
+    if "v" in units:
+        units.setdefault("x", f"({units['v']})*s")
+    return units

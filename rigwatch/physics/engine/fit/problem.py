@@ -6,14 +6,15 @@ and V. Pereyra, Inverse Problems 19, 2003), so that a solver sees the parameters
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit.effect_states import Recall
 from rigwatch.physics.engine.fit.initial_state_projection import Tangent
-from rigwatch.physics.engine.fit.recording import Recording, initial_states, windows
+from rigwatch.physics.engine.fit.recording import Recording, cut_for, initial_states
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
@@ -84,9 +85,15 @@ class Problem:
         system = self.system = compiled.system
         names = list(system.parameters)
         self.free = np.array([names.index(name) for name in system.free], dtype=np.int64)
-        self._cut = windows(system, len(recording), horizon)
+        self._cut = cut_for(system, recording, horizon)
         rows = self._cut.starts[:, None] + np.arange(self._cut.length)
-        self.measured = recording.outputs[rows]
+        self.measured = recording.outputs[np.minimum(rows, len(recording) - 1)]
+        self._inputs = recording.inputs
+        if self._cut.parts:
+            ends = np.array(self._cut.parts)[:, None]
+            self.measured[np.arange(self._cut.length) >= ends] = np.nan
+            beyond = int(rows.max()) + 1 - len(recording)
+            self._inputs = np.pad(recording.inputs, ((0, beyond), (0, 0)), mode="edge")
         self.scale = np.nanstd(recording.outputs, axis=0) if scale is None else scale
         self.scale = np.where(self.scale > 0, self.scale, 1.0)
         shown = initial_states(system, recording)
@@ -130,7 +137,7 @@ class Problem:
         self._remember(parameters, self._memory.exact, since=1)
 
     def _remember(self, parameters: FloatArray, columns: list[int], since: int = 0) -> None:
-        if columns:
+        if columns and not self._cut.parts:
             led = self._memory.at(parameters)
             self._initial = self._initial.copy()
             for column in columns:
@@ -142,7 +149,7 @@ class Problem:
         """Scaled residuals (rows, k), slopes (rows, k, free + states); 0 if unmeasured."""
         r = self.recording
         run = self.compiled.simulate(
-            r.inputs, r.dt, self._cut.starts[rows], self._cut.length, initial=initial,
+            self._inputs, r.dt, self._cut.starts[rows], self._cut.length, initial=initial,
             parameters=parameters, substeps=self._substeps,
         )  # fmt: skip
         error = (self.measured[rows] - run.outputs) / self.scale
@@ -150,10 +157,36 @@ class Problem:
         missing = np.isnan(self.measured[rows])
         if missing.any():
             error, slopes = np.where(missing, 0.0, error), np.where(missing[..., None], 0.0, slopes)
-        if r.thinning:
-            error, slopes = r.thinning.apply(error), r.thinning.apply(slopes)
+        error, slopes = self._thinned(error, rows), self._thinned(slopes, rows)
         flat = error.reshape(len(error), -1)
         return flat, slopes.reshape(*flat.shape, slopes.shape[-1])
+
+    def _thinned(self, signals: FloatArray, rows: IntArray) -> FloatArray:
+        """Filtered and thinned as the recording asks for; where windows are recordings, each."""
+        thinning = self.recording.thinning
+        if thinning is None:
+            return signals
+        if not self._cut.parts:
+            return thinning.apply(signals)
+        found = np.zeros((len(rows), max(self._lengths), *signals.shape[2:]))
+        for at, row in enumerate(rows):
+            length = self._cut.parts[row]
+            alone = replace(thinning, parts=(length,))
+            found[at, : self._lengths[row]] = alone.apply(signals[at : at + 1, :length])[0]
+        return found
+
+    @cached_property
+    def _lengths(self) -> tuple[int, ...]:
+        """Samples that are counted of each recording, where windows are recordings."""
+        thinning, parts = self.recording.thinning, self._cut.parts
+        if thinning is None:
+            return parts
+        alone = [replace(thinning, parts=(n,)).apply(np.zeros((1, n, 1))) for n in parts]
+        return tuple(each.shape[1] for each in alone)
+
+    def whole_recording(self, windowed: FloatArray) -> FloatArray:
+        """Of all windows, (windows, samples, …), in the form that a `Fit` has."""
+        return self._cut.whole(windowed, self._lengths)
 
     def start_windows(self, parameters: FloatArray) -> Started:
         """Settle, and let windows that went astray begin where the one before has ended.
@@ -164,7 +197,7 @@ class Problem:
             self._initial = self._best.initial
         error, slopes = self.settle(parameters)
         found, rows = Started(parameters, self._initial, error, slopes), _astray(error)
-        if not (self.system.states and len(rows)):
+        if not (self.system.states and len(rows)) or self._cut.parts:
             return found
         self._initial = self._initial.copy()
         self._initial[rows] = self._ends_before(parameters, rows)
@@ -279,8 +312,7 @@ class Problem:
     def count(self) -> int:
         """Residuals that the solver sees."""
         shape = (self.measured.shape[0], self.measured.shape[1], 1)
-        thinning = self.recording.thinning
-        thinned = thinning.apply(np.zeros(shape)).shape if thinning else shape
+        thinned = self._thinned(np.zeros(shape), np.arange(shape[0])).shape
         return math.prod(thinned) * int(self.measured.shape[2])
 
     def _project(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,5 +1,6 @@
 """What was measured, how it is cut into windows, and where their states seem to begin."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,10 +41,24 @@ class Windows:
     Attributes:
         starts: first sample of each window, shape (windows,).
         length: samples in each.
+        parts: where windows are recordings, samples of each; the shorter ones are filled up.
     """
 
     starts: IntArray
     length: int
+    parts: tuple[int, ...] = ()
+
+    def whole(self, windowed: FloatArray, lengths: Sequence[int] | None = None) -> FloatArray:
+        """Recordings (windows, samples, …) behind one another, (1, all samples, …).
+
+        Args:
+            windowed: over the windows; as it is where they are no recordings.
+            lengths: samples of each recording, those of `parts` if None.
+        """
+        if not self.parts:
+            return windowed
+        pieces = zip(windowed, lengths or self.parts, strict=True)
+        return np.concatenate([window[:length] for window, length in pieces])[None]
 
 
 def windows(system: System, samples: int, horizon: int) -> Windows:
@@ -56,6 +71,18 @@ def windows(system: System, samples: int, horizon: int) -> Windows:
     if length < 2:
         raise ModelError(f"{system.model.name}: found {samples} samples, expected at least 2")
     return Windows(np.arange(0, samples - length + 1, length, dtype=np.int64), length)
+
+
+def cut_for(system: System, recording: Recording, horizon: int) -> Windows:
+    """`windows`, but one a recording where a model without states has effects with memory.
+
+    What an effect remembers of one recording says nothing about the next.
+    """
+    parts = recording.parts
+    if system.model.states or not system.states or len(parts) < 2:
+        return windows(system, len(recording), horizon)
+    starts = np.cumsum([0, *parts[:-1]]).astype(np.int64)
+    return Windows(starts, max(parts), parts)
 
 
 def initial_states(system: System, recording: Recording, smoothed: int = 11) -> FloatArray:

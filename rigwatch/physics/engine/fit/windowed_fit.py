@@ -215,12 +215,17 @@ def result_of(problem: Problem, found: Started) -> Fit:
             f"{problem.system.model.name}: the slopes leave the finite numbers; try other"
             " starting values"
         )
-    used = residual.size - found.initial.size - len(problem.free)
+    outputs, m = problem.measured.shape[2], len(problem.free)
+    counted = problem.whole_recording(error.reshape(len(error), -1, outputs))
+    used = counted.size - found.initial.size - m
     variance = float(residual @ residual) / max(used, 1)
     covariance = np.asarray(np.linalg.pinv(curvature) * variance, np.float64)
-    left = error.reshape(len(error), -1, problem.measured.shape[2]) * scale
+    left = counted * scale
     if problem.recording.thinning is None:
-        left = np.where(np.isnan(problem.measured), np.nan, left)
+        left = np.where(np.isnan(problem.whole_recording(problem.measured)), np.nan, left)
+    cleaned = np.concatenate([residual[:, None], jacobian], axis=1)
+    cleaned = problem.whole_recording(cleaned.reshape(len(error), -1, outputs, 1 + m))
+    cleaned = cleaned.reshape(len(cleaned), -1, 1 + m)
     return Fit(
         problem.compiled,
         found.parameters,
@@ -228,6 +233,6 @@ def result_of(problem: Problem, found: Started) -> Fit:
         found.initial,
         left,
         scale,
-        residual.reshape(len(error), -1),
-        jacobian.reshape(*error.shape, len(problem.free)),
+        cleaned[..., 0],
+        cleaned[..., 1:],
     )

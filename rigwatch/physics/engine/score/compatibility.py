@@ -1,6 +1,8 @@
 """Which effects can stand where, and which strengths of them make sense."""
 
 import ast
+import re
+from string import Formatter
 
 from rigwatch.physics.engine.equations import LEFT, RATE, Effect, Model, Port
 from rigwatch.physics.engine.score.candidates import Candidate
@@ -16,7 +18,7 @@ def suits(effect: Effect, port: Port, model: Model) -> bool:
         return False
     if port.passive and not _named(effect) & set(port.variables):
         return False
-    return knows(effect, port)
+    return knows(effect, port) and _units_named(effect) <= _told_by(port)
 
 
 def knows(effect: Effect, port: Port) -> bool:
@@ -30,6 +32,21 @@ def knows(effect: Effect, port: Port) -> bool:
         *({"u"} if port.kind != "force" else ()),
     }
     return _named(effect) - own <= set(port.variables)
+
+
+def _told_by(port: Port) -> set[str]:
+    """Quantities whose unit and size a port tells: a distance follows from a speed."""
+    told = {*port.variables, "F" if port.kind == "force" else "u"}
+    return told | ({"x"} if "v" in told else set())
+
+
+def _units_named(effect: Effect) -> set[str]:
+    """Quantities of the port that units and scales of an effect name."""
+    units = [p.unit for p in effect.parameters.values()]
+    units += [s.unit for s in effect.states.values()]
+    in_units = {field for unit in units for _, field, _, _ in Formatter().parse(unit) if field}
+    scales = " ".join(p.scale for p in effect.parameters.values())
+    return (in_units | set(re.findall(r"[A-Za-z_]\w*", scales))) - {"dt", "rate"}
 
 
 def _named(effect: Effect) -> set[str]:

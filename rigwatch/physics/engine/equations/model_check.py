@@ -1,0 +1,92 @@
+"""Whether a model file makes sense as a whole: its equations parse, units fit, ports are used.
+
+A model is checked when a study opens, so that a slip of the pen is one line and not a verdict.
+"""
+
+import difflib
+import keyword
+
+from rigwatch.physics.engine.equations.expression import FUNCTIONS, parse
+from rigwatch.physics.engine.equations.model import Model
+from rigwatch.physics.engine.equations.scope import symbol
+from rigwatch.physics.engine.equations.system import PROBE, TIME, UNTIL, System, compose
+from rigwatch.wire.errors import ModelError
+
+_TABLES = ("inputs", "states", "parameters", "ports")
+
+
+def check_model(model: Model, where: str = "") -> System:
+    """The model's equations, alone.
+
+    Args:
+        model: as it was read.
+        where: its file, for errors.
+
+    Raises:
+        ModelError: a name is taken or used twice, an equation does not parse or has other units, a
+            channel is shown by nothing, or a port stands in no equation.
+    """
+    try:
+        _check_names(model)
+        _check_channels(model)
+        system = compose(model)
+        for name, port in model.ports.items():
+            for variable, own in port.variables.items():
+                _check_variable(model, system, f"port {name}: variable {variable}", own.expression)
+    except ModelError as error:
+        raise ModelError(f"{where}: {error}" if where else str(error)) from None
+    unused = unused_ports(system)
+    if unused:
+        name = unused[0]
+        kind = model.ports[name].kind
+        meant = f"its signal's place taken by {name!r}" if kind == "actuator" else f"'… + {name}'"
+        begin = f"{where}: " if where else ""
+        raise ModelError(
+            f"{begin}ports.{name}: found in no equation, so that no effect there could do anything;"
+            f" expected {meant} in a derivative or an output"
+        )
+    return system
+
+
+def unused_ports(system: System) -> tuple[str, ...]:
+    """Force and actuator ports that stand in no equation, by name."""
+    equations = (*system.derivatives.values(), *system.outputs.values())
+    used = {s for equation in equations for s in equation.free_symbols}
+    return tuple(p.removeprefix(PROBE) for p in system.probes if symbol(p) not in used)
+
+
+def _check_names(model: Model) -> None:
+    seen: dict[str, str] = {}
+    for table in _TABLES:
+        for name in getattr(model, table):
+            key = f"{table}.{name}"
+            taken = name in FUNCTIONS or name == TIME or keyword.iskeyword(name)
+            if taken or name.startswith((PROBE, UNTIL)):
+                raise ModelError(
+                    f"{key}: found a name that equations use for something else,"
+                    f" expected another, such as {name + '_'!r}"
+                )
+            if not name.isidentifier():
+                raise ModelError(f"{key}: found {name!r}, expected letters, digits and _")
+            if name in seen:
+                raise ModelError(f"{key}: found {name!r} again after {seen[name]}, expected one")
+            seen[name] = key
+
+
+def _check_channels(model: Model) -> None:
+    """A state names the channel of an output; another name shows it nowhere."""
+    known = {output.channel or name: name for name, output in model.outputs.items()}
+    for name, state in model.states.items():
+        for key in ("measured", "rate_of"):
+            channel = getattr(state, key)
+            if channel and channel not in known:
+                close = difflib.get_close_matches(channel, known, 1) or sorted(known)
+                raise ModelError(
+                    f"states.{name}.{key}: found channel {channel!r}, expected that of an output,"
+                    f" such as {close[0]!r}"
+                )
+
+
+def _check_variable(model: Model, system: System, where: str, text: str) -> None:
+    names = (*system.states, *system.parameters, *model.inputs, *model.ports, TIME)
+    parse(text, {name: symbol(name) for name in names}, where)

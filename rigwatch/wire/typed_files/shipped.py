@@ -1,0 +1,89 @@
+"""The example files that come with rigwatch: rigs, scenarios, studies, mappings, structures.
+
+They lie in the folder `configs` of the checkout, which the wheel brings as package data. A command
+takes one by its path or by its name: `--template emps` is `configs/studies/emps.toml`.
+"""
+
+import difflib
+import shutil
+from pathlib import Path
+
+from rigwatch.wire.errors import ConfigError
+
+FOLDER = "configs"
+KINDS = ("imports", "plants", "rigs", "scenarios", "structures", "studies")
+
+
+def shipped_folders() -> tuple[Path, ...]:
+    """Where `configs` may be: here, in the checkout, as the wheel brought it; those that exist."""
+    package = Path(__file__).parents[2]
+    roots = (Path(), package.parent, package)
+    return tuple(root / FOLDER for root in roots if (root / FOLDER).is_dir())
+
+
+def find_config(name: str) -> Path:
+    """The file `name` of the folder `configs`.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    for folder in shipped_folders():
+        if (folder / name).is_file():
+            return folder / name
+    raise ConfigError(f"{FOLDER}/{name}", "", "no such file", "a folder with rigwatch's configs")
+
+
+def shipped_names(kind: str) -> list[str]:
+    """Names of the shipped files of a kind, such as "studies"; those of the rigs if empty."""
+    files = (path for folder in shipped_folders() for path in (folder / kind).glob("*.toml"))
+    return sorted({path.stem for path in files})
+
+
+def find_file(given: Path | str, kind: str) -> Path:
+    """A user's own file, or else the shipped one of that path or name.
+
+    Args:
+        given: what was typed; a path that is nowhere comes back as it is.
+        kind: folder of `configs` that a name is looked for in.
+
+    Raises:
+        ConfigError: a name, without folder and ending, is not known; near ones are told.
+    """
+    path = Path(given)
+    if path.is_file():
+        return path
+    inside = path.relative_to(FOLDER) if path.parts[:1] == (FOLDER,) else Path(kind, path)
+    for folder in shipped_folders():
+        for found in (folder / inside, folder / inside.with_name(f"{inside.name}.toml")):
+            if found.is_file():
+                return found
+    if path.suffix or len(path.parts) != 1 or path.exists():
+        return path
+    known = shipped_names(kind)
+    close = difflib.get_close_matches(str(given), known, 3, 0.5) or known
+    raise ConfigError(given, "", "no such file", f"a file or one of {', '.join(close)}")
+
+
+def copy_out(folder: Path) -> tuple[list[Path], list[Path]]:
+    """Copy all of them into `folder`/configs; those copied, and those that were there and stay.
+
+    Raises:
+        ConfigError: rigwatch's own are not found, or the folder cannot be written.
+    """
+    target = folder / FOLDER
+    sources = [own for own in shipped_folders() if own.resolve() != target.resolve()]
+    if not sources:
+        raise ConfigError(target, "", "rigwatch's own files", "another folder")
+    source, copied, kept = sources[-1], list[Path](), list[Path]()
+    for file in sorted(source.rglob("*.toml")):
+        to = target / file.relative_to(source)
+        if to.exists():
+            kept.append(to)
+            continue
+        try:
+            to.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(file, to)
+        except OSError as error:
+            raise ConfigError(to, "", error.strerror or str(error), "a folder to write") from error
+        copied.append(to)
+    return copied, kept

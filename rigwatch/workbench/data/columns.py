@@ -1,0 +1,35 @@
+"""Channels over equally spaced samples, as a session gives them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigwatch.wire.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Channels over equally spaced samples.
+
+    Attributes:
+        dt: time between samples [s].
+        values: by channel, each of shape (n,), in SI; NaN where nothing valid was measured.
+        units: of the channels as they were recorded.
+    """
+
+    dt: float
+    values: Mapping[str, FloatArray]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.values.values())))
+
+
+def bridged(signal: FloatArray) -> FloatArray:
+    """The signal with straight lines over what is missing."""
+    good = np.isfinite(signal)
+    if good.all() or not good.any():
+        return signal
+    at = np.arange(len(signal))
+    return np.interp(at, at[good], signal[good])

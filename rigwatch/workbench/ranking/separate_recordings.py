@@ -1,0 +1,91 @@
+"""Directions of candidates recording by recording, where a model without states has memory on it.
+
+What an effect remembers of one recording says nothing about the next, so each begins anew.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigwatch.physics.engine.fit import Recording
+from rigwatch.physics.engine.score import Candidate
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.data import Data
+from rigwatch.workbench.fit import Fitted
+from rigwatch.workbench.study import Study
+
+PLACE = """[ports.load], kind = "force", unit, variables, and `+ load` in the equation of a rate"""
+Along = Callable[[Data, Fitted, Sequence[Candidate]], tuple[FloatArray, FloatArray]]
+
+
+def part_by_part(
+    along: Along, data: Data, base: Fitted, found: Sequence[Candidate]
+) -> tuple[FloatArray, FloatArray]:
+    """`along` for the whole of the training recordings.
+
+    Args:
+        along: directions of candidates (windows, samples, outputs, candidates) and slopes of the
+            model by its free parameters, then its initial states.
+        data, base, found: what it is given.
+    """
+    system = base.compiled.system
+    if system.model.states or len(data.train.parts) < 2:
+        return along(data, base, found)
+    if system.states:
+        return _apart(along, data, base, found)
+    # Time runs on for what needs no memory, as it does in a fit.
+    moved, slopes = along(data, base, found)
+    keen = [index for index, candidate in enumerate(found) if candidate.effect.states]
+    if keen:
+        moved[..., keen] = _apart(along, data, base, [found[index] for index in keen])[0]
+    return moved, slopes
+
+
+def _apart(
+    along: Along, data: Data, base: Fitted, found: Sequence[Candidate]
+) -> tuple[FloatArray, FloatArray]:
+    """The same of each recording by itself; slopes by each one's own initial states."""
+    system, parts = base.compiled.system, data.train.parts
+    pieces = zip(_pieces(data.train), _fits(base, len(parts)), strict=True)
+    made = [along(replace(data, train=train), fitted, found) for train, fitted in pieces]
+    free, states = len(system.free), len(system.states)
+    moved = np.concatenate([piece for piece, _ in made], axis=1)
+    slopes = np.zeros((*moved.shape[:3], free + states * len(parts)))
+    first = 0
+    for index, (_, own) in enumerate(made):
+        rows = slice(first, first + own.shape[1])
+        slopes[:, rows, :, :free] = own[..., :free]
+        at = free + index * states
+        slopes[:, rows, :, at : at + states] = own[..., free:]
+        first += own.shape[1]
+    return moved, slopes
+
+
+def check_ports(study: Study) -> None:
+    """Refuse to rank effects in a model that they cannot enter.
+
+    Raises:
+        ModelError: it has no port.
+    """
+    if not study.model.ports:
+        raise ModelError(
+            f"{study.file.model}: found no port, expected one where effects may enter: {PLACE}"
+        )
+
+
+def _pieces(recording: Recording) -> list[Recording]:
+    ends = np.cumsum(recording.parts)[:-1]
+    pairs = zip(np.split(recording.inputs, ends), np.split(recording.outputs, ends), strict=True)
+    return [Recording(recording.dt, u, y, parts=(len(u),)) for u, y in pairs]
+
+
+def _fits(base: Fitted, parts: int) -> list[Fitted]:
+    """The fit with the initial state of each recording alone."""
+    initial = base.train.initial
+    if len(initial) != parts:
+        return [base] * parts
+    return [
+        replace(base, train=replace(base.train, initial=initial[i : i + 1])) for i in range(parts)
+    ]

@@ -1,0 +1,45 @@
+"""A user's own machine: a model file, recordings made here, and the study of both."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.wire.exchange.importing import import_file
+from rigwatch.wire.exchange.mapping import ImportMapping
+from rigwatch.workbench.study.study import Study, create
+
+Table = Mapping[str, np.ndarray]
+
+
+def recorded(path: Path, table: Table, units: Mapping[str, str], rate: float = 100.0) -> None:
+    """A session at `path`, by way of a CSV file."""
+    lines = [",".join(table)]
+    lines += [",".join(f"{v:.9g}" for v in row) for row in zip(*table.values(), strict=True)]
+    source = path.with_suffix(".csv")
+    source.write_text("\n".join(lines) + "\n")
+    channels = {name: f"{name}[{units[name]}]" for name in table}
+    import_file(source, path, ImportMapping(channels=channels, rate=rate, flag_missing=True))
+
+
+def studied(  # noqa: PLR0917 -- a test helper
+    folder: Path,
+    model: str,
+    train: Sequence[Table],
+    held_out: Sequence[Table],
+    units: Mapping[str, str],
+    keys: str = "",
+    rates: Sequence[float] = (),
+) -> Study:
+    """The study of a model file and recordings; `keys` are put into its file in front."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "model.toml").write_text(model)
+    text = f'model = "model.toml"\n{keys}\n'
+    given = iter(rates or [100.0] * (len(train) + len(held_out)))
+    for use, tables in (("train", train), ("held_out", held_out)):
+        for index, table in enumerate(tables):
+            name = f"{use}{index}.mcap"
+            recorded(folder / name, table, units, next(given))
+            text += f'[[{use}]]\nsession = "{name}"\n'
+    (folder / "template.toml").write_text(text)
+    return create(folder / "study", folder / "template.toml")

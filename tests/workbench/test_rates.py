@@ -1,0 +1,79 @@
+"""Recordings of one rig whose loggers are not clocked together."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.physics.engine.equations.model import Model
+from rigwatch.wire.errors import ConfigError, ModelError
+from rigwatch.wire.typed_files.loading import parse
+from rigwatch.workbench.compare.compare import compare
+from rigwatch.workbench.data.columns import Columns
+from rigwatch.workbench.data.one_rate import resampled
+from tests.workbench.machine import studied
+
+LINE = """
+name = "line"
+summary = "A force that grows with position."
+inputs.position = { unit = "m" }
+parameters.k = { unit = "N/m" }
+outputs.force = { unit = "N", expression = "k*position + load" }
+ports.load = { kind = "force", unit = "N", variables.x = { expression = "position", unit = "m" } }
+"""
+UNITS = {"position": "m", "force": "N"}
+
+
+def waves(rate: float, seed: int, seconds: float = 8.0) -> dict[str, np.ndarray]:
+    time = np.arange(round(seconds * rate)) / rate
+    position = np.sin(9 * time) + 0.3 * np.sin(31 * time + seed)
+    noise = np.random.default_rng(seed).normal(size=len(time))
+    return {"position": position, "force": 3 * position + 0.01 * noise}
+
+
+def test_loggers_that_differ_by_parts_of_a_percent_are_put_on_one_rate(tmp_path: Path) -> None:
+    train, held_out = waves(188.8, 0), waves(188.1, 1)
+    found = compare(studied(tmp_path, LINE, [train], [held_out], UNITS, rates=(188.8, 188.1)))
+    assert found.parameters["k"].value == pytest.approx(3.0, rel=1e-3)
+    assert found.held_out_error == pytest.approx(0.01, rel=0.15)
+    assert "../train0.mcap: 188.8 Hz, resampled to 188.1 Hz" in found.remarks
+
+
+def test_others_are_put_on_the_rate_that_the_study_says(tmp_path: Path) -> None:
+    train, held_out = waves(500.0, 0), waves(200.0, 1)
+    given = (LINE, [train], [held_out], UNITS)
+    with pytest.raises(ModelError, match=r"found 200 Hz, expected 500 Hz.*`rate = 200` in"):
+        compare(studied(tmp_path / "a", *given, rates=(500.0, 200.0)))
+    found = compare(studied(tmp_path / "b", *given, "rate = 100", rates=(500.0, 200.0)))
+    assert found.parameters["k"].value == pytest.approx(3.0, rel=1e-3)
+    with pytest.raises(ModelError, match="rate: found 300 Hz, expected at most 200 Hz"):
+        compare(studied(tmp_path / "c", *given, "rate = 300", rates=(500.0, 200.0)))
+
+
+def test_what_the_new_rate_cannot_show_is_filtered_away() -> None:
+    time = np.arange(4000) / 1000
+    low, high = np.sin(2 * np.pi * 5 * time), np.sin(2 * np.pi * 97 * time)
+    made = resampled(Columns(1e-3, {"both": low + high}), 100.0)
+    inner = slice(20, -20)
+    at = np.arange(len(made)) / 100
+    error = (made.values["both"] - np.sin(2 * np.pi * 5 * at))[inner]
+    # Unfiltered it comes back as 3 Hz, as large as it was.
+    assert np.sqrt(np.mean(error**2)) < 0.01
+
+
+def test_a_signal_that_is_kept_stays_a_staircase_and_holes_stay_holes() -> None:
+    stairs = np.repeat([0.0, 1.0, -2.0], 50)
+    holed = np.where((np.arange(150) > 70) & (np.arange(150) < 80), np.nan, 1.0)
+    made = resampled(Columns(0.01, {"u": stairs, "y": holed}), 60.0, frozenset({"u"}))
+    assert set(made.values["u"]) == {0.0, 1.0, -2.0}
+    assert np.isnan(made.values["y"][44:47]).all()
+    assert np.isfinite(made.values["y"][:42]).all()
+
+
+def test_a_parameter_needs_no_starting_value_unless_it_is_fixed() -> None:
+    values = {"": 1.0, ", low = 4.0": 8.0, ", low = 1.0, high = 100.0": 10.0, ", high = -3.0": -6.0}
+    for bounds, value in values.items():
+        text = LINE.replace('"N/m" }', f'"N/m"{bounds} }}')
+        assert parse(text, Model, "line.toml").parameters["k"].value == pytest.approx(value)
+    with pytest.raises(ConfigError, match="expected a value, as it is fixed"):
+        parse(LINE.replace('"N/m" }', '"N/m", fixed = true }'), Model, "line.toml")
