@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from monitor.alarms import AlarmJournal, Announcement, last_records, read_journal
+from monitor.alarms import AlarmJournal, Announcement, bounded, last_records, read_journal
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
@@ -86,7 +86,8 @@ class MonitorProcess:
         self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
         serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
         if section.journal:
-            self.say(self.rig.alarms.restore(last_records(read_journal(section.journal)[0])))
+            records = last_records(read_journal(section.journal)[0])
+            self.say(self.rig.alarms.restore(records, time.time_ns()))
         self._models = ModelDesk(bus, self.rig, Path(section.model))
         self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
@@ -104,7 +105,7 @@ class MonitorProcess:
         if self._cursor and (position := self.reader.position):
             self._cursor.write(*position)
         for command in self._commands.drain():
-            self.say(self.rig.alarms.command(command))
+            self.say(self.rig.alarms.command(bounded(command, time.time_ns())))
         self._change_models()
         for event in self._explainer.results():
             self.bus.publish(EVENTS, event)
