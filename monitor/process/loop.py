@@ -21,7 +21,7 @@ from monitor.process.link_watch import LinkWatch, Seen, disk_report
 from monitor.process.model_requests import ModelDesk, Place
 from monitor.process.startup_grace import Patience
 from rigwatch.wire.bus import Bus, connect, serve_alarm_list
-from rigwatch.wire.delivery import SampleReader
+from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import MONITOR, Heartbeat, prepare_for_real_time, raise_priority
 from rigwatch.wire.messages import (
@@ -99,6 +99,10 @@ class MonitorProcess:
                 self._judge(block)
         elif isinstance(item, Gap):
             self._links.lost(max(0, item.last - item.first + 1), time.monotonic_ns())
+        elif item.code == POSITION_WRONG:
+            self._done = None
+            if self._cursor:
+                self._cursor.set_aside()
 
     def look_around(self) -> None:
         """Remember how far it has come, obey commands, judge the link, tell the health."""

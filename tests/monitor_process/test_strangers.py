@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from monitor.alarms import Occasion
+from monitor.process.cursor import Cursor
 from rigwatch.wire.bus.bus import wait_until
 from rigwatch.wire.bus.model_change import Granted, Wish, ask_for_model
-from rigwatch.wire.messages import ALARMS, COMMANDS, AlarmCommand
+from rigwatch.wire.messages import ALARMS, COMMANDS, ESTIMATES, AlarmCommand
 from tests.bus.publisher import wave
 from tests.bus.rig import PATIENCE
 from tests.monitor_process.test_process import Bench
@@ -61,3 +62,36 @@ def test_a_command_from_the_future_has_the_monitors_time_and_its_user_is_cut(ben
     assert len(last.user) <= 100  # type: ignore[attr-defined]
     journal = Path(f"{bench.config.monitor.journal}")  # type: ignore[union-attr]
     assert journal.stat().st_size < 20_000
+
+
+def test_a_poisoned_position_file_is_set_aside_and_watching_goes_on(bench: Bench) -> None:
+    began = time.time_ns()
+    bench.send(wave(0, 64, 7, began))
+    bench.turn_until(63)
+    position = Path(f"{bench.config.monitor.journal}.position")  # type: ignore[union-attr]
+    bench.kill()
+    poisoned = Cursor(position)
+    poisoned.write(7, 10**9)
+    poisoned.close()
+    bench.start()
+    bench.got(ESTIMATES)
+    for seq in range(64, 1024, 16):
+        bench.send(wave(seq, 16, 7, began + seq * 3_906_250))
+        bench.turn()
+    assert wait_until(lambda: _caught_up(bench), PATIENCE, 0.001)
+    assert sum(len(block) for block in bench.got(ESTIMATES)) > 0  # type: ignore[arg-type]
+    assert position.with_name(f"{position.name}.set-aside").exists()
+    assert Cursor(position).read() == (7, 1023)
+
+
+def _caught_up(bench: Bench) -> bool:
+    bench.turn()
+    return bench.monitor.reader.position == (7, 1023)
+
+
+@pytest.mark.parametrize("seq", [2**60, -7])
+def test_a_position_that_no_device_reaches_is_none(tmp_path: Path, seq: int) -> None:
+    cursor = Cursor(tmp_path / "p")
+    cursor.write(7, seq)
+    assert cursor.read() is None
+    assert (tmp_path / "p.set-aside").exists()

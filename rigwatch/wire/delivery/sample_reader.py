@@ -16,7 +16,14 @@ from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus
 from rigwatch.wire.delivery.ownership import Owners
 from rigwatch.wire.delivery.ring import SOURCE_KEY
 from rigwatch.wire.delivery.ring_protocol import Ask, RingReply
-from rigwatch.wire.delivery.sample_order import Counters, Loss, Outcome, Remark, SampleOrder
+from rigwatch.wire.delivery.sample_order import (
+    FORGED,
+    Counters,
+    Loss,
+    Outcome,
+    Remark,
+    SampleOrder,
+)
 from rigwatch.wire.errors import BusError, MessageError
 from rigwatch.wire.messages import (
     EVENTS,
@@ -75,6 +82,7 @@ class SampleReader:
         self._bus = bus
         self._order = SampleOrder(resume_after, history)
         self._owners = Owners()
+        self._refused_boot: int | None = None
         self._impostor_at: float | None = None
         self._capacity = capacity
         self._inbox: SimpleQueue[_Incoming] = SimpleQueue()
@@ -187,6 +195,7 @@ class SampleReader:
         if not self._owners.admits(block.boot, sender):
             self._refuse(block)
             return
+        self._notice_impostor(block.boot)
         self.heard = True
         self._heard_at = self._silence_told_at = time.monotonic()
         self._handle(self._order.on_block(block))
@@ -194,10 +203,16 @@ class SampleReader:
     def _refuse(self, block: SampleBlock) -> None:
         """Samples in the name of a boot that another process owns."""
         self.counters.foreign += len(block)
-        if self._impostor_at is None:
-            text = f"another process sends samples as boot {block.boot}; they are dropped"
+        self._refused_boot = block.boot
+
+    def _notice_impostor(self, boot: int) -> None:
+        """The owner speaks on after samples in his name were refused: there are two indeed."""
+        if self._refused_boot != boot:
+            return
+        if not self.contested:
+            text = f"another process sends samples as boot {boot}; they are dropped"
             self._report_event(Remark("error", "DUPLICATE SOURCE", text))
-        self._impostor_at = time.monotonic()
+        self._refused_boot, self._impostor_at = None, time.monotonic()
 
     def _check_silence(self) -> None:
         now = time.monotonic()
@@ -215,6 +230,8 @@ class SampleReader:
             elif isinstance(outcome, Loss):
                 self._report_gap(outcome)
             else:
+                if outcome.code == FORGED:
+                    self._impostor_at = time.monotonic()
                 self._report_event(outcome)
 
     def _report_event(self, remark: Remark) -> None:
