@@ -185,4 +185,5 @@ def test_an_endless_line_is_one_bad_line(tmp_path):
     good = path.read_bytes()
     path.write_bytes(b"[" * 1_000_000 + b"\n" + good)
     records, bad = read_journal(path)
-    assert len(records) == good.count(b"\n") and bad == 1
+    assert len(records) == good.count(b"\n")
+    assert bad == 1

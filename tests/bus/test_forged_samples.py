@@ -1,4 +1,4 @@
-"""What a stranger sends in a boot's name: dropped, counted, told, and the real samples still come."""
+"""What a stranger sends in a boot's name: dropped, counted, told, while the real samples come."""
 
 from collections.abc import Callable
 
@@ -66,21 +66,25 @@ def test_a_poisoned_position_is_set_back_to_the_newest_of_the_ring() -> None:
 def test_the_first_token_owns_a_boot_until_it_is_gone() -> None:
     owners = Owners()
     owners.appeared(7, 100, "daq")
-    assert owners.admits(7, "daq") and not owners.admits(7, "eve")
+    assert owners.admits(7, "daq")
+    assert not owners.admits(7, "eve")
     owners.appeared(7, 50, "eve")
-    assert owners.admits(7, "daq") and not owners.admits(7, "eve")
+    assert owners.admits(7, "daq")
+    assert not owners.admits(7, "eve")
     owners.appeared(7, 200, "daq again")
     owners.vanished(7, 50)
     assert not owners.admits(7, "daq again")
     owners.vanished(7, 100)
-    assert owners.admits(7, "daq again") and not owners.admits(7, "daq")
+    assert owners.admits(7, "daq again")
+    assert not owners.admits(7, "daq")
 
 
 def test_one_who_spoke_before_the_token_came_does_not_keep_the_boot() -> None:
     owners = Owners()
     assert owners.admits(7, "eve")
     owners.appeared(7, 100, "daq")
-    assert owners.admits(7, "daq") and not owners.admits(7, "eve")
+    assert owners.admits(7, "daq")
+    assert not owners.admits(7, "eve")
 
 
 def test_samples_in_the_name_of_a_boot_are_dropped_counted_and_contested() -> None:
@@ -104,7 +108,8 @@ def test_samples_in_the_name_of_a_boot_are_dropped_counted_and_contested() -> No
         send(block(seq, 4))
     assert wait_until(_reads(reader, items, 399), 10.0, 0.001)
     values = [v for b in items if isinstance(b, SampleBlock) for v in b.channels[0].values]
-    assert len(values) == 400 and min(values) >= 0.0
+    assert len(values) == 400
+    assert min(values) >= 0.0
     assert reader.counters.foreign == 99 * 5
     assert reader.counters.lost == 0
     assert reader.contested

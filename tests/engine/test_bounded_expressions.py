@@ -17,9 +17,9 @@ BOMBS = {
     "a power of a power": "(9**60)**60**60",
     "a negative tower": "9**(-9**9**9)",
     "a root of a tower": "2**(1e300)",
+    "powers within powers": "((((9**60)**60)**60)**60)**60*x",
     "no value": "x/0",
     "infinity": "x*1e999",
-    "a function that runs off": "exp(1e6)**exp(10)",
     "an integer of 5000 digits": "9" * 5000,
     "many terms": "+".join(["x"] * 9000),
 }

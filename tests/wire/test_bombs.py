@@ -144,7 +144,7 @@ def test_rates_that_no_device_has_are_refused(rate: str) -> None:
 def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "good.mcap"
     path.write_bytes(intact())
-    with open("/dev/full", "w") as full:
+    with Path("/dev/full").open("w") as full:
         command = [sys.executable, "-m", "rigwatch", "info", str(path)]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 2

@@ -52,7 +52,9 @@ LONGEST = 20_000
 DEEPEST = 200
 """Operations within one another: SymPy works through them by recursion."""
 LARGEST_EXPONENT = 64.0
-"""Of a power that is worked out as a number while reading."""
+"""Of any power whose exponent is a number."""
+MOST_BITS = 4096
+"""Of a whole number that is worked out while reading: 9**9**9 would have 370 million digits."""
 
 
 def parse(text: str, names: Mapping[str, sympy.Expr], where: str) -> sympy.Expr:
@@ -141,11 +143,8 @@ class _Reader:
         )
 
     def _combined(self, op: ast.operator, left: Any, right: Any) -> Any:
-        if isinstance(op, ast.Pow) and getattr(right, "is_number", False):
-            # SymPy works a power of numbers out exactly: 9**9**9 would have 370 million digits.
-            if abs(float(right)) > LARGEST_EXPONENT:
-                expected = f"an exponent of at most {LARGEST_EXPONENT:g}"
-                raise ModelError(f"{self._where}: found the exponent {right}, expected {expected}")
+        if isinstance(op, ast.Pow) and (excess := _excess(sympy.sympify(left), right)):
+            raise ModelError(f"{self._where}: found {excess}, expected a smaller power")
         return _OPERATORS[type(op)](left, right)
 
     def _named(self, name: str, known: Mapping[str, Any], kind: str) -> Any:
@@ -160,6 +159,16 @@ class _Reader:
             return function(*args)
         except TypeError:
             raise ModelError(f"{self._where}: found {len(args)} arguments of {name}()") from None
+
+
+def _excess(base: sympy.Expr, exponent: Any) -> str:
+    """What makes a power too large to be worked out, as SymPy does where it is one of numbers."""
+    if not isinstance(exponent, sympy.Rational | sympy.Float):
+        return ""
+    if abs(exponent) > LARGEST_EXPONENT:
+        return f"an exponent beyond {LARGEST_EXPONENT:g}"
+    digits = max(base.p.bit_length(), base.q.bit_length()) if base.is_Rational else 0
+    return "a number of too many digits" if digits * abs(exponent) > MOST_BITS else ""
 
 
 def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> Dimension | None:
