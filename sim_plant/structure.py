@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files import loads
 from sim_plant.structure_kernel import GROUND, Elements, Floats, Loads, integrate
 
 _LAWS = ("linear", "hardening", "softening", "gap")
@@ -129,7 +130,7 @@ def with_noise(
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return loads(path.read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError) as error:
         raise ConfigError(path, "", str(error), "a readable structure file") from error
 

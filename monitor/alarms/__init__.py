@@ -7,18 +7,22 @@ every alarm with its severity, cause, guidance and default settings.
 from monitor.alarms.journal import AlarmJournal, last_records, read_journal
 from monitor.alarms.kinds import ALARM_KINDS, AlarmKind, check_settings
 from monitor.alarms.manager import AlarmManager, Announcement
+from monitor.alarms.operator import LONGEST_NAME, LONGEST_TEXT, bounded
 from monitor.alarms.quality import quality_conditions
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.state import Occasion
 
 __all__ = [
     "ALARM_KINDS",
+    "LONGEST_NAME",
+    "LONGEST_TEXT",
     "AlarmJournal",
     "AlarmKind",
     "AlarmManager",
     "AlarmRecord",
     "Announcement",
     "Occasion",
+    "bounded",
     "check_settings",
     "last_records",
     "quality_conditions",

@@ -10,10 +10,10 @@ line behind it. Figures that JSON cannot say are written as the words "nan", "in
 import json
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, BinaryIO, get_type_hints
 
 from monitor.alarms.record import AlarmRecord
 from rigwatch.wire.errors import SessionError
@@ -21,6 +21,8 @@ from rigwatch.wire.messages import Alarm
 
 _ALARM_TYPES = get_type_hints(Alarm)
 _RECORD_TYPES = get_type_hints(AlarmRecord)
+LONGEST_LINE = 1 << 16
+"""No line of ours comes near this [bytes]."""
 
 
 class AlarmJournal:
@@ -69,9 +71,10 @@ class AlarmJournal:
         os.close(self._file)
 
     def _end_torn_line(self) -> None:
+        """The newline goes out with the first line: there may be no space for it now."""
         size = os.fstat(self._file).st_size
         if size and os.pread(self._file, 1, size - 1) != b"\n":
-            os.write(self._file, b"\n")
+            self._waiting.append(b"\n")
 
 
 def read_journal(path: Path | str) -> tuple[list[AlarmRecord], int]:
@@ -81,12 +84,12 @@ def read_journal(path: Path | str) -> tuple[list[AlarmRecord], int]:
         SessionError: the file exists and cannot be read.
     """
     try:
-        lines = Path(path).read_bytes().split(b"\n")
+        with Path(path).open("rb") as file:
+            parsed = [_parse(line) for line in _lines(file) if line.strip()]
     except FileNotFoundError:
         return [], 0
     except OSError as error:
         raise SessionError(f"{path}: alarm journal cannot be read: {error.strerror}") from error
-    parsed = [_parse(line) for line in lines if line.strip()]
     records = [record for record in parsed if record is not None]
     return records, len(parsed) - len(records)
 
@@ -94,6 +97,14 @@ def read_journal(path: Path | str) -> tuple[list[AlarmRecord], int]:
 def last_records(records: Iterable[AlarmRecord]) -> list[AlarmRecord]:
     """The newest record of each alarm: what a restarted monitor has to stand by."""
     return list({record.alarm.name: record for record in records}.values())
+
+
+def _lines(file: BinaryIO) -> Iterator[bytes]:
+    """The lines of a journal; of one that is longer than any of ours no more than its start."""
+    while line := file.readline(LONGEST_LINE):
+        yield line
+        while len(line) == LONGEST_LINE and not line.endswith(b"\n"):
+            line = file.readline(LONGEST_LINE)
 
 
 def _write_all(file: int, waiting: list[bytes]) -> None:
@@ -130,7 +141,7 @@ def _parse(line: bytes) -> AlarmRecord | None:
         plain = json.loads(line)
         alarm = Alarm(**_typed(plain.pop("alarm"), Alarm, _ALARM_TYPES))
         return AlarmRecord(alarm=alarm, **_typed(plain, AlarmRecord, _RECORD_TYPES))
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
 
 

@@ -124,10 +124,18 @@ class AlarmManager:
         changes, self._changes = self._changes, []
         return changes
 
-    def restore(self, records: Iterable[AlarmRecord]) -> list[Alarm]:
-        """Stand as the records say, and return the standing alarms to be published again."""
+    def restore(self, records: Iterable[AlarmRecord], now_ns: int | None = None) -> list[Alarm]:
+        """Stand as the records say, and return the standing alarms to be published again.
+
+        Args:
+            records: the newest of each alarm.
+            now_ns: Unix time; nothing stays on the shelf for longer than a shelf life from it [ns].
+        """
         for record in records:
             self._restore_one(record)
+        if now_ns is not None:
+            for alarm in self._alarms.values():
+                alarm.shelved_until_ns = min(alarm.shelved_until_ns, now_ns + SHELF_LIFE_NS)
         return self.standing()
 
     def _restore_one(self, record: AlarmRecord) -> None:

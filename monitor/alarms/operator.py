@@ -1,12 +1,38 @@
 """What an operator's command means: which alarms it is for, and why it may be refused."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from monitor.alarms.kinds import split
 from monitor.alarms.state import UNSEEN, AlarmInstance
 from rigwatch.wire.messages import AlarmCommand
 
 EVERY = "*"
+LONGEST_NAME, LONGEST_TEXT = 100, 500
+"""Characters kept of the names in a command and of its text."""
+MOST_APART_NS = 60_000_000_000
+"""A command's time further than this from the monitor's is a wrong clock, or a lie [ns]."""
+
+
+def bounded(command: AlarmCommand, now_ns: int) -> AlarmCommand:
+    """The command as it may be obeyed and journalled.
+
+    Args:
+        command: as it was sent, by whomever.
+        now_ns: the monitor's time, Unix time, which counts where the command's is far off [ns].
+    """
+    wrong_clock = abs(command.t_ns - now_ns) > MOST_APART_NS
+    return replace(
+        command,
+        name=_shortened(command.name, LONGEST_NAME),
+        user=_shortened(command.user, LONGEST_NAME),
+        text=_shortened(command.text, LONGEST_TEXT),
+        t_ns=now_ns if wrong_clock else command.t_ns,
+    )
+
+
+def _shortened(text: str, longest: int) -> str:
+    return text if len(text) <= longest else f"{text[: longest - 1]}…"
 
 
 def wanted(command: AlarmCommand, alarms: Iterable[AlarmInstance]) -> list[AlarmInstance]:

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from monitor.alarms import AlarmJournal, Announcement, last_records, read_journal
+from monitor.alarms import AlarmJournal, Announcement, bounded, last_records, read_journal
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
@@ -20,7 +20,7 @@ from monitor.process.link_watch import LinkWatch, Seen, disk_report
 from monitor.process.model_requests import ModelDesk, Place
 from monitor.process.startup_grace import Patience
 from rigwatch.wire.bus import Bus, connect, serve_alarm_list
-from rigwatch.wire.delivery import SampleReader
+from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
     MONITOR,
@@ -91,7 +91,8 @@ class MonitorProcess:
         self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
         serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
         if section.journal:
-            self.say(self.rig.alarms.restore(last_records(read_journal(section.journal)[0])))
+            records = last_records(read_journal(section.journal)[0])
+            self.say(self.rig.alarms.restore(records, time.time_ns()))
         self._models = ModelDesk(bus, self.rig, Path(section.model))
         self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
@@ -103,13 +104,17 @@ class MonitorProcess:
                 self._judge(block)
         elif isinstance(item, Gap):
             self._links.lost(max(0, item.last - item.first + 1), time.monotonic_ns())
+        elif item.code == POSITION_WRONG:
+            self._done = None
+            if self._cursor:
+                self._cursor.set_aside()
 
     def look_around(self) -> None:
         """Remember how far it has come, obey commands, judge the link, tell the health."""
         if self._cursor and (position := self.reader.position):
             self._cursor.write(*position)
         for command in self._commands.drain():
-            self.say(self.rig.alarms.command(command))
+            self.say(self.rig.alarms.command(bounded(command, time.time_ns())))
         self._change_models()
         for event in self._explainer.results():
             self.bus.publish(EVENTS, event)

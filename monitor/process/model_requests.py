@@ -2,11 +2,12 @@
 
 import queue
 import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import msgspec
 
+from monitor.alarms import LONGEST_NAME, LONGEST_TEXT
 from monitor.model import RigModel, model_text, parse_model
 from monitor.model import model_versions as versions
 from monitor.pipeline import RigMonitor, check_can_follow
@@ -62,6 +63,9 @@ class ModelDesk:
                 one.answer = Granted(True, text, place.boot, place.seq)
             except RigwatchError as error:
                 one.answer = Granted(False, str(error))
+            except (OSError, ValueError, ArithmeticError, RecursionError, MemoryError) as error:
+                # Whatever a stranger's model is, it is not the end of the monitor.
+                one.answer = Granted(False, f"the new model cannot be used: {error}")
             one.answered.set()
         return found
 
@@ -72,8 +76,8 @@ class ModelDesk:
     def _take(self, question: bytes) -> list[bytes]:
         """In a thread of the bus: hand over and wait."""
         try:
-            one = _Waiting(msgspec.json.decode(question, type=Wish))
-        except msgspec.DecodeError as error:
+            one = _Waiting(_bounded(msgspec.json.decode(question, type=Wish)))
+        except (msgspec.DecodeError, RecursionError) as error:
             return [msgspec.json.encode(Granted(False, f"not a wish for a model: {error}"))]
         self._waiting.put(one)
         one.withdrawn = not one.answered.wait(0.8 * PATIENCE)
@@ -104,3 +108,8 @@ class ModelDesk:
         if wish.action == "rollback":
             return parse_model(versions.version_before(self._path), str(self._path))
         return parse_model(wish.model, "the new model")
+
+
+def _bounded(wish: Wish) -> Wish:
+    """The wish with no more of its user and reason than the records of versions need."""
+    return replace(wish, user=wish.user[:LONGEST_NAME], text=wish.text[:LONGEST_TEXT])

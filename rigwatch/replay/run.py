@@ -13,7 +13,7 @@ from monitor.alarms import Announcement
 from monitor.model import RigModel, parse_model
 from monitor.pipeline import RigMonitor, Watched
 from rigwatch.replay.source import Item, items
-from rigwatch.wire.errors import SessionError
+from rigwatch.wire.errors import RigwatchError, SessionError
 from rigwatch.wire.messages import Alarm, AlarmCommand, Event, ModelChange, SampleBlock
 from rigwatch.wire.session import MERGED_SAMPLES, LostSpan, Session, SessionWriter
 
@@ -97,8 +97,7 @@ def judge(session: Session, monitor: RigMonitor, found: Iterable[Item]) -> Itera
             yield Judged(item, None, monitor.alarms.command(item))
             continue
         if isinstance(item, ModelChange):
-            monitor.adopt(parse_model(item.model, f"{session.path}: the model promoted"))
-            yield Judged(item, None, [])
+            yield Judged(item, None, _adopted(monitor, item, session))
             continue
         try:
             watched = monitor.update(item)
@@ -107,6 +106,15 @@ def judge(session: Session, monitor: RigMonitor, found: Iterable[Item]) -> Itera
             text = f"found the channels {names}, expected {error} that the model needs"
             raise SessionError(f"{session.path}: {text}") from None
         yield Judged(item, watched, watched.announcements if watched else [])
+
+
+def _adopted(monitor: RigMonitor, change: ModelChange, session: Session) -> list[Announcement]:
+    """Go on with the model promoted; one that no monitor can have granted is told and left out."""
+    try:
+        monitor.adopt(parse_model(change.model, f"{session.path}: the model promoted"))
+    except RigwatchError as error:
+        return [Event("replay", change.t_ns, "error", "MODEL REFUSED", str(error))]
+    return []
 
 
 def replay(

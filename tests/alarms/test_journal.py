@@ -1,5 +1,6 @@
 """What the journal keeps: everything that was written, after kill -9, torn lines and full disks."""
 
+import errno
 import json
 import os
 import signal
@@ -153,3 +154,36 @@ def test_kill_9_loses_nothing_that_was_written(tmp_path):
     assert unreadable <= 1
     assert [record.alarm.seq for record in records] == list(range(len(records)))
     assert len(records) > int(said[-1] if said else 49)
+
+
+def test_a_torn_line_on_a_full_disk_does_not_keep_the_monitor_from_starting(tmp_path, monkeypatch):
+    path = tmp_path / "alarms.jsonl"
+    AlarmJournal(path).write(faulty_manager().take_changes())
+    before = read_journal(path)[0]
+    with path.open("ab") as file:
+        file.write(b'{"alarm": {"na')
+    write, full = os.write, True
+
+    def on_a_full_disk(file: int, data: bytes) -> int:
+        if full:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(file, data)
+
+    monkeypatch.setattr(os, "write", on_a_full_disk)
+    journal = AlarmJournal(path)
+    journal.write(before[:1])
+    assert "No space left" in journal.failure
+    full = False
+    journal.write(before[1:2])
+    assert journal.failure == ""
+    assert read_journal(path) == ([*before, *before[:2]], 1)
+
+
+def test_an_endless_line_is_one_bad_line(tmp_path):
+    path = tmp_path / "alarms.jsonl"
+    AlarmJournal(path).write(faulty_manager().take_changes())
+    good = path.read_bytes()
+    path.write_bytes(b"[" * 1_000_000 + b"\n" + good)
+    records, bad = read_journal(path)
+    assert len(records) == good.count(b"\n")
+    assert bad == 1

@@ -238,3 +238,22 @@ bus = connect(load_rig(sys.argv[1]), "frozen")
 subscription = bus.subscribe(EVENTS)
 time.sleep(600)
 """
+
+
+def test_a_message_says_from_which_process_it_came(join: Join) -> None:
+    one, other, reader = join("one"), join("other"), join("reader")
+    heard: list[tuple[bytes, str]] = []
+    close = reader.transport.listen_from(
+        reader.key(EVENTS.key), lambda payload, sender: heard.append((payload, sender))
+    )
+    for bus in (one, other):
+        sent = encode(event(bus.process))
+
+        def arrives(bus: Bus = bus, sent: bytes = sent) -> bool:
+            bus.publish(EVENTS, event(bus.process))
+            return (sent, bus.identity) in heard
+
+        eventually(arrives, f"a message of {bus.process} under its identity")
+    assert {sender for _, sender in heard} == {one.identity, other.identity}
+    assert one.identity != other.identity
+    close()

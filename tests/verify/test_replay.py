@@ -7,9 +7,18 @@ from pathlib import Path
 
 import pytest
 
+from monitor.model import load_model
+from monitor.pipeline import RigMonitor
 from rigwatch.commands import main
+from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
-from rigwatch.wire.messages.message_types import AlarmCommand, SampleBlock
+from rigwatch.wire.messages.message_types import (
+    Alarm,
+    AlarmCommand,
+    Event,
+    ModelChange,
+    SampleBlock,
+)
 from rigwatch.wire.session import SessionWriter, open_session, run_info
 
 HERE = Path(__file__).parent
@@ -101,3 +110,19 @@ def test_a_block_keeps_its_samples_where_nothing_falls_in() -> None:
     (block,) = items(open_session(FRICTION))
     assert isinstance(block, SampleBlock)
     assert len(block) == 2048
+
+
+@pytest.mark.parametrize("model", ["", "a = " + "[" * 50_000, "no toml"])
+def test_a_forged_change_of_the_model_is_told_and_left_out(tmp_path: Path, model: str) -> None:
+    genuine = open_session(FRICTION)
+    path = tmp_path / "forged.mcap"
+    with SessionWriter(path, genuine.info) as writer:
+        for block in genuine.samples():
+            writer.write(block)
+        at = int(block.t_ns[256])
+        writer.write(ModelChange("rig", block.boot, block.seq, at, "eve", "", model, ""))
+    monitor = RigMonitor(load_model(HERE / "model.toml"))
+    judged = list(judge(open_session(path), monitor, items(open_session(path))))
+    said = [one for item in judged for one in item.announced]
+    assert [one.code for one in said if isinstance(one, Event)] == ["MODEL REFUSED"]
+    assert "dry_friction" in [one.name for one in said if isinstance(one, Alarm)]

@@ -67,8 +67,10 @@ def rig_of(session: "Session") -> str:
 
 
 def _configured_model(session: "Session") -> Path | None:
+    from rigwatch.wire.typed_files import loads
+
     try:
-        name = tomllib.loads(session.info.configuration).get("monitor", {}).get("model", "")
+        name = loads(session.info.configuration).get("monitor", {}).get("model", "")
     except (SessionError, tomllib.TOMLDecodeError):
         return None
     return Path(name) if name and Path(name).is_file() else None

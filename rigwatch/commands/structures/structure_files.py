@@ -120,13 +120,12 @@ def subject_of(path: Path) -> "Structure | Model":
     Raises:
         ConfigError: it is neither.
     """
-    import tomllib
-
     from rigwatch.physics.engine.equations import load_model
     from rigwatch.structures.model import load_structure
+    from rigwatch.wire.typed_files import loads
 
     try:
-        has_equations = "states" in tomllib.loads(path.read_text(encoding="utf-8"))
+        has_equations = "states" in loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         has_equations = False
     return load_model(path) if has_equations else load_structure(path)

@@ -64,6 +64,11 @@ class Bus:
         """Replies of all processes that serve `key` of this rig, none where there is no such."""
         return self.transport.ask(self.key(key), question, timeout)
 
+    @property
+    def identity(self) -> str:
+        """Who this process is to those that hear it."""
+        return self.transport.identity
+
     def declare_token(self, key: str) -> Close:
         """Show a liveliness token at `key` of this rig until closed or dead."""
         return self.transport.declare_token(self.key(key))

@@ -5,6 +5,7 @@ puts them.
 """
 
 import fnmatch
+import itertools
 import threading
 from collections.abc import Callable
 from typing import TypeVar
@@ -13,6 +14,7 @@ from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, answered
 
 T = TypeVar("T")
+_IDENTITIES = (f"process-{number}" for number in itertools.count(1))
 
 
 class MemoryNetwork:
@@ -20,7 +22,7 @@ class MemoryNetwork:
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
-        self.listeners: dict[str, list[Callable[[bytes], None]]] = {}
+        self.listeners: dict[str, list[Callable[[bytes, str], None]]] = {}
         self.servers: dict[str, list[Answer]] = {}
         self.tokens: list[str] = []
         self.watchers: list[tuple[str, Callable[[str, bool], None]]] = []
@@ -30,13 +32,13 @@ class MemoryNetwork:
         """A process's place on this network."""
         return Bus(MemoryTransport(self), rig, process)
 
-    def deliver(self, key: str, payload: bytes) -> None:
+    def deliver(self, key: str, payload: bytes, sender: str) -> None:
         """Hand a payload to all who listen, unless it is too large or the network is down."""
         with self.lock:
             receivers = tuple(self.listeners.get(key, ()))
         if self.up and len(payload) <= MAX_PAYLOAD:
             for receive in receivers:
-                receive(payload)
+                receive(payload, sender)
 
     def tell(self, key: str, alive: bool) -> None:
         """Tell the watchers of a token that it came or went."""
@@ -50,14 +52,19 @@ class MemoryTransport:
 
     def __init__(self, network: MemoryNetwork) -> None:
         self._network = network
+        self.identity = next(_IDENTITIES)
         self._closers: list[Close] = []
 
     def put(self, key: str, payload: bytes) -> None:
         """Send to all who listen."""
-        self._network.deliver(key, payload)
+        self._network.deliver(key, payload, self.identity)
 
     def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
         """Call `receive` with each payload put to `key`."""
+        return self.listen_from(key, lambda payload, _: receive(payload))
+
+    def listen_from(self, key: str, receive: Callable[[bytes, str], None]) -> Close:
+        """The same with the identity of the sender."""
         return self._register(self._network.listeners.setdefault(key, []), receive)
 
     def serve(self, key: str, answer: Answer) -> Close:

@@ -14,11 +14,18 @@ Answer = Callable[[bytes], list[bytes]]
 class Transport(Protocol):
     """What carries bytes between processes. Keys are whole, such as "rig/bench1/daq/samples"."""
 
+    @property
+    def identity(self) -> str:
+        """Who this process is to those that hear it; no two on a bus are the same."""
+
     def put(self, key: str, payload: bytes) -> None:
         """Send without waiting; dropped where the link is full or down."""
 
     def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
         """Call `receive` with each payload put to `key`, in the transport's own thread."""
+
+    def listen_from(self, key: str, receive: Callable[[bytes, str], None]) -> Close:
+        """The same with the `identity` of the one who sent it, "" where nobody says."""
 
     def serve(self, key: str, answer: Answer) -> Close:
         """Answer questions to `key`, in a thread of the transport."""

@@ -147,25 +147,36 @@ class ZenohTransport:
         """
         return cls(_reach(endpoint, timeout, lease))
 
+    @property
+    def identity(self) -> str:
+        """The session's own number, which no other client can claim by Zenoh's own interface."""
+        return str(self._session.info.zid())
+
     def put(self, key: str, payload: bytes) -> None:
         """Send without waiting; dropped where the link is full or down."""
         publisher = self._publishers.get(key) or self._declare_publisher(key)
         with contextlib.suppress(zenoh.ZError):
-            publisher.put(payload)
+            publisher[0].put(payload, source_info=publisher[1])
 
     def _declare_publisher(self, key: str) -> Any:
         with self._lock:
             if key not in self._publishers:
-                self._publishers[key] = self._session.declare_publisher(
+                publisher = self._session.declare_publisher(
                     key,
                     congestion_control=zenoh.CongestionControl.DROP,
                     reliability=zenoh.Reliability.RELIABLE,
                 )
+                self._publishers[key] = publisher, zenoh.SourceInfo(publisher.id, 0)
             return self._publishers[key]
 
     def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
         """Call `receive` with each payload put to `key`, in Zenoh's own thread."""
         take = _direct(lambda sample: receive(sample.payload.to_bytes()))
+        return self._keep(self._session.declare_subscriber(key, take))
+
+    def listen_from(self, key: str, receive: Callable[[bytes, str], None]) -> Close:
+        """The same with the identity of the sender."""
+        take = _direct(lambda sample: receive(sample.payload.to_bytes(), _sender(sample)))
         return self._keep(self._session.declare_subscriber(key, take))
 
     def serve(self, key: str, answer: Answer) -> Close:
@@ -227,6 +238,11 @@ class ZenohTransport:
                     entity.undeclare()
 
         return close
+
+
+def _sender(sample: Any) -> str:
+    info = sample.source_info
+    return "" if info is None else str(info.source_id.zid)
 
 
 def _direct(callback: Callable[[Any], None]) -> Any:

@@ -2,11 +2,12 @@
 
     publisher ──▶ Ring ◀──asks── SampleReader ──▶ SampleOrder ──▶ samples in order, losses counted
 
-`source_arbitration` decides which of several sources of samples has control of a rig.
+`source_arbitration` decides which of several sources of samples has control of a rig, `ownership`
+who may send the samples of one.
 """
 
 from rigwatch.wire.delivery.ring import SampleRing
-from rigwatch.wire.delivery.sample_order import Counters
+from rigwatch.wire.delivery.sample_order import LARGEST_SEQ, POSITION_WRONG, Counters
 from rigwatch.wire.delivery.sample_reader import SampleReader
 
-__all__ = ["Counters", "SampleReader", "SampleRing"]
+__all__ = ["LARGEST_SEQ", "POSITION_WRONG", "Counters", "SampleReader", "SampleRing"]

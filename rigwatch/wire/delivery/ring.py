@@ -17,7 +17,7 @@ from rigwatch.wire.delivery.ring_protocol import UNKNOWN, Ask, RingReply
 from rigwatch.wire.messages import RING_KEY, Column, SampleBlock
 
 SOURCE_KEY = "source"
-"""Tokens of sources stand at `source/<boot>/<Unix time in ns since when>`."""
+"""Tokens of sources stand at `source/<boot>/<Unix time in ns since when>/<identity on the bus>`."""
 SAMPLES_PER_REPLY = 1024
 RUNS_PER_REPLY = 64
 """A reply is bounded so that answering one never holds up the publishing of samples."""
@@ -130,7 +130,8 @@ class SampleRing:
         self._withdraw()
         with self._lock:
             self._stores = [*self._stores[-1:], RingStore(head, self._capacity)]
-        self._withdraw = self._bus.declare_token(f"{SOURCE_KEY}/{head.boot}/{time.time_ns()}")
+        place = f"{SOURCE_KEY}/{head.boot}/{time.time_ns()}/{self._bus.identity}"
+        self._withdraw = self._bus.declare_token(place)
 
     def _answer(self, question: bytes) -> list[bytes]:
         ask = Ask.from_bytes(question)

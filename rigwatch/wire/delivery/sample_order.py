@@ -17,6 +17,10 @@ from rigwatch.wire.delivery.ring_protocol import OPEN, UNKNOWN, Ask, RingReply
 from rigwatch.wire.delivery.source_arbitration import Sources
 from rigwatch.wire.messages import SampleBlock, Severity, cut, unseen
 
+LARGEST_SEQ = 2**53
+"""No device counts so far: a number beyond it is a lie."""
+SUSPECT = 256
+"""Old samples after which the ring is asked whether it is the reader that is ahead."""
 TRIES = 5
 """Questions left unanswered, while newer samples come, before a hole is given up."""
 
@@ -40,6 +44,10 @@ class Remark:
     text: str
 
 
+FORGED = "FORGED SAMPLES"
+"""Code of the remark that samples came which the source never sent."""
+POSITION_WRONG = "POSITION SET ASIDE"
+"""Code of the remark that the position to go on from was beyond all that the source has sent."""
 Outcome = SampleBlock | Loss | Ask | Remark
 
 
@@ -123,6 +131,7 @@ class SampleOrder:
         self._asked: Ask | None = None
         self._unanswered = 0
         self._heard_since_ask = False
+        self._stale = 0
         self._out: list[Outcome] = []
         if resume_after is not None:
             # Taken for alive until the tokens that are there have been listed.
@@ -132,8 +141,11 @@ class SampleOrder:
 
     def on_block(self, block: SampleBlock) -> list[Outcome]:
         """A block was received from the bus."""
-        if len(block):
-            self._admit(block)
+        if 0 <= block.seq <= LARGEST_SEQ - len(block):
+            if len(block):
+                self._admit(block)
+        else:
+            self.counters.foreign += len(block)
         return self._outcomes()
 
     def on_reply(self, ask: Ask, reply: RingReply | None) -> list[Outcome]:
@@ -234,12 +246,21 @@ class SampleOrder:
     def _store(self, stream: Stream, block: SampleBlock) -> None:
         fresh = unseen(block, stream.next)
         self.counters.duplicates += len(block) - (len(fresh) if fresh else 0)
+        self._stale = 0 if fresh else self._stale + len(block)
         if fresh is None:
+            self._suspect_itself()
             return
         if fresh.seq == stream.next and stream is self._line[0] and not stream.waiting:
             self._deliver(stream, fresh)
         else:
             stream.hold(fresh)
+
+    def _suspect_itself(self) -> None:
+        """Old samples only, for long: perhaps the position is wrong, which the ring can tell."""
+        front = self._line[0]
+        if self._stale >= SUSPECT and self._asked is None and not front.ended:
+            self._stale = 0
+            self._ask(Ask(front.boot, front.next, OPEN))
 
     def _deliver(self, stream: Stream, block: SampleBlock) -> None:
         fresh = unseen(block, stream.next)
@@ -290,8 +311,14 @@ class SampleOrder:
     def _settle(self, ask: Ask, reply: RingReply) -> None:
         front = self._line[0]
         self._unanswered = 0
-        if reply.settled == UNKNOWN or (reply.settled < ask.first and ask.last != OPEN):
+        if reply.settled == UNKNOWN:
             self._give_up(front, ask, "the source has restarted since")
+            return
+        if reply.settled < ask.first - 1 and not front.ended:
+            self._set_back(front, reply.settled + 1)
+            return
+        if reply.settled < ask.first and ask.last != OPEN:
+            self._disbelieve(front)
             return
         for block in reply.blocks:
             before = self.counters.delivered
@@ -301,6 +328,26 @@ class SampleOrder:
         self._skip(front, min(reply.settled, ask.last), "the ring no longer has them")
         if ask.last == OPEN and front.ended and not self._progressed(ask, front):
             self._leave(front)
+
+    def _disbelieve(self, front: Stream) -> None:
+        """Every sample is in the ring before it is published: what the ring has not seen is forged.
+
+        A sample that came while the ring was asked is dropped as well, and recovered from it.
+        """
+        self.counters.foreign += front.samples_waiting
+        front.waiting.clear()
+        front.samples_waiting = 0
+        text = f"samples of boot {front.boot} that its source never sent; they are dropped"
+        self._out.append(Remark("error", FORGED, text))
+
+    def _set_back(self, front: Stream, seq: int) -> None:
+        """The position lies behind the newest sample of the source: it was never right."""
+        told = f"sample {front.next - 1} of boot {front.boot} lies beyond its newest, {seq - 1}"
+        self._out.append(Remark("error", POSITION_WRONG, f"{told}; reading goes on from there"))
+        self._lose(front.boot, seq, seq - 1, "the position to go on from was wrong")
+        front.waiting.clear()
+        front.samples_waiting = 0
+        front.next = front.promised_from = seq
 
     def _take_recovered(self, front: Stream, block: SampleBlock, last: int) -> None:
         wanted = cut(block, 0, max(0, min(len(block), last + 1 - block.seq)))

@@ -13,9 +13,17 @@ import time
 from queue import Empty, SimpleQueue
 
 from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus
+from rigwatch.wire.delivery.ownership import Owners
 from rigwatch.wire.delivery.ring import SOURCE_KEY
 from rigwatch.wire.delivery.ring_protocol import Ask, RingReply
-from rigwatch.wire.delivery.sample_order import Counters, Loss, Outcome, Remark, SampleOrder
+from rigwatch.wire.delivery.sample_order import (
+    FORGED,
+    Counters,
+    Loss,
+    Outcome,
+    Remark,
+    SampleOrder,
+)
 from rigwatch.wire.errors import BusError, MessageError
 from rigwatch.wire.messages import (
     EVENTS,
@@ -33,11 +41,13 @@ from rigwatch.wire.messages import (
 SILENCE = 1.0
 """Time without a sample after which the ring is asked whether it has more [s]."""
 REPLY_TIMEOUT = 1.0
+CONTESTED = 1.0
+"""How long samples in the name of another are remembered [s]."""
 PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
 """Waits before a question that nobody answered goes out again [s]."""
 
 Item = SampleBlock | Gap | Event
-_Incoming = bytes | tuple[int, int, bool] | tuple[Ask, RingReply | None]
+_Incoming = tuple[bytes, str] | tuple[int, int, str | None] | tuple[Ask, RingReply | None]
 
 
 class SampleReader:
@@ -71,6 +81,9 @@ class SampleReader:
         self.dropped = 0
         self._bus = bus
         self._order = SampleOrder(resume_after, history)
+        self._owners = Owners()
+        self._refused_boot: int | None = None
+        self._impostor_at: float | None = None
         self._capacity = capacity
         self._inbox: SimpleQueue[_Incoming] = SimpleQueue()
         self._questions: SimpleQueue[Ask | None] = SimpleQueue()
@@ -82,13 +95,13 @@ class SampleReader:
         self._start(resume_after)
 
     def _start(self, resume_after: tuple[int, int] | None) -> None:
-        for key in self._bus.tokens(f"{SOURCE_KEY}/*/*"):
+        for key in self._bus.tokens(f"{SOURCE_KEY}/*/*/*"):
             self._token(key, True)
         if resume_after is not None:
-            self._inbox.put((resume_after[0], 0, False))
+            self._inbox.put((resume_after[0], 0, None))
         self._closers = [
-            self._bus.watch_tokens(f"{SOURCE_KEY}/*/*", self._token),
-            self._bus.transport.listen(self._bus.key(SAMPLES.key), self._receive),
+            self._bus.watch_tokens(f"{SOURCE_KEY}/*/*/*", self._token),
+            self._bus.transport.listen_from(self._bus.key(SAMPLES.key), self._receive),
         ]
         threading.Thread(target=self._ask_on, name="ring-questions", daemon=True).start()
 
@@ -107,8 +120,10 @@ class SampleReader:
 
     @property
     def contested(self) -> bool:
-        """Whether a second source sends samples beside the one that is read."""
-        return self._order.sources.contested
+        """Whether a second source sends samples beside the one that is read, or in its name."""
+        at = self._impostor_at
+        impostor = at is not None and time.monotonic() - at < CONTESTED
+        return impostor or self._order.sources.contested
 
     def silent_for(self) -> float:
         """Time since a sample was received, or since the start [s]."""
@@ -141,38 +156,63 @@ class SampleReader:
 
     # ---- called in the bus's threads ----------------------------------------------------
 
-    def _receive(self, payload: bytes) -> None:
+    def _receive(self, payload: bytes, sender: str) -> None:
         if len(payload) > MAX_PAYLOAD:
             self.rejected += 1
         elif self._inbox.qsize() >= self._capacity:
             self.dropped += 1
         else:
-            self._inbox.put(payload)
+            self._inbox.put((payload, sender))
 
     def _token(self, key: str, alive: bool) -> None:
         with contextlib.suppress(ValueError):
-            _, boot, since_ns = key.split("/")
-            self._inbox.put((int(boot), int(since_ns), alive))
+            _, boot, since_ns, sender = key.split("/")
+            self._inbox.put((int(boot), int(since_ns), sender if alive else None))
 
     # ---- called in the reader's thread --------------------------------------------------
 
     def _take(self, incoming: _Incoming) -> None:
-        if isinstance(incoming, bytes):
-            self._take_block(incoming)
-        elif len(incoming) == 3:
-            self._handle(self._order.on_token(*incoming))
+        if len(incoming) == 3:
+            self._take_token(*incoming)
+        elif isinstance(incoming[0], bytes):
+            self._take_block(*incoming)
         else:
             self._handle(self._order.on_reply(*incoming))
 
-    def _take_block(self, payload: bytes) -> None:
+    def _take_token(self, boot: int, since_ns: int, sender: str | None) -> None:
+        if sender is None:
+            self._owners.vanished(boot, since_ns)
+        else:
+            self._owners.appeared(boot, since_ns, sender)
+        self._handle(self._order.on_token(boot, since_ns, sender is not None))
+
+    def _take_block(self, payload: bytes, sender: str) -> None:
         try:
             block = decode(SampleBlock, payload)
         except MessageError:
             self.rejected += 1
             return
+        if not self._owners.admits(block.boot, sender):
+            self._refuse(block)
+            return
+        self._notice_impostor(block.boot)
         self.heard = True
         self._heard_at = self._silence_told_at = time.monotonic()
         self._handle(self._order.on_block(block))
+
+    def _refuse(self, block: SampleBlock) -> None:
+        """Samples in the name of a boot that another process owns."""
+        self.counters.foreign += len(block)
+        self._refused_boot = block.boot
+
+    def _notice_impostor(self, boot: int) -> None:
+        """The owner speaks on after samples in his name were refused: there are two indeed."""
+        if self._refused_boot != boot:
+            return
+        if not self.contested:
+            text = f"another process sends samples as boot {boot}; they are dropped"
+            self._report_event(Remark("error", "DUPLICATE SOURCE", text))
+        self._refused_boot, self._impostor_at = None, time.monotonic()
 
     def _check_silence(self) -> None:
         now = time.monotonic()
@@ -190,6 +230,8 @@ class SampleReader:
             elif isinstance(outcome, Loss):
                 self._report_gap(outcome)
             else:
+                if outcome.code == FORGED:
+                    self._impostor_at = time.monotonic()
                 self._report_event(outcome)
 
     def _report_event(self, remark: Remark) -> None:

@@ -15,6 +15,10 @@ JITTER = 0.1
 """Time stamps this far from a uniform grid, in sample periods, are still taken for uniform."""
 RATE_TOLERANCE = 0.02
 """A given rate may differ from that of the time stamps by this share."""
+LATEST = 9e9
+"""Time beyond which nanoseconds do not fit their 64 bits [s]."""
+MOST_POINTS, MOST_PER_SAMPLE = 4_000_000, 50
+"""Points that any grid may have, and those more for each sample."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +49,10 @@ def fit_grid(times: FloatArray, rate: float | None, max_hole: float) -> Grid:
         max_hole: sample periods without data that are bridged.
 
     Raises:
-        ImportDataError: the rate is not that of the time stamps.
+        ImportDataError: the rate is not that of the time stamps, or they jump too far.
     """
+    if len(times) and max(abs(times[0]), abs(times[-1])) > LATEST:
+        raise ImportDataError(f"time: found {times[-1]:.6g} s, expected at most {LATEST:g} s")
     period = float(np.median(np.diff(times))) if len(times) > 1 else 1.0 / (rate or 1.0)
     if rate is not None and abs(period * rate - 1) > RATE_TOLERANCE:
         found = f"found {1 / period:.6g} Hz in the time stamps, expected {rate:.6g} Hz"
@@ -60,9 +66,19 @@ def fit_grid(times: FloatArray, rate: float | None, max_hole: float) -> Grid:
         rate_hz = rate or _rounded((len(times) - 1) / span if span else 1 / period)
         return Grid(rate_hz, times, False, np.zeros(len(times), bool), extremes)
     rate_hz = rate or _rounded(1 / period)
+    most = MOST_POINTS + MOST_PER_SAMPLE * len(times)
+    if span * rate_hz > most:
+        raise ImportDataError(_too_many(times, rate_hz))
     count = int(np.floor(span * rate_hz * (1 + 1e-12))) + 1
     grid = times[0] + np.arange(count) / rate_hz
     return Grid(rate_hz, grid, True, _holes(times, grid, max_hole / rate_hz), extremes)
+
+
+def _too_many(times: FloatArray, rate_hz: float) -> str:
+    at = int(np.argmax(np.diff(times)))
+    jump = f"a jump from {times[at]:.6g} s to {times[at + 1]:.6g} s"
+    points = f"{(times[-1] - times[0]) * rate_hz:.3g} points at {rate_hz:.6g} Hz"
+    return f"time: found {jump}, which asks for {points}; expected one recording without it"
 
 
 def _is_uniform(times: FloatArray, period: float) -> bool:

@@ -5,6 +5,7 @@ force    = "vir * gtau [N]"    column vir times the scalar gtau of the same file
 force    = "vir*35.15 - 3[N]"  the same with numbers
 """
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -34,7 +35,7 @@ class ImportMapping(Section, frozen=True):
         str, Meta(description='column of the time with its unit, such as "t[ms]", empty for none')
     ] = ""
     rate: Annotated[
-        Annotated[float, Meta(gt=0)] | None,
+        Annotated[float, Meta(ge=1e-6, le=1e9)] | None,
         Meta(description="sample rate [Hz]; needed where there is no time"),
     ] = None
     format: Annotated[
@@ -90,7 +91,10 @@ def parse_source(channel: str, text: str, columns: tuple[str, ...]) -> Source:
         raise ImportDataError(
             f"{channel}: found no column {column!r}, expected one of {', '.join(columns) or 'none'}"
         )
-    return Source(column, _factor(parts["factor"]), _offset(parts["sign"], parts["offset"]), unit)
+    factor, offset = _factor(parts["factor"]), _offset(parts["sign"], parts["offset"])
+    if not all(math.isfinite(x) for x in (factor, offset) if isinstance(x, float)):
+        raise ImportDataError(f"{channel}: found {source!r}, expected finite numbers")
+    return Source(column, factor, offset, unit)
 
 
 def _factor(text: str | None) -> float | str:

@@ -8,6 +8,7 @@ Written here because a damaged file can crash the process in SciPy's reader. Str
 complex arrays are passed over. Source: MathWorks, "MAT-File Format", 2019.
 """
 
+import itertools
 import struct
 import zlib
 from collections.abc import Iterator
@@ -15,6 +16,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
+from rigwatch.wire.exchange.budget import Budget
 
 Value = np.ndarray[Any, Any] | list[str] | str
 
@@ -30,7 +33,8 @@ _CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13
     15: "u8",
 }
 _COMPLEX = 0x0800
-_LARGEST = 1 << 31
+_MOST_PARTS = 10_000
+"""Elements of one variable, cells of a cell array among them."""
 
 
 class MatError(ValueError):
@@ -40,7 +44,7 @@ class MatError(ValueError):
 @dataclass(frozen=True, slots=True)
 class _Element:
     kind: int
-    data: bytes
+    data: memoryview
 
 
 def read_mat5(content: bytes) -> dict[str, Value]:
@@ -51,9 +55,10 @@ def read_mat5(content: bytes) -> dict[str, Value]:
     """
     order = _byte_order(content)
     found: dict[str, Value] = {}
+    budget = Budget(len(content))
     try:
-        for element in _elements(content[128:], order):
-            name, value = _matrix(_unpacked(element, order), order)
+        for element in _elements(memoryview(content)[128:], order):
+            name, value = _matrix(_unpacked(element, order, budget), order, budget)
             if value is not None:
                 found[name] = value
     except (struct.error, zlib.error, ValueError, TypeError, RecursionError) as error:
@@ -71,7 +76,7 @@ def _byte_order(content: bytes) -> str:
     return orders[mark]
 
 
-def _elements(data: bytes, order: str) -> Iterator[_Element]:
+def _elements(data: memoryview, order: str) -> Iterator[_Element]:
     at = 0
     while at + 8 <= len(data):
         kind, size = struct.unpack_from(f"{order}II", data, at)
@@ -85,33 +90,36 @@ def _elements(data: bytes, order: str) -> Iterator[_Element]:
         if start + size > len(data) or (start == at - 4 and size > 4):
             raise ValueError("an element is longer than the file")
         yield _Element(kind, data[start : start + size])
-    if data[at:].strip(b"\0"):
+    if bytes(data[at:]).strip(b"\0"):
         raise ValueError("bytes behind the last element")
 
 
-def _unpacked(element: _Element, order: str) -> _Element:
+def _unpacked(element: _Element, order: str, budget: Budget) -> _Element:
     if element.kind != _COMPRESSED:
         return element
     unpacker = zlib.decompressobj()
-    data = unpacker.decompress(element.data, _LARGEST)
+    data = unpacker.decompress(element.data, budget.left + 1)
+    budget.take(len(data))
     if not unpacker.eof:
         raise ValueError("a compressed variable is truncated")
-    return next(_elements(data, order))
+    return next(_elements(memoryview(data), order))
 
 
-def _matrix(element: _Element, order: str) -> tuple[str, Value | None]:
+def _matrix(element: _Element, order: str, budget: Budget) -> tuple[str, Value | None]:
     """Name and value of a variable; None for a kind that we pass over."""
     if element.kind != _MATRIX:
         raise ValueError(f"an element of kind {element.kind} where a variable should be")
-    parts = list(_elements(element.data, order))
+    parts = list(itertools.islice(_elements(element.data, order), _MOST_PARTS + 1))
+    if len(parts) > _MOST_PARTS:
+        raise ValueError(f"a variable of more than {_MOST_PARTS} parts")
     if len(parts) < 3:
         return "", None
     (flags,) = struct.unpack_from(f"{order}I", parts[0].data)
     shape = tuple(np.frombuffer(parts[1].data, f"{order}i4").tolist())
-    name = parts[2].data.decode("ascii")
+    name = bytes(parts[2].data).decode("ascii")
     kind = flags & 0xFF
     if kind == _CELL:
-        return name, _texts(parts[3:], order)
+        return name, _texts(parts[3:], order, budget)
     if kind == _CHAR and len(parts) > 3:
         return name, _text(parts[3], order)
     if kind not in _CLASSES or flags & _COMPLEX or len(parts) < 4:
@@ -119,11 +127,12 @@ def _matrix(element: _Element, order: str) -> tuple[str, Value | None]:
     values = np.frombuffer(parts[3].data, order + _DATA_TYPES.get(parts[3].kind, "V"))
     if min(shape) < 0 or values.size != int(np.prod(shape, dtype=np.float64)):
         raise ValueError(f"{name} has {values.size} values, expected the shape {shape}")
+    budget.take(values.size * np.dtype(_CLASSES[kind]).itemsize)
     return name, values.reshape(shape, order="F").astype(_CLASSES[kind])
 
 
-def _texts(cells: list[_Element], order: str) -> list[str] | None:
-    found = [_matrix(cell, order)[1] for cell in cells]
+def _texts(cells: list[_Element], order: str, budget: Budget) -> list[str] | None:
+    found = [_matrix(cell, order, budget)[1] for cell in cells]
     texts = [value for value in found if isinstance(value, str)]
     return texts if len(texts) == len(found) else None
 
@@ -132,4 +141,4 @@ def _text(element: _Element, order: str) -> str:
     encoding = _TEXTS.get(element.kind, "latin-1")
     if encoding in ("utf-16", "utf-32"):
         encoding += "-le" if order == "<" else "-be"
-    return element.data.decode(encoding)
+    return bytes(element.data).decode(encoding)

@@ -11,6 +11,7 @@ import numpy as np
 
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ImportDataError, MissingExtraError
+from rigwatch.wire.exchange.budget import Budget
 from rigwatch.wire.exchange.mapping import ImportMapping
 from rigwatch.wire.exchange.mat5 import MatError, Value, read_mat5
 
@@ -142,7 +143,10 @@ def _read_csv(path: Path, mapping: ImportMapping) -> Table:
         lines.pop()
     if not lines:
         raise ImportDataError(f"{path}: the file is empty, expected rows of data")
-    rows = _rows(lines, mapping.delimiter)
+    try:
+        rows = _rows(lines, mapping.delimiter)
+    except ImportDataError as error:
+        raise ImportDataError(f"{path}: {error}") from None
     header = [name.strip() for name in (mapping.columns or rows.pop(0))]
     first_line = 1 if mapping.columns else 2
     if len(set(header)) < len(header):
@@ -165,7 +169,10 @@ def _rows(lines: list[str], delimiter: str) -> list[list[str]]:
     if len(delimiter) != 1:
         expected = "auto, whitespace or one character"
         raise ImportDataError(f"delimiter: found {delimiter!r}, expected {expected}")
-    return list(csv.reader(lines, delimiter=delimiter))
+    try:
+        return list(csv.reader(lines, delimiter=delimiter))
+    except csv.Error as error:
+        raise ImportDataError(f"not readable as CSV: {error}") from None
 
 
 def _read_mat(path: Path, _: ImportMapping) -> Table:
@@ -220,8 +227,10 @@ def _read_parquet(path: Path, _: ImportMapping) -> Table:
     import pyarrow
 
     try:
+        rows, columns = parquet.read_metadata(path).num_rows, parquet.read_schema(path).names
+        Budget(path.stat().st_size).take(8 * rows * len(columns))
         found = parquet.read_table(path)
-    except pyarrow.ArrowException as error:
+    except (pyarrow.ArrowException, ValueError) as error:
         reason = str(error).splitlines()[0]
         raise ImportDataError(f"{path}: not a readable Parquet file: {reason}") from error
     return Table(

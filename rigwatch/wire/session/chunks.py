@@ -25,6 +25,8 @@ from rigwatch.wire.errors import SessionError
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST_RECORD = 1 << 28
 """No record of ours comes near this; a length beyond it is a flipped bit [bytes]."""
+LARGEST_CHUNK = 1 << 26
+"""Nor do the unpacked records of a chunk, which are half a second of messages [bytes]."""
 _CHUNK, _MESSAGE, _MESSAGE_INDEX, _DATA_END, _FOOTER = 0x06, 0x05, 0x07, 0x0F, 0x02
 _KNOWN = frozenset(range(0x01, 0x10))
 _RECORD = struct.Struct("<BQ")
@@ -140,7 +142,7 @@ def _records(body: bytes, unpacker: zstandard.ZstdDecompressor) -> bytes:
     _, _, raw_size, crc, _ = _CHUNK_HEAD.unpack_from(body)
     packed = memoryview(body)[_CHUNK_HEAD.size + 12 :]
     try:
-        if raw_size > LARGEST_RECORD or zstandard.frame_content_size(packed) != raw_size:
+        if raw_size > LARGEST_CHUNK or zstandard.frame_content_size(packed) != raw_size:
             raise _DamagedError("a chunk of the wrong size")
         records = unpacker.decompress(packed)
     except zstandard.ZstdError as error:

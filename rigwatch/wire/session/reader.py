@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.records import Channel, Schema
 
 from rigwatch.wire.errors import MessageError, SessionError
@@ -308,6 +309,17 @@ class _ChunkReader:
         self._lines: dict[int, Topic | None] = {}
 
     def messages(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
+        """Topic, time and bytes of each message.
+
+        Raises:
+            SessionError: a record is none, although its checksum is right, or of a later version.
+        """
+        try:
+            yield from self._cut(records)
+        except (struct.error, McapError, ValueError, RecursionError) as error:
+            raise SessionError(f"{self._path}: a malformed record: {error}") from None
+
+    def _cut(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
         at, end = 0, len(records)
         while at + _RECORD.size <= end:
             opcode, length = _RECORD.unpack_from(records, at)

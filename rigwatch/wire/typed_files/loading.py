@@ -12,6 +12,7 @@ from typing import TypeVar
 import msgspec
 
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.typed_files.bounded import loads
 from rigwatch.wire.typed_files.explanation import explained
 
 S = TypeVar("S", bound="Section")
@@ -37,7 +38,7 @@ def parse(text: str, kind: type[S], file: Path | str) -> S:
         ConfigError: the text is not TOML or does not fit `kind`.
     """
     try:
-        raw = tomllib.loads(text)
+        raw = loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(file, "", str(error), "TOML") from error
     try:

@@ -47,6 +47,16 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 }
 
 
+LONGEST = 20_000
+"""Characters of one expression."""
+DEEPEST = 200
+"""Operations within one another: SymPy works through them by recursion."""
+LARGEST_EXPONENT = 64.0
+"""Of any power whose exponent is a number."""
+MOST_BITS = 4096
+"""Of a whole number that is worked out while reading: 9**9**9 would have 370 million digits."""
+
+
 def parse(text: str, names: Mapping[str, sympy.Expr], where: str) -> sympy.Expr:
     """The expression `text` in the symbols `names`.
 
@@ -64,13 +74,44 @@ def parse(text: str, names: Mapping[str, sympy.Expr], where: str) -> sympy.Expr:
 @lru_cache(maxsize=4096)
 def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) -> sympy.Expr:
     """The same, kept: SymPy takes milliseconds to simplify choices and extremes."""
+    value = sympy.sympify(_Reader(dict(names), where).value(_tree(text, where)))
+    if value.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
+        raise ModelError(f"{where}: found {_shown(text)}, which has no finite value")
+    return value
+
+
+def _tree(text: str, where: str) -> ast.expr:
+    """Python's syntax tree of an expression that is neither too long nor too deep to work with."""
+    if len(text) > LONGEST:
+        found = f"found {len(text)} characters"
+        raise ModelError(f"{where}: {found}, expected an expression of at most {LONGEST}")
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        tree = ast.parse(text.strip(), mode="eval").body
     except SyntaxError as error:
         raise ModelError(
-            f"{where}: found {text!r}, which breaks off at character {error.offset}"
+            f"{where}: found {_shown(text)}, which breaks off at character {error.offset}"
         ) from None
-    return sympy.sympify(_Reader(dict(names), where).value(tree.body))
+    except (RecursionError, MemoryError, ValueError):
+        raise ModelError(f"{where}: found {_shown(text)}, which cannot be read") from None
+    if _depth(tree) > DEEPEST:
+        raise ModelError(
+            f"{where}: found {_shown(text)}, expected operations at most {DEEPEST} deep"
+        )
+    return tree
+
+
+def _depth(tree: ast.AST) -> int:
+    """How deep the operations stand within one another."""
+    level: list[ast.AST] = [tree]
+    depth = 0
+    while level:
+        level = [child for node in level for child in ast.iter_child_nodes(node)]
+        depth += 1
+    return depth
+
+
+def _shown(text: str) -> str:
+    return repr(text) if len(text) <= 200 else f"{text[:200]!r}…"
 
 
 class _Reader:
@@ -90,7 +131,7 @@ class _Reader:
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return -self.value(operand)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-                return _OPERATORS[type(op)](self.value(left), self.value(right))
+                return self._combined(op, self.value(left), self.value(right))
             case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in _COMPARISONS:
                 return _COMPARISONS[type(op)](self.value(left), self.value(right))
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
@@ -100,6 +141,11 @@ class _Reader:
         raise ModelError(
             f"{self._where}: found {ast.unparse(node)!r}, which is no arithmetic{hint}"
         )
+
+    def _combined(self, op: ast.operator, left: Any, right: Any) -> Any:
+        if isinstance(op, ast.Pow) and (excess := _excess(sympy.sympify(left), right)):
+            raise ModelError(f"{self._where}: found {excess}, expected a smaller power")
+        return _OPERATORS[type(op)](left, right)
 
     def _named(self, name: str, known: Mapping[str, Any], kind: str) -> Any:
         if name in known:
@@ -115,13 +161,23 @@ class _Reader:
             raise ModelError(f"{self._where}: found {len(args)} arguments of {name}()") from None
 
 
+def _excess(base: sympy.Expr, exponent: Any) -> str:
+    """What makes a power too large to be worked out, as SymPy does where it is one of numbers."""
+    if not isinstance(exponent, sympy.Rational | sympy.Float):
+        return ""
+    if abs(exponent) > LARGEST_EXPONENT:
+        return f"an exponent beyond {LARGEST_EXPONENT:g}"
+    digits = max(base.p.bit_length(), base.q.bit_length()) if base.is_Rational else 0
+    return "a number of too many digits" if digits * abs(exponent) > MOST_BITS else ""
+
+
 def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> Dimension | None:
     """The dimension of the expression `text`; None for zero, which fits every unit.
 
     Raises:
         ModelError: it adds, compares or feeds to a function what does not have fitting units.
     """
-    return _Measurer(dimensions, where).dim(ast.parse(text.strip(), mode="eval").body)
+    return _Measurer(dimensions, where).dim(_tree(text, where))
 
 
 def _is_caret(node: ast.AST) -> bool:

@@ -1,0 +1,139 @@
+"""What a stranger sends in a boot's name: dropped, counted, told, while the real samples come."""
+
+from collections.abc import Callable
+
+import pytest
+
+from rigwatch.wire.bus.bus import wait_until
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.delivery.ownership import Owners
+from rigwatch.wire.delivery.ring import SampleRing
+from rigwatch.wire.delivery.sample_order import (
+    FORGED,
+    POSITION_WRONG,
+    SUSPECT,
+    Loss,
+    SampleOrder,
+)
+from rigwatch.wire.delivery.sample_reader import SampleReader
+from rigwatch.wire.messages import SAMPLES, Event, SampleBlock
+from tests.bus.samples import block
+from tests.bus.test_sample_order import Bench
+
+BILLION = 10**9
+
+
+def test_a_jump_that_the_ring_has_not_seen_is_dropped_and_nothing_is_lost() -> None:
+    bench = Bench()
+    bench.send(block(0, 10))
+    bench.take(bench.order.on_block(block(BILLION, 1)))
+    for seq in range(10, 50, 10):
+        bench.send(block(seq, 10))
+        bench.reply_all()
+    assert bench.order.position == (7, 49)
+    assert bench.order.counters.lost == 0
+    assert bench.order.counters.foreign >= 1
+    assert FORGED in [remark.code for remark in bench.remarks]
+
+
+@pytest.mark.parametrize("seq", [-5, 2**53, 2**63 - 1])
+def test_numbers_that_no_device_reaches_are_dropped(seq: int) -> None:
+    bench = Bench()
+    bench.send(block(0, 10))
+    forged = SampleBlock("rig", 7, seq, *_columns(block(0, 1)))
+    bench.take(bench.order.on_block(forged))
+    bench.send(block(10, 10))
+    assert bench.order.position == (7, 19)
+    assert not bench.asks
+
+
+def _columns(part: SampleBlock) -> tuple[object, ...]:
+    return part.device_us, part.t_ns, part.channels
+
+
+def test_a_poisoned_position_is_set_back_to_the_newest_of_the_ring() -> None:
+    bench = Bench(SampleOrder(resume_after=(7, BILLION), history=100))
+    bench.order.on_token(7, 1, True)
+    sent = 0
+    while sent <= 2 * SUSPECT:
+        bench.send(block(sent, 16))
+        bench.reply_all()
+        sent += 16
+    assert POSITION_WRONG in [remark.code for remark in bench.remarks]
+    assert bench.order.position == (7, sent - 1)
+
+
+def test_the_first_token_owns_a_boot_until_it_is_gone() -> None:
+    owners = Owners()
+    owners.appeared(7, 100, "daq")
+    assert owners.admits(7, "daq")
+    assert not owners.admits(7, "eve")
+    owners.appeared(7, 50, "eve")
+    assert owners.admits(7, "daq")
+    assert not owners.admits(7, "eve")
+    owners.appeared(7, 200, "daq again")
+    owners.vanished(7, 50)
+    assert not owners.admits(7, "daq again")
+    owners.vanished(7, 100)
+    assert owners.admits(7, "daq again")
+    assert not owners.admits(7, "daq")
+
+
+def test_one_who_spoke_before_the_token_came_does_not_keep_the_boot() -> None:
+    owners = Owners()
+    assert owners.admits(7, "eve")
+    owners.appeared(7, 100, "daq")
+    assert owners.admits(7, "daq")
+    assert not owners.admits(7, "eve")
+
+
+def test_samples_in_the_name_of_a_boot_are_dropped_counted_and_contested() -> None:
+    network = MemoryNetwork()
+    daq, eve = network.bus("bench", "daq"), network.bus("bench", "eve")
+    ring = SampleRing(daq, 4096)
+    reader = SampleReader(network.bus("bench", "reader"))
+    items: list[object] = []
+
+    def send(part: SampleBlock) -> None:
+        ring.add(part)
+        daq.publish(SAMPLES, part)
+
+    send(block(0, 4))
+    for seq in range(4, 400, 4):
+        # Her samples come first, and one of them is far ahead.
+        forged = block(seq, 4)
+        forged.channels[0].values[:] = -1.0
+        eve.publish(SAMPLES, forged)
+        eve.publish(SAMPLES, block(BILLION + seq, 1))
+        send(block(seq, 4))
+    assert wait_until(_reads(reader, items, 399), 10.0, 0.001)
+    values = [v for b in items if isinstance(b, SampleBlock) for v in b.channels[0].values]
+    assert len(values) == 400
+    assert min(values) >= 0.0
+    assert reader.counters.foreign == 99 * 5
+    assert reader.counters.lost == 0
+    assert reader.contested
+    events = [item.code for item in items if isinstance(item, Event)]
+    assert events.count("DUPLICATE SOURCE") == 1
+    reader.close()
+
+
+def _reads(reader: SampleReader, items: list[object], last: int) -> Callable[[], bool]:
+    def done() -> bool:
+        items.extend(reader.read(0.0))
+        return reader.position == (7, last)
+
+    return done
+
+
+def test_a_loss_by_a_wrong_position_is_of_unknown_length() -> None:
+    bench = Bench(SampleOrder(resume_after=(7, BILLION)))
+    losses: list[Loss] = []
+    for seq in range(0, 2 * SUSPECT, 16):
+        bench.send(block(seq, 16))
+        while bench.asks:
+            ask = bench.asks.popleft()
+            found = bench.order.on_reply(ask, bench.stores[7].reply(ask))
+            losses += [one for one in found if isinstance(one, Loss)]
+            bench.take([one for one in found if not isinstance(one, Loss)])
+    assert [loss.last - loss.first for loss in losses] == [-1]

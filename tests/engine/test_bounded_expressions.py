@@ -1,0 +1,44 @@
+"""Expressions that ask for too much are refused in one line and at once."""
+
+import time
+
+import pytest
+import sympy
+
+from rigwatch.physics.engine.equations.expression import dimension_of, parse
+from rigwatch.wire.errors import ModelError
+
+X = {"x": sympy.Symbol("x", real=True)}
+BOMBS = {
+    "50 000 minuses": "-" * 50_000 + "x",
+    "1000 minuses": "-" * 1000 + "x",
+    "a tower of powers": "9**9**9**9",
+    "a large power": "x*9**100000000",
+    "a power of a power": "(9**60)**60**60",
+    "a negative tower": "9**(-9**9**9)",
+    "a root of a tower": "2**(1e300)",
+    "powers within powers": "((((9**60)**60)**60)**60)**60*x",
+    "no value": "x/0",
+    "infinity": "x*1e999",
+    "an integer of 5000 digits": "9" * 5000,
+    "many terms": "+".join(["x"] * 9000),
+}
+
+
+@pytest.mark.parametrize("text", BOMBS.values(), ids=BOMBS)
+def test_a_bomb_is_refused_at_once(text: str) -> None:
+    began = time.perf_counter()
+    with pytest.raises(ModelError) as refused:
+        parse(text, X, "force of effect boom")
+    assert time.perf_counter() - began < 2.0
+    assert len(str(refused.value)) < 500
+
+
+def test_dimensions_are_bounded_in_the_same_way() -> None:
+    with pytest.raises(ModelError):
+        dimension_of("-" * 50_000 + "x", {}, "boom")
+
+
+def test_usual_powers_and_sums_stay() -> None:
+    assert parse("x**3 + 2**10*x - 1e-3*x**0.5", X, "good").has(X["x"])
+    assert parse(" + ".join(f"{k}*x**{k % 5}" for k in range(1, 150)), X, "good").has(X["x"])

@@ -1,0 +1,98 @@
+"""A stranger on the bus: what he sends is refused, and the monitor goes on."""
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from monitor.alarms import Occasion
+from monitor.process.cursor import Cursor
+from rigwatch.wire.bus.bus import wait_until
+from rigwatch.wire.bus.model_change import Granted, Wish, ask_for_model
+from rigwatch.wire.messages import ALARMS, COMMANDS, ESTIMATES, AlarmCommand
+from tests.bus.publisher import wave
+from tests.bus.rig import PATIENCE
+from tests.monitor_process.test_process import Bench
+
+YEAR_NS = 365 * 86_400 * 1_000_000_000
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    made = Bench(tmp_path)
+    yield made
+    made.monitor.close()
+
+
+def asked(bench: Bench, wish: Wish) -> Granted:
+    """The answer to a wish, while the monitor's loop turns."""
+    answers: list[Granted] = []
+    asker = threading.Thread(target=lambda: answers.append(ask_for_model(bench.observer, wish)))
+    asker.start()
+
+    def answered() -> bool:
+        bench.turn()
+        return bool(answers)
+
+    assert wait_until(answered, PATIENCE)
+    asker.join()
+    return answers[0]
+
+
+@pytest.mark.parametrize("model", [f"sample_rate = {'9' * 5000}", "a = " + "[" * 50_000])
+def test_a_model_that_is_a_bomb_is_refused_and_watching_goes_on(bench: Bench, model: str) -> None:
+    granted = asked(bench, Wish("promote", model, "eve", "x" * 100_000))
+    assert not granted.done
+    assert len(granted.text) < 400
+    bench.send(wave(0, 64, 7, time.time_ns()))
+    bench.turn_until(63)
+
+
+def test_a_command_from_the_future_has_the_monitors_time_and_its_user_is_cut(bench: Bench) -> None:
+    alarms, stuck = bench.monitor.rig.alarms, "sensor_stuck.position"
+    bench.monitor.say(alarms.report(stuck, Occasion(t_ns=time.time_ns()), active=True))
+    ahead = time.time_ns() + 50 * YEAR_NS
+    command = AlarmCommand(stuck, "acknowledge", "e" * 200_000, ahead)
+    bench.observer.publish(COMMANDS, command)
+    bench.turn()
+    last = bench.got(ALARMS)[-1]
+    assert last.state == "acknowledged"  # type: ignore[attr-defined]
+    assert abs(last.t_ns - time.time_ns()) < 60e9  # type: ignore[attr-defined]
+    assert len(last.user) <= 100  # type: ignore[attr-defined]
+    journal = Path(f"{bench.config.monitor.journal}")  # type: ignore[union-attr]
+    assert journal.stat().st_size < 20_000
+
+
+def test_a_poisoned_position_file_is_set_aside_and_watching_goes_on(bench: Bench) -> None:
+    began = time.time_ns()
+    bench.send(wave(0, 64, 7, began))
+    bench.turn_until(63)
+    position = Path(f"{bench.config.monitor.journal}.position")  # type: ignore[union-attr]
+    bench.kill()
+    poisoned = Cursor(position)
+    poisoned.write(7, 10**9)
+    poisoned.close()
+    bench.start()
+    bench.got(ESTIMATES)
+    for seq in range(64, 1024, 16):
+        bench.send(wave(seq, 16, 7, began + seq * 3_906_250))
+        bench.turn()
+    assert wait_until(lambda: _caught_up(bench), PATIENCE, 0.001)
+    assert sum(len(block) for block in bench.got(ESTIMATES)) > 0  # type: ignore[arg-type]
+    assert position.with_name(f"{position.name}.set-aside").exists()
+    assert Cursor(position).read() == (7, 1023)
+
+
+def _caught_up(bench: Bench) -> bool:
+    bench.turn()
+    return bench.monitor.reader.position == (7, 1023)
+
+
+@pytest.mark.parametrize("seq", [2**60, -7])
+def test_a_position_that_no_device_reaches_is_none(tmp_path: Path, seq: int) -> None:
+    cursor = Cursor(tmp_path / "p")
+    cursor.write(7, seq)
+    assert cursor.read() is None
+    assert (tmp_path / "p.set-aside").exists()

@@ -1,0 +1,151 @@
+"""Files that ask for gigabytes, or that no writer wrote: one plain line, little time and memory."""
+
+import struct
+import subprocess
+import sys
+import time
+import tracemalloc
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zstandard
+from scipy.io import savemat
+
+from rigwatch.commands import main
+from rigwatch.wire.errors import ImportDataError, SessionError
+from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
+from rigwatch.wire.exchange.mat5 import MatError, read_mat5
+from rigwatch.wire.exchange.tables import read_table
+from rigwatch.wire.session import open_session
+from rigwatch.wire.session.chunks import MAGIC
+from rigwatch.wire.typed_files import parse
+from tests.wire.test_exchange_import import made, simple
+from tests.wire.test_session_damage import intact
+
+MEMORY = 300 << 20
+MAT_HEAD = b"MATLAB 5.0".ljust(124) + b"\x00\x01IM"
+
+
+def peak_of(refused: type[Exception], call: object, *arguments: object) -> str:
+    """What the refusal says, after at most 5 s and 300 MB."""
+    tracemalloc.start()
+    began = time.perf_counter()
+    try:
+        with pytest.raises(refused) as error:
+            call(*arguments)  # type: ignore[operator]
+        assert time.perf_counter() - began < 5.0
+        assert tracemalloc.get_traced_memory()[1] < MEMORY
+    finally:
+        tracemalloc.stop()
+    return str(error.value)
+
+
+def chunk(records: bytes, packed: bytes | None = None, size: int | None = None) -> bytes:
+    """A chunk of an MCAP file under the right checksum."""
+    packed = zstandard.compress(records) if packed is None else packed
+    head = struct.pack("<QQQI", 0, 1, size or len(records), zlib.crc32(records))
+    body = head + struct.pack("<I4sQ", 4, b"zstd", len(packed)) + packed
+    return struct.pack("<BQ", 6, len(body)) + body
+
+
+def record(opcode: int, body: bytes) -> bytes:
+    return struct.pack("<BQ", opcode, len(body)) + body
+
+
+def test_a_session_whose_chunk_unpacks_to_much_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bomb.mcap"
+    path.write_bytes(MAGIC + chunk(bytes(256 << 20)) + MAGIC)
+    assert path.stat().st_size < 50_000
+    assert "wrong size" in peak_of(SessionError, open_session, path)
+
+
+MALFORMED = {
+    "a message without a head": record(5, b"abc"),
+    "a schema that breaks off": record(3, b"\x01\x00\xff"),
+    "a channel that breaks off": record(4, b"\x01\x00\x01\x00\xff\xff\xff\xff"),
+    "a schema whose name is no text": record(3, b"\x01\x00\x02\x00\x00\x00\xff\xfe"),
+    "a length beyond the chunk": struct.pack("<BQ", 5, 1 << 60),
+}
+
+
+@pytest.mark.parametrize("records", MALFORMED.values(), ids=MALFORMED)
+def test_records_malformed_under_a_right_checksum_are_one_line(
+    tmp_path: Path, records: bytes, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "forged.mcap"
+    path.write_bytes(intact()[: -len(MAGIC)] + chunk(records) + MAGIC)
+    assert main(["info", str(path)]) in (0, 2)
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_mat_file_that_unpacks_to_much_is_refused() -> None:
+    packed = zlib.compress(bytes(1 << 28), 1)
+    bomb = MAT_HEAD + struct.pack("<II", 15, len(packed)) + packed
+    assert "unpacks to more than" in peak_of(MatError, read_mat5, bomb)
+
+
+def test_a_mat_file_of_many_small_parts_is_refused() -> None:
+    inside = struct.pack("<HHI", 1, 0, 0) * 4_000_000
+    packed = zlib.compress(struct.pack("<II", 14, len(inside)) + inside)
+    bomb = MAT_HEAD + struct.pack("<II", 15, len(packed)) + packed
+    assert "parts" in peak_of(MatError, read_mat5, bomb)
+
+
+def test_a_mat_file_of_constant_channels_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "zeros.mat"
+    savemat(path, {"u": np.zeros(1_000_000), "x": np.arange(1_000_000.0)}, do_compression=True)
+    assert {k: v.size for k, v in read_mat5(path.read_bytes()).items() if k in "ux"} == {  # type: ignore[union-attr]
+        "u": 1_000_000,
+        "x": 1_000_000,
+    }
+
+
+def test_a_parquet_file_that_unpacks_to_much_is_refused(tmp_path: Path) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    path = tmp_path / "bomb.parquet"
+    table = pyarrow.table({"t": pyarrow.array(np.zeros(30_000_000, np.int8))})
+    parquet.write_table(table, path, compression="zstd")
+    del table
+    assert "unpacks to more than" in peak_of(ImportDataError, read_table, path, ImportMapping())
+
+
+def test_a_cell_without_end_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ImportDataError, match=r"run\.csv: not readable as CSV: field larger"):
+        made(tmp_path, f"t,qm\n0,{'1' * 200_000}\n1,2\n", simple())
+
+
+@pytest.mark.parametrize(("times", "told"), [("0 1 2 1e12", "a jump from"), ("0 1 1e300", "time:")])
+def test_a_jump_of_time_is_named_and_asks_for_no_memory(
+    tmp_path: Path, times: str, told: str
+) -> None:
+    rows = "".join(f"{t},1\n" for t in times.split())
+    message = peak_of(ImportDataError, made, tmp_path, f"t,qm\n{rows}", simple(time="t[ms]"))
+    assert told in message
+
+
+@pytest.mark.parametrize("source", ["qm*nan[m]", "qm*inf[m]", "qm*1e999[m]", "qm + 1e999[m]"])
+def test_factors_that_are_no_numbers_are_refused(source: str) -> None:
+    with pytest.raises(ImportDataError, match="finite"):
+        parse_source("position", source, ("qm",))
+
+
+@pytest.mark.parametrize("rate", ["inf", "nan", "1e-300", "1e300", "0"])
+def test_rates_that_no_device_has_are_refused(rate: str) -> None:
+    from rigwatch.wire.errors import ConfigError
+
+    with pytest.raises(ConfigError, match="rate"):
+        parse(f"rate = {rate}\n", ImportMapping, "map.toml")
+
+
+def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "good.mcap"
+    path.write_bytes(intact())
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "rigwatch", "info", str(path)]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "rigwatch: the output cannot be written: No space left on device\n"
