@@ -23,7 +23,9 @@ from rigwatch.physics.engine.equations.model import (
     shipped_models,
 )
 from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.physics.engine.fit.convergence import Convergence
 from rigwatch.physics.engine.fit.measured_recording import motion_recording
+from rigwatch.physics.engine.fit.motion_fit import fit_along_motion
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.smoothing import best_width, smoothed
 from rigwatch.physics.engine.fit.windowed_fit import Fit, fit
@@ -224,3 +226,33 @@ def test_model_without_measured_states_is_refused() -> None:
 
     with pytest.raises(ModelError, match="no measured state"):
         along_measured_motion(blind)
+
+
+def _fitted_from_afar(t_high: float) -> tuple[Fit, Convergence]:
+    """The actuated mass, its parameters started a factor of two off, fitted along the motion."""
+    model = _actuated_mass()
+    slow = replace(model.parameters["T"], high=t_high)
+    model = replace(model, parameters=model.parameters | {"T": slow})
+    recording = _measured(noise=0.01)
+    compiled = compile_system(compose(along_measured_motion(model)))
+    motion = motion_recording(model, recording)
+    start = compiled.vector(
+        {"k": 2 * SPRING, "c": DAMPER / 2, "K": 2 * FORCE_A_VOLT, "T": LATE / 2}
+    )
+    noise = 0.01 * recording.outputs[:, 1:].std(axis=0)
+    return fit_along_motion(compiled, motion, start=start, scale=noise)
+
+
+def test_fit_along_the_motion_says_that_it_converged() -> None:
+    found, ended = _fitted_from_afar(t_high=1.0)
+
+    assert found.values()["T"] == pytest.approx(LATE, rel=0.05)
+    assert ended.converged
+    assert ended.gradient < 0.02
+    assert ended.at_bound == ()
+
+
+def test_fit_along_the_motion_names_what_sits_on_a_bound() -> None:
+    _, ended = _fitted_from_afar(t_high=0.75 * LATE)
+
+    assert ended.at_bound == ("T",)

@@ -92,7 +92,7 @@ def comparison(bench: Bench) -> Comparison:
         [f"{a.effect}@{a.port}" for a in bench.study.file.effects],
         [*bench.data.remarks, *weak],
         dict(bench.study.holds),
-        base.convergence,
+        base.convergence or (bench.study.kept.convergence if bench.study.kept else None),
     )
 
 

@@ -9,11 +9,12 @@ from rigwatch.workbench.data.noise_floor import (
     quiet_scale,
 )
 from rigwatch.workbench.data.signal_scales import port_sizes
-from rigwatch.workbench.data.signals import Data, parameters_of, prepare
+from rigwatch.workbench.data.signals import Data, MotionSensor, parameters_of, prepare
 
 __all__ = [
     "METHODS",
     "Data",
+    "MotionSensor",
     "NoiseFloor",
     "along_motion",
     "find_period",

@@ -18,7 +18,7 @@ from rigwatch.physics.engine.equations import (
 )
 from rigwatch.physics.engine.fit import Recording, motion_recording, motion_widths
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.data.signals import Data
+from rigwatch.workbench.data.signals import Data, MotionSensor
 from rigwatch.workbench.study import Study
 
 SETTLING = 1.0
@@ -26,6 +26,10 @@ SETTLING = 1.0
 SLOW = 0.05
 """Speed over its rms below which samples are not counted: there a smoothed motion does not show
 which way the rig slides, or whether it sticks."""
+UNCHECKED = (
+    "no healthy recording: the model cannot be checked; record one with nothing wrong and list it"
+    " under [[healthy]]"
+)
 BEYOND = 1.2
 """Range of a motion over that of the healthy recording from which it is said to be beyond it."""
 FORM = "predicted along the measured motion: {shown} drive the model, {hidden} are simulated"
@@ -66,8 +70,11 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     longest = max(len(r) for r in (train, held_out, healthy) if r is not None)
     shown = ", ".join(state.name for state in measured_states(study.model))
     form = FORM.format(shown=shown, hidden=", ".join(model.states) or "no states")
-    remarks = (*data.remarks, form, *beyond_healthy_motion(study, train, held_out, healthy))
-    along = Data(train, held_out, healthy, longest, remarks, along_motion=True)
+    told = () if healthy is not None else (UNCHECKED,)
+    remarks = (*data.remarks, form, *told, *beyond_healthy_motion(study, train, held_out, healthy))
+    along = Data(
+        train, held_out, healthy, longest, remarks, along_motion=True, motion=_sensors(study)
+    )
     return replace(study, model=model), along
 
 
@@ -79,6 +86,23 @@ def _while_moving(study: Study, recording: Recording, slow: FloatArray) -> Recor
         return recording
     still = np.any(np.abs(recording.inputs[:, rates]) < slow[rates], axis=1)
     return replace(recording, outputs=np.where(still[:, None], np.nan, recording.outputs))
+
+
+def _sensors(study: Study) -> tuple[MotionSensor, ...]:
+    """The sensors that show a position and, as its rate, a speed."""
+    model, columns = study.model, dict[str, dict[int, int]]()
+    for column, state in enumerate(measured_states(model), start=len(model.inputs)):
+        columns.setdefault(state.channel, {})[state.order] = column
+    ports = {
+        model.outputs[port.signal].channel or port.signal: name
+        for name, port in model.ports.items()
+        if port.kind == "sensor"
+    }
+    return tuple(
+        MotionSensor(ports[channel], found[0], found[1])
+        for channel, found in columns.items()
+        if channel in ports and 0 in found and 1 in found
+    )
 
 
 def _rms(signals: FloatArray) -> FloatArray:

@@ -25,6 +25,20 @@ MOST_MISSING = 0.2
 
 
 @dataclass(frozen=True, eq=False)
+class MotionSensor:
+    """A sensor whose reading drives a model along its measured motion.
+
+    Attributes:
+        port: where effects at it would enter the model as it was written.
+        position, rate: columns of the inputs.
+    """
+
+    port: str
+    position: int
+    rate: int
+
+
+@dataclass(frozen=True, eq=False)
 class Data:
     """What a study is fitted to, and what decides.
 
@@ -34,6 +48,7 @@ class Data:
         horizon: samples from one re-initialisation to the next.
         remarks: what was noticed on the way, for people.
         along_motion: whether the recordings are for a model along its measured motion.
+        motion: sensors whose position and rate are among the inputs then.
     """
 
     train: Recording
@@ -42,6 +57,7 @@ class Data:
     horizon: int
     remarks: tuple[str, ...]
     along_motion: bool = False
+    motion: tuple[MotionSensor, ...] = ()
 
     @property
     def of_healthy(self) -> "Data | None":

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rigwatch.workbench.compare import Bench, Comparison, beyond, comparison, open_bench
-from rigwatch.workbench.explain.adequacy import inadequate
+from rigwatch.workbench.explain.adequacy import inadequate, unchecked
 from rigwatch.workbench.explain.believed import believed
+from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
-from rigwatch.workbench.explain.rough_verdict import modest
+from rigwatch.workbench.explain.rough_verdict import leaves_much, modest
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.explain.verdict_calibration import seen
 from rigwatch.workbench.fit import Value, as_written, values
@@ -53,7 +54,8 @@ class Explanation:
         also: what is missing as well, where two effects hide at once.
         rivals: of different physics that the recording cannot tell from the best.
         next_experiment: what would tell them apart, None where nothing needs to be told.
-        wrong_probability: of the verdict, calibrated on simulated cases.
+        wrong_probability: of the verdict, calibrated on simulated cases; None for a model along its
+            measured motion, as all of those were free runs.
         like_this: simulated cases with such a verdict, and how many of them were wrong.
     """
 
@@ -64,7 +66,7 @@ class Explanation:
     rivals: list[str] = field(default_factory=list)
     also: list[str] = field(default_factory=list)
     next_experiment: Experiment | None = None
-    wrong_probability: float = 0.5
+    wrong_probability: float | None = 0.5
     like_this: tuple[int, int] = (0, 0)
 
 
@@ -86,21 +88,34 @@ def explain(study: Study, progress: Progress = unheard) -> Explanation:
 
 def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], Verdict]:
     """The ranking, what the verdict names in front, and the verdict."""
-    stopped = not_converged({
-        "the model": bench.base, "the model to the healthy recording": bench.bare,
-    }) or inadequate(bench)  # fmt: skip
+    stopped = _stopped(bench)
     if stopped is not None:
         return rank_all(bench.study, bench.data, bench.base), stopped
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = believed(bench, rows)
-    if verdict.word == "unknown_effect" and verdict.best is not None:
+    rough = bench.study.model.rough and bench.data.along_motion
+    much = verdict.word == "unknown_effect" or (rough and leaves_much(bench.floor, verdict))
+    if much and verdict.best is not None:
         progress(f"{verdict.best.label} leaves much: trying two effects at once")
         verdict = two_effects(bench, rows, verdict, progress)
-    if bench.study.model.rough and bench.data.along_motion:
+    verdict = with_motion_sensor(bench, verdict)
+    if rough:
         verdict = modest(bench.base, rows, bench.floor, verdict)
+    verdict = unchecked(bench, verdict)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
+
+
+def _stopped(bench: Bench) -> Verdict | None:
+    """The verdict where no effect can be judged, None where they can."""
+    kept, bare = bench.study.kept, bench.bare
+    ended = {
+        "the model": bench.base.convergence,
+        "the model to the healthy recording": bare.convergence if bare else None,
+        "the kept parameters to the healthy recording": kept.convergence if kept else None,
+    }
+    return not_converged(ended) or inadequate(bench)
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
@@ -124,8 +139,8 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         rivals,
         list(verdict.second),
         experiment,
-        verdict.doubt,
-        seen(verdict.word, verdict.evidence),
+        None if bench.data.along_motion else verdict.doubt,
+        (0, 0) if bench.data.along_motion else seen(verdict.word, verdict.evidence),
     )
 
 

@@ -5,6 +5,8 @@ fault changes the motion, and a little of what is left then is the model's own. 
 
 * where no more is left than on the healthy rig, nothing is missing, whatever would fit that better;
 * where hardly more is left, an effect that fits it is not named;
+* where the best effect leaves much more than the healthy rig does, another effect hides beside it
+  or in its place, and it is not named with confidence;
 * where the best effect leaves more than the healthy rig does, another one that does nearly as well
   may be the right one: the model's own error may favour either.
 """
@@ -22,8 +24,21 @@ TRANSFERS = 1.2
 
 Healthy rigs of the simulated family leave 1.07 to 1.3 times as much under another excitation.
 """
+MUCH = 1.5
+"""Error over the healthy one from which one effect alone is not the whole truth.
+
+What is rightly named alone leaves up to 1.3 times on rigs of the simulated family.
+"""
 NEARLY = 0.8
 """Share of the best effect's gain from which another one may be right as well."""
+
+
+def leaves_much(floor: NoiseFloor, found: Verdict) -> bool:
+    """Whether the effect that is named leaves so much that it cannot be all that is missing."""
+    if found.word != "missing_effect" or found.second or found.best is None:
+        return False
+    fitted = found.best.fitted
+    return fitted is not None and floor.ratio(fitted.held_out) > MUCH
 
 
 def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdict) -> Verdict:
@@ -45,6 +60,14 @@ def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdi
         text = (
             f"the held-out error is {ratio:.2f} times that on the healthy recording; as much may"
             f" be the model's own under another motion; {found.best.label} would explain it"
+        )
+        return replace(found, word="undetermined", text=text)
+    if leaves_much(floor, found):
+        assert found.best.fitted is not None
+        left = floor.ratio(found.best.fitted.held_out)
+        text = (
+            f"{found.best.label} explains most, but leaves {left:.2f} times the error on the"
+            f" healthy recording, expected at most {MUCH:g}: something else may hide beside it"
         )
         return replace(found, word="undetermined", text=text)
     rivals = _nearly_as_good(rows, floor, found)

@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from rigwatch.physics.engine.fit import Convergence
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, doubt
@@ -64,14 +65,13 @@ class Verdict:
         return doubt(self.word, self.evidence)
 
 
-def not_converged(fits: Mapping[str, Fitted | None]) -> Verdict | None:
+def not_converged(fits: Mapping[str, Convergence | None]) -> Verdict | None:
     """The verdict where a fit that the others build on did not converge, None where all did.
 
     Args:
-        fits: by what they are of, in words.
+        fits: how they ended, by what they are of, in words.
     """
-    for name, fitted in fits.items():
-        ended = fitted.convergence if fitted else None
+    for name, ended in fits.items():
         if ended is not None and not ended.converged:
             text = f"the fit of {name} did not converge: {ended.reason}"
             if ended.undetermined:

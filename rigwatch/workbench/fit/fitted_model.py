@@ -221,8 +221,10 @@ def fit_model(
     first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
     if data.along_motion and len(compiled.system.free) >= FROM_AFAR and scale is not None:
-        found = fit_along_motion(compiled, data.train, start=begin, scale=scale, substeps=substeps)
-        return _judged(study, data, placements, found, horizon, later, None)
+        found, ended = fit_along_motion(
+            compiled, data.train, start=begin, scale=scale, substeps=substeps
+        )
+        return _judged(study, data, placements, found, horizon, later, ended)
     if from_afar and not data.along_motion:
         found, ended = fit_from_afar(
             compiled, data.train, horizon, start=begin, scale=scale,

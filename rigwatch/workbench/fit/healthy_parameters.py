@@ -42,7 +42,7 @@ def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> S
     return replace(
         study,
         model=_with_values(study.model, found.train.values()),
-        kept=Kept(tuple(kept), uncertain),
+        kept=Kept(tuple(kept), uncertain, found.convergence),
     )
 
 

@@ -126,6 +126,11 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
 def doubt_of(found: Explanation) -> str:
     """How often a verdict like this one was wrong where the truth was known, in a sentence."""
     cases, wrong = found.like_this
+    if found.wrong_probability is None:
+        return (
+            "how often such a verdict is wrong is not calibrated for models along the measured"
+            " motion: the simulated cases are free runs"
+        )
     if not cases:
         return "no simulated case looked like this one: how often that is wrong is not known"
     return (

@@ -33,6 +33,7 @@ from rigwatch.physics.engine.equations import (
     shipped_models,
     units_at,
 )
+from rigwatch.physics.engine.fit import Convergence
 from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError
 from rigwatch.wire.typed_files import Section, load
 from rigwatch.wire.units import Unit, unit_of
@@ -145,10 +146,12 @@ class Kept:
     Attributes:
         names: of the model's parameters.
         covariance: of their values, shape (names, names).
+        convergence: how the fit ended that told them; None where it was not asked.
     """
 
     names: tuple[str, ...]
     covariance: NDArray[np.float64]
+    convergence: Convergence | None = None
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,14 @@ class Convergence:
     reason: str
 
 
-def convergence(best: Fit, others: Sequence[Fit], begun: str, *, near_noise: bool) -> Convergence:
+def convergence(
+    best: Fit,
+    others: Sequence[Fit],
+    begun: str,
+    *,
+    near_noise: bool,
+    gradient: float | None = None,
+) -> Convergence:
     """How the best of several fits ended.
 
     Args:
@@ -61,8 +68,10 @@ def convergence(best: Fit, others: Sequence[Fit], begun: str, *, near_noise: boo
         others: fits of the same data from other starts.
         begun: what the best one began from.
         near_noise: whether its error is so small that no other end could be much better.
+        gradient: share of what was minimised that a further step promises, where that is not the
+            squared error alone.
     """
-    gradient = promise(best)
+    gradient = promise(best) if gradient is None else gradient
     size = spread(best)
     agreeing = 1 + sum(spread(other) <= AGREE * size for other in others)
     alone = bool(others) and agreeing == 1 and not near_noise

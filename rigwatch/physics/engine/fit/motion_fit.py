@@ -18,6 +18,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rigwatch.physics.engine.compile import CompiledSystem
+from rigwatch.physics.engine.fit.convergence import Convergence, convergence
 from rigwatch.physics.engine.fit.problem import Problem
 from rigwatch.physics.engine.fit.recording import Recording, initial_states
 from rigwatch.physics.engine.fit.windowed_fit import Fit, result_of
@@ -34,6 +35,8 @@ STARTS = 5
 """Searches beside the one from the defaults, where that ends above `GOOD`."""
 GOOD = 1.3
 """Error over the channels' noise from which no other start is tried."""
+NEAR = 3.0
+"""Error over the channels' noise from which another search must lead to the same end."""
 LOOK, POLISH = 25, 60
 """Simulations at most: of a first look over a part of a recording, and over all of it."""
 PART = 2048
@@ -73,8 +76,8 @@ def fit_along_motion(
     start: FloatArray | None = None,
     scale: FloatArray,
     substeps: int = 2,
-) -> Fit:
-    """Parameters fitted along the measured motion, over the recording in one piece.
+) -> tuple[Fit, Convergence]:
+    """Parameters fitted along the measured motion, over the recording in one piece; how it ended.
 
     Args:
         compiled: of a model that `along_measured_motion` made, with effects.
@@ -95,13 +98,16 @@ def fit_along_motion(
         found = [part.run(part.begun(z), LOOK) for z in spread]
         best = min(found, key=lambda look: look.cost)
         looks.append(search.run(search.begun(best.z[: search.count]), POLISH))
-    best = min(looks, key=lambda look: look.cost)
+    best, *others = sorted(looks, key=lambda look: look.cost)
     if not np.isfinite(best.rms):
         raise ModelError(
             f"{compiled.system.model.name}: the simulation along the measured motion diverges;"
             " try other starting values or more substeps"
         )
-    return search.result(best)
+    kept = search.result(best)
+    ended = [search.result(other) for other in others if other.rms < BLOWN_UP]
+    begun = "the values to start from" if best is looks[0] else "the best of several starts"
+    return kept, convergence(kept, ended, begun, near_noise=best.rms <= NEAR, gradient=best.promise)
 
 
 def _first(recording: Recording, samples: int) -> Recording:
@@ -116,11 +122,13 @@ class _Look:
         z: unknowns as they are moved, shape (unknowns,).
         cost: robust; infinite where it diverged.
         rms: of the residual, in deviations of noise.
+        promise: share of the cost that a further Gauss-Newton step promises.
     """
 
     z: FloatArray
     cost: float
     rms: float
+    promise: float
 
 
 class _Search:
@@ -156,7 +164,8 @@ class _Search:
         """The search from z, with `most` simulations."""
         if not len(z):
             residual = self._evaluated(z)[0]
-            return _Look(z, float(residual @ residual) / 2, float(np.sqrt(np.mean(residual**2))))
+            rms = float(np.sqrt(np.mean(residual**2)))
+            return _Look(z, float(residual @ residual) / 2, rms, 0.0)
         found = least_squares(
             lambda at: self._evaluated(at)[0],
             np.clip(z, self._scaled.low, self._scaled.high),
@@ -170,7 +179,11 @@ class _Search:
         )
         residual = found.fun[: -len(z)]
         counted = max(int(np.sum(~self._missing)), 1)
-        return _Look(found.x, float(found.cost), float(np.sqrt(residual @ residual / counted)))
+        rms = float(np.sqrt(residual @ residual / counted))
+        moving = found.active_mask == 0
+        step = np.linalg.lstsq(found.jac[:, moving].T @ found.jac[:, moving], found.grad[moving])[0]
+        promised = float(found.grad[moving] @ step) / max(2 * float(found.cost), 1e-300)
+        return _Look(found.x, float(found.cost), rms, promised)
 
     def _evaluated(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals and their slopes by the unknowns, the priors' rows below."""

@@ -1,0 +1,192 @@
+"""Faults of the sensor whose motion drives the model, which no port of such a model can hold.
+
+Along the measured motion a sensor's fault enters the equations wherever position or speed does. So
+it is taken out of what was read, to first order in its strength s, and the rate follows,
+
+    x = x_read - s·d(x_read),   v = v_read - s·(∂d/∂x·v_read + ∂d/∂t)
+
+and s is found by Gauss-Newton steps: the change of the error by s is a difference of two
+simulations, and the parameters are fitted anew after each step. What is left on the recordings held
+out decides, as of any other effect.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from rigwatch.physics.engine.equations import Placement
+from rigwatch.physics.engine.fit import Recording, evaluate
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.data import Data, MotionSensor
+from rigwatch.workbench.explain.rough_verdict import NEARLY
+from rigwatch.workbench.explain.verdict import EQUAL, Verdict, Word
+from rigwatch.workbench.explain.verdict_calibration import Evidence
+from rigwatch.workbench.fit import Fitted, block_errors, fit_model
+from rigwatch.workbench.ranking import Ranked, judge_fit
+
+STEPS = 2
+"""Gauss-Newton steps; the error is nearly linear in the strength."""
+CHANGE, LARGEST = 0.05, 0.5
+"""Change of the position over its spread: of a difference, and of a step at most."""
+WORTH = 0.1
+"""Share of the error's energy above the floor that is worth fits, to first order."""
+
+LATE = "lag"
+"""The effect that can only be positive: no sensor reads what is yet to come."""
+
+Motion = tuple[FloatArray, FloatArray]
+Direction = Callable[[FloatArray, FloatArray, FloatArray], Motion]
+"""From position, speed and time, each of shape (n,)."""
+
+DIRECTIONS: Mapping[str, Direction] = {
+    "gain": lambda x, v, _: (x, v),
+    "offset": lambda x, v, _: (np.ones_like(x), np.zeros_like(v)),
+    "drift": lambda _, v, t: (t, np.ones_like(v)),
+    "curvature": lambda x, v, _: (x * x, 2 * x * v),
+    LATE: lambda _, v, t: (-v, -np.gradient(v, t)),
+}
+"""What effects at such a sensor do to position and speed, for a strength of 1."""
+
+
+def motion_sensor_rows(bench: Bench) -> list[Ranked]:
+    """Effects at the sensors of the motion that may be missing, fitted and judged."""
+    found = []
+    least = WORTH * bench.floor.above(bench.base.train)
+    for sensor in bench.data.motion:
+        for name, direction in DIRECTIONS.items():
+            effect = bench.study.effects.get(name)
+            if effect is None:
+                continue
+            try:
+                strength, explained = _step(bench.base, bench.data, sensor, direction)
+                if explained < least or (name == LATE and strength < 0):
+                    continue
+                fitted, strength = _fitted(bench, sensor, direction, strength)
+            except (ModelError, np.linalg.LinAlgError):
+                continue
+            row = _row(Placement(name, effect, sensor.port), explained, strength)
+            row.fitted = fitted
+            judge_fit(bench.base, row)
+            found.append(row)
+    return found
+
+
+def _row(placement: Placement, explained: float, strength: float) -> Ranked:
+    """A row whose `start` is what was found: a gain is what the sensor makes of the position."""
+    value = 1 / (1 - strength) if placement.name == "gain" else strength
+    start = {placement.effect.strength: value}
+    return Ranked(placement, "sensor", 0.0, explained, start, [], {}, {})
+
+
+def _fitted(
+    bench: Bench, sensor: MotionSensor, direction: Direction, strength: float
+) -> tuple[Fitted, float]:
+    """The base model on the motion without the sensor's fault, and how strong that is."""
+    base = bench.base
+    for step in range(STEPS):
+        data = _undone(bench.data, sensor, direction, strength)
+        found = fit_model(
+            bench.study, data, base.placements, base.train.values(), base.train.scale, base=base
+        )
+        if step + 1 < STEPS:
+            strength += _step(found, data, sensor, direction)[0]
+    return found, strength
+
+
+def _step(
+    at: Fitted, data: Data, sensor: MotionSensor, direction: Direction
+) -> tuple[float, float]:
+    """A Gauss-Newton step of the strength, free parameters beside it; the share it explains."""
+    change = CHANGE * _unit(data.train, sensor, direction)
+    moved = undone(data.train, sensor, direction, change)
+    there = evaluate(at.train, moved, at.horizon, at.substeps, at.train.initial)
+    error = at.train.error.ravel()
+    column = (there.error.ravel() - error) / change
+    free = at.train.jacobian.reshape(error.size, -1)
+    basis = np.linalg.qr(free / np.maximum(np.linalg.norm(free, axis=0), 1e-300))[0]
+    column, left = column - basis @ (basis.T @ column), error - basis @ (basis.T @ error)
+    energy = float(column @ column)
+    step = -float(column @ left) / max(energy, 1e-300)
+    largest = LARGEST / CHANGE * change
+    return float(np.clip(step, -largest, largest)), step**2 * energy / float(error @ error)
+
+
+def _unit(recording: Recording, sensor: MotionSensor, direction: Direction) -> float:
+    """Strength that changes the position as much as it spreads."""
+    x, v = (recording.inputs[:, c] for c in (sensor.position, sensor.rate))
+    change = direction(x, v, _times(recording, len(x)))[0]
+    return float(np.std(x) / max(float(np.sqrt(np.mean(change**2))), 1e-300))
+
+
+def _times(recording: Recording, samples: int) -> FloatArray:
+    return np.asarray(np.arange(samples) * recording.dt, np.float64)
+
+
+def _undone(data: Data, sensor: MotionSensor, direction: Direction, strength: float) -> Data:
+    train, held_out = (undone(r, sensor, direction, strength) for r in (data.train, data.held_out))
+    return replace(data, train=train, held_out=held_out)
+
+
+def undone(
+    recording: Recording, sensor: MotionSensor, direction: Direction, strength: float
+) -> Recording:
+    """The recording with the motion as it is without the sensor's fault."""
+    inputs, begin = recording.inputs.copy(), 0
+    for length in recording.parts or (len(recording),):
+        part = inputs[begin : begin + length]
+        x, v = part[:, sensor.position].copy(), part[:, sensor.rate].copy()
+        dx, dv = direction(x, v, _times(recording, length))
+        part[:, sensor.position] -= strength * dx
+        part[:, sensor.rate] -= strength * dv
+        begin += length
+    return replace(recording, inputs=inputs)
+
+
+def with_motion_sensor(bench: Bench, found: Verdict) -> Verdict:
+    """The verdict with faults of the motion's sensors weighed against what was named.
+
+    Args:
+        bench: the study; along the measured motion, else nothing changes.
+        found: the verdict on effects at the ports of the model along the motion.
+    """
+    if found.best is None and bench.floor.reached(bench.base.held_out):
+        return found
+    rows = [row for row in motion_sensor_rows(bench) if row.accepted]
+    if not rows:
+        return found
+    best = min(rows, key=lambda row: row.held_out_error)
+    assert best.fitted is not None
+    named = found.best if found.word != "unknown_effect" else None
+    if bench.floor.reached(best.fitted.held_out) and (named is None or _ahead(best, named)):
+        return _named(bench, best, rows)
+    if found.best is None or found.best.gain is None or best.gain is None:
+        return found
+    if best.gain < NEARLY * found.best.gain and not found.second:
+        return found
+    text = f"{found.best.label} may be missing, but {best.label} explains nearly as much or more"
+    return replace(found, word="undetermined", rivals=(*found.rivals, best.label), text=text)
+
+
+def _named(bench: Bench, best: Ranked, rows: list[Ranked]) -> Verdict:
+    """The verdict that a sensor's fault is missing."""
+    alike = [row.label for row in rows if row is not best and not _ahead(best, row)]
+    name, value = next(iter(best.start.items()))
+    assert best.fitted is not None
+    text = (
+        f"{best.label} is missing ({name} = {value:.4g} in SI units): the held-out error falls from"
+        f" {bench.base.held_out_error:.3g} to {best.held_out_error:.3g}"
+    )
+    left = bench.floor.left_over(bench.base.held_out, best.fitted.held_out)
+    word: Word = "undetermined" if alike else "missing_effect"
+    return Verdict(word, best, (best.label,), tuple(alike), text, evidence=Evidence(left))
+
+
+def _ahead(one: Ranked, other: Ranked) -> bool:
+    """Whether one does better on the recordings held out, beyond chance."""
+    assert one.fitted is not None
+    assert other.fitted is not None
+    difference = block_errors(other.fitted.held_out) - block_errors(one.fitted.held_out)
+    return bool(difference.mean() > EQUAL * difference.std(ddof=1) / np.sqrt(len(difference)))
