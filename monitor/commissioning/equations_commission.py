@@ -33,6 +33,7 @@ from monitor.observer import (
     Layout,
     Observed,
     ObserverSignals,
+    SpectralWidth,
     base_model,
     drive_energy,
     fit_remainder,
@@ -57,6 +58,8 @@ TRAINED = 2.0 / 3.0
 """Share of each recording from which the remainder is learnt before it is judged on the rest."""
 SKIPPED = 1.0
 """Beginning of each recording that limits are not taken from [s]."""
+STARTED = 2.0
+"""Beginning of each recording over which its spectrum is a start's [s]."""
 WORST = 0.2
 """Residual of held-out healthy data, over what is measured, above which nothing is described."""
 SLOW, TURNS = 0.02, 4.0
@@ -192,6 +195,13 @@ def _rms(signal: FloatArray) -> float:
     return float(np.sqrt(np.mean(signal**2)))
 
 
+def _narrow(seen: Observed, layout: Layout, slow: float, rate: float) -> float:
+    """Least narrowness of a recording's spectrum, once it has begun."""
+    speed = np.ascontiguousarray(seen.rows[:, layout.speed])
+    found = SpectralWidth(slow, rate).update(speed, seen.state)[round(STARTED * rate) :]
+    return float(np.clip(found.min(initial=1.0), 0.0, 1.0))
+
+
 def _model(  # noqa: PLR0917 -- all that was found
     used: Sequence[Recording],
     plant: EquationsPlant,
@@ -203,7 +213,8 @@ def _model(  # noqa: PLR0917 -- all that was found
     layout = layout_of(base_model(plant.model), plant.port)
     speeds = np.concatenate([o.rows[:, layout.speed] for o in parts])
     slow = max(SLOW * _rms(speeds), plant.turn)
-    seen = range_of(layout.signals, [range_signals(o)[o.state != EMPTY] for o in parts])
+    signals = [range_signals(o)[o.state != EMPTY] for o in parts]
+    seen = range_of(layout.signals, signals, min(_narrow(o, layout, slow, rate) for o in parts))
     healthy = [
         HealthyPart(
             o.judged,

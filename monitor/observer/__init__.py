@@ -42,6 +42,7 @@ from monitor.observer.prediction import (
 )
 from monitor.observer.range_seen import RangeSeen, drive_energy, range_of, range_signals
 from monitor.observer.remainder import fit_remainder, no_remainder
+from monitor.observer.spectral_width import SpectralWidth
 
 __all__ = [
     "DEVIATIONS",
@@ -62,6 +63,7 @@ __all__ = [
     "Observed",
     "ObserverSignals",
     "RangeSeen",
+    "SpectralWidth",
     "balanced",
     "base_model",
     "decide",
