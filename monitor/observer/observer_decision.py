@@ -58,18 +58,19 @@ from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
 from monitor.signals import Codes
 from rigwatch.wire.arrays import FloatArray
 
-HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED = range(
-    10
-)
+(
+    HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
+    ABOVE,
+) = range(11)  # fmt: skip
 """Places of `decision_state.Counts`, as the kernel needs constants."""
 LOOKS = 3
 """Samples in a row that must agree on friction."""
 LEAST_LOOK = 12
 """Samples from the onset on before friction is named [samples]."""
-FITS, DRY_PART = 0.75, 0.5
-"""Share of the missing force, beyond noise, that friction explains and its dry part stands for."""
-FITS_LATER = 0.6
-"""The same over a whole long window, where onsets and edges have faded."""
+FITS, DRY_PART = 0.6, 0.5
+"""Share of the missing force, beyond noise, that friction explains and its dry part stands for;
+real friction also rises before it slides and falls with speed, which neither part describes.
+"""
 AT_REST, STUCK = 0.25, 0.5
 """Share of the time at rest that makes it sticking."""
 OVER = 256
@@ -78,6 +79,10 @@ RIDGE = 1e-3
 """Of the viscous regressor against the dry one, where the two cannot be told apart."""
 VIOLATED = 16
 """Samples in a row in which the sensors disagree."""
+SURE, LASTING = 1.4, 48
+"""A deviation so far beyond the limit is a departure at once, a smaller one after so many samples:
+what a change of the drive stirs up is small or short.
+"""
 SUDDEN, LATE, BEFORE = 8.0, 16.0, 256.0
 """A drive whose energy over `LATE` samples is so many times that over `BEFORE` has just begun, or
 grown; what follows is no steady motion.
@@ -163,6 +168,9 @@ def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: F
     out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]))
     away = out[DEVIATION, k] > 1.0
     count[QUIET] = 0 if away else count[QUIET] + 1
+    count[ABOVE] = count[ABOVE] + 1 if away else 0
+    if count[ONSET] < 0:
+        away = out[DEVIATION, k] > SURE or count[ABOVE] >= LASTING
     mode = _mode(kept, rules)
     out[MODE, k] = mode
     if mode != JUDGING:
@@ -243,7 +251,7 @@ def _verdict(
     _, _, _, share, dry = _friction(kept, length, spread)
     force = _dry_force(kept, length)
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
-    fits = share > (FITS if since < LONG else FITS_LATER) and dry > DRY_PART and force > 0.0
+    fits = share > FITS and dry > DRY_PART and force > 0.0
     turned = _reversals(kept, length, rules.speed_noise) > 0
     rest = _rest(kept, length, rules.speed_noise)
     sticks = since >= LONG // 2 and rest > AT_REST and out[DEPARTED, k] > 0.0
