@@ -15,6 +15,7 @@ from scipy.signal import savgol_coeffs
 from monitor.commissioning.healthy_fit import Stretch, fit_healthy
 from monitor.commissioning.healthy_limits import HealthyPart, healthy_limits
 from monitor.commissioning.sensor_chain import fit_sensor
+from monitor.commissioning.unhealthy import check_healthy
 from monitor.model import (
     EquationsPlant,
     FrictionSection,
@@ -77,8 +78,8 @@ def commission_equations(
         corner: of the high-pass of all that is judged [Hz].
 
     Raises:
-        ModelError: there is no healthy recording, rates differ, or the equations do not describe
-            the rig.
+        ModelError: there is no healthy recording, rates differ, the equations do not describe the
+            rig, or a healthy recording is not healthy.
     """
     used = [one for one in recordings if one.role != "friction"]
     if not any(one.role == "healthy" for one in used):
@@ -225,6 +226,8 @@ def _model(  # noqa: PLR0917 -- all that was found
         )
         for o in parts
     ]
+    steady = [k for k, one in enumerate(used) if one.role == "healthy"]
+    check_healthy([used[k].name for k in steady], [healthy[k] for k in steady], rate)
     skip = round(SKIPPED * rate)
     limits = healthy_limits(healthy, slow, skip)
     return RigModel(

@@ -21,7 +21,15 @@ from monitor.observer.decision_state import (
     new_state,
 )
 from monitor.observer.lagged_motion import EMPTY, FixedLag
-from monitor.observer.missing_force import DISAGREE, MEASURED, PREDICTED, E, high_pass, levels
+from monitor.observer.missing_force import (
+    DISAGREE,
+    DRY_UNIT,
+    MEASURED,
+    PREDICTED,
+    E,
+    high_pass,
+    levels,
+)
 from monitor.observer.model_signals import (
     Layout,
     Observed,
@@ -47,6 +55,7 @@ from monitor.observer.spectral_width import SpectralWidth
 __all__ = [
     "DEVIATIONS",
     "DISAGREE",
+    "DRY_UNIT",
     "EMPTY",
     "MEASURED",
     "MEDIUM",
