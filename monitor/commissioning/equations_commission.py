@@ -15,6 +15,7 @@ from scipy.signal import savgol_coeffs
 from monitor.commissioning.healthy_fit import Stretch, fit_healthy
 from monitor.commissioning.healthy_limits import HealthyPart, healthy_limits
 from monitor.commissioning.sensor_chain import fit_sensor
+from monitor.commissioning.unhealthy import check_healthy
 from monitor.model import (
     EquationsPlant,
     FrictionSection,
@@ -33,6 +34,7 @@ from monitor.observer import (
     Layout,
     Observed,
     ObserverSignals,
+    SpectralWidth,
     base_model,
     drive_energy,
     fit_remainder,
@@ -57,6 +59,8 @@ TRAINED = 2.0 / 3.0
 """Share of each recording from which the remainder is learnt before it is judged on the rest."""
 SKIPPED = 1.0
 """Beginning of each recording that limits are not taken from [s]."""
+STARTED = 2.0
+"""Beginning of each recording over which its spectrum is a start's [s]."""
 WORST = 0.2
 """Residual of held-out healthy data, over what is measured, above which nothing is described."""
 SLOW, TURNS = 0.02, 4.0
@@ -74,8 +78,8 @@ def commission_equations(
         corner: of the high-pass of all that is judged [Hz].
 
     Raises:
-        ModelError: there is no healthy recording, rates differ, or the equations do not describe
-            the rig.
+        ModelError: there is no healthy recording, rates differ, the equations do not describe the
+            rig, or a healthy recording is not healthy.
     """
     used = [one for one in recordings if one.role != "friction"]
     if not any(one.role == "healthy" for one in used):
@@ -192,6 +196,13 @@ def _rms(signal: FloatArray) -> float:
     return float(np.sqrt(np.mean(signal**2)))
 
 
+def _narrow(seen: Observed, layout: Layout, slow: float, rate: float) -> float:
+    """Least narrowness of a recording's spectrum, once it has begun."""
+    speed = np.ascontiguousarray(seen.rows[:, layout.speed])
+    found = SpectralWidth(slow, rate).update(speed, seen.state)[round(STARTED * rate) :]
+    return float(np.clip(found.min(initial=1.0), 0.0, 1.0))
+
+
 def _model(  # noqa: PLR0917 -- all that was found
     used: Sequence[Recording],
     plant: EquationsPlant,
@@ -203,7 +214,8 @@ def _model(  # noqa: PLR0917 -- all that was found
     layout = layout_of(base_model(plant.model), plant.port)
     speeds = np.concatenate([o.rows[:, layout.speed] for o in parts])
     slow = max(SLOW * _rms(speeds), plant.turn)
-    seen = range_of(layout.signals, [range_signals(o)[o.state != EMPTY] for o in parts])
+    signals = [range_signals(o)[o.state != EMPTY] for o in parts]
+    seen = range_of(layout.signals, signals, min(_narrow(o, layout, slow, rate) for o in parts))
     healthy = [
         HealthyPart(
             o.judged,
@@ -214,6 +226,8 @@ def _model(  # noqa: PLR0917 -- all that was found
         )
         for o in parts
     ]
+    steady = [k for k, one in enumerate(used) if one.role == "healthy"]
+    check_healthy([used[k].name for k in steady], [healthy[k] for k in steady], rate)
     skip = round(SKIPPED * rate)
     limits = healthy_limits(healthy, slow, skip)
     return RigModel(

@@ -42,6 +42,15 @@ class RangeSection(Section, frozen=True, kw_only=True):
     names: Annotated[tuple[str, ...], Meta(description="inputs, motion, and what is predicted")]
     low: Annotated[Floats, Meta(description="least value of each")]
     high: Annotated[Floats, Meta(description="largest value of each")]
+    narrow: Annotated[
+        float,
+        Meta(
+            ge=0,
+            le=1,
+            description="least narrowness of its spectrum: 1 for one frequency, towards 0 for "
+            "broad noise",
+        ),
+    ] = 0.0
 
 
 class HealthyLimits(Section, frozen=True, kw_only=True):

@@ -21,7 +21,15 @@ from monitor.observer.decision_state import (
     new_state,
 )
 from monitor.observer.lagged_motion import EMPTY, FixedLag
-from monitor.observer.missing_force import DISAGREE, MEASURED, PREDICTED, E, high_pass, levels
+from monitor.observer.missing_force import (
+    DISAGREE,
+    DRY_UNIT,
+    MEASURED,
+    PREDICTED,
+    E,
+    high_pass,
+    levels,
+)
 from monitor.observer.model_signals import (
     Layout,
     Observed,
@@ -42,10 +50,12 @@ from monitor.observer.prediction import (
 )
 from monitor.observer.range_seen import RangeSeen, drive_energy, range_of, range_signals
 from monitor.observer.remainder import fit_remainder, no_remainder
+from monitor.observer.spectral_width import SpectralWidth
 
 __all__ = [
     "DEVIATIONS",
     "DISAGREE",
+    "DRY_UNIT",
     "EMPTY",
     "MEASURED",
     "MEDIUM",
@@ -62,6 +72,7 @@ __all__ = [
     "Observed",
     "ObserverSignals",
     "RangeSeen",
+    "SpectralWidth",
     "balanced",
     "base_model",
     "decide",

@@ -43,6 +43,7 @@ class Counts(NamedTuple):
     agreed: int = 7
     disagreed: int = 8
     since_change: int = 9
+    above: int = 10
 
 
 AT = Counts()

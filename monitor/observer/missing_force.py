@@ -19,7 +19,7 @@ from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 
 COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured")
-E, G1, G2, PREDICTED, DISAGREE, MEASURED = range(6)
+E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED = range(6)
 
 
 class Polynomial(NamedTuple):

@@ -25,7 +25,6 @@ from monitor.observer.decision_state import (
     DEVIATION,
     DEVIATIONS,
     DISAGREE,
-    DRY,
     DRY_SHARE,
     ERROR,
     FORCE,
@@ -50,34 +49,43 @@ from monitor.observer.decision_state import (
     UNNAMED,
     VERDICT,
     VISCOUS,
-    WET,
     DecisionRules,
     DecisionState,
 )
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
+from monitor.observer.window_statistics import (
+    dry_force,
+    friction,
+    mean_square,
+    rest,
+    reversals,
+)
 from monitor.signals import Codes
 from rigwatch.wire.arrays import FloatArray
 
-HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED = range(
-    10
-)
+(
+    HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
+    ABOVE,
+) = range(11)  # fmt: skip
 """Places of `decision_state.Counts`, as the kernel needs constants."""
 LOOKS = 3
 """Samples in a row that must agree on friction."""
 LEAST_LOOK = 12
 """Samples from the onset on before friction is named [samples]."""
-FITS, DRY_PART = 0.75, 0.5
-"""Share of the missing force, beyond noise, that friction explains and its dry part stands for."""
-FITS_LATER = 0.6
-"""The same over a whole long window, where onsets and edges have faded."""
+FITS, DRY_PART = 0.6, 0.5
+"""Share of the missing force, beyond noise, that friction explains and its dry part stands for;
+real friction also rises before it slides and falls with speed, which neither part describes.
+"""
 AT_REST, STUCK = 0.25, 0.5
 """Share of the time at rest that makes it sticking."""
 OVER = 256
 """Samples without a departure after which an episode is over."""
-RIDGE = 1e-3
-"""Of the viscous regressor against the dry one, where the two cannot be told apart."""
 VIOLATED = 16
 """Samples in a row in which the sensors disagree."""
+SURE, LASTING = 1.4, 48
+"""A deviation so far beyond the limit is a departure at once, a smaller one after so many samples:
+what a change of the drive stirs up is small or short.
+"""
 SUDDEN, LATE, BEFORE = 8.0, 16.0, 256.0
 """A drive whose energy over `LATE` samples is so many times that over `BEFORE` has just begun, or
 grown; what follows is no steady motion.
@@ -147,22 +155,25 @@ def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: F
     count = kept.counts
     count[SINCE_START] += 1
     count[OUTSIDE] = 0 if not inside else min(count[OUTSIDE] + 1, LONG)
-    out[AMPLITUDE, k] = _mean_square(kept, LEVEL, MEDIUM)
+    out[AMPLITUDE, k] = mean_square(kept, LEVEL, MEDIUM)
     spread = np.sqrt(_variance(kept, rules))
     out[SPREAD, k] = spread
-    force, viscous, deviations, _, _ = _friction(kept, MEDIUM, spread)
+    force, viscous, deviations, _, _ = friction(kept, MEDIUM, spread)
     out[FORCE, k], out[VISCOUS, k], out[DEVIATIONS, k] = force, viscous, deviations
-    out[REST, k] = _rest(kept, LONG, rules.speed_noise)
-    sensor_variance = rules.sensor_noise**2 + rules.sensor_growth**2 * _mean_square(
+    out[REST, k] = rest(kept, LONG, rules.speed_noise)
+    sensor_variance = rules.sensor_noise**2 + rules.sensor_growth**2 * mean_square(
         kept, MEASURED, MEDIUM
     )
-    out[SENSORS, k] = _mean_square(kept, DISAGREE, MEDIUM) / sensor_variance / rules.sensor
-    short = _mean_square(kept, ERROR, SHORT) / spread**2 / rules.short
-    medium = _mean_square(kept, ERROR, MEDIUM) / spread**2 / rules.medium
+    out[SENSORS, k] = mean_square(kept, DISAGREE, MEDIUM) / sensor_variance / rules.sensor
+    short = mean_square(kept, ERROR, SHORT) / spread**2 / rules.short
+    medium = mean_square(kept, ERROR, MEDIUM) / spread**2 / rules.medium
     largest = max(np.sqrt(short), np.sqrt(medium), deviations / rules.friction)
     out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]))
     away = out[DEVIATION, k] > 1.0
     count[QUIET] = 0 if away else count[QUIET] + 1
+    count[ABOVE] = count[ABOVE] + 1 if away else 0
+    if count[ONSET] < 0:
+        away = out[DEVIATION, k] > SURE or count[ABOVE] >= LASTING
     mode = _mode(kept, rules)
     out[MODE, k] = mode
     if mode != JUDGING:
@@ -240,95 +251,17 @@ def _verdict(
         return OTHER
     since = count[ONSET]
     length = min(since + SHORT, LONG)
-    _, _, _, share, dry = _friction(kept, length, spread)
-    force = _dry_force(kept, length)
+    _, _, _, share, dry = friction(kept, length, spread)
+    force = dry_force(kept, length)
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
-    fits = share > (FITS if since < LONG else FITS_LATER) and dry > DRY_PART and force > 0.0
-    turned = _reversals(kept, length, rules.speed_noise) > 0
-    rest = _rest(kept, length, rules.speed_noise)
-    sticks = since >= LONG // 2 and rest > AT_REST and out[DEPARTED, k] > 0.0
+    fits = share > FITS and dry > DRY_PART and force > 0.0
+    turned = reversals(kept, length, rules.speed_noise) > 0
+    still = rest(kept, length, rules.speed_noise)
+    sticks = since >= LONG // 2 and still > AT_REST and out[DEPARTED, k] > 0.0
     agrees = since >= LEAST_LOOK and ((fits and turned) or sticks)
     count[AGREED] = count[AGREED] + 1 if agrees and count[DISAGREED] == 0 else 0
     if fits:
         kept.value[1] = force
     if count[AGREED] >= LOOKS or before in (FRICTION, STICKING):
-        return STICKING if rest > STUCK or before == STICKING else FRICTION
+        return STICKING if still > STUCK or before == STICKING else FRICTION
     return OTHER if since > rules.patience else UNNAMED
-
-
-@njit(cache=True)
-def _mean_square(kept: DecisionState, column: int, length: int) -> float:
-    n = min(length, kept.counts[FILLED])
-    total = 0.0
-    for ago in range(1, n + 1):
-        total += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, column] ** 2
-    return total / max(n, 1)
-
-
-@njit(cache=True)
-def _friction(
-    kept: DecisionState, length: int, spread: float
-) -> tuple[float, float, float, float, float]:
-    """Coulomb force, viscous coefficient, the former in deviations, and the shares of the residual,
-    beyond its healthy spread, that both explain and that the dry part stands for.
-    """
-    n = min(length, kept.counts[FILLED])
-    a = b = c = p = q = yy = 0.0
-    for ago in range(1, n + 1):
-        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
-        a += row[DRY] * row[DRY]
-        b += row[DRY] * row[WET]
-        c += row[WET] * row[WET]
-        p += row[DRY] * row[ERROR]
-        q += row[WET] * row[ERROR]
-        yy += row[ERROR] * row[ERROR]
-    if a <= 0.0 or c <= 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
-    c_ridged = c * (1.0 + RIDGE)
-    left = max(a - b * b / c_ridged, 1e-9 * a)
-    force = (p - b * q / c_ridged) / left
-    viscous = (q - b * force) / c_ridged
-    deviations = force * np.sqrt(left) / spread
-    explained = 2.0 * (force * p + viscous * q)
-    explained -= force * force * a + 2.0 * force * viscous * b + viscous * viscous * c
-    beyond = max(yy - n * spread * spread, 0.2 * yy)
-    dry_alone = p * p / a if p > 0.0 else 0.0
-    return force, viscous, deviations, explained / beyond, dry_alone / beyond
-
-
-@njit(cache=True)
-def _dry_force(kept: DecisionState, length: int) -> float:
-    """Force of dry friction alone [N]: viscous friction beside it is hardly told from it by a
-    steady motion, and takes from it what smoothing and presliding round off.
-    """
-    n = min(length, kept.counts[FILLED])
-    a = p = 0.0
-    for ago in range(1, n + 1):
-        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
-        a += row[DRY] * row[DRY]
-        p += row[DRY] * row[ERROR]
-    return p / a if a > 0.0 else 0.0
-
-
-@njit(cache=True)
-def _rest(kept: DecisionState, length: int, slow: float) -> float:
-    """Share of the time at which the motion cannot be told from rest."""
-    n = min(length, kept.counts[FILLED])
-    still = 0
-    for ago in range(1, n + 1):
-        still += abs(kept.rows[(kept.counts[HEAD] - ago) % HISTORY, SPEED]) < slow
-    return still / max(n, 1)
-
-
-@njit(cache=True)
-def _reversals(kept: DecisionState, length: int, slow: float) -> int:
-    """How often the motion turns, beyond what noise does."""
-    n = min(length, kept.counts[FILLED])
-    found, side = 0, 0
-    for ago in range(n, 0, -1):
-        speed = kept.rows[(kept.counts[HEAD] - ago) % HISTORY, SPEED]
-        now = 1 if speed > slow else (-1 if speed < -slow else 0)
-        if now != 0:
-            found += side == -now
-            side = now
-    return found

@@ -8,27 +8,43 @@ from monitor.model import RangeSection, RigModel
 from monitor.observer.lagged_motion import EMPTY
 from monitor.observer.missing_force import PREDICTED
 from monitor.observer.model_signals import Observed
+from monitor.observer.spectral_width import SpectralWidth
 from rigwatch.wire.arrays import FloatArray
 
 ALLOWED = 1.2
 """Half width of what is judged, in half the width of what was fitted."""
+WIDER = 0.25
+"""Broadening that is always judged: what changes of the drive and faults do to a tone."""
 PREDICTION = "predicted"
 """What the high-passed prediction is called among the signals of a range."""
 
 
 class RangeSeen:
-    """Judges samples by the range in the model file."""
+    """Judges samples by the range in the model file, block by block.
 
-    def __init__(self, model: RigModel) -> None:
+    Args:
+        model: with a range, and the speed that cannot be told from rest.
+        speed: place of the speed among inputs and motion.
+    """
+
+    def __init__(self, model: RigModel, speed: int) -> None:
         assert model.motion_range is not None
+        assert model.healthy is not None
+        self._speed = speed
+        self._width = SpectralWidth(model.healthy.speed_noise, model.sample_rate)
+        self._wider = max(ALLOWED * (1.0 - model.motion_range.narrow), WIDER)
         low, high = np.array(model.motion_range.low), np.array(model.motion_range.high)
         self._middle = 0.5 * (low + high)
         self._half = ALLOWED * np.maximum(0.5 * (high - low), 1e-12)
 
     def distance(self, seen: Observed) -> FloatArray:
-        """Largest distance of any signal from the middle, 1 at the limit, shape (n,)."""
+        """Largest distance of any signal from the middle, or of the motion's width from a tone's:
+        1 at the limit, shape (n,).
+        """
         signals = range_signals(seen)
         far = (np.abs(signals - self._middle) / self._half).max(axis=1)
+        narrow = self._width.update(np.ascontiguousarray(seen.rows[:, self._speed]), seen.state)
+        far = np.maximum(far, (1.0 - narrow) / self._wider)
         return np.where(seen.state == EMPTY, 0.0, far)
 
 
@@ -45,11 +61,12 @@ def drive_energy(rows: FloatArray, seen: RangeSection, motions: Sequence[int]) -
     return np.asarray((scaled**2).sum(axis=1))
 
 
-def range_of(names: Sequence[str], parts: Sequence[FloatArray]) -> RangeSection:
-    """The range of healthy signals, each part of shape (n, signals)."""
+def range_of(names: Sequence[str], parts: Sequence[FloatArray], narrow: float) -> RangeSection:
+    """The range of healthy signals, each part of shape (n, signals), and their least q."""
     every = np.concatenate(parts)
     return RangeSection(
         names=(*names, PREDICTION),
         low=tuple(every.min(axis=0).tolist()),
         high=tuple(every.max(axis=0).tolist()),
+        narrow=narrow,
     )

@@ -49,7 +49,7 @@ class ObserverMonitor:
         assert remainder is not None
         self._admission = Admission(model.channels, model.channels, model.decision.longest_hold)
         self._signals = ObserverSignals(plant, remainder, model.sample_rate)
-        self._range = RangeSeen(model)
+        self._range = RangeSeen(model, self._signals.layout.speed)
         self._state = d.new_state(1 + 2 * len(self._signals.layout.motions))
         self._since = 0
         self._follow(model)

@@ -1,0 +1,87 @@
+"""Healthy recordings that are not: friction that sets in, or one that rubs while the others do not.
+
+Dry friction is estimated block by block,
+
+    F = Σ g·e / Σ g²
+
+with e the residual and g what one newton makes of it. A step of F between two parts of a recording,
+or between it and the others, is compared with the residual that stands without it: in healthy
+recordings of simulated rigs it is at most a tenth of that, where friction sets in at least six
+times as much.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from monitor.commissioning.healthy_limits import HealthyPart
+from monitor.observer import DRY_UNIT, E
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
+
+BLOCK, SETTLED = 128, 512
+"""Samples of one estimate, and of a beginning that is not counted."""
+LEAST = 3
+"""Blocks that either side of a step must have, and recordings of which one is told apart."""
+STEP = 2.5
+"""Step of the friction over the residual beside it, from which a recording is refused."""
+
+
+def check_healthy(names: Sequence[str], parts: Sequence[HealthyPart], rate: float) -> None:
+    """Refuse healthy recordings in which something rubs.
+
+    Args:
+        names: of the recordings.
+        parts: what the fitted equations leave of them.
+        rate: samples a second [Hz].
+
+    Raises:
+        ModelError: friction sets in within a recording, or one recording has more than the others.
+    """
+    blocks = [_blocks(part) for part in parts]
+    for name, one in zip(names, blocks, strict=True):
+        _check_onset(name, one, rate)
+    if len(blocks) >= LEAST:
+        for k, name in enumerate(names):
+            _check_beside(name, blocks[k], blocks[:k] + blocks[k + 1 :])
+
+
+def _blocks(part: HealthyPart) -> FloatArray:
+    """Friction [N], mean squares of its regressor and of the residual, shape (3, blocks)."""
+    judged = part.judged[SETTLED:]
+    whole = judged[: len(judged) // BLOCK * BLOCK].reshape(-1, BLOCK, judged.shape[1])
+    g, e = whole[:, :, DRY_UNIT], whole[:, :, E]
+    squares = np.maximum((g * g).mean(axis=1), 1e-12)
+    return np.stack([(g * e).mean(axis=1) / squares, squares, (e * e).mean(axis=1)])
+
+
+def _check_onset(name: str, blocks: FloatArray, rate: float) -> None:
+    force, squares, errors = blocks
+    places = range(LEAST, force.size - LEAST)
+    if not places:
+        return
+    place = max(places, key=lambda at: _rise(force, at) * np.sqrt(at * (force.size - at)))
+    step = _rise(force, place)
+    found = step * np.sqrt(np.median(squares) / max(np.median(errors[:place]), 1e-300))
+    if found > STEP:
+        since = (SETTLED + place * BLOCK) / rate
+        raise ModelError(
+            f"{name}: found friction of about {step:.2g} N that sets in about {since:.0f} s after"
+            " the beginning, expected a healthy recording: leave it out, or record again"
+        )
+
+
+def _rise(force: FloatArray, at: int) -> float:
+    return float(force[at:].mean() - force[:at].mean())
+
+
+def _check_beside(name: str, blocks: FloatArray, others: Sequence[FloatArray]) -> None:
+    force, squares, _ = blocks
+    usual = float(np.median([np.median(other[0]) for other in others]))
+    left = float(np.median([np.median(other[2]) for other in others]))
+    more = float(np.median(force)) - usual
+    if more * np.sqrt(np.median(squares) / max(left, 1e-300)) > STEP:
+        raise ModelError(
+            f"{name}: found about {more:.2g} N more friction than in the other healthy recordings,"
+            " expected the same rig in the same state: leave it out, or record again"
+        )

@@ -1,0 +1,70 @@
+"""How broad the spectrum of the motion is, of late: a tone's is narrow, that of noise is not.
+
+    q = ⟨v²⟩ / √(⟨(∫v)²⟩·⟨(Δv)²⟩),   1 for one frequency, less for several at once
+
+the bandwidth parameter of random processes (D. E. Cartwright, M. S. Longuet-Higgins, Proc. Royal
+Society A 237, 1956). What equations leave of tones says nothing about several at once, which mix
+in whatever they lack.
+"""
+
+from typing import cast
+
+import numpy as np
+from numba import njit
+
+from monitor.observer.lagged_motion import EMPTY, FIRST
+from monitor.signals import Codes
+from rigwatch.wire.arrays import FloatArray
+
+SLOWEST = 1.0
+"""Corner below which motion does not count: the mass drifts [Hz]."""
+MEMORY = 0.5
+"""Time over which the means reach back [s]."""
+
+
+class SpectralWidth:
+    """Carries the means from block to block.
+
+    Args:
+        slow: speed that cannot be told from rest [m/s].
+        rate: samples a second [Hz].
+    """
+
+    def __init__(self, slow: float, rate: float) -> None:
+        self._leak = float(np.exp(-2.0 * np.pi * SLOWEST / rate))
+        self._share = 1.0 / (MEMORY * rate)
+        self._slow = slow
+        self._kept = np.zeros(5)
+
+    def update(self, speed: FloatArray, state: Codes) -> FloatArray:
+        """q after each sample, shape (n,); 1 at rest and without a whole kernel."""
+        out = np.ones(len(speed))
+        _advance(speed, state, self._leak, self._share, self._slow, self._kept, out)
+        return cast("FloatArray", out)
+
+
+@njit(cache=True)
+def _advance(  # noqa: PLR0917 -- a kernel
+    speed: FloatArray,
+    state: Codes,
+    leak: float,
+    share: float,
+    slow: float,
+    kept: FloatArray,
+    out: FloatArray,
+) -> None:
+    """`kept` holds the way, the last speed, and the means of way, speed and change squared."""
+    for k in range(state.size):
+        if state[k] == EMPTY:
+            continue
+        if state[k] == FIRST:
+            kept[:] = 0.0
+            kept[1] = speed[k]
+        kept[0] = leak * kept[0] + speed[k]
+        change = speed[k] - kept[1]
+        kept[1] = speed[k]
+        kept[2] += share * (kept[0] * kept[0] - kept[2])
+        kept[3] += share * (speed[k] * speed[k] - kept[3])
+        kept[4] += share * (change * change - kept[4])
+        if kept[3] > slow * slow:
+            out[k] = kept[3] / max(np.sqrt(kept[2] * kept[4]), 1e-300)

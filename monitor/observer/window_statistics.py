@@ -1,0 +1,93 @@
+"""Statistics of the last samples that the observer decides by: energies, friction, rest."""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import numpy as np
+from numba import njit
+
+from monitor.observer.decision_state import DRY, ERROR, HISTORY, SPEED, WET, DecisionState
+
+HEAD, FILLED = 0, 1
+"""Places of `decision_state.Counts`, as the kernel needs constants."""
+RIDGE = 1e-3
+"""Of the viscous regressor against the dry one, where the two cannot be told apart."""
+
+
+@njit(cache=True)
+def mean_square(kept: DecisionState, column: int, length: int) -> float:
+    """Of a column over the last samples."""
+    n = min(length, kept.counts[FILLED])
+    total = 0.0
+    for ago in range(1, n + 1):
+        total += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, column] ** 2
+    return total / max(n, 1)
+
+
+@njit(cache=True)
+def friction(
+    kept: DecisionState, length: int, spread: float
+) -> tuple[float, float, float, float, float]:
+    """Coulomb force, viscous coefficient, the former in deviations, and the shares of the residual,
+    beyond its healthy spread, that both explain and that the dry part stands for.
+    """
+    n = min(length, kept.counts[FILLED])
+    a = b = c = p = q = yy = 0.0
+    for ago in range(1, n + 1):
+        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        a += row[DRY] * row[DRY]
+        b += row[DRY] * row[WET]
+        c += row[WET] * row[WET]
+        p += row[DRY] * row[ERROR]
+        q += row[WET] * row[ERROR]
+        yy += row[ERROR] * row[ERROR]
+    if a <= 0.0 or c <= 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    c_ridged = c * (1.0 + RIDGE)
+    left = max(a - b * b / c_ridged, 1e-9 * a)
+    force = (p - b * q / c_ridged) / left
+    viscous = (q - b * force) / c_ridged
+    deviations = force * np.sqrt(left) / spread
+    explained = 2.0 * (force * p + viscous * q)
+    explained -= force * force * a + 2.0 * force * viscous * b + viscous * viscous * c
+    beyond = max(yy - n * spread * spread, 0.2 * yy)
+    dry_alone = p * p / a if p > 0.0 else 0.0
+    return force, viscous, deviations, explained / beyond, dry_alone / beyond
+
+
+@njit(cache=True)
+def dry_force(kept: DecisionState, length: int) -> float:
+    """Force of dry friction alone [N]: viscous friction beside it is hardly told from it by a
+    steady motion, and takes from it what smoothing and presliding round off.
+    """
+    n = min(length, kept.counts[FILLED])
+    a = p = 0.0
+    for ago in range(1, n + 1):
+        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        a += row[DRY] * row[DRY]
+        p += row[DRY] * row[ERROR]
+    return p / a if a > 0.0 else 0.0
+
+
+@njit(cache=True)
+def rest(kept: DecisionState, length: int, slow: float) -> float:
+    """Share of the time at which the motion cannot be told from rest."""
+    n = min(length, kept.counts[FILLED])
+    still = 0
+    for ago in range(1, n + 1):
+        still += abs(kept.rows[(kept.counts[HEAD] - ago) % HISTORY, SPEED]) < slow
+    return still / max(n, 1)
+
+
+@njit(cache=True)
+def reversals(kept: DecisionState, length: int, slow: float) -> int:
+    """How often the motion turns, beyond what noise does."""
+    n = min(length, kept.counts[FILLED])
+    found, side = 0, 0
+    for ago in range(n, 0, -1):
+        speed = kept.rows[(kept.counts[HEAD] - ago) % HISTORY, SPEED]
+        now = 1 if speed > slow else (-1 if speed < -slow else 0)
+        if now != 0:
+            found += side == -now
+            side = now
+    return found

@@ -1,0 +1,41 @@
+"""A healthy recording that is not healthy is refused with its name."""
+
+import numpy as np
+import pytest
+
+from monitor.commissioning.healthy_limits import HealthyPart
+from monitor.commissioning.unhealthy import check_healthy
+from rigwatch.wire.errors import ModelError
+
+RATE, SAMPLES = 256.0, 5120
+
+
+def part(seed: int, friction: float = 0.0, since: int = 0, noise: float = 0.2) -> HealthyPart:
+    """Residual of a 0.23 kg mass at 8 Hz, with dry friction [N] from a sample on."""
+    rng = np.random.default_rng(seed)
+    speed = np.sin(2.0 * np.pi * 8.0 * np.arange(SAMPLES) / RATE)
+    dry = -np.sign(speed) / 0.23
+    judged = np.zeros((SAMPLES, 6))
+    judged[:, 1] = dry
+    judged[:, 0] = noise * rng.standard_normal(SAMPLES) + 0.1 * speed
+    judged[since:, 0] += friction * dry[since:]
+    empty = np.zeros(SAMPLES)
+    return HealthyPart(judged, speed, np.zeros((SAMPLES, 5)), empty, np.full(SAMPLES, 2))
+
+
+def test_healthy_recordings_pass() -> None:
+    check_healthy(["a", "b", "c"], [part(1), part(2, noise=0.4), part(3)], RATE)
+
+
+def test_friction_that_sets_in_is_said_with_its_time() -> None:
+    with pytest.raises(ModelError, match=r"b: found friction of about 0\.5.* about 10 s after"):
+        check_healthy(["a", "b"], [part(1), part(2, 0.5, 2560)], RATE)
+
+
+def test_one_that_rubs_all_the_time_is_told_from_the_others() -> None:
+    with pytest.raises(ModelError, match=r"c: found about 0\.5.* more friction than"):
+        check_healthy(["a", "b", "c"], [part(1), part(2), part(3, 0.5)], RATE)
+
+
+def test_one_kind_of_rubbing_in_all_of_them_is_the_rig() -> None:
+    check_healthy(["a", "b", "c"], [part(k, 0.3) for k in range(3)], RATE)
