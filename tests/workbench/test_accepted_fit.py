@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigwatch.workbench.compare.compare import compare
-from rigwatch.workbench.ranking.rank import accepted_from
+from rigwatch.workbench.ranking.ranked import accepted_from
 from rigwatch.workbench.steps.change import add, undo
 from rigwatch.workbench.steps.ledger_replay import replay
 from rigwatch.workbench.study.study import Study, open_study

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.workbench.compare.compare import Bench, open_bench
-from rigwatch.workbench.ranking.rank import candidates, rank_only
+from rigwatch.workbench.compare.preparation import Bench, open_bench
+from rigwatch.workbench.ranking.candidates import candidates
+from rigwatch.workbench.ranking.scoring import rank_only
 from rigwatch.workbench.study.study import Accepted
 from tests.workbench.machine import studied
 
