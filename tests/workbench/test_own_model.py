@@ -74,7 +74,7 @@ def test_without_ports_it_is_compared_and_explain_asks_for_one(tmp_path: Path) -
         ("parameters.a", "parameters.exp", "parameters.exp: found a name that equations use"),
         ("parameters.a", "parameters.lambda", "parameters.lambda: found a name that equations use"),
         ("parameters.a", "parameters.v", "parameters.v: found 'v' again after states.v"),
-        ('measured = "v"', 'measured = "vel"', "states.v.measured: found channel 'vel'.*'v'"),
+        ('measured = "v"', 'measured = "vel"', "states.v.measured: found channel 'vel'.*: u, v"),
     ],
 )
 def test_a_slip_is_told_when_the_study_is_made(

@@ -3,7 +3,6 @@
 A model is checked when a study opens, so that a slip of the pen is one line and not a verdict.
 """
 
-import difflib
 import keyword
 
 from rigwatch.physics.engine.equations.expression import FUNCTIONS, parse
@@ -74,16 +73,17 @@ def _check_names(model: Model) -> None:
 
 
 def _check_channels(model: Model) -> None:
-    """A state names the channel of an output; another name shows it nowhere."""
-    known = {output.channel or name: name for name, output in model.outputs.items()}
+    """A state names a channel of the model; another name shows it nowhere."""
+    known = {own.channel or name for name, own in model.inputs.items()}
+    known |= {own.channel or name for name, own in model.outputs.items()}
+    known |= {*model.inputs, *model.outputs}
     for name, state in model.states.items():
         for key in ("measured", "rate_of"):
             channel = getattr(state, key)
             if channel and channel not in known:
-                close = difflib.get_close_matches(channel, known, 1) or sorted(known)
                 raise ModelError(
-                    f"states.{name}.{key}: found channel {channel!r}, expected that of an output,"
-                    f" such as {close[0]!r}"
+                    f"states.{name}.{key}: found channel {channel!r}, expected one of the model's:"
+                    f" {', '.join(sorted(known))}"
                 )
 
 
