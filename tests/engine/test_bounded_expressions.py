@@ -18,6 +18,7 @@ BOMBS = {
     "a negative tower": "9**(-9**9**9)",
     "a root of a tower": "2**(1e300)",
     "powers within powers": "((((9**60)**60)**60)**60)**60*x",
+    "functions within functions": "tanh(x+" * 60 + "x" + ")" * 60,
     "no value": "x/0",
     "infinity": "x*1e999",
     "an integer of 5000 digits": "9" * 5000,
@@ -41,4 +42,6 @@ def test_dimensions_are_bounded_in_the_same_way() -> None:
 
 def test_usual_powers_and_sums_stay() -> None:
     assert parse("x**3 + 2**10*x - 1e-3*x**0.5", X, "good").has(X["x"])
+    assert parse(" + ".join(f"{k}*x" for k in range(1, 300)), X, "good").has(X["x"])
+    assert parse("tanh(x+" * 20 + "x" + ")" * 20, X, "good").diff(X["x"]).has(X["x"])
     assert parse(" + ".join(f"{k}*x**{k % 5}" for k in range(1, 150)), X, "good").has(X["x"])

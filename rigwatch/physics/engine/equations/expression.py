@@ -49,8 +49,8 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 
 LONGEST = 20_000
 """Characters of one expression."""
-DEEPEST = 200
-"""Operations within one another: SymPy works through them by recursion."""
+DEEPEST, DEEPEST_CALLS = 400, 24
+"""Operations and functions within one another: SymPy works through them by recursion."""
 LARGEST_EXPONENT = 64.0
 """Of any power whose exponent is a number."""
 MOST_BITS = 4096
@@ -74,7 +74,10 @@ def parse(text: str, names: Mapping[str, sympy.Expr], where: str) -> sympy.Expr:
 @lru_cache(maxsize=4096)
 def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) -> sympy.Expr:
     """The same, kept: SymPy takes milliseconds to simplify choices and extremes."""
-    value = sympy.sympify(_Reader(dict(names), where).value(_tree(text, where)))
+    try:
+        value = sympy.sympify(_Reader(dict(names), where).value(_tree(text, where)))
+    except RecursionError:
+        raise ModelError(f"{where}: found {_shown(text)}, which is too deep") from None
     if value.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
         raise ModelError(f"{where}: found {_shown(text)}, which has no finite value")
     return value
@@ -93,21 +96,24 @@ def _tree(text: str, where: str) -> ast.expr:
         ) from None
     except (RecursionError, MemoryError, ValueError):
         raise ModelError(f"{where}: found {_shown(text)}, which cannot be read") from None
-    if _depth(tree) > DEEPEST:
-        raise ModelError(
-            f"{where}: found {_shown(text)}, expected operations at most {DEEPEST} deep"
-        )
+    if _is_deep(tree):
+        expected = f"operations at most {DEEPEST} deep, functions {DEEPEST_CALLS}"
+        raise ModelError(f"{where}: found {_shown(text)}, expected {expected}")
     return tree
 
 
-def _depth(tree: ast.AST) -> int:
-    """How deep the operations stand within one another."""
-    level: list[ast.AST] = [tree]
-    depth = 0
-    while level:
-        level = [child for node in level for child in ast.iter_child_nodes(node)]
-        depth += 1
-    return depth
+def _is_deep(tree: ast.AST) -> bool:
+    """Whether operations or functions stand too deep within one another."""
+    level = [(tree, 0)]
+    for _ in range(DEEPEST):
+        if any(calls > DEEPEST_CALLS for _, calls in level):
+            return True
+        level = [
+            (child, calls + isinstance(node, ast.Call))
+            for node, calls in level
+            for child in ast.iter_child_nodes(node)
+        ]
+    return bool(level)
 
 
 def _shown(text: str) -> str:
@@ -177,7 +183,10 @@ def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> 
     Raises:
         ModelError: it adds, compares or feeds to a function what does not have fitting units.
     """
-    return _Measurer(dimensions, where).dim(_tree(text, where))
+    try:
+        return _Measurer(dimensions, where).dim(_tree(text, where))
+    except RecursionError:
+        raise ModelError(f"{where}: found {_shown(text)}, which is too deep") from None
 
 
 def _is_caret(node: ast.AST) -> bool:
