@@ -19,6 +19,7 @@ a measured state's rate, held against the rate of the channel (see `measured_rec
 Two weaknesses: noise of the measured motion enters as an input and biases what multiplies v, or
 its sign near standstill; and an effect at the sensor of a measured state enters the equations
 wherever the state does, so that the transformed model has no port for it.
+The workbench takes such an effect out of the recording instead.
 """
 
 import ast
