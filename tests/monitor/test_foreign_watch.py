@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from observed_rig import FAULTS, RATE, raised, watched
 
 from monitor.commissioning.equations_commission import commission_equations
 from monitor.model.model_file import RigModel
 from monitor.signals.recordings import recording_of
+from tests.monitor.observed_rig import FAULTS, RATE, raised, watched
 
 FOLDER = Path(os.environ.get("RIGWATCH_DATA", "")) / "foreign_rig" / "watch"
 NAMES = ("voltage", "position", "acceleration")

@@ -4,7 +4,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from observed_rig import (
+
+from monitor.model.model_file import model_text, parse_model
+from monitor.observer.lagged_motion import DELAY, FixedLag, MotionColumn
+from monitor.pipeline.observer_pipeline import ObserverMonitor
+from monitor.pipeline.rig_monitor import RigMonitor
+from monitor.signals.recordings import recording_of
+from rigwatch.wire.errors import ConfigError, ModelError
+from tests.monitor.observed_rig import (
     FAULTS,
     FREE,
     RATE,
@@ -16,13 +23,6 @@ from observed_rig import (
     run,
     watched,
 )
-
-from monitor.model.model_file import model_text, parse_model
-from monitor.observer.lagged_motion import DELAY, FixedLag, MotionColumn
-from monitor.pipeline.observer_pipeline import ObserverMonitor
-from monitor.pipeline.rig_monitor import RigMonitor
-from monitor.signals.recordings import recording_of
-from rigwatch.wire.errors import ConfigError, ModelError
 
 pytestmark = pytest.mark.long
 
