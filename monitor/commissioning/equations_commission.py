@@ -163,7 +163,7 @@ def _remainder(
     """The remainder, and how much is left of the part of each recording that it has not seen.
 
     Raises:
-        ModelError: too much.
+        ModelError: too much, or a recording is not healthy.
     """
     layout = layout_of(base_model(plant.model), plant.port)
     size = ObserverSignals(plant, no_remainder(0), rate).remainder_size
@@ -173,6 +173,10 @@ def _remainder(
     earlier = [(z[: _split(z)], e[: _split(z)]) for z, e in pairs]
     learnt = fit_remainder(earlier, filters, skip)
     later = _observed(used, plant, learnt, rate)
+    steady = [
+        (one.name, o.judged) for one, o in zip(used, later, strict=True) if one.role == "healthy"
+    ]
+    check_healthy([name for name, _ in steady], [judged for _, judged in steady], rate)
     left = [o.judged[_split(o.judged) :] for o in later]
     shares = [_rms(part[:, E]) / max(_rms(part[:, MEASURED]), 1e-12) for part in left]
     worst = int(np.argmax(shares))
@@ -226,8 +230,6 @@ def _model(  # noqa: PLR0917 -- all that was found
         )
         for o in parts
     ]
-    steady = [k for k, one in enumerate(used) if one.role == "healthy"]
-    check_healthy([used[k].name for k in steady], [healthy[k] for k in steady], rate)
     skip = round(SKIPPED * rate)
     limits = healthy_limits(healthy, slow, skip)
     return RigModel(

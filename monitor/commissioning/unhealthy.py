@@ -14,7 +14,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from monitor.commissioning.healthy_limits import HealthyPart
 from monitor.observer import DRY_UNIT, E
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -27,18 +26,18 @@ STEP = 2.5
 """Step of the friction over the residual beside it, from which a recording is refused."""
 
 
-def check_healthy(names: Sequence[str], parts: Sequence[HealthyPart], rate: float) -> None:
+def check_healthy(names: Sequence[str], judged: Sequence[FloatArray], rate: float) -> None:
     """Refuse healthy recordings in which something rubs.
 
     Args:
         names: of the recordings.
-        parts: what the fitted equations leave of them.
+        judged: columns of each as the decision has them, shape (n, 6).
         rate: samples a second [Hz].
 
     Raises:
         ModelError: friction sets in within a recording, or one recording has more than the others.
     """
-    blocks = [_blocks(part) for part in parts]
+    blocks = [_blocks(one) for one in judged]
     for name, one in zip(names, blocks, strict=True):
         _check_onset(name, one, rate)
     if len(blocks) >= LEAST:
@@ -46,10 +45,10 @@ def check_healthy(names: Sequence[str], parts: Sequence[HealthyPart], rate: floa
             _check_beside(name, blocks[k], blocks[:k] + blocks[k + 1 :])
 
 
-def _blocks(part: HealthyPart) -> FloatArray:
+def _blocks(judged: FloatArray) -> FloatArray:
     """Friction [N], mean squares of its regressor and of the residual, shape (3, blocks)."""
-    judged = part.judged[SETTLED:]
-    whole = judged[: len(judged) // BLOCK * BLOCK].reshape(-1, BLOCK, judged.shape[1])
+    settled = judged[SETTLED:]
+    whole = settled[: len(settled) // BLOCK * BLOCK].reshape(-1, BLOCK, judged.shape[1])
     g, e = whole[:, :, DRY_UNIT], whole[:, :, E]
     squares = np.maximum((g * g).mean(axis=1), 1e-12)
     return np.stack([(g * e).mean(axis=1) / squares, squares, (e * e).mean(axis=1)])

@@ -72,7 +72,7 @@ LOOKS = 3
 """Samples in a row that must agree on friction."""
 LEAST_LOOK = 12
 """Samples from the onset on before friction is named [samples]."""
-FITS, DRY_PART = 0.6, 0.5
+FITS, DRY_PART = 0.7, 0.5
 """Share of the missing force, beyond noise, that friction explains and its dry part stands for;
 real friction also rises before it slides and falls with speed, which neither part describes.
 """
