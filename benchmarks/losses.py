@@ -143,7 +143,7 @@ def read_recording(rig: LiveRig) -> Spans:
 
 
 def reader(config: str, name: str, log: str) -> None:
-    """A reader that writes down what it gets, and goes on there after it was killed."""
+    """A reader that writes down what it gets, and continues there after it was killed."""
     from rigwatch.wire.bus.connection import connect
     from rigwatch.wire.delivery.sample_reader import SampleReader
     from rigwatch.wire.messages.message_types import Event

@@ -26,7 +26,7 @@ RATE = 256.0
 LARGEST = 40.0
 """Force that the drive gives before it saturates, divided by 1 + the strength [N]."""
 LIMIT = 1e6
-"""Share that stands for a plant that leaves the finite numbers."""
+"""Share that stands for a plant that diverges (NaN or infinite)."""
 STEPS = 64
 """Integration steps between two samples."""
 MASS, DAMPING, STIFFNESS = 0.8, 1.5, 60.0

@@ -102,7 +102,7 @@ class Rig:
         return self._sample - self._origin
 
     def restart_count(self) -> None:
-        """Calls the next sample number 0, device time 0; the motion goes on."""
+        """Calls the next sample number 0, device time 0; the motion continues."""
         self._origin = self._sample
 
     def set_effect(self, name: str, value: float, over_s: float = 0.0) -> None:

@@ -131,12 +131,12 @@ class ScenarioRun:
 
     @property
     def duration_s(self) -> float:
-        """Length of the scenario from t = 0 [s], infinite where it goes on for ever."""
+        """Length of the scenario from t = 0 [s], infinite where it continues for ever."""
         return self.scenario.duration_s
 
     @property
     def samples(self) -> int | None:
-        """Samples in the whole scenario, None where it goes on for ever."""
+        """Samples in the whole scenario, None where it continues for ever."""
         return None if math.isinf(self.duration_s) else round(self.duration_s * self._rate)
 
     def advance(self, n: int) -> RawSamples:

@@ -4,7 +4,7 @@
 
 The same for TCP and RTU, which differ in the `Registers` that is handed in. A poll that fails is
 counted and the samples stay in the device's ring for the next one; after several failures in a row
-the connection is made anew.
+the connection is made again.
 """
 
 import time

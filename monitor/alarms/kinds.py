@@ -116,7 +116,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "disk",
         "error",
         "the disk is full or nearly so; recording or journal may stop",
-        "Free space or mount another disk. Watching goes on; what is not recorded is counted.",
+        "Free space or mount another disk. Monitoring continues; what is not recorded is counted.",
         _AT_ONCE,
     ),
     AlarmKind(
@@ -169,7 +169,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "sensor_spike",
         "warning",
-        "the {channel} signal jumps as the sensor cannot have",
+        "the {channel} signal changes faster than the sensor can",
         "Look for a loose contact or electrical disturbance near the sensor's cable.",
         _SENSOR,
     ),

@@ -46,7 +46,7 @@ def wanted(command: AlarmCommand, alarms: Iterable[AlarmInstance]) -> list[Alarm
 def refusal(command: AlarmCommand, found: list[AlarmInstance]) -> str:
     """One plain line saying why nothing is done; "" where the command can be obeyed."""
     if not command.user:
-        return f"{command.action} of {command.name} refused: nobody is named as its user"
+        return f"{command.action} of {command.name} refused: no user given"
     if command.name == EVERY:
         return ""
     if not found:

@@ -67,7 +67,7 @@ from monitor.signals import (
 from monitor.signals import MODELLED as MODELLED_COLUMN
 from rigwatch.wire.arrays import FloatArray
 
-FINGERPRINT = "7c0221fe37c5"
+FINGERPRINT = "9ac5f8f8094a"
 """Of every source file whose code is compiled into `watch_block`."""
 
 

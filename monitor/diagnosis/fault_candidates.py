@@ -2,7 +2,7 @@
 
 The engine's score test, as in a study: what an effect at a port would do to the change, to first
 order along what was measured, is held against the change itself. p-values allow for residuals that
-hang together and for the number of candidates; effects whose directions are nearly parallel form a
+are correlated and for the number of candidates; effects whose directions are nearly parallel form a
 class, but for those that the samples make clearly worse. Nothing is fitted: a study says more.
 """
 

@@ -1,4 +1,4 @@
-"""How far the monitor has come, kept so that a killed monitor's successor goes on from there.
+"""How far the monitor has come, kept so that a killed monitor's successor continues from there.
 
 Twenty bytes in a file that is mapped into memory: boot, seq, CRC-32. Writing costs no system call,
 and the kernel keeps what was written when the process is killed.

@@ -1,4 +1,4 @@
-"""Takes wishes for another model while the monitor runs, and grants them between two samples."""
+"""Applies model-change requests while the monitor runs, between two samples."""
 
 import queue
 import threading
@@ -40,7 +40,7 @@ class ModelDesk:
     """One desk of one monitor.
 
     Args:
-        bus: where wishes come from.
+        bus: where requests come from.
         rig: what judges with the model.
         path: the model file.
     """
@@ -70,7 +70,7 @@ class ModelDesk:
         return found
 
     def close(self) -> None:
-        """Take no more wishes."""
+        """Accept no more requests."""
         self._close()
 
     def _take(self, question: bytes) -> list[bytes]:

@@ -9,7 +9,7 @@ what remains is the change of the residual
 
 with φ the place in the period, A and AM the averages of measured and modelled acceleration, s the
 amplitude scale. The average comes from the model file where that holds this very excitation, else
-from the first second of the run, and it goes on growing while the rig is plainly healthy.
+from the first second of the run, and it continues to grow while the rig is plainly healthy.
 
 An excitation that does not repeat has no such average; see `aperiodic.py`.
 

@@ -1,6 +1,6 @@
 """The feed drawn into one viewer, in a thread of its own: a viewer that hangs holds whoever draws.
 
-A drawer lives as long as its viewer. The next one goes on with the same facts, so that a verdict
+A drawer lives as long as its viewer. The next one continues with the same facts, so that a verdict
 survives the viewer in which it was shown.
 """
 

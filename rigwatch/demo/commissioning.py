@@ -28,7 +28,7 @@ RECORDINGS = {
 
 
 def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path:
-    """The model for the simulated rig of `config`, made anew where anything has changed.
+    """The model for the simulated rig of `config`, remade where anything has changed.
 
     Raises:
         ModelError: a step failed.

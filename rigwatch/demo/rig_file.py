@@ -55,7 +55,7 @@ def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
         dashboard=_free_dashboard(config.dashboard or DashboardSection(), viewer),
     )
     target = folder / NAME
-    # The time makes each run's file another one: the recorder goes on with the last session where
+    # The time makes each run's file another one: the recorder continues with the last session where
     # the configuration is the same.
     head = f"# Made by `rigwatch demo` from {source}, {time.strftime('%Y-%m-%d %H:%M:%S')}.\n"
     target.write_text(head + as_toml(msgspec.to_builtins(own)), encoding="utf-8")

@@ -2,7 +2,7 @@
 
     <recorder.folder>/<rig>-20260501T120000Z/000001.mcap, 000002.mcap, …
 
-A recorder that was killed and started again goes on in the same folder and asks the ring for what
+A recorder that was killed and started again continues in the same folder and asks the ring for what
 it missed.
 """
 

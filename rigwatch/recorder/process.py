@@ -30,7 +30,7 @@ class Recorder:
 
     Args:
         config: the rig's configuration.
-        run: stands at the head of every segment.
+        run: is written at the head of every segment.
         bus: where the messages are.
     """
 
@@ -100,7 +100,7 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event) -> 
 
 
 def describe_run(path: Path | str, config: RigConfig, notes: str = "") -> RunInfo:
-    """What stands at the head of a recording made with the configuration at `path`."""
+    """What is written at the head of a recording made with the configuration at `path`."""
     text = Path(path).read_text(encoding="utf-8")
     return run_info(
         config.rig.id,

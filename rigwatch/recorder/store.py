@@ -39,7 +39,7 @@ class Store:
 
     Args:
         folder: the session's folder, made with the first segment.
-        run: stands at the head of each segment.
+        run: is written at the head of each segment.
         segment: length of a segment [s].
         ram_bytes: memory for messages that wait [bytes].
 

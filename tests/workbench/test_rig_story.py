@@ -43,7 +43,7 @@ class Shell:
         self.running: list[subprocess.Popen[bytes]] = []
 
     def type(self, command: str) -> str:
-        """The command's output; empty where it goes on in the background."""
+        """The command's output; empty where it continues in the background."""
         words = command.replace("rigwatch ", f"{sys.executable} -m rigwatch ", 1)
         setting = {"cwd": self.folder, "env": {**os.environ, "PYTHONPATH": str(ROOT)}}
         if words.endswith("&"):

@@ -52,7 +52,7 @@ def add_span(parser: argparse.ArgumentParser) -> None:
     """Options `--start` and `--end`."""
     kind = "seconds from the first sample, or ISO time (UTC where it names no zone)"
     parser.add_argument("--start", metavar="TIME", help=f"first time that is kept: {kind}")
-    parser.add_argument("--end", metavar="TIME", help="first time that is not kept any more")
+    parser.add_argument("--end", metavar="TIME", help="end time (exclusive)")
 
 
 def span_of(arguments: argparse.Namespace, session: "Session") -> tuple[int | None, int | None]:

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--mapping",
         type=file_or_name("imports"),
         metavar="TOML",
-        help="file that says what is what, or the name of one that comes with rigwatch",
+        help="column mapping, or the name of one that comes with rigwatch",
     )
     parser.add_argument(
         "--map",

@@ -22,5 +22,5 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(line)
     else:
-        print(f"{arguments.study}: goes on with the recordings as they are now")
+        print(f"{arguments.study}: continues with the recordings as they are now")
     return 0

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rigwatch.commands.common import print_json
 
-HELP = "take the effect that was added last out of the model of a study"
+HELP = "remove the last effect from the model of a study"
 EXAMPLE = "  rigwatch undo emps"
 
 

@@ -2,8 +2,8 @@
 
 The undamaged structure's model runs beside the record. Where the residual is no noise any more,
 only data from there on are used (a fit to the whole record mixes two structures, thesis 4.6.1): the
-springs are ranked, the best is identified with unknown first states, and watching goes on with the
-changed model until the next damage.
+springs are ranked, the best is identified with unknown first states, and monitoring continues with
+the changed model until the next damage.
 """
 
 from collections.abc import Callable, Mapping

@@ -35,7 +35,7 @@ WORTH = 0.4
 CHANCE = float(chi2.isf(0.01, 1))
 """χ² by which the best may be better than another of its class."""
 SCREENING = 6
-"""Gauss-Newton steps that candidates get; the best goes on from there."""
+"""Gauss-Newton steps that candidates get; the best continues from there."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,7 +128,7 @@ class Stretch:
         return None
 
     def _lost(self, names: tuple[str, ...], now: FloatArray) -> Refit:
-        """What stands for a fit whose simulation leaves the finite numbers."""
+        """What stands for a fit whose simulation diverges (NaN or infinite)."""
         values = dict(zip(names, now.tolist(), strict=False))
         blank = np.zeros((0, len(self.model.candidates) + len(self.model.start())))
         unknown = dict.fromkeys(names, float("inf"))

@@ -48,7 +48,7 @@ class WholeRecord:
         if not np.isfinite(slopes).all():
             raise ModelError(
                 f"{self.problem.sweeper.compiled.system.model.name}: the simulation over the whole"
-                " record leaves the finite numbers; try other guesses"
+                " record diverges (NaN or infinite); try other guesses"
             )
         for turn in range(iterations):
             if turn >= PATIENCE and not self.consistent(errors):

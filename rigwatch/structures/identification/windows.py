@@ -91,7 +91,7 @@ class Windows:
     def refined(self, parameters: FloatArray, most: int, enough: float = ENOUGH) -> FloatArray:
         """Better values of the free parameters; all of them are given and returned, shape (n_p,).
 
-        What leaves the finite numbers, or does not lower the errors, is left as it was.
+        What diverges (NaN or infinite), or does not lower the errors, is left as it was.
         """
         free = self.problem.free
         now, errors, slopes = parameters, *self._run(parameters, self._initial)
@@ -151,7 +151,7 @@ class Windows:
         """The last linear problem at what `refined` returned, with its covariance.
 
         Raises:
-            ModelError: a window's trajectory leaves the finite numbers.
+            ModelError: a window's trajectory diverges (NaN or infinite).
         """
         errors, slopes = self._run(parameters, self._initial)
         if not np.isfinite(slopes).all():

@@ -343,7 +343,7 @@ class SampleOrder:
     def _set_back(self, front: Stream, seq: int) -> None:
         """The position lies behind the newest sample of the source: it was never right."""
         told = f"sample {front.next - 1} of boot {front.boot} lies beyond its newest, {seq - 1}"
-        self._out.append(Remark("error", POSITION_WRONG, f"{told}; reading goes on from there"))
+        self._out.append(Remark("error", POSITION_WRONG, f"{told}; reading continues from there"))
         self._lose(front.boot, seq, seq - 1, "the position to go on from was wrong")
         front.waiting.clear()
         front.samples_waiting = 0

@@ -1,8 +1,8 @@
 """Blocks of samples or estimates cut, joined and put in order, without touching a single value.
 
 A block holds consecutive samples `seq`, `seq + 1`, … of one boot of one device. Two blocks are
-joined only where the second goes on where the first ended and has the same columns; everything else
-stays apart.
+joined only where the second continues where the first ended and has the same columns; everything
+else stays apart.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

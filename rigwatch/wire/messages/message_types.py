@@ -234,7 +234,7 @@ class RunInfo:
 
 @dataclass(frozen=True, slots=True)
 class ModelChange:
-    """The monitor goes on with another model.
+    """The monitor continues with another model.
 
     Attributes:
         device, boot, seq: the first sample that is judged with it; seq 0 before any sample.

@@ -5,8 +5,8 @@
     records
 
 A chunk counts only if its two lengths agree and the checksum of its unpacked bytes is right. Where
-they do not, the search goes on at the next place that looks like a chunk, and the bytes between are
-reported. Records outside of chunks (indexes) are skipped, but none may hide a chunk whose opcode
+they do not, the search continues at the next place that looks like a chunk, and the bytes between
+are reported. Records outside of chunks (indexes) are skipped, but none may hide a chunk whose opcode
 was flipped.
 """
 

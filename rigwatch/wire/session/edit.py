@@ -123,7 +123,7 @@ def copy_messages(
 
     Args:
         messages: what is copied; descriptions of runs among them only where they are new.
-        run: stands at the head.
+        run: is written at the head.
         target: the file to be made.
         progress: called with the time of each message [ns].
 

@@ -116,8 +116,7 @@ def with_derived(columns: Columns, derive: Derive | None) -> Columns:
     for name, signal in derive.signals.items():
         if signal.channel not in columns.values:
             raise ModelError(
-                f"derive: found channel {signal.channel!r}, expected"
-                f" {nearest(signal.channel, columns.values)}"
+                f"derive: found channel {signal.channel!r}{nearest(signal.channel, columns.values)}"
             )
         raw = columns.values[signal.channel]
         smooth = sosfiltfilt(sections, bridged(raw))
@@ -214,8 +213,8 @@ def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:
         wanted = file.channels.get(name, signal.channel or name)
         if wanted not in table.values:
             raise ModelError(
-                f"{model.name}: found no channel {wanted!r} for {name}, expected"
-                f" {nearest(wanted, table.values)}"
+                f"{model.name}: found no channel {wanted!r} for {name}"
+                f"{nearest(wanted, table.values)}"
             )
         check_unit(
             table.units.get(wanted, ""), signal, f"channel {wanted!r}", f"{model.name}: {name}"

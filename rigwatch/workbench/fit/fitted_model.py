@@ -213,7 +213,7 @@ def fit_model(
         from_afar: whether `start` may be far from the truth, so that other starts are tried.
 
     Raises:
-        ModelError: an effect does not fit its port, or the simulation leaves the finite numbers.
+        ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
     """
     compiled = compile_system(compose(study.model, placements))
     horizon = data.horizon if study.model.states else len(data.train)

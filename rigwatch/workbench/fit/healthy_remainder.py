@@ -157,7 +157,7 @@ def _largest_states(fitted: Fitted) -> FloatArray:
 
 
 def _tried(study: Study, model: Model, both: Data, start: Mapping[str, float]) -> Fitted | None:
-    """A larger model's fit; None where it leaves the finite numbers."""
+    """A larger model's fit; None where it diverges (NaN or infinite)."""
     try:
         return _fit(study, model, both, start)
     except ModelError:

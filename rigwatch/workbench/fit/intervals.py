@@ -1,6 +1,6 @@
 """Intervals of parameters that stay honest where residuals are not white.
 
-A model that is wrong leaves residuals that hang together over many samples, and the textbook
+A model that is wrong leaves residuals that are autocorrelated over many samples, and the textbook
 covariance, which takes each for itself, promises too much. Here whole blocks are left out instead,
 one after the other (the delete-a-block jackknife: B. Efron, C. Stein, Annals of Statistics 9, 1981;
 as cluster-robust covariance "CR3": R. M. Bell, D. F. McCaffrey, Survey Methodology 28, 2002):

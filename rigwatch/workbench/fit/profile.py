@@ -6,7 +6,7 @@ where the squared error has risen by more than chance allows,
     Δ(Σ r²) = χ²(95 %, 1) · s² · swelling
 
 (D. Bates, D. Watts, Nonlinear Regression Analysis, 1988). The swelling is that of the jackknife's
-variance (`intervals.py`) over the textbook's, so that residuals may hang together here, too.
+variance (`intervals.py`) over the textbook's, so that residuals may be autocorrelated here, too.
 """
 
 from dataclasses import dataclass, replace

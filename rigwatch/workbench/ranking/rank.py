@@ -1,8 +1,8 @@
 """Ranks every effect at every port: scored along the fitted model, the best fitted and judged.
 
 The score test asks all candidates at once which of them the residual looks like, with what has been
-fitted already taken out. Its p-value allows for residuals that hang together, as those of a wrong
-model do, and is corrected for the number of candidates. The best are then fitted in full, and the
+fitted already taken out. Its p-value allows for autocorrelated residuals, as a wrong model leaves
+them, and is corrected for the number of candidates. The best are then fitted in full, and the
 recordings held out decide: an effect counts only if their error falls, block by block, by more
 than chance would do.
 """

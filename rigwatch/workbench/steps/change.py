@@ -170,7 +170,7 @@ def _port(study: Study, name: str, port: str | None) -> str:
             f"{name}: found {found} of the model's ports for it, expected one (--port)"
         )
     if port not in ports:
-        raise ModelError(f"{name}: found no port {port!r}, expected {nearest(port, ports)}")
+        raise ModelError(f"{name}: found no port {port!r}{nearest(port, ports)}")
     if port not in fitting:
         expected = ", ".join(fitting) or "another model"
         raise ModelError(f"{name}: cannot stand at port {port!r}, expected {expected}")

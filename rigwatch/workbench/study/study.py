@@ -216,7 +216,7 @@ class Study:
             ModelError: there is none; near matches are named.
         """
         if name not in self.effects:
-            raise ModelError(f"found no effect {name!r}, expected {nearest(name, self.effects)}")
+            raise ModelError(f"found no effect {name!r}{nearest(name, self.effects)}")
         return self.effects[name]
 
     def effect_at(self, name: str, port: str) -> Effect:
@@ -232,9 +232,9 @@ class Study:
 
 
 def nearest(name: str, known: Mapping[str, object]) -> str:
-    """Words for what `name` may have been meant to be."""
-    close = difflib.get_close_matches(name, known, 3, 0.5)
-    return f"perhaps {' or '.join(close)}" if close else f"one of {', '.join(sorted(known))}"
+    """The end of a sentence that found `name`: what may have been meant, or what there is."""
+    close = " or ".join(map(repr, difflib.get_close_matches(name, known, 3, 0.5)))
+    return f"; did you mean {close}?" if close else f", expected one of {', '.join(sorted(known))}"
 
 
 def open_study(folder: Path | str) -> Study:
@@ -305,7 +305,7 @@ def _model(folder: Path, name: str) -> Model:
         return model
     models = shipped_models()
     if name not in models:
-        raise ModelError(f"{folder / FILE}: found model {name!r}, expected {nearest(name, models)}")
+        raise ModelError(f"{folder / FILE}: found model {name!r}{nearest(name, models)}")
     return models[name]
 
 
@@ -317,7 +317,7 @@ def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
     """
     for name in (*file.hold, *file.late):
         if name not in model.inputs:
-            raise ModelError(f"hold: found input {name!r}, expected {nearest(name, model.inputs)}")
+            raise ModelError(f"hold: found input {name!r}{nearest(name, model.inputs)}")
     inputs, holds = {}, {}
     for name, own in model.inputs.items():
         hold, late = file.hold.get(name), file.late.get(name)

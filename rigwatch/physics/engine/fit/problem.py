@@ -248,7 +248,7 @@ class Problem:
         error, slopes = self._simulated(parameters, rows, best)
         if not (np.isfinite(slopes).all() and np.isfinite(error).all()):
             raise ModelError(
-                f"{self.system.model.name}: the simulation leaves the finite numbers;"
+                f"{self.system.model.name}: the simulation diverged (NaN or infinite);"
                 " try other starting values or more substeps"
             )
         if not self.system.states:

@@ -99,7 +99,7 @@ def fit(
         substeps: Runge-Kutta steps between samples, where nothing is stiff.
 
     Raises:
-        ModelError: the recording is too short, or the model leaves the finite numbers at the start.
+        ModelError: the recording is too short, or the model diverges at the start.
     """
     problem = Problem(compiled, recording, horizon, scale=scale, substeps=substeps, initial=initial)
     begin = compiled.parameters if start is None else start.copy()
@@ -140,7 +140,7 @@ def _smallest_error(problem: Problem, begin: FloatArray, theta: FloatArray) -> F
     except (ValueError, np.linalg.LinAlgError) as error:
         # Slopes that are finite may still be too large to be squared.
         raise ModelError(
-            f"{problem.system.model.name}: the search leaves the finite numbers;"
+            f"{problem.system.model.name}: the search diverged (NaN or infinite);"
             " try other starting values"
         ) from error
     return np.asarray(parameters(found.x)[problem.free])
@@ -212,7 +212,7 @@ def result_of(problem: Problem, found: Started) -> Fit:
     curvature = jacobian.T @ jacobian
     if not np.isfinite(curvature).all():
         raise ModelError(
-            f"{problem.system.model.name}: the slopes leave the finite numbers; try other"
+            f"{problem.system.model.name}: the sensitivities diverged (NaN or infinite); try other"
             " starting values"
         )
     outputs, m = problem.measured.shape[2], len(problem.free)

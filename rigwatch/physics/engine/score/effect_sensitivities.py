@@ -161,7 +161,7 @@ def _step(signal: FloatArray, substeps: int) -> FloatArray:
     """Change of a signal since a sample before, shape (windows, nodes)."""
     changed = np.zeros_like(signal)
     changed[:, substeps:] = signal[:, substeps:] - signal[:, :-substeps]
-    # What came before a window is not known: it goes on as it begins.
+    # What came before a window is not known: it continues as it begins.
     changed[:, :substeps] = changed[:, substeps : 2 * substeps][:, :substeps]
     return changed
 

@@ -1,6 +1,6 @@
 """How likely chance alone would make a candidate look as good as it does.
 
-Residuals hang together from sample to sample where a model is wrong, and the best of many
+Residuals are autocorrelated where a model is wrong, and the best of many
 candidates looks good without being so: the p-values of the score test allow for both.
 """
 
@@ -12,7 +12,7 @@ from rigwatch.wire.arrays import FloatArray
 
 
 def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> FloatArray:
-    """p-values of the scores where residuals hang together, corrected for all candidates.
+    """p-values of the scores where residuals are autocorrelated, corrected for all candidates.
 
     The variance of a sum of products of two series is larger than that of white noise by
     Σ_k ρr(k)·ρd(k) (M. S. Bartlett, 1946), with the autocorrelations ρ of the direction and of
