@@ -4,10 +4,10 @@
     chunk   := start u64 | end u64 | raw size u64 | CRC-32 u32 | "zstd" | size u64 | compressed
     records
 
-A chunk counts only if its two lengths agree and the checksum of its unpacked bytes is right. Where
-they do not, the search continues at the next place that looks like a chunk, and the bytes between
-are reported. Records outside of chunks (indexes) are skipped, but none may hide a chunk whose opcode
-was flipped.
+A chunk counts only if its two lengths agree and the checksum of its unpacked bytes is right.
+Where they do not, the search continues at the next place that looks like a chunk, and the bytes
+between are reported. Records outside of chunks (indexes) are skipped, but none may hide a chunk
+whose opcode was flipped.
 """
 
 import os

@@ -1,10 +1,11 @@
 """How inputs go on between samples, chosen from the data where neither model nor study says.
 
 A converter keeps what it was told until it is told again; a signal that was itself measured
-continues along a line. The one taken for the other is half a sample late, which looks like a slow sensor. So
-the model is fitted with each, and with inputs that are kept and change a part of a sample late, as
-those of a converter that is written to after the sensors were read. Another hold than a line needs
-an error that falls block by block beyond chance, on recordings held out where there are some.
+continues along a line. The one taken for the other is half a sample late, which looks like a slow
+sensor. So the model is fitted with each, and with inputs that are kept and change a part of a
+sample late, as those of a converter that is written to after the sensors were read. Another hold
+than a line needs an error that falls block by block beyond chance, on recordings held out where
+there are some.
 
 A healthy recording is asked where there is one: a fault cannot pass for a hold there.
 """

@@ -52,7 +52,7 @@ def place(  # noqa: PLR0917 -- a kernel
     """Inputs between one sample and the next, and the time until those that are kept change.
 
     An input whose `hold` is 1 continues along a line, one whose `hold` is 0 is kept; where `hold`
-    is -d it changes d of a sample late. A step that ends at a change is `inside` what was before it.
+    is -d it changes d of a sample late. A step that ends at a change is `inside` what was before.
     """
     us[u.shape[1]] = 0.0
     for j in range(u.shape[1]):
