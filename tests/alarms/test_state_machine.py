@@ -118,7 +118,7 @@ def test_the_operators_name_time_and_text_are_kept():
 @pytest.mark.parametrize(
     ("name", "action", "user", "why"),
     [
-        ("departure", "acknowledge", "", "nobody"),
+        ("departure", "acknowledge", "", "no user given"),
         ("departur", "acknowledge", "ann", "no such alarm"),
         ("departure", "unshelve", "ann", "not shelved"),
         ("link", "shelve", "ann", "critical"),

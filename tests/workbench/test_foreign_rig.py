@@ -86,6 +86,6 @@ def test_model_that_does_not_describe_the_healthy_rig_names_nothing() -> None:
 
     assert verdict.word == "model_inadequate"
     assert verdict.best is None
-    assert "times its noise" in verdict.text
+    assert "healthy recording" in verdict.text
     assert rows
     assert all(row.fitted is None for row in rows)

@@ -39,9 +39,14 @@ def test_one_effect_that_leaves_much_of_a_rough_model_is_not_named_with_confiden
     assert "leaves 2.00 times" in found.text
 
 
+def test_a_strong_effect_may_leave_more_as_it_changes_the_motion() -> None:
+    assert modest(left(28.0), [], FLOOR, naming(3.3)).word == "missing_effect"
+    assert modest(left(7.3), [], FLOOR, naming(2.0)).word == "undetermined"
+
+
 @pytest.mark.parametrize("found", [naming(1.3), naming(2.0, ("cubic_stiffness@load",))])
 def test_what_leaves_little_and_a_pair_stay_named(found: Verdict) -> None:
-    assert not leaves_much(FLOOR, found)
+    assert not leaves_much(left(4.0), FLOOR, found)
     assert modest(left(4.0), [], FLOOR, found).word == "missing_effect"
 
 

@@ -94,7 +94,9 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = believed(bench, rows)
     rough = bench.study.model.rough and bench.data.along_motion
-    much = verdict.word == "unknown_effect" or (rough and leaves_much(bench.floor, verdict))
+    much = verdict.word == "unknown_effect" or (
+        rough and leaves_much(bench.base, bench.floor, verdict)
+    )
     if much and verdict.best is not None:
         progress(f"{verdict.best.label} leaves much: trying two effects at once")
         verdict = two_effects(bench, rows, verdict, progress)
