@@ -1,0 +1,181 @@
+"""Issues and revokes certificates (X.509, ECDSA P-256), with the library `cryptography`.
+
+The common name of a certificate is `<name>.<serial>`: the router admits the common names that the
+register lists as valid, so that a revoked certificate is worth nothing when its name is issued
+again.
+"""
+
+import ipaddress
+import os
+import socket
+from collections.abc import Iterable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import msgspec
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from rigwatch.wire.bus import REGISTER, ROLES, Issued, Register, authority_file, key_files
+from rigwatch.wire.errors import KeysError
+
+AUTHORITY_KEY = "authority.key"
+AUTHORITY_DAYS, CERTIFICATE_DAYS = 3650, 730
+
+
+class Authority:
+    """The authority in a folder of keys.
+
+    Args:
+        folder: made by `create`.
+
+    Raises:
+        KeysError: there is none, or it cannot be read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        try:
+            self.register = msgspec.json.decode((folder / REGISTER).read_bytes(), type=Register)
+            self._certificate = x509.load_pem_x509_certificate(authority_file(folder).read_bytes())
+            key = serialization.load_pem_private_key((folder / AUTHORITY_KEY).read_bytes(), None)
+        except (OSError, ValueError, msgspec.MsgspecError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise KeysError(f"{folder}: no authority here: {reason}; `rigwatch keys new`") from None
+        assert isinstance(key, ec.EllipticCurvePrivateKey)
+        self._key = key
+
+    @classmethod
+    def create(cls, folder: Path, rig: str) -> "Authority":
+        """A new authority for `rig` in `folder`.
+
+        Raises:
+            KeysError: the folder holds one already, or cannot be written.
+        """
+        if (folder / REGISTER).exists():
+            raise KeysError(f"{folder}: holds an authority already, expected a new folder")
+        key = ec.generate_private_key(ec.SECP256R1())
+        name = _name(f"rigwatch authority of {rig}")
+        builder = _builder(name, name, key, AUTHORITY_DAYS)
+        builder = builder.add_extension(
+            x509.BasicConstraints(ca=True, path_length=0), critical=True
+        )
+        certificate = builder.sign(key, hashes.SHA256())
+        _write(folder, AUTHORITY_KEY, _private(key), secret=True)
+        _write(folder, authority_file(folder).name, _pem(certificate))
+        _write(folder, REGISTER, msgspec.json.encode(Register(rig, ())))
+        return cls(folder)
+
+    def issue(self, name: str, role: str, addresses: Iterable[str] = ()) -> Issued:
+        """A certificate for `name` in `role`; one that it had before is revoked.
+
+        Args:
+            name: such as "daq" or "ann".
+            role: one of `ROLES`.
+            addresses: further names or addresses of the router's machine.
+
+        Raises:
+            KeysError: the role is unknown, or the folder cannot be written.
+        """
+        if role not in ROLES:
+            raise KeysError(f"role: found {role!r}, expected one of {', '.join(ROLES)}")
+        if not name.replace("-", "").replace("_", "").isalnum():
+            raise KeysError(f"name: found {name!r}, expected letters, digits, - and _")
+        serial = 1 + max((one.serial for one in self.register.issued), default=0)
+        ends = datetime.now(UTC) + timedelta(days=CERTIFICATE_DAYS)
+        issued = Issued(name, role, serial, ends.strftime("%Y-%m-%d"))
+        key = ec.generate_private_key(ec.SECP256R1())
+        builder = _builder(
+            _name(issued.common_name), self._certificate.subject, key, CERTIFICATE_DAYS
+        )
+        builder = builder.add_extension(_alternative_names(role, addresses), critical=False)
+        usage = x509.ExtendedKeyUsage(
+            [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
+        )
+        certificate = builder.add_extension(usage, critical=False).sign(self._key, hashes.SHA256())
+        public, private = key_files(self.folder, name)
+        _write(self.folder, private.name, _private(key), secret=True)
+        _write(self.folder, public.name, _pem(certificate))
+        self._save((*self._without(name), issued))
+        return issued
+
+    def revoke(self, name: str) -> Issued:
+        """Take the certificate of `name` off the valid ones.
+
+        Raises:
+            KeysError: none is valid.
+        """
+        found = [one for one in self.register.issued if one.name == name and not one.revoked]
+        if not found:
+            raise KeysError(f"{name}: has no valid certificate in {self.folder}")
+        self._save(self._without(name))
+        return found[-1]
+
+    def _without(self, name: str) -> tuple[Issued, ...]:
+        return tuple(
+            msgspec.structs.replace(one, revoked=True) if one.name == name else one
+            for one in self.register.issued
+        )
+
+    def _save(self, issued: tuple[Issued, ...]) -> None:
+        self.register = Register(self.register.rig, issued)
+        _write(self.folder, REGISTER, msgspec.json.encode(self.register))
+
+
+def _name(text: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, text)])
+
+
+def _builder(
+    subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey, days: int
+) -> x509.CertificateBuilder:
+    now = datetime.now(UTC)
+    return (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(issuer)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(now - timedelta(hours=1))
+        .not_valid_after(now + timedelta(days=days))
+    )
+
+
+def _alternative_names(role: str, addresses: Iterable[str]) -> x509.SubjectAlternativeName:
+    local = ("localhost", "127.0.0.1", "::1", socket.gethostname()) if role == "router" else ()
+    found: list[x509.GeneralName] = []
+    for address in (*local, *addresses) or (role,):
+        try:
+            found.append(x509.IPAddress(ipaddress.ip_address(address)))
+        except ValueError:
+            found.append(x509.DNSName(address))
+    return x509.SubjectAlternativeName(found)
+
+
+def _pem(certificate: x509.Certificate) -> bytes:
+    return certificate.public_bytes(serialization.Encoding.PEM)
+
+
+def _private(key: ec.EllipticCurvePrivateKey) -> bytes:
+    return key.private_bytes(
+        serialization.Encoding.PEM,
+        serialization.PrivateFormat.PKCS8,
+        serialization.NoEncryption(),
+    )
+
+
+def _write(folder: Path, name: str, data: bytes, *, secret: bool = False) -> None:
+    """Write a file whole; one with a private key is readable by its owner only from the start."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        new = folder / f"{name}.new"
+        new.unlink(missing_ok=True)
+        mode = 0o600 if secret else 0o644
+        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        new.replace(folder / name)
+    except OSError as error:
+        raise KeysError(f"{folder / name}: cannot be written: {error.strerror}") from error

@@ -1,0 +1,40 @@
+"""Decides when people are notified of an alarm: at once, and again while nobody has seen it."""
+
+from rigwatch.wire.messages import Alarm
+from rigwatch.wire.rig_config import WitnessSection
+
+_SEVERITIES = ("info", "warning", "error", "critical")
+
+
+class Notices:
+    """The alarms that people know of; told the time, it reads no clock.
+
+    Args:
+        settings: section [witness].
+    """
+
+    def __init__(self, settings: WitnessSection) -> None:
+        self._settings = settings
+        self._lowest = _SEVERITIES.index(settings.notify_from)
+        self._unseen: dict[str, tuple[Alarm, float]] = {}
+
+    def hear(self, alarm: Alarm, now: float) -> list[Alarm]:
+        """What to notify people of, now that an alarm has changed; `now` in seconds."""
+        if _SEVERITIES.index(alarm.severity) < self._lowest:
+            return []
+        if alarm.state != "unacknowledged":
+            self._unseen.pop(alarm.name, None)
+            return []
+        known = alarm.name in self._unseen
+        self._unseen[alarm.name] = alarm, self._unseen[alarm.name][1] if known else now
+        return [] if known else [alarm]
+
+    def due(self, now: float) -> list[Alarm]:
+        """Alarms that nobody has acknowledged for so long that people are notified again."""
+        again = self._settings.repeat_minutes * 60.0
+        found = [
+            alarm for alarm, told in self._unseen.values() if again > 0 and now - told >= again
+        ]
+        for alarm in found:
+            self._unseen[alarm.name] = alarm, now
+        return found

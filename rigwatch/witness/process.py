@@ -1,0 +1,141 @@
+"""The witness as a process: looks ten times a second, and says what it sees.
+
+python -m rigwatch witness CONFIG
+"""
+
+import contextlib
+import json
+import math
+import os
+import subprocess
+import threading
+import time
+from dataclasses import asdict
+from pathlib import Path
+
+from rigwatch.wire.bus import Bus, connect, serve_alarm_list
+from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.messages import ALARMS, ESTIMATES, HEALTH, Alarm, AlarmState, Health
+from rigwatch.wire.rig_config import RigConfig, WitnessSection
+from rigwatch.witness.notices import Notices
+
+PROCESS = "witness"
+STALE = "monitor_stale"
+TURN = 0.1
+FOR_MONITOR = 30.0
+"""Time that a monitor may take until its first estimate [s]."""
+_NONE = float("nan")
+
+
+class Witness:
+    """One rig, watched from outside.
+
+    Args:
+        settings: section [witness].
+        bus: where the monitor speaks.
+        now: time on a monotonic clock [s].
+    """
+
+    def __init__(self, settings: WitnessSection, bus: Bus, now: float) -> None:
+        self.settings, self._bus = settings, bus
+        self._estimates = bus.overhear(ESTIMATES)
+        self._alarms = bus.listen(ALARMS)
+        self._notices = Notices(settings)
+        self._heard_at = now + max(0.0, FOR_MONITOR - settings.stale_after)
+        self._stale: Alarm | None = None
+        self._running: list[subprocess.Popen[bytes]] = []
+        self._told_at = now - 1.0
+        serve_alarm_list(bus, lambda: [self._stale] if self._stale else [])
+
+    def turn(self, now: float, t_ns: int) -> None:
+        """Look once; `now` is a monotonic clock's time [s], `t_ns` Unix time [ns]."""
+        if self._estimates.drain():
+            self._heard_at = now
+        silent = now - self._heard_at
+        self._judge(silent > self.settings.stale_after, silent, t_ns)
+        for alarm in self._alarms.drain():
+            self._notify(self._notices.hear(alarm, now))
+        self._notify(self._notices.due(now))
+        if now - self._told_at >= 1.0:
+            self._told_at = now
+            self._report(silent, t_ns)
+
+    def _judge(self, stale: bool, silent: float, t_ns: int) -> None:
+        if stale and self._stale is None:
+            self._stale = self._say("unacknowledged", f"for {silent:.1f} s", t_ns)
+        elif not stale and self._stale is not None:
+            self._say("cleared_unacknowledged", "estimates come again", t_ns)
+            self._stale = None
+
+    def _say(self, state: AlarmState, text: str, t_ns: int) -> Alarm:
+        alarm = Alarm(
+            STALE, state, "critical", f"the monitor sends no estimates: {text}",
+            "The rig is not being watched. Check the monitor's process and its last message, then "
+            "data acquisition and router.",
+            "", 0, -1, t_ns, _NONE, _NONE, _NONE, False, "", -1,
+        )  # fmt: skip
+        self._bus.publish(ALARMS, alarm)
+        return alarm
+
+    def _notify(self, alarms: list[Alarm]) -> None:
+        """Start the command for each alarm; nothing waits for it."""
+        self._running = [one for one in self._running if one.poll() is None]
+        for alarm in alarms if self.settings.notify else ():
+            with contextlib.suppress(OSError):
+                self._start(alarm)
+
+    def _start(self, alarm: Alarm) -> None:
+        fields = {
+            key: None if isinstance(value, float) and not math.isfinite(value) else value
+            for key, value in asdict(alarm).items()
+        }
+        started = subprocess.Popen(
+            [*self.settings.notify, alarm.name, alarm.severity, alarm.cause],
+            stdin=subprocess.PIPE,
+            env={**os.environ, "RIGWATCH_RIG": self._bus.rig},
+        )
+        assert started.stdin is not None
+        with contextlib.suppress(BrokenPipeError), started.stdin as pipe:
+            pipe.write(json.dumps(fields).encode())
+        self._running.append(started)
+
+    def _report(self, silent: float, t_ns: int) -> None:
+        state = STALE if self._stale else "running"
+        counters = {"estimates_silent_s": max(0.0, silent), "lost_alarms": float(self._alarms.lost)}
+        self._bus.publish(HEALTH, Health(PROCESS, t_ns, state, "", counters))
+        if self.settings.heartbeat_file and not self._stale:
+            self._beat(Path(self.settings.heartbeat_file), t_ns)
+
+    def _beat(self, path: Path, t_ns: int) -> None:
+        """A file whose age says how long ago the rig was last watched."""
+        new = path.with_name(f"{path.name}.new")
+        with contextlib.suppress(OSError):
+            new.write_text(f"{t_ns / 1e9:.3f} {self._bus.rig} running\n", encoding="utf-8")
+            new.replace(path)
+
+    def close(self) -> None:
+        """Leave the bus in order."""
+        self._alarms.close()
+        self._estimates.close()
+
+
+def run(config: RigConfig, stop: threading.Event) -> None:
+    """Witness the rig until `stop` is set.
+
+    Raises:
+        BusError: the bus cannot be joined.
+    """
+    bus = connect(config, PROCESS)
+    try:
+        witness = Witness(config.witness or WitnessSection(), bus, time.monotonic())
+        heartbeat = Heartbeat(PROCESS)
+        heartbeat.ready()
+        turns = 0
+        while not stop.wait(TURN):
+            witness.turn(time.monotonic(), time.time_ns())
+            turns += 1
+            heartbeat.advance(turns)
+        heartbeat.stopping()
+        witness.close()
+    finally:
+        bus.close()
