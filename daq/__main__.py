@@ -24,7 +24,7 @@ def acquire(config: RigConfig, adapter: Adapter, bus: Bus, stop: threading.Event
     """Acquire until `stop` is set.
 
     Raises:
-        DeviceBusyError: another process has the device.
+        DeviceBusyError: another process holds the device.
     """
     device = Supervisor(adapter)
     acquisition = Acquisition(config, adapter.clock_rate)
@@ -43,11 +43,11 @@ def acquire(config: RigConfig, adapter: Adapter, bus: Bus, stop: threading.Event
 
 
 def run(path: Path | str, stop: threading.Event) -> None:
-    """Acquire what the configuration at `path` says, until `stop` is set.
+    """Acquire as configured at `path`, until `stop` is set.
 
     Raises:
         ConfigError: the configuration is wrong.
-        DeviceError: the adapter is not installed, or another process has the device.
+        DeviceError: the adapter is not installed, or another process holds the device.
     """
     config = load_rig(path)
     adapter = adapter_for(config.daq.device, config.channels)

@@ -1,6 +1,6 @@
-"""Raw blocks to messages: counted, stamped, calibrated and judged. No bus or device inside.
+"""Turns raw blocks into messages: numbered, time-stamped, calibrated. No bus or device inside.
 
-What becomes of a block::
+The path of a block::
 
     RawBlock ─▶ SequenceTracker ─▶ DeviceClock ─▶ Conditioner ─▶ SampleBlock
                   └▶ Gap, Event      └▶ Event       └▶ quality ─▶ Watch ─▶ Health, Event
@@ -17,11 +17,11 @@ from rigwatch.wire.messages import Event, Gap, Message, SampleBlock, Severity
 from rigwatch.wire.rig_config import RigConfig
 
 LONGEST_BLOCK = 1024
-"""Samples in a block at most, so that no message grows beyond what the bus carries."""
+"""Most samples in a block, so that no message exceeds what the bus carries."""
 
 
 class Acquisition:
-    """One device's raw blocks to messages.
+    """Turns one device's raw blocks into messages.
 
     Args:
         config: the rig.
@@ -46,7 +46,7 @@ class Acquisition:
         self.watch = Watch(self.source, rate, config.daq.stale_after, clock_rate)
 
     def update(self, raw: RawBlock) -> list[Message]:
-        """The messages that `raw` means, in order: samples, and gaps and events between them."""
+        """The messages for `raw`, in order: samples, with gaps and events between them."""
         messages: list[Message] = []
         now_ns = int(raw.arrived_ns[-1]) if len(raw) else 0
         for step in self.tracker.accept(raw):
@@ -59,7 +59,7 @@ class Acquisition:
         return messages
 
     def tick(self, now_ns: int, link: Link, counters: Mapping[str, float]) -> list[Message]:
-        """What time alone brings: silence noticed, health once a second.
+        """Time-driven work: silence detection, and health once a second.
 
         Args:
             now_ns: the host's monotonic clock [ns].
@@ -77,7 +77,7 @@ class Acquisition:
         return [*stepped, *self.watch.tick(now_ns, self.clock.unix_ns(now_ns), link, figures)]
 
     def patience(self, now_ns: int) -> float:
-        """How long the device may be waited for before `tick` has to look again [s]."""
+        """Longest wait for the device before `tick` is due again [s]."""
         return self.watch.silent_in(now_ns)
 
     def _wall_clock_step(self, now_ns: int) -> list[Message]:

@@ -1,8 +1,8 @@
-"""What an adapter is: it turns a device into raw blocks and knows nothing of what becomes of them.
+"""The adapter protocol: an adapter turns a device into raw blocks and knows nothing of their use.
 
-An adapter's `read` waits for samples and returns them as they came: with wrapping counters, perhaps
-twice, perhaps with holes. Everything after that is the same for all devices (`acquisition.py`). An
-adapter raises `DeviceError` when the device has gone away and the supervisor opens it again.
+An adapter's `read` waits for samples and returns them as received: counters may wrap, samples may
+repeat or be missing. Everything after that is the same for all devices (`acquisition.py`). An
+adapter raises `DeviceError` when the device is gone, and the supervisor reopens it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,20 +18,20 @@ from rigwatch.wire.messages import ByteArray
 
 
 class DeviceBusyError(DeviceError):
-    """The device is there and another process has it."""
+    """Another process holds the device."""
 
 
 @dataclass(frozen=True, slots=True)
 class RawBlock:
-    """Samples of one boot in the order in which they came.
+    """Samples of one boot, in order of arrival.
 
     Attributes:
-        boot: drawn by the device at its start.
+        boot: random number that the device draws when it starts.
         seq: shape (n,), sample numbers; may wrap at 2³².
         device_us: shape (n,), the device's clock [µs]; may wrap at 2³².
         codes: shape (n, channels), raw codes, or SI values where `calibrated`.
-        arrived_ns: shape (n,), host's monotonic clock when each was complete [ns].
-        calibrated: `codes` are SI values already, as in a recording.
+        arrived_ns: shape (n,), host's monotonic clock when each sample was complete [ns].
+        calibrated: whether `codes` are SI values already, as in a recording.
         quality: shape (n, channels), flags of a recording; empty where there are none.
     """
 
@@ -48,10 +48,10 @@ class RawBlock:
 
 
 class Adapter(Protocol):
-    """One device. Opened, read, and after an error closed and opened again.
+    """One device: opened, read, and after an error closed and reopened.
 
     Attributes:
-        clock_rate: device microseconds in a microsecond of the host; 1 but for replays.
+        clock_rate: device microseconds per host microsecond; 1 except in replays.
     """
 
     clock_rate: float
@@ -60,26 +60,26 @@ class Adapter(Protocol):
         """Open the device.
 
         Raises:
-            DeviceError: it is not there, in use, or not what the configuration says.
+            DeviceError: it is absent, in use, or not what the configuration says.
         """
 
     def read(self, timeout: float) -> Sequence[RawBlock]:
-        """Samples that are there, or that come within `timeout` [s]; none where none came.
+        """Samples available now or within `timeout` [s]; an empty list if there are none.
 
         Raises:
-            DeviceError: the device has gone away.
-            ModbusError: it answers, but not as it should.
+            DeviceError: the device is gone.
+            ModbusError: it answers wrongly.
         """
 
     def close(self) -> None:
-        """Close the device; harmless when it is closed."""
+        """Close the device; does nothing if it is closed."""
 
     def counters(self) -> Mapping[str, float]:
-        """Figures since the adapter was made, such as `crc_errors`, for the health message."""
+        """Counters since the adapter was created, such as `crc_errors`, for the health message."""
 
 
 def picked(raw: RawBlock, index: Sequence[int] | slice) -> RawBlock:
-    """Some of a block's samples, in order."""
+    """A selection of a block's samples, in order."""
     if not isinstance(index, slice) and len(index) == len(raw):
         return raw
     span = index if isinstance(index, slice) else list(index)

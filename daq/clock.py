@@ -1,12 +1,11 @@
-"""The device's clock on the host's: which Unix time a sample has, from its device microseconds.
+"""Maps the device's clock to Unix time, from each sample's device microseconds.
 
     t = origin + (us - us0)·1000·(1 + drift) + offset
 
-A sample arrives late by what the line and the host take, never early. So of every quarter second
-the least late sample counts, and through those of the last minute a line is laid by the median of
-slopes (after Theil and Sen), which does not care about the seconds in which the host slept. A jump
-of the device's clock shows within one sample: its microseconds move otherwise than its sample
-numbers, and the host's clock disagrees as well.
+Line and host delay a sample, and never make it early. So the least delayed sample of every quarter
+second counts, and a line is fitted through those of the last minute by the median of slopes (Theil
+and Sen), which ignores the seconds in which the host slept. A jump of the device's clock shows
+within one sample: its microseconds disagree with its sample numbers and with the host's clock.
 """
 
 import time
@@ -31,12 +30,12 @@ class DeviceClock:
 
     Args:
         rate: nominal sample rate [Hz].
-        clock_rate: device microseconds in a microsecond of the host, other than 1 in a replay.
+        clock_rate: device microseconds per host microsecond; not 1 in a replay.
         unix_minus_monotonic_ns: difference of the host's two clocks at the start.
 
     Attributes:
         drift_ppm: how much faster the device's clock runs than the host's [1e-6]; 0 for the first
-            20 s, in which late arrivals would be taken for drift.
+            20 s, when late arrivals would look like drift.
         jumps: jumps of the device's clock so far.
     """
 
@@ -53,14 +52,14 @@ class DeviceClock:
         self.restart()
 
     def restart(self) -> None:
-        """Forget the device's clock, as after it started anew; time still only goes forward."""
+        """Forget the device's clock, as after a restart; time still only moves forward."""
         self._bins: deque[tuple[float, float]] = deque(maxlen=_BINS)
         self._anchor: tuple[int, int] | None = None
         self._slope, self._offset, self._centre = 0.0, 0.0, 0.0
         self._last = None
 
     def stamp(self, run: RawBlock) -> tuple[IntArray, float]:
-        """Unix time of each sample of `run` [ns], and the last jump of its clock in it [s].
+        """Unix time of each sample of `run` [ns], and its last clock jump [s].
 
         `run` holds consecutive samples, unwrapped, of one boot.
         """
@@ -79,9 +78,9 @@ class DeviceClock:
         return np.array(stamps, np.int64), jump
 
     def follow(self, unix_minus_monotonic_ns: int) -> float:
-        """How far the host's wall clock was stepped since last asked [s], 0 where it was not.
+        """Step of the host's wall clock since the last call [s], 0 if there was none.
 
-        A step forward is followed. A step back is not: time in a recording only goes forward.
+        A step forward is followed. A step back is not: time in a recording only moves forward.
         """
         step = unix_minus_monotonic_ns - self._wall_ns
         if abs(step) < _WALL_STEP_NS:
@@ -102,7 +101,7 @@ class DeviceClock:
         return ns0 + round(relative * self._ns_per_us + late)
 
     def _jump(self, seq: int, us: int, arrived: int) -> float:
-        """Jump of the device's clock before this sample [s], 0 where there was none."""
+        """Jump of the device's clock before this sample [s], 0 if there was none."""
         if self._last is None:
             return 0.0
         last_seq, last_us = self._last
@@ -129,7 +128,7 @@ class DeviceClock:
             self._offset = min(late for _, late in self._bins)
 
     def _fit(self) -> None:
-        """Lay the line anew; the newest quarter second has only begun and does not count yet."""
+        """Refit the line; the newest, unfinished quarter second does not count yet."""
         if len(self._bins) <= _BINS_FOR_LINE:
             return
         relative, late = np.array(self._bins)[:-1].T

@@ -1,14 +1,13 @@
-"""Raw codes to calibrated samples with quality flags, one sample after the other.
+"""Turns raw codes into calibrated samples with quality flags, sample by sample.
 
-    saturated    a rail of the converter for the third sample running, or outside the sensor's range
-    stuck        the same code for `stuck_after` samples while every other channel moves
-    spike        further from the last good sample than the sensor can have moved
-    non-finite   NaN or infinite; the last good value is held in its place
+    saturated    at a converter rail for three samples in a row, or outside the sensor's range
+    stuck        constant code for `stuck_after` samples while every other channel moves
+    spike        further from the last good sample than the sensor can move
+    non-finite   NaN or infinite; replaced by the last good value
 
-What is decided about a sample depends on it and on those before it, never on how they were cut into
-blocks. A channel "moves" when its code has gone at least a thousandth of the converter's range
-within the same time: all others must, so that a mass that friction holds still is not taken for a
-dead sensor.
+A decision about a sample depends on it and the samples before it, never on the cut into blocks. A
+channel "moves" when its code changes by at least a thousandth of the converter's range within the
+same time. All others must move, so that a mass held by friction is not mistaken for a dead sensor.
 """
 
 from collections.abc import Sequence
@@ -41,7 +40,7 @@ _STATE = np.dtype(
 
 
 class Conditioner:
-    """Calibrates and judges the samples of one device.
+    """Calibrates and flags the samples of one device.
 
     Args:
         channels: the device's channels, in the order of its codes.
@@ -78,7 +77,7 @@ class Conditioner:
         return SampleBlock(self._device, raw.boot, int(raw.seq[0]), raw.device_us, t_ns, columns)
 
     def _compile(self) -> None:
-        """Have the kernels ready before the first sample comes."""
+        """Compile the kernels before the first sample arrives."""
         none = np.zeros((0, len(self._channels)))
         for calibrated in (False, True):
             no_numbers = np.zeros(0, np.int64)
@@ -109,7 +108,7 @@ def _hold_last(values, flags, state):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _follow(code, moves, s):  # type: ignore[no-untyped-def]
-    """Take note of how long a channel's code has been the same, and since when it has not moved."""
+    """Track how long a channel's code has been constant, and how long it has not moved."""
     s.equal = s.equal + 1 if code == s.code else 1
     s.code = code
     s.since_move += 1

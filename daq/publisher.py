@@ -1,4 +1,4 @@
-"""Messages onto the bus and samples into the ring; never waits for a reader."""
+"""Publishes messages on the bus and keeps samples in the ring; never waits for a reader."""
 
 from collections.abc import Iterable
 
@@ -26,11 +26,11 @@ _TOPICS: dict[type[Message], Topic] = {
 
 
 class Publisher:
-    """Says what the acquisition has to say.
+    """Publishes the acquisition's messages.
 
     Args:
-        bus: where it is said.
-        ring: where samples are kept, served on the bus.
+        bus: the bus.
+        ring: holds samples and serves them on the bus.
     """
 
     def __init__(self, bus: Bus, ring: SampleRing) -> None:
@@ -38,7 +38,7 @@ class Publisher:
         self._ring = ring
 
     def publish(self, messages: Iterable[Message]) -> None:
-        """Publish messages in order; samples go into the ring first, to be there when asked for."""
+        """Publish messages in order; samples go into the ring first, ready for queries."""
         for message in messages:
             if isinstance(message, SampleBlock):
                 self._ring.add(message)

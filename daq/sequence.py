@@ -1,8 +1,8 @@
-"""Sample numbers of a device: every sample is delivered once, or counted.
+"""Sequence numbers of a device: every sample is delivered once, or counted as lost.
 
-Counters of 32 bits are unwrapped, repeated samples dropped and counted, holes told exactly, and a
-device that starts anew is recognised by its boot, or where it keeps that, by a count that went back
-while its clock did not say so.
+32-bit counters are unwrapped, repeated samples dropped and counted, and gaps reported exactly. A
+restarted device is recognised by its boot number or, if it keeps that, by a counter that goes back
+although its clock does not.
 """
 
 import zlib
@@ -14,17 +14,17 @@ from daq.adapter import RawBlock, picked
 
 _U32 = 1 << 32
 _REPEATS = 1024
-"""A sample at most so far behind the newest may be a repetition; farther back is a new count."""
+"""A sample at most this far behind the newest may be a repeat; farther back is a new count."""
 _LONG_HOLE = 1024
-"""From so many missing samples on, the device's clock must agree that so much time has passed."""
+"""From this many missing samples on, the device's clock must confirm the elapsed time."""
 
 _REPEATS_IN_A_ROW = 64
-"""More repetitions than these, one after the other, are a new count."""
+"""More repeats than this in a row mean a new count."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hole:
-    """Samples `first` to `last` of `boot` never came; `last` < `first` where nobody can say."""
+    """Samples `first` to `last` of `boot` are missing; `last` < `first` if unknown."""
 
     boot: int
     first: int
@@ -33,7 +33,7 @@ class Hole:
 
 @dataclass(frozen=True, slots=True)
 class Restart:
-    """The device began a new count: samples carry `boot` from now on."""
+    """The device started a new count: samples carry `boot` from now on."""
 
     boot: int
     before: int
@@ -42,17 +42,17 @@ class Restart:
 
 Step = RawBlock | Hole | Restart
 _REPEATED: list[Step] = []
-"""Says that a sample has come before; told apart by identity from "nothing to say"."""
+"""Marks a sample as a repeat; compared by identity, distinct from "nothing to report"."""
 
 
 class SequenceTracker:
-    """Raw blocks in any state to runs of consecutive, unwrapped samples, with holes told.
+    """Turns raw blocks into runs of consecutive, unwrapped samples, and reports gaps.
 
     Args:
         rate: nominal sample rate [Hz].
 
     Attributes:
-        duplicates: samples dropped because they had come before.
+        duplicates: samples dropped as repeats.
         lost: samples known to be lost.
     """
 
@@ -69,7 +69,7 @@ class SequenceTracker:
         self._repeats = 0
 
     def accept(self, raw: RawBlock) -> list[Step]:
-        """The steps that `raw` means, in order: runs, and between them holes and restarts."""
+        """The steps in `raw`, in order: runs, with gaps and restarts between them."""
         steps: list[Step] = []
         run = _Run(self._boot)
         rows = zip(raw.seq.tolist(), raw.device_us.tolist(), raw.arrived_ns.tolist(), strict=True)
@@ -85,7 +85,7 @@ class SequenceTracker:
         return steps + run.of(raw)
 
     def _place(self, boot: int, seq: int, us: int, arrived: int) -> list[Step]:
-        """Take one sample in; what has to be said before it, or `_REPEATED`."""
+        """Add one sample; what is reported before it, or `_REPEATED`."""
         if boot != self._device_boot:
             reason = "the device has started anew" if self._device_boot is not None else ""
             return self._begin(boot, seq, us, arrived, reason)
@@ -117,7 +117,7 @@ class SequenceTracker:
         return 0.2 * expected < later_us < 5.0 * expected
 
     def _begin(self, boot: int, seq: int, us: int, arrived: int, reason: str) -> list[Step]:
-        """Start a new count; where the device kept its boot, the samples get one made from it."""
+        """Start a new count; if the device kept its boot, derive a new one from it."""
         before, first, last = self._boot, self._seq + 1, self._seq
         self._recounts = self._recounts + 1 if boot == self._device_boot else 0
         self._device_boot, self._seq, self._us, self._arrived = boot, seq, us, arrived
@@ -129,7 +129,7 @@ class SequenceTracker:
 
 
 class _Run:
-    """Samples of one block that follow each other."""
+    """Consecutive samples of one block."""
 
     def __init__(self, boot: int) -> None:
         self._boot = boot
@@ -143,7 +143,7 @@ class _Run:
         self._us.append(us)
 
     def of(self, raw: RawBlock) -> list[Step]:
-        """The run as a block, none where it is empty."""
+        """The run as a block, or nothing if it is empty."""
         if not self._index:
             return []
         kept = picked(raw, self._index)
@@ -152,5 +152,5 @@ class _Run:
 
 
 def _signed(difference: int) -> int:
-    """A difference of two counters of 32 bits, of which either may have wrapped."""
+    """The difference of two 32-bit counters, either of which may have wrapped."""
     return (difference + _U32 // 2) % _U32 - _U32 // 2

@@ -1,6 +1,6 @@
-"""Keeps an adapter open: after an error it is closed and opened again, for as long as it takes.
+"""Keeps an adapter open: after an error it is closed and reopened, for as long as it takes.
 
-Waits between attempts grow from 50 ms to one second, and start short again once samples have come.
+The wait between attempts grows from 50 ms to one second, and resets once samples arrive.
 """
 
 import time
@@ -15,18 +15,18 @@ _LONGEST_WAIT = 1.0
 
 
 class Supervisor:
-    """An adapter that comes back by itself.
+    """An adapter that reconnects by itself.
 
     Args:
-        adapter: opened and closed here.
+        adapter: opened and closed by this object.
         clock: monotonic time [s].
-        sleep: waits some seconds.
+        sleep: waits for a number of seconds.
 
     Attributes:
         connected: whether the device is open.
-        text: what is wrong, empty where nothing is.
-        reconnects: times that it was opened again after a loss.
-        losses: times that it was lost.
+        text: what is wrong, empty if nothing is.
+        reconnects: how often it was reopened after a loss.
+        losses: how often it was lost.
     """
 
     def __init__(
@@ -48,14 +48,14 @@ class Supervisor:
 
     @property
     def link(self) -> Link:
-        """The connection as the watch wants to know it."""
+        """The connection as the watch needs it."""
         return Link(self.connected, self.text, self.reconnects)
 
     def start(self) -> None:
-        """Open the device for the first time; one that is absent is waited for in `read`.
+        """Open the device for the first time; `read` waits for an absent one.
 
         Raises:
-            DeviceBusyError: another process has it: two readers would share its bytes.
+            DeviceBusyError: another process has it: two readers would split its bytes.
         """
         try:
             self._open()
@@ -65,7 +65,7 @@ class Supervisor:
             self._lose(error)
 
     def read(self, timeout: float) -> Sequence[RawBlock]:
-        """What the adapter reads; none while the device is away. Waits up to `timeout` [s]."""
+        """What the adapter reads; empty while the device is gone. Waits up to `timeout` [s]."""
         try:
             if not self.connected and not self._reopen(timeout):
                 return ()

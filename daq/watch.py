@@ -1,10 +1,10 @@
-"""How the device is doing: rates, silence, quality and plausibility, said as health and events.
+"""Device health: rates, silence, quality and plausibility, published as health and events.
 
-`state` is the first of these that holds:
+`state` is the first of these that applies:
 
-    reconnecting   the device is not open, or open again and nothing has come yet
-    starting       open, nothing has come yet
-    garbage        more than 1 % of the bytes of the last second belonged to no frame
+    reconnecting   the device is not open, or reopened and nothing has arrived yet
+    starting       open, nothing has arrived yet
+    garbage        more than 1 % of the bytes of the last second belong to no frame
     stale          no sample for `stale_after`
     slow           fewer than 90 % of the nominal rate over the last hundred samples
     running
@@ -36,7 +36,7 @@ _STATE_EVENTS: dict[str, tuple[Severity, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """The connection: whether it stands, what is wrong with it, how often it came back."""
+    """The connection: whether it is up, what is wrong with it, how often it was re-established."""
 
     connected: bool
     text: str = ""
@@ -44,12 +44,12 @@ class Link:
 
 
 class Watch:
-    """Watches the stream of one device.
+    """Monitors the stream of one device.
 
     Args:
-        source: who speaks, such as "daq/rig".
+        source: name of the sender, such as "daq/rig".
         rate: nominal sample rate [Hz].
-        stale_after: silence that means stale [s].
+        stale_after: silence after which the device counts as stale [s].
         clock_rate: how much faster than real time a replay runs.
     """
 
@@ -76,7 +76,7 @@ class Watch:
         self._outside: dict[str, int] = {}
 
     def saw(self, block: SampleBlock, arrived_ns: int) -> None:
-        """Take note of samples that are published."""
+        """Count published samples."""
         if self._first_ns is None:
             self._first_ns, self._first_samples = arrived_ns, len(block)
         self._last_ns = arrived_ns
@@ -90,7 +90,7 @@ class Watch:
         self._samples += len(block)
 
     def silent_in(self, now_ns: int) -> float:
-        """Time until silence would mean stale [s], never below a millisecond."""
+        """Time until the device counts as stale [s], at least a millisecond."""
         if self._last_ns is None or self.state == "stale":
             return 0.05
         return float(min(max((self._last_ns + self._stale_ns - now_ns) / _SECOND, 1e-3), 0.05))
@@ -98,7 +98,7 @@ class Watch:
     def tick(
         self, now_ns: int, unix_ns: int, link: Link, counters: Mapping[str, float]
     ) -> list[Message]:
-        """Events of what changed; the health where a second is over or the state changed."""
+        """Events for what changed; health once a second and when the state changes."""
         messages: list[Message] = []
         second_over = self._second_ns is None or now_ns - self._second_ns >= _SECOND
         if second_over:

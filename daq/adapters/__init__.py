@@ -1,4 +1,4 @@
-"""Adapters: devices that samples are read from, found by name through entry points."""
+"""Adapters: the devices that samples are read from, found by name through entry points."""
 
 from daq.adapters.registry import adapter_for, known
 

@@ -1,7 +1,7 @@
 """Input registers through pymodbus, over TCP or a serial line.
 
-pymodbus takes a reply that is too short for good and hides a silent device behind retries: here
-lengths are checked, nothing is retried and every wait has an end.
+pymodbus accepts a reply that is too short and hides a silent device behind retries: here lengths
+are checked, nothing is retried and every wait has a timeout.
 """
 
 import contextlib
@@ -40,7 +40,7 @@ class PymodbusRegisters:
     """Input registers of one unit.
 
     Args:
-        make: makes and opens a client; `DeviceError` where that fails.
+        make: makes and opens a client; raises `DeviceError` if that fails.
         unit: unit id.
         where: names the device in errors.
     """
@@ -55,7 +55,7 @@ class PymodbusRegisters:
         """Connect.
 
         Raises:
-            DeviceError: nobody answers there.
+            DeviceError: no answer at that address.
         """
         self.close()
         self._client = self._make()
@@ -64,8 +64,8 @@ class PymodbusRegisters:
         """`count` registers from `address`.
 
         Raises:
-            RefusedError: exception codes that mean a wrong configuration.
-            ModbusError: no answer in time, a short one, or exception codes 5 and 6.
+            RefusedError: exception codes that point to a wrong configuration.
+            ModbusError: no answer in time, a short answer, or exception codes 5 and 6.
             DeviceError: the connection is gone.
         """
         if self._client is None:
@@ -79,7 +79,7 @@ class PymodbusRegisters:
         except (OSError, serial.SerialException) as error:
             raise DeviceError(f"{self._where}: {error}") from error
         except Exception as error:
-            # Replies cut short or garbled make pymodbus's decoders raise whatever they meet.
+            # Replies cut short or garbled make pymodbus's decoders raise arbitrary exceptions.
             raise ModbusError(f"{self._where}: an answer that cannot be decoded") from error
         self._check(reply, count)
         return list(reply.registers)
@@ -102,17 +102,17 @@ class PymodbusRegisters:
 
 
 class _RtuClient(ModbusSerialClient):
-    """A serial client that waits for bytes instead of looking for them every millisecond."""
+    """A serial client that waits for bytes instead of polling every millisecond."""
 
     def open_port(self) -> None:
-        """Open the port for this process alone; errors are the operating system's."""
+        """Open the port exclusively; errors are the operating system's."""
         params = self.comm_params
         self.socket = serial.Serial(
             params.host, params.baudrate, timeout=params.timeout_connect, exclusive=True
         )
 
     def recv(self, size: int | None) -> bytes:
-        """The bytes that are there or come in time, none where none come."""
+        """The bytes available now or before the timeout; empty if there are none."""
         if self.socket is None:
             raise ConnectionException(str(self))
         try:

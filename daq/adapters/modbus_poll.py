@@ -1,10 +1,10 @@
-"""Polling a Modbus device: header, then the slots that have not been read yet.
+"""Polls a Modbus device: the header, then the slots not read yet.
 
     32 times a second:  header ─▶ how many samples are new ─▶ their slots ─▶ RawBlock
 
-The same for TCP and RTU, which differ in the `Registers` that is handed in. A poll that fails is
-counted and the samples stay in the device's ring for the next one; after several failures in a row
-the connection is made again.
+The same for TCP and RTU, which differ in the `Registers` passed in. A failed poll is counted, and
+its samples stay in the device's ring for the next one; after several failures in a row the client
+reconnects.
 """
 
 import time
@@ -20,7 +20,7 @@ from rigwatch.wire.errors import DeviceError, ModbusError
 
 _FAILURES = 3
 _MARGIN = 8
-"""Slots nearest to being overwritten that are not read any more."""
+"""Slots about to be overwritten, which are no longer read."""
 _U32 = 1 << 32
 
 
@@ -28,29 +28,29 @@ class Registers(Protocol):
     """Input registers of one unit."""
 
     def open(self) -> None:
-        """Connect; `DeviceError` where that fails."""
+        """Connect; raises `DeviceError` if that fails."""
 
     def read(self, address: int, count: int) -> list[int]:
-        """`count` registers; `ModbusError` with its cause, `DeviceError` when the link is gone."""
+        """`count` registers; raises `ModbusError`, or `DeviceError` if the link is gone."""
 
     def close(self) -> None:
-        """Close; harmless when closed."""
+        """Close; does nothing if closed."""
 
 
 class RefusedError(ModbusError):
-    """The device answers with an exception code that no repetition cures."""
+    """The device answers with an exception code that retrying does not cure."""
 
 
 class ModbusAdapter:
-    """Buffered samples of a Modbus device.
+    """Reads the buffered samples of a Modbus device.
 
     Args:
         registers: the device.
-        channels: how many channels it must have.
-        polls: polls a second.
-        order: which half of a 32-bit value comes first.
+        channels: number of channels it must have.
+        polls: polls per second.
+        order: which 16-bit half of a 32-bit value comes first.
         clock: monotonic time [ns].
-        sleep: waits some seconds.
+        sleep: waits for a number of seconds.
     """
 
     clock_rate = 1.0
@@ -82,7 +82,7 @@ class ModbusAdapter:
         """Connect, and check identification, word order and channels.
 
         Raises:
-            DeviceError: it cannot be reached.
+            DeviceError: the device cannot be reached.
             ModbusError: it is not what the configuration says.
         """
         self._registers.open()
@@ -91,7 +91,7 @@ class ModbusAdapter:
         self._header()
 
     def read(self, timeout: float) -> Sequence[RawBlock]:
-        """The samples that are new at the next poll, if that is due within `timeout` [s].
+        """The new samples at the next poll, if it is due within `timeout` [s].
 
         Raises:
             DeviceError: the link is gone, or several polls in a row failed.
@@ -118,7 +118,7 @@ class ModbusAdapter:
         self._registers.close()
 
     def counters(self) -> Mapping[str, float]:
-        """Polls, and how many of them failed."""
+        """Number of polls, and of failed polls."""
         return dict(self._counts)
 
     def _count_failure(self, error: ModbusError) -> None:
@@ -147,7 +147,7 @@ class ModbusAdapter:
         return blocks
 
     def _new(self, header: Header) -> int:
-        """Samples to be read, from `_next_seq` on."""
+        """Samples to read, from `_next_seq` on."""
         if self._boot is None:
             self._next_seq = (header.samples - min(header.samples, 1)) % _U32
         elif header.boot != self._boot:

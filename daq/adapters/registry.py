@@ -1,7 +1,7 @@
-"""The adapters that come with rigwatch, and how others are found.
+"""Finds adapters: those shipped with rigwatch and those that other packages register.
 
-Adapters are entry points in the group `rigwatch.adapters`; the ones here are registered there like
-those of anybody else. An entry point names a callable `factory(section, channels) -> Adapter`.
+Adapters are entry points in the group `rigwatch.adapters`; the built-in ones are registered there
+like any other. An entry point names a callable `factory(section, channels) -> Adapter`.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ Factory = Callable[[Any, tuple[ChannelSection, ...]], Adapter]
 
 
 def adapter_for(section: DeviceSection, channels: tuple[ChannelSection, ...]) -> Adapter:
-    """The adapter that `section` asks for, not yet opened.
+    """The adapter that `section` names, not opened yet.
 
     Raises:
         DeviceError: no adapter has that name, or it cannot be loaded.
@@ -28,7 +28,7 @@ def adapter_for(section: DeviceSection, channels: tuple[ChannelSection, ...]) ->
 
 
 def known() -> dict[str, EntryPoint]:
-    """Every adapter that is installed, by name."""
+    """Every installed adapter, by name."""
     return {point.name: point for point in entry_points(group=GROUP)}
 
 

@@ -1,7 +1,7 @@
-"""A recorded session in place of a device, at any speed.
+"""Plays a recorded session in place of a device, at any speed.
 
-Samples come when they are due by the recording's own clock, calibrated and judged as they were
-recorded. Their numbers are those of the recording; each turn of a loop has a boot of its own.
+Samples arrive when they are due by the recording's clock, calibrated and flagged as recorded. They
+keep their recorded sequence numbers; each pass of a loop is a boot of its own.
 """
 
 import math
@@ -25,10 +25,10 @@ class ReplayAdapter:
     Args:
         session: file or folder.
         channels: the channels to deliver, by name, in this order.
-        speed: times real time.
-        loop: begin again at the end.
+        speed: multiple of real time.
+        loop: start over at the end.
         clock: monotonic time [ns].
-        sleep: waits some seconds.
+        sleep: waits for a number of seconds.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class ReplayAdapter:
         self._played = 0
 
     def open(self) -> None:
-        """Begin at the session's first sample.
+        """Start at the session's first sample.
 
         Raises:
             DeviceError: there is no such session, or it holds no samples.
@@ -67,7 +67,7 @@ class ReplayAdapter:
         self._start_ns, self._start_us = self._clock(), int(self._rest.device_us[0])
 
     def read(self, timeout: float) -> Sequence[RawBlock]:
-        """The samples that are due, or become due within `timeout` [s].
+        """The samples due now or within `timeout` [s].
 
         Raises:
             DeviceError: the session lacks a channel or has it in another unit.
@@ -93,7 +93,7 @@ class ReplayAdapter:
         self._blocks, self._rest = iter(()), None
 
     def counters(self) -> Mapping[str, float]:
-        """Samples played, and how often from the start."""
+        """Samples played, and passes started."""
         return {"played": self._played, "turns": self._turn + 1}
 
     def _due_ns(self, us: int) -> int:

@@ -1,9 +1,9 @@
-"""Frames on a serial line: bytes in, raw blocks out.
+"""Reads frames from a serial line: bytes in, raw blocks out.
 
     port (device file or glob) ── SerialPort ──bytes──▶ FrameDecoder ──frames──▶ RawBlock
 
-The port is waited for with `select`, so that a frame is handed on as soon as its last byte is here.
-A test hands the adapter a transport of its own.
+The port is watched with `select`, so that a frame is passed on as soon as its last byte arrives.
+A test passes a transport of its own.
 """
 
 import errno
@@ -27,20 +27,20 @@ _CHUNK = 4096
 
 
 class ByteSource(Protocol):
-    """A line that bytes come from."""
+    """A source of bytes."""
 
     def open(self) -> None:
-        """Open the line; `DeviceError` where it is not there or in use."""
+        """Open the line; raises `DeviceError` if it is absent or in use."""
 
     def read(self, timeout: float) -> bytes:
-        """The bytes that are there or come within `timeout` [s]; `DeviceError` when it is gone."""
+        """The bytes available within `timeout` [s]; raises `DeviceError` if the line is gone."""
 
     def close(self) -> None:
-        """Close the line; harmless when it is closed."""
+        """Close the line; does nothing if it is closed."""
 
 
 class SerialPort:
-    """A serial device or pty, for this process alone.
+    """A serial device or pty, opened exclusively.
 
     Args:
         port: device file or glob pattern; the first match that opens is taken.
@@ -56,8 +56,8 @@ class SerialPort:
         """Open the first match of the pattern.
 
         Raises:
-            DeviceBusyError: what matches is in use by another process.
-            DeviceError: nothing matches, or what matches refuses.
+            DeviceBusyError: the matching device is in use by another process.
+            DeviceError: nothing matches, or the match cannot be opened.
         """
         self.close()
         self._serial = first_that_opens(
@@ -65,10 +65,10 @@ class SerialPort:
         )
 
     def read(self, timeout: float) -> bytes:
-        """The bytes that are there or come within `timeout` [s].
+        """The bytes available within `timeout` [s].
 
         Raises:
-            DeviceError: the line was closed at its other end or unplugged.
+            DeviceError: the other end closed the line, or it was unplugged.
         """
         if self._serial is None:
             raise DeviceError(f"{self.port} is not open")
@@ -85,7 +85,7 @@ class SerialPort:
         return data or b""
 
     def close(self) -> None:
-        """Close the device; harmless when it is closed."""
+        """Close the device; does nothing if it is closed."""
         if self._serial is not None:
             self._serial.close()
             self._serial = None
@@ -98,8 +98,8 @@ def first_that_opens(pattern: str, opened: Callable[[str], P]) -> P:
     """`opened(path)` of the first device file that matches `pattern` and opens.
 
     Raises:
-        DeviceBusyError: what matches is in use by another process.
-        DeviceError: nothing matches, or what matches refuses.
+        DeviceBusyError: the matching device is in use by another process.
+        DeviceError: nothing matches, or the match cannot be opened.
     """
     paths = sorted(glob.glob(pattern)) if glob.has_magic(pattern) else [pattern]  # noqa: PTH207
     refusals: list[str] = []
@@ -125,11 +125,11 @@ def _plain(error: Exception) -> str:
 
 
 class SerialAdapter:
-    """Frames of a serial line as raw blocks, one block a read.
+    """Frames of a serial line as raw blocks, one block per read.
 
     Args:
         source: the line.
-        channels: how many channels a frame must have.
+        channels: number of channels a frame must have.
         clock: monotonic time [ns].
     """
 
@@ -145,15 +145,15 @@ class SerialAdapter:
         self._bytes = 0
 
     def open(self) -> None:
-        """Open the line; an unfinished frame of an earlier opening is dropped."""
+        """Open the line; drops an unfinished frame from before."""
         self._decoder.forget()
         self._source.open()
 
     def read(self, timeout: float) -> Sequence[RawBlock]:
-        """The samples whose frames are complete; waits up to `timeout` [s] for the first byte.
+        """The samples of complete frames; waits up to `timeout` [s] for the first byte.
 
         Raises:
-            DeviceError: the line is gone, or frames have another number of channels.
+            DeviceError: the line is gone, or frames have a different number of channels.
         """
         data = self._source.read(timeout)
         arrived = self._clock()
@@ -170,7 +170,7 @@ class SerialAdapter:
         self._source.close()
 
     def counters(self) -> Mapping[str, float]:
-        """What the line lost, in frames and bytes."""
+        """Losses on the line, in frames and bytes."""
         decoder = self._decoder
         return {
             "bytes": self._bytes,

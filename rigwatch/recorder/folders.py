@@ -6,10 +6,11 @@ A recorder that was killed and started again continues in the same folder and as
 it missed.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
+from rigwatch.recorder.positions import Positions, load_positions
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import RunInfo
 from rigwatch.wire.session import SUFFIX, Session, open_session
@@ -20,10 +21,16 @@ LONGEST_BREAK = 120.0
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The folder to record to, and (boot, seq) of the last sample in it, None in a new one."""
+    """The folder to record to, and what it ends with.
+
+    Attributes:
+        last: (boot, seq) of the last sample in it, None in a new one.
+        positions: the same of numbered messages.
+    """
 
     folder: Path
     last: tuple[int, int] | None = None
+    positions: Positions = field(default_factory=dict)
 
 
 def choose(root: Path, run: RunInfo) -> Place:
@@ -58,7 +65,7 @@ def _interrupted(root: Path, run: RunInfo) -> Place | None:
         return None
     boot, seq, t_ns = last
     recent = abs(run.t_ns - t_ns) <= LONGEST_BREAK * 1e9
-    return Place(newest, (boot, seq)) if recent else None
+    return Place(newest, (boot, seq), load_positions(newest)) if recent else None
 
 
 def _last_sample(session: Session) -> tuple[int, int, int] | None:

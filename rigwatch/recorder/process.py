@@ -12,10 +12,12 @@ from pathlib import Path
 from rigwatch.recorder.disk import DiskWatch, free_share
 from rigwatch.recorder.feed import Feed
 from rigwatch.recorder.folders import choose
+from rigwatch.recorder.positions import Positions, save_positions
+from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.host import Heartbeat
-from rigwatch.wire.messages import EVENTS, HEALTH, RUN, Event, Health, RunInfo
+from rigwatch.wire.messages import ALARMS, ESTIMATES, EVENTS, HEALTH, RUN, Event, Health, RunInfo
 from rigwatch.wire.rig_config import RecorderSection, RigConfig, load_rig
 from rigwatch.wire.session import run_info
 
@@ -38,20 +40,30 @@ class Recorder:
         self.settings = config.recorder or RecorderSection()
         place = choose(Path(self.settings.folder), run)
         self.store = Store(place.folder, run, self.settings.segment)
-        self.feed = Feed(bus, place.last)
+        self.feed = Feed(bus, place.last, place.positions)
         self._bus = bus
         self._disk = DiskWatch()
+        self._retention = Retention(self.settings, config.rig.id)
         self._told_at = -HEALTH_EVERY
+        self._kept: Positions = {}
         bus.publish(RUN, run)
 
     def turn(self, now: float, t_ns: int) -> None:
         """Keep what has come; `now` is a monotonic clock's time [s], `t_ns` Unix time [ns]."""
         for message in self.feed.take():
             self.store.add(message)
-        self._tell(self.store.flush(now, t_ns))
+        self._flush(now, t_ns)
         if now - self._told_at >= HEALTH_EVERY:
             self._told_at = now
+            self._tell(self._retention.update(now, t_ns, self.store.folder))
             self._report(t_ns)
+
+    def _flush(self, now: float, t_ns: int) -> None:
+        taken = self.feed.positions()
+        self._tell(self.store.flush(now, t_ns))
+        if not self.store.failure and taken != self._kept:
+            self._kept = taken
+            save_positions(self.store.folder, taken)
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:
@@ -69,6 +81,8 @@ class Recorder:
         counters = {
             "samples": float(self.store.samples),
             "lost_samples": float(self.feed.gap_samples),
+            "lost_alarms": float(self.feed.lost(ALARMS.name)),
+            "lost_estimates": float(self.feed.lost(ESTIMATES.name)),
             "dropped_samples": float(self.store.dropped_samples),
             "dropped_messages": float(self.store.dropped_messages + self.feed.dropped),
             "rejected": float(self.feed.rejected),
@@ -84,6 +98,8 @@ class Recorder:
             self.store.add(message)
         self.feed.close()
         self._tell(self.store.close(now, t_ns))
+        # An orderly stop is no failure: whoever watches the recording stops expecting one.
+        self._bus.publish(HEALTH, Health(PROCESS, t_ns, "stopped", "", {}))
 
 
 def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event) -> Path:

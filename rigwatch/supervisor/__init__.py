@@ -1,9 +1,9 @@
-"""Starts the processes of a rig, watches them, and starts again those that die or hang.
+"""Starts the processes of a rig, monitors them, and restarts those that die or hang.
 
-plan.py        which processes a configuration asks for, and whose samples each works on
-vitals.py      what a process has said, and when that means that it hangs
-child.py       one process: start, words, output, end
-supervisor.py  all of them: restart with back-off, status, orderly stop
+plan.py        which processes a configuration asks for, and whose samples each uses
+vitals.py      what a process has reported, and when it counts as hung
+child.py       one process: start, notifications, output, end
+supervisor.py  all processes: restart with back-off, status, orderly stop
 """
 
 from rigwatch.supervisor.console import Console, Flow

@@ -1,4 +1,4 @@
-"""One process under supervision: its start, its words, its output and its end."""
+"""One supervised process: start, notifications, output and end."""
 
 import contextlib
 import ctypes
@@ -17,11 +17,11 @@ _READ_SIZE = 65536
 
 
 class Child:
-    """One process; started again as often as wanted.
+    """One process, which can be restarted any number of times.
 
     Args:
         plan: what to run.
-        folder: a private folder for the socket on which it speaks.
+        folder: a private folder for its notification socket.
     """
 
     def __init__(self, plan: ProcessPlan, folder: Path) -> None:
@@ -38,11 +38,11 @@ class Child:
 
     @property
     def pid(self) -> int:
-        """Process id of the present run, 0 before the first."""
+        """Process id of the current run, 0 before the first."""
         return self._process.pid if self._process else 0
 
     def start(self, now: float) -> None:
-        """Start it; it speaks to us alone and dies with us, but gets no Ctrl-C of our terminal."""
+        """Start it; it dies with this process, but gets no Ctrl-C from the terminal."""
         self.close_run()
         environment = {k: v for k, v in os.environ.items() if not k.startswith("WATCHDOG_")}
         environment |= {"NOTIFY_SOCKET": self._address, "PYTHONUNBUFFERED": "1"}
@@ -62,13 +62,13 @@ class Child:
         os.close(writing)
 
     def listen(self, now: float) -> None:
-        """Take in what it has said since the last time."""
+        """Read its notifications since the last call."""
         with contextlib.suppress(BlockingIOError):
             while True:
                 self.vitals.take(self.words.recv(4096).decode(errors="replace"), now)
 
     def lines(self) -> list[str]:
-        """What it has printed since the last time, whole lines."""
+        """The whole lines it has printed since the last call."""
         with contextlib.suppress(BlockingIOError):
             self._unfinished += os.read(self._output, _READ_SIZE)
         *whole, self._unfinished = self._unfinished.split(b"\n")
@@ -82,19 +82,19 @@ class Child:
         return self._process.poll() if self._process else 0
 
     def terminate(self) -> None:
-        """Ask it to stop in good order."""
+        """Ask it to stop."""
         if self._process is not None:
             self._process.terminate()
 
     def kill(self) -> None:
-        """End it and all that it has started, at once."""
+        """Kill it and everything that it has started."""
         if self._process is not None:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
 
     def close_run(self) -> None:
-        """Clear away what an ended run has left: its own children, its pipe, its unread words."""
+        """Clean up after an ended run: its children, its pipe, its unread notifications."""
         if self._process is None:
             return
         self.kill()
@@ -105,12 +105,12 @@ class Child:
                 self.words.recv(_READ_SIZE)
 
     def close(self) -> None:
-        """End it and free the socket."""
+        """Kill it and free the socket."""
         self.close_run()
         self.words.close()
         Path(self._address).unlink(missing_ok=True)
 
 
 def _die_with_parent() -> None:
-    """In the new process: a supervisor that is killed leaves no orphans that hold its ports."""
+    """Runs in the new process: a killed supervisor leaves no orphans that hold its ports."""
     _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -1,4 +1,4 @@
-"""What the supervisor tells people and programs: a line an event, and one line of status."""
+"""The supervisor's output for people and programs: a line per event, and a status line."""
 
 import json
 import sys
@@ -16,7 +16,7 @@ STATUS_EVERY_FILE = 30.0
 
 
 class Flow:
-    """Samples that go through each process: the rate now, and the total over all restarts."""
+    """Samples through each process: the current rate, and the total over all restarts."""
 
     def __init__(self, supervisor: Supervisor, clock: Callable[[], float] = time.monotonic) -> None:
         self._supervisor = supervisor
@@ -28,11 +28,11 @@ class Flow:
         self.rates: dict[str, float] = {}
 
     def look(self) -> None:
-        """Take in the present counts."""
+        """Update with the current counts."""
         for name, watched in self._supervisor.processes.items():
             before, now = self._counts.get(name, 0), watched.vitals.count
             self._counts[name] = now
-            # A smaller count is that of a new run, which began at 0.
+            # A smaller count belongs to a new run, which starts at 0.
             grown = now - before if now >= before else now
             self.totals[name] = self.totals.get(name, 0) + grown
         passed = self._clock() - self._marked_at
@@ -47,7 +47,7 @@ class Console:
     Args:
         rig: the rig's id.
         as_json: one JSON object a line instead of text.
-        out: where to.
+        out: where it is printed.
     """
 
     def __init__(self, rig: str, as_json: bool, out: TextIO | None = None) -> None:
@@ -67,7 +67,7 @@ class Console:
         self._print(f"{event.process:{NAME_WIDTH}} {mark} {event.text}")
 
     def status(self, supervisor: Supervisor, flow: Flow) -> None:
-        """The state of all processes, from time to time."""
+        """The state of all processes, at intervals."""
         now = time.monotonic()
         if now - self._status_at < self._every:
             return
@@ -93,7 +93,7 @@ def _fields(event: ProcessEvent) -> dict[str, object]:
 
 
 def states(supervisor: Supervisor, flow: Flow) -> dict[str, dict[str, object]]:
-    """State, rate [1/s], total, restarts and own words of each process."""
+    """State, rate [1/s], total, restarts and own status text of each process."""
     return {
         name: {
             "state": watched.state,
@@ -108,7 +108,7 @@ def states(supervisor: Supervisor, flow: Flow) -> dict[str, dict[str, object]]:
 
 
 def status_line(rig: str, seconds: float, supervisor: Supervisor, flow: Flow) -> str:
-    """One line: how long the rig is up, and what each process does."""
+    """One line: uptime of the rig, and the state of each process."""
     minutes, second = divmod(int(seconds), 60)
     parts = [f"{rig} {minutes}:{second:02}"]
     for name, watched in supervisor.processes.items():

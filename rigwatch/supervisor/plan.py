@@ -1,4 +1,4 @@
-"""Which processes a rig's configuration asks for, in the order in which they are started."""
+"""The processes that a rig's configuration asks for, in starting order."""
 
 import sys
 from collections.abc import Collection
@@ -13,11 +13,11 @@ class ProcessPlan:
     """One process of a rig.
 
     Attributes:
-        name: what it is called in events and in the status line.
+        name: name in events and in the status line.
         arguments: the command and its arguments.
-        source: the process whose samples it works on, empty where there is none here.
-        may_finish: an end with code 0 is somebody's wish, such as a viewer that was closed.
-        after: processes that are given time to get ready before it is started first.
+        source: the process whose samples it uses, empty if there is none here.
+        may_finish: exit code 0 is intended, such as a viewer closed by its user.
+        after: processes that get time to become ready before its first start.
     """
 
     name: str
@@ -27,10 +27,10 @@ class ProcessPlan:
     after: tuple[str, ...] = ()
 
 
-PROCESSES = ("router", "plant", "daq", "monitor", "recorder", "dashboard")
+PROCESSES = ("router", "plant", "daq", "monitor", "recorder", "witness", "dashboard")
 _COMMANDS = {"recorder": "record"}
 _READERS = ("daq", "monitor", "recorder")
-"""A simulated device waits for those who want to see it from its first sample on."""
+"""A simulated device waits for readers that want its first sample."""
 
 
 def plan(config: RigConfig, path: Path | str, without: Collection[str] = ()) -> list[ProcessPlan]:

@@ -1,11 +1,11 @@
-"""All processes of a rig under one loop: started, watched, started again, stopped in order.
+"""Runs all processes of a rig in one loop: start, monitor, restart, stop in order.
 
-    every 0.1 s, for each process:  take in its words and lines
+    every 0.1 s, for each process:  read its notifications and output
                                     ended?            → pause, longer each time, then start
                                     hangs or stalls?  → kill, pause, start
     on stop:                        reverse order, SIGTERM, then SIGKILL
 
-A process that dies changes nothing for the others: each of them finds its way back by itself.
+A process that dies does not affect the others: each reconnects by itself.
 """
 
 import contextlib
@@ -27,12 +27,12 @@ Kind = Literal[
     "started", "ready", "says", "ended", "ill", "restarting", "finished", "stopping", "stopped"
 ]
 TURN = 0.1
-"""Time between two looks at the processes [s]."""
+"""Time between two checks of the processes [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProcessEvent:
-    """Something that happened to one process: what kind of thing, and one plain line."""
+    """An event of one process: its kind, and one plain line."""
 
     process: str
     kind: Kind
@@ -43,7 +43,7 @@ class ProcessEvent:
 
 @dataclass(slots=True)
 class Watched:
-    """One process and how it has fared under this supervisor."""
+    """One process and its history under this supervisor."""
 
     child: Child
     restarts: int = 0
@@ -55,7 +55,7 @@ class Watched:
 
     @property
     def vitals(self) -> Vitals:
-        """What the present run has said."""
+        """What the current run has reported."""
         return self.child.vitals
 
     @property
@@ -74,7 +74,7 @@ class Supervisor:
     Args:
         plans: the processes in starting order.
         report: called with every event.
-        limits: how long things may take.
+        limits: time limits.
         clock: seconds on a monotonic clock [s].
     """
 
@@ -101,7 +101,7 @@ class Supervisor:
         return self._watched
 
     def run(self, each_turn: Callable[[], None] = lambda: None) -> None:
-        """Start everything and watch it until `stop`; then stop in reverse order and clean up."""
+        """Start everything and monitor it until `stop`; then stop in reverse order and clean up."""
         try:
             for watched in self._watched.values():
                 self._start_or_hold(watched)
@@ -112,19 +112,19 @@ class Supervisor:
             self._stop_all()
 
     def stop(self) -> None:
-        """End `run` after the present turn; may be called from a signal handler."""
+        """End `run` after the current turn; may be called from a signal handler."""
         self._stopped = True
 
     def stop_on_signals(self) -> None:
-        """Stop in good order on SIGTERM and SIGINT."""
+        """Stop in order on SIGTERM and SIGINT."""
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda _number, _frame: self.stop())
 
     def _turn(self) -> None:
         self._selector.select(TURN)
         now = self._clock()
-        # All words are taken in before any process is judged: after a turn that was itself late,
-        # they have been waiting here and nobody was silent.
+        # All notifications are read before any process is judged: after a turn that was itself late
+        # they have been waiting, and no process was silent.
         for watched in self._watched.values():
             self._take_in(watched, now)
         for watched in self._watched.values():
@@ -214,7 +214,7 @@ class Supervisor:
         watched.child.terminate()
         deadline = self._clock() + self._limits.stop
         while watched.child.exit_code() is None and self._clock() < deadline:
-            # Those that wait for their turn to stop go on printing: their pipes must not fill.
+            # Processes waiting for their turn to stop keep printing: their pipes must not fill.
             for other in self._watched.values():
                 self._take_in(other, self._clock())
             time.sleep(TURN / 5)
@@ -232,7 +232,7 @@ class Supervisor:
 
 
 def how_it_ended(code: int, last_line: str) -> str:
-    """An exit code in words, with the last line that the process printed."""
+    """An exit code as text, with the last line that the process printed."""
     how = f"ended with code {code}"
     if code < 0:
         how = f"ended by signal {-code}"

@@ -1,8 +1,8 @@
-"""What one process has said of itself, and when that means that it has to be started again.
+"""What one process has reported, and when that requires a restart.
 
-Three ways to be ill, told apart: it never got ready; it is silent, so its loop hangs; its loop
-turns but no sample goes through although its source has them. A process that waits for its source
-is well.
+Three failures are distinguished: the process never became ready; it is silent, so its loop hangs;
+its loop runs but no sample passes although its source has samples. A process that waits for its
+source is healthy.
 """
 
 from dataclasses import dataclass, field
@@ -10,17 +10,17 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How long things may take [s].
+    """Time limits [s].
 
     Attributes:
-        start: until a process is ready; compiling the kernels of a first run is within it.
-        silence: between two words of a process.
+        start: until a process is ready, including the compilation of kernels in a first run.
+        silence: between two notifications of a process.
         stall: without samples while its source has them.
-        patience: that a process is kept back for those that it comes after.
-        stop: from the request to stop until it is killed.
-        first_pause: before the first restart; doubled for each one that follows.
+        patience: longest delay of a start for the processes that come before it.
+        stop: from the request to stop to the kill.
+        first_pause: before the first restart; doubled for each further one.
         longest_pause: before any restart.
-        settled: running this long, a process counts as well again.
+        settled: after running this long, a process counts as healthy again.
     """
 
     start: float = 120.0
@@ -35,18 +35,18 @@ class Limits:
 
 @dataclass(slots=True)
 class Vitals:
-    """The words of one run of one process; all times on the supervisor's monotonic clock [s].
+    """The notifications of one run of a process; all times on the supervisor's monotonic clock [s].
 
     Attributes:
         started_at: when it was started.
-        heard_at: when it said something last.
-        ready: it has said that it is.
-        ready_at: when it said so first; until then it may have compiled kernels.
-        stopping: it has said that it stops.
-        count: samples that went through it since its start.
-        advanced_at: when the count last grew.
-        flowing_since: since when it has grown without a pause.
-        status: its own line for people.
+        heard_at: time of its last notification.
+        ready: whether it has reported ready.
+        ready_at: when it first did so; until then it may be compiling kernels.
+        stopping: whether it has reported that it is stopping.
+        count: samples that passed through it since its start.
+        advanced_at: when the count last increased.
+        flowing_since: since when it has increased without a pause.
+        status: its own status line for people.
     """
 
     started_at: float
@@ -64,7 +64,7 @@ class Vitals:
         self.advanced_at = self.flowing_since = self.started_at
 
     def take(self, word: str, now: float) -> None:
-        """Take in one datagram of systemd's notify protocol; unknown variables are passed over."""
+        """Process one datagram of systemd's notify protocol; unknown variables are ignored."""
         self.heard_at = now
         for line in word.splitlines():
             name, _, value = line.partition("=")
@@ -90,11 +90,11 @@ class Vitals:
         self.count, self.advanced_at = count, now
 
     def flows(self, now: float) -> bool:
-        """Whether samples went through it in the last second."""
+        """Whether samples passed in the last second."""
         return self.count > 0 and now - self.advanced_at <= 1.0
 
     def complaint(self, source: "Vitals | None", now: float, limits: Limits) -> str:
-        """Why the process has to be started again, empty where it has not."""
+        """Why the process needs a restart, empty if it does not."""
         if not self.ready:
             late = now - self.started_at > limits.start
             return f"not ready after {limits.start:g} s" if late else ""

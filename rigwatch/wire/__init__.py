@@ -1,1 +1,1 @@
-"""What travels between the processes and what is kept: messages, topics, bus, files, errors."""
+"""Communication and storage: messages, topics, bus, session files, configuration, errors."""

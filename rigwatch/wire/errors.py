@@ -1,24 +1,26 @@
-"""Every error that rigwatch shows to its users, drawn as a tree.
+"""All errors that rigwatch shows to its users, as a tree.
 
 RigwatchError             one plain line, shown by the command line without a traceback
 ├── ConfigError           a configuration, scenario or model file is wrong
-├── WireError             bytes that came from outside do not mean what they should
+├── WireError             bytes from outside are malformed
 │   ├── FrameError        a serial frame: framing, length or checksum
-│   ├── ModbusError       a Modbus reply: short, late, an exception code, a wrong map
+│   ├── ModbusError       a Modbus reply: short, late, an exception code, a wrong register map
 │   └── MessageError      a message on the bus or in a file
-├── DeviceError           a device cannot be opened or has gone away
+├── DeviceError           a device cannot be opened or is gone
 ├── BusError              the bus cannot be reached
 ├── SessionError          a session file cannot be read or written
 ├── ImportDataError       foreign data cannot be turned into a session (column, unit, rate)
-├── ModelError            a model cannot be fitted or does not suit the data
+├── ModelError            a model cannot be fitted or does not match the data
 └── MissingExtraError     an optional package is not installed
 """
 
+import difflib
+from collections.abc import Mapping
 from pathlib import Path
 
 
 class RigwatchError(Exception):
-    """Base of all errors with a message made for the user: one plain line."""
+    """Base of all errors whose message is one plain line for the user."""
 
 
 class ConfigError(RigwatchError):
@@ -26,10 +28,10 @@ class ConfigError(RigwatchError):
 
     Args:
         file: the file that was read.
-        key: dotted path of the key, empty where the whole file is meant.
-        found: what stands there.
-        expected: what should stand there.
-        line: line number in the file, 1 is the first, where it is known.
+        key: dotted path of the key, empty for the whole file.
+        found: the value found.
+        expected: the value expected.
+        line: line number in the file, starting at 1, if known.
     """
 
     def __init__(
@@ -42,7 +44,7 @@ class ConfigError(RigwatchError):
 
 
 class WireError(RigwatchError):
-    """Bytes from outside do not mean what they should."""
+    """Bytes from outside are malformed."""
 
 
 class FrameError(WireError):
@@ -50,7 +52,7 @@ class FrameError(WireError):
 
 
 class ModbusError(WireError):
-    """A Modbus reply that is short, late, an exception, or from another map."""
+    """A Modbus reply that is short, late, an exception, or of another register map."""
 
 
 class MessageError(WireError):
@@ -58,7 +60,11 @@ class MessageError(WireError):
 
 
 class DeviceError(RigwatchError):
-    """A device cannot be opened or has gone away."""
+    """A device cannot be opened or is gone."""
+
+
+class KeysError(RigwatchError):
+    """Keys or certificates are missing, or cannot be made."""
 
 
 class BusError(RigwatchError):
@@ -74,16 +80,16 @@ class ImportDataError(RigwatchError):
 
 
 class ModelError(RigwatchError):
-    """A model cannot be fitted or does not suit the data."""
+    """A model cannot be fitted or does not match the data."""
 
 
 class MissingExtraError(RigwatchError):
-    """An optional package is needed and not installed.
+    """A required optional package is not installed.
 
     Args:
-        package: the package that is missing.
-        extra: the extra of rigwatch that brings it.
-        purpose: what it is needed for.
+        package: the missing package.
+        extra: the extra of rigwatch that includes it.
+        purpose: the feature that needs it.
     """
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
@@ -91,3 +97,9 @@ class MissingExtraError(RigwatchError):
             f"{purpose} needs the package {package}:"
             f" install it with pip install 'rigwatch[{extra}]'"
         )
+
+
+def nearest(name: str, known: Mapping[str, object]) -> str:
+    """The end of a sentence that found `name`: what may have been meant, or what there is."""
+    close = " or ".join(map(repr, difflib.get_close_matches(name, known, 3, 0.5)))
+    return f"; did you mean {close}?" if close else f", expected one of {', '.join(sorted(known))}"

@@ -16,13 +16,36 @@ from rigwatch.wire.typed_files import Section, load
 Text = Annotated[str, Meta(min_length=1)]
 Positive = Annotated[float, Meta(gt=0)]
 Count = Annotated[int, Meta(ge=1)]
+SLOWEST, FASTEST = 1e-3, 1e6
+"""Sample rates that a rig may have [Hz]."""
 
 
 class RigSection(Section, frozen=True):
     """[rig] — what is watched."""
 
     id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_-]+$", description="the rig's name on the bus")]
-    sample_rate: Annotated[float, Meta(gt=0, description="nominal sample rate [Hz]")] = 256.0
+    sample_rate: Annotated[
+        float, Meta(ge=SLOWEST, le=FASTEST, description="nominal sample rate [Hz]")
+    ] = 256.0
+
+
+class SecuritySection(Section, frozen=True):
+    """[bus.security] — who may speak on the bus."""
+
+    keys: Annotated[
+        str,
+        Meta(description="folder with the rig's certificates, empty for none (loopback only)"),
+    ] = ""
+    operator: Annotated[
+        Text, Meta(description="name of the certificate that commands on this machine use")
+    ] = "operator"
+    isolated_network: Annotated[
+        bool,
+        Meta(
+            description="the router may listen beyond loopback without keys: its network is closed "
+            "to others, such as one of containers"
+        ),
+    ] = False
 
 
 class BusSection(Section, frozen=True):
@@ -37,6 +60,9 @@ class BusSection(Section, frozen=True):
     lease: Annotated[
         float, Meta(gt=0, description="silence after which a link counts as broken [s]")
     ] = 10.0
+    security: Annotated[SecuritySection, Meta(description="who may speak")] = field(
+        default_factory=SecuritySection
+    )
 
 
 class ChannelSection(Section, frozen=True):
@@ -174,6 +200,47 @@ class RecorderSection(Section, frozen=True):
     folder: Annotated[Text, Meta(description="folder of the sessions")] = "sessions"
     segment: Annotated[float, Meta(gt=0, description="length of a segment [s]")] = 3600.0
     flush: Annotated[float, Meta(gt=0, le=0.5, description="time between flushes [s]")] = 0.5
+    keep_days: Annotated[
+        float, Meta(ge=0, description="age at which segments are removed [days]; 0 for never")
+    ] = 0.0
+    keep_alarm_days: Annotated[
+        float, Meta(ge=0, description="the same for segments with alarms [days]; 0 for never")
+    ] = 0.0
+    keep_gigabytes: Annotated[
+        float,
+        Meta(
+            ge=0,
+            description="total size of the rig's segments above which the oldest are removed, "
+            "those with alarms last [GB]; 0 for no limit",
+        ),
+    ] = 0.0
+
+
+class WitnessSection(Section, frozen=True):
+    """[witness] — a process that watches the monitor from outside and notifies people."""
+
+    stale_after: Annotated[
+        float, Meta(gt=0, description="time without estimates that is an alarm [s]")
+    ] = 1.0
+    heartbeat_file: Annotated[
+        str,
+        Meta(description="file renewed every second while estimates come, empty for none"),
+    ] = ""
+    notify: Annotated[
+        tuple[str, ...],
+        Meta(
+            description="command run for each alarm, with name, severity and cause as arguments "
+            "and all of it as JSON on standard input; empty for none"
+        ),
+    ] = ()
+    notify_from: Annotated[
+        Literal["info", "warning", "error", "critical"],
+        Meta(description="lowest severity that people are notified of"),
+    ] = "error"
+    repeat_minutes: Annotated[
+        float,
+        Meta(ge=0, description="repeat while nobody has acknowledged the alarm [min]; 0 for never"),
+    ] = 0.0
 
 
 class DashboardSection(Section, frozen=True):
@@ -197,6 +264,7 @@ class RigConfig(Section, frozen=True):
     plant: Annotated[PlantSection | None, Meta(description="the simulated rig")] = None
     monitor: Annotated[MonitorSection | None, Meta(description="the monitor")] = None
     recorder: Annotated[RecorderSection | None, Meta(description="the recorder")] = None
+    witness: Annotated[WitnessSection | None, Meta(description="the witness")] = None
     dashboard: Annotated[DashboardSection | None, Meta(description="the dashboard")] = None
 
 

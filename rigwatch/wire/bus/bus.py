@@ -10,9 +10,11 @@ bad message is counted there and hurts nobody.
 """
 
 import os
-import time
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Mapping
 
+from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
+from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, Outlet
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Transport
 from rigwatch.wire.errors import BusError
@@ -32,6 +34,8 @@ class Bus:
         self.transport = transport
         self.rig = rig
         self.process = process
+        self._outlet: Outlet | None = None
+        self._lock = threading.Lock()
         transport.declare_token(self.key(f"{ALIVE_KEY}/{process}"))
 
     def key(self, key: str) -> str:
@@ -45,13 +49,38 @@ class Bus:
             BusError: the message is larger than the bus carries.
         """
         payload = encode(message)
-        if len(payload) > MAX_PAYLOAD:
-            size = f"found a message of {len(payload)} bytes, expected at most {MAX_PAYLOAD}"
+        largest = LARGEST_NUMBERED if topic.numbered else MAX_PAYLOAD
+        if len(payload) > largest:
+            size = f"found a message of {len(payload)} bytes, expected at most {largest}"
             raise BusError(f"{topic.name}: {size}")
-        self.transport.put(self.key(topic.key), payload)
+        if topic.numbered:
+            self._numbered().put(topic, payload)
+        else:
+            self.transport.put(self.key(topic.key), payload)
+
+    def _numbered(self) -> Outlet:
+        with self._lock:
+            if self._outlet is None:
+                self._outlet = Outlet(self.transport, self.rig, self.process)
+            return self._outlet
 
     def subscribe(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:
-        """The topic's messages from now on."""
+        """The topic's messages from now on; of a numbered topic every one, once and in order."""
+        if topic.numbered:
+            return self.listen(topic, capacity=capacity)
+        return self.overhear(topic, capacity)
+
+    def listen(
+        self,
+        topic: Topic,
+        resume_after: Mapping[str, Place] | None = None,
+        capacity: int = QUEUE_CAPACITY,
+    ) -> CompleteSubscription:
+        """The messages of a numbered topic, from those on that an earlier run has dealt with."""
+        return CompleteSubscription(self, topic, capacity, resume_after)
+
+    def overhear(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:
+        """The topic's messages as they come: for who may miss some, such as a screen."""
         subscription = Subscription(topic, capacity)
         subscription._close = self.transport.listen(self.key(topic.key), subscription.receive)
         return subscription
@@ -92,14 +121,6 @@ class Bus:
     def close(self) -> None:
         """Leave the bus; the process's tokens vanish."""
         self.transport.close()
-
-
-def wait_until(holds: Callable[[], bool], timeout: float, pause: float = 0.02) -> bool:
-    """Poll until `holds()` or until `timeout` [s] has passed; returns what it said last."""
-    deadline = time.monotonic() + timeout
-    while not (done := holds()) and time.monotonic() < deadline:
-        time.sleep(pause)
-    return done
 
 
 def unique_process(name: str) -> str:

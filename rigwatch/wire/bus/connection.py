@@ -4,6 +4,12 @@ Zenoh is slow to import and not needed on a bus in memory, so it is imported whe
 """
 
 from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.security import (
+    access_settings,
+    certificate_name,
+    check_exposure,
+    tls_settings,
+)
 from rigwatch.wire.bus.transport import Close
 from rigwatch.wire.rig_config import RigConfig
 
@@ -25,7 +31,8 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
         ZenohTransport,  # slow to import, not needed in memory
     )
 
-    transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease)
+    tls = tls_settings(config.bus, certificate_name(config.bus, process))
+    transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease, tls)
     return Bus(transport, config.rig.id, process)
 
 
@@ -37,4 +44,8 @@ def open_router(config: RigConfig) -> Close:
     """
     from rigwatch.wire.bus import zenoh_transport
 
-    return zenoh_transport.open_router(config.bus.listen, config.bus.lease)
+    check_exposure(config.bus)
+    secured = tls_settings(config.bus, "router", listens=True) | access_settings(
+        config.bus, config.rig.id
+    )
+    return zenoh_transport.open_router(config.bus.listen, config.bus.lease, secured)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from rigwatch.wire.bus.bus import Bus
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, answered
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, answered
 
 T = TypeVar("T")
 _IDENTITIES = (f"process-{number}" for number in itertools.count(1))
@@ -22,7 +22,7 @@ class MemoryNetwork:
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
-        self.listeners: dict[str, list[Callable[[bytes, str], None]]] = {}
+        self.listeners: dict[str, list[Receive]] = {}
         self.servers: dict[str, list[Answer]] = {}
         self.tokens: list[str] = []
         self.watchers: list[tuple[str, Callable[[str, bool], None]]] = []
@@ -32,13 +32,13 @@ class MemoryNetwork:
         """A process's place on this network."""
         return Bus(MemoryTransport(self), rig, process)
 
-    def deliver(self, key: str, payload: bytes, sender: str) -> None:
+    def deliver(self, key: str, payload: bytes, sender: str, mark: bytes) -> None:
         """Hand a payload to all who listen, unless it is too large or the network is down."""
         with self.lock:
             receivers = tuple(self.listeners.get(key, ()))
         if self.up and len(payload) <= MAX_PAYLOAD:
             for receive in receivers:
-                receive(payload, sender)
+                receive(payload, sender, mark)
 
     def tell(self, key: str, alive: bool) -> None:
         """Tell the watchers of a token that it came or went."""
@@ -55,16 +55,16 @@ class MemoryTransport:
         self.identity = next(_IDENTITIES)
         self._closers: list[Close] = []
 
-    def put(self, key: str, payload: bytes) -> None:
+    def put(self, key: str, payload: bytes, mark: bytes = b"") -> None:
         """Send to all who listen."""
-        self._network.deliver(key, payload, self.identity)
+        self._network.deliver(key, payload, self.identity, mark)
 
     def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
         """Call `receive` with each payload put to `key`."""
-        return self.listen_from(key, lambda payload, _: receive(payload))
+        return self.listen_from(key, lambda payload, *_: receive(payload))
 
-    def listen_from(self, key: str, receive: Callable[[bytes, str], None]) -> Close:
-        """The same with the identity of the sender."""
+    def listen_from(self, key: str, receive: Receive) -> Close:
+        """The same with the identity of the sender and the mark."""
         return self._register(self._network.listeners.setdefault(key, []), receive)
 
     def serve(self, key: str, answer: Answer) -> Close:

@@ -7,6 +7,8 @@ MAX_PAYLOAD = 1 << 18
 """Largest payload that any of our messages or replies has [bytes]; larger ones are refused."""
 
 Close = Callable[[], None]
+Receive = Callable[[bytes, str, bytes], None]
+"""Given a payload, the identity of its sender and the mark that came with it."""
 Answer = Callable[[bytes], list[bytes]]
 """Given a question's bytes, the replies' bytes, none of them above `MAX_PAYLOAD`."""
 
@@ -18,14 +20,14 @@ class Transport(Protocol):
     def identity(self) -> str:
         """Who this process is to those that hear it; no two on a bus are the same."""
 
-    def put(self, key: str, payload: bytes) -> None:
-        """Send without waiting; dropped where the link is full or down."""
+    def put(self, key: str, payload: bytes, mark: bytes = b"") -> None:
+        """Send without waiting, `mark` beside it; dropped where the link is full or down."""
 
     def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
         """Call `receive` with each payload put to `key`, in the transport's own thread."""
 
-    def listen_from(self, key: str, receive: Callable[[bytes, str], None]) -> Close:
-        """The same with the `identity` of the one who sent it, "" where nobody says."""
+    def listen_from(self, key: str, receive: Receive) -> Close:
+        """The same with the sender's `identity`, "" where nobody says it, and the mark."""
 
     def serve(self, key: str, answer: Answer) -> Close:
         """Answer questions to `key`, in a thread of the transport."""

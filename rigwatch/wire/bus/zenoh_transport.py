@@ -16,13 +16,13 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import zenoh
 from zenoh.handlers import Callback
 
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, answered
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, answered
 from rigwatch.wire.errors import BusError
 
 RETRY_MS = (100, 200)
@@ -89,17 +89,20 @@ def _configured(settings: dict[str, Any], endpoint: str) -> Any:
     return config
 
 
-def open_router(endpoint: str, lease: float = LEASE) -> Close:
+def open_router(
+    endpoint: str, lease: float = LEASE, secured: Mapping[str, Any] | None = None
+) -> Close:
     """Run a router that listens at `endpoint`, until the returned function is called.
 
     Args:
         endpoint: such as tcp/127.0.0.1:7447.
         lease: silence after which a link counts as broken [s].
+        secured: settings of certificates and access; none without keys.
 
     Raises:
         BusError: the endpoint is not well formed or already taken.
     """
-    config = _configured(_router_settings(endpoint, lease), endpoint)
+    config = _configured(_router_settings(endpoint, lease) | dict(secured or {}), endpoint)
     try:
         session = zenoh.open(config)
     except zenoh.ZError:
@@ -109,12 +112,13 @@ def open_router(endpoint: str, lease: float = LEASE) -> Close:
     return close
 
 
-def _reach(endpoint: str, timeout: float | None, lease: float) -> Any:
+def _reach(endpoint: str, timeout: float | None, lease: float, secured: Mapping[str, Any]) -> Any:
     """A session with the router at `endpoint`, tried again and again."""
     started, told = time.monotonic(), False
     while True:
         try:
-            return zenoh.open(_configured(_client_settings(endpoint, lease), endpoint))
+            settings = _client_settings(endpoint, lease) | dict(secured)
+            return zenoh.open(_configured(settings, endpoint))
         except zenoh.ZError:
             waited = time.monotonic() - started
         if timeout is not None and waited >= timeout:
@@ -136,27 +140,32 @@ class ZenohTransport:
 
     @classmethod
     def client(
-        cls, endpoint: str, timeout: float | None = None, lease: float = LEASE
+        cls,
+        endpoint: str,
+        timeout: float | None = None,
+        lease: float = LEASE,
+        secured: Mapping[str, Any] | None = None,
     ) -> "ZenohTransport":
         """A client of the router at `endpoint`, awaited for `timeout` [s], None for ever.
 
-        A link that has been silent for `lease` [s] counts as broken.
+        A link that has been silent for `lease` [s] counts as broken; `secured` are the settings of
+        certificates, none without keys.
 
         Raises:
             BusError: the endpoint is not well formed, or no router answers there.
         """
-        return cls(_reach(endpoint, timeout, lease))
+        return cls(_reach(endpoint, timeout, lease, secured or {}))
 
     @property
     def identity(self) -> str:
         """The session's own number, which no other client can claim by Zenoh's own interface."""
         return str(self._session.info.zid())
 
-    def put(self, key: str, payload: bytes) -> None:
+    def put(self, key: str, payload: bytes, mark: bytes = b"") -> None:
         """Send without waiting; dropped where the link is full or down."""
         publisher = self._publishers.get(key) or self._declare_publisher(key)
         with contextlib.suppress(zenoh.ZError):
-            publisher[0].put(payload, source_info=publisher[1])
+            publisher[0].put(payload, source_info=publisher[1], attachment=mark or None)
 
     def _declare_publisher(self, key: str) -> Any:
         with self._lock:
@@ -174,9 +183,9 @@ class ZenohTransport:
         take = _direct(lambda sample: receive(sample.payload.to_bytes()))
         return self._keep(self._session.declare_subscriber(key, take))
 
-    def listen_from(self, key: str, receive: Callable[[bytes, str], None]) -> Close:
-        """The same with the identity of the sender."""
-        take = _direct(lambda sample: receive(sample.payload.to_bytes(), _sender(sample)))
+    def listen_from(self, key: str, receive: Receive) -> Close:
+        """The same with the identity of the sender and the mark."""
+        take = _direct(lambda s: receive(s.payload.to_bytes(), _sender(s), _mark(s)))
         return self._keep(self._session.declare_subscriber(key, take))
 
     def serve(self, key: str, answer: Answer) -> Close:
@@ -243,6 +252,10 @@ class ZenohTransport:
 def _sender(sample: Any) -> str:
     info = sample.source_info
     return "" if info is None else str(info.source_id.zid)
+
+
+def _mark(sample: Any) -> bytes:
+    return b"" if sample.attachment is None else bytes(sample.attachment.to_bytes())
 
 
 def _direct(callback: Callable[[Any], None]) -> Any:

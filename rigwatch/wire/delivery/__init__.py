@@ -2,12 +2,11 @@
 
     publisher ──▶ Ring ◀──asks── SampleReader ──▶ SampleOrder ──▶ samples in order, losses counted
 
-`source_arbitration` decides which of several sources of samples has control of a rig, `ownership`
-who may send the samples of one.
+The logic stands in `ordering`, which alarms and estimates take as well.
 """
 
 from rigwatch.wire.delivery.ring import SampleRing
-from rigwatch.wire.delivery.sample_order import LARGEST_SEQ, POSITION_WRONG, Counters
 from rigwatch.wire.delivery.sample_reader import SampleReader
+from rigwatch.wire.ordering import LARGEST_SEQ, POSITION_WRONG, Counters
 
 __all__ = ["LARGEST_SEQ", "POSITION_WRONG", "Counters", "SampleReader", "SampleRing"]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.wire.bus import Bus, Close
-from rigwatch.wire.delivery.ring_protocol import UNKNOWN, Ask, RingReply
 from rigwatch.wire.messages import RING_KEY, Column, SampleBlock
+from rigwatch.wire.ordering import UNKNOWN, Ask, RingReply
 
 SOURCE_KEY = "source"
 """Tokens of sources stand at `source/<boot>/<Unix time in ns since when>/<identity on the bus>`."""
@@ -58,7 +58,7 @@ class RingStore:
                 quality[rows] = channel.quality[keep]
         self.newest = max(self.newest, block.seq + len(block) - 1)
 
-    def reply(self, ask: Ask) -> RingReply:
+    def reply(self, ask: Ask) -> RingReply[SampleBlock]:
         """What is kept of the samples asked for, as far as one reply goes."""
         last = min(ask.last, self.newest)
         first = min(max(ask.first, self.newest - self.capacity + 1, 0), last + 1)

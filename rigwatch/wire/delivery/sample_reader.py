@@ -8,23 +8,12 @@ All logic is in `sample_order.py`; a block in order goes straight through, in th
 """
 
 import contextlib
-import threading
 import time
 from queue import Empty, SimpleQueue
 
-from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus
-from rigwatch.wire.delivery.ownership import Owners
+from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus, RingQuestions
 from rigwatch.wire.delivery.ring import SOURCE_KEY
-from rigwatch.wire.delivery.ring_protocol import Ask, RingReply
-from rigwatch.wire.delivery.sample_order import (
-    FORGED,
-    Counters,
-    Loss,
-    Outcome,
-    Remark,
-    SampleOrder,
-)
-from rigwatch.wire.errors import BusError, MessageError
+from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import (
     EVENTS,
     GAPS,
@@ -37,17 +26,27 @@ from rigwatch.wire.messages import (
     continues,
     decode,
 )
+from rigwatch.wire.ordering import (
+    FORGED,
+    Ask,
+    Counters,
+    Loss,
+    Outcome,
+    Owners,
+    Remark,
+    RingReply,
+    SampleOrder,
+)
 
 SILENCE = 1.0
 """Time without a sample after which the ring is asked whether it has more [s]."""
-REPLY_TIMEOUT = 1.0
 CONTESTED = 1.0
 """How long samples in the name of another are remembered [s]."""
-PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
-"""Waits before a question that nobody answered goes out again [s]."""
 
 Item = SampleBlock | Gap | Event
-_Incoming = tuple[bytes, str] | tuple[int, int, str | None] | tuple[Ask, RingReply | None]
+_Incoming = (
+    tuple[bytes, str] | tuple[int, int, str | None] | tuple[Ask, RingReply[SampleBlock] | None]
+)
 
 
 class SampleReader:
@@ -80,17 +79,16 @@ class SampleReader:
         self.rejected = 0
         self.dropped = 0
         self._bus = bus
-        self._order = SampleOrder(resume_after, history)
+        self._order: SampleOrder[SampleBlock] = SampleOrder(resume_after, history)
         self._owners = Owners()
         self._refused_boot: int | None = None
         self._impostor_at: float | None = None
         self._capacity = capacity
         self._inbox: SimpleQueue[_Incoming] = SimpleQueue()
-        self._questions: SimpleQueue[Ask | None] = SimpleQueue()
+        self._questions = RingQuestions(bus, self._answered)
         self._heard_at = self._silence_told_at = time.monotonic()
         self._latest_ns = 0
         self._device = ""
-        self._closed = False
         self._ready: list[Item] = []
         self._start(resume_after)
 
@@ -103,7 +101,6 @@ class SampleReader:
             self._bus.watch_tokens(f"{SOURCE_KEY}/*/*/*", self._token),
             self._bus.transport.listen_from(self._bus.key(SAMPLES.key), self._receive),
         ]
-        threading.Thread(target=self._ask_on, name="ring-questions", daemon=True).start()
 
     def __len__(self) -> int:
         return self._inbox.qsize()
@@ -149,14 +146,13 @@ class SampleReader:
 
     def close(self) -> None:
         """Read no more."""
-        self._closed = True
         for close in self._closers:
             close()
-        self._questions.put(None)
+        self._questions.close()
 
     # ---- called in the bus's threads ----------------------------------------------------
 
-    def _receive(self, payload: bytes, sender: str) -> None:
+    def _receive(self, payload: bytes, sender: str, _mark: bytes) -> None:
         if len(payload) > MAX_PAYLOAD:
             self.rejected += 1
         elif self._inbox.qsize() >= self._capacity:
@@ -220,13 +216,13 @@ class SampleReader:
             self._silence_told_at = now
             self._handle(self._order.on_silence())
 
-    def _handle(self, outcomes: list[Outcome]) -> None:
+    def _handle(self, outcomes: list[Outcome[SampleBlock]]) -> None:
         for outcome in outcomes:
             if isinstance(outcome, SampleBlock):
                 self._device, self._latest_ns = outcome.device, int(outcome.t_ns[-1])
                 self._ready.append(outcome)
             elif isinstance(outcome, Ask):
-                self._questions.put(outcome)
+                self._questions.ask(RING_KEY, outcome)
             elif isinstance(outcome, Loss):
                 self._report_gap(outcome)
             else:
@@ -254,29 +250,16 @@ class SampleReader:
         self._ready.append(item)
         self._bus.publish(GAPS if isinstance(item, Gap) else EVENTS, item)
 
-    # ---- the thread that asks -----------------------------------------------------------
+    # ---- called in the thread that asks --------------------------------------------------
 
-    def _ask_on(self) -> None:
-        last: Ask | None = None
-        repeats = 0
-        while (ask := self._questions.get()) is not None:
-            repeats = repeats + 1 if ask == last else 0
-            last = ask
-            if repeats:
-                time.sleep(PAUSES[min(repeats, len(PAUSES)) - 1])
-            self._inbox.put((ask, self._asked(ask)))
-
-    def _asked(self, ask: Ask) -> RingReply | None:
-        """The reply of the ring that knows most; None where none replied."""
-        while not (self._bus.connected() or self._closed):
-            time.sleep(0.1)
+    def _answered(self, _key: str, ask: Ask, found: list[bytes]) -> None:
+        """Take the reply of the ring that knows most; None where none replied."""
         replies = []
-        with contextlib.suppress(BusError):
-            for data in self._bus.query(RING_KEY, ask.to_bytes(), REPLY_TIMEOUT):
-                with contextlib.suppress(MessageError):
-                    replies.append(RingReply.from_bytes(data))
+        for data in found:
+            with contextlib.suppress(MessageError):
+                replies.append(RingReply.from_bytes(data))
         own = [reply for reply in replies if reply.boot == ask.boot]
-        return max(own, key=lambda reply: reply.settled, default=None)
+        self._inbox.put((ask, max(own, key=lambda reply: reply.settled, default=None)))
 
 
 def joined(items: list[Item]) -> list[Item]:

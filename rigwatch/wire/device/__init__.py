@@ -1,4 +1,4 @@
-"""What a device sends: serial frames, Modbus registers, and the calibration of channels to SI."""
+"""Device formats: serial frames, Modbus registers, and the calibration of channels to SI."""
 
 from rigwatch.wire.device.calibration import Calibration
 from rigwatch.wire.device.frame import Frame, FrameDecoder, encode

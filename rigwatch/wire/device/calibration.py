@@ -1,4 +1,4 @@
-"""Raw codes to SI values and back: value = gain · code + offset, channel by channel."""
+"""Converts raw codes to SI values and back: value = gain · code + offset, per channel."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class Calibration:
         gain: SI units per code.
         offset: SI value at code 0.
         code_low, code_high: rails of the converter.
-        low, high: ends of the sensor's range [SI], infinite where there is none.
+        low, high: limits of the sensor's range [SI], infinite if there are none.
     """
 
     gain: FloatArray
@@ -30,7 +30,7 @@ class Calibration:
 
     @classmethod
     def of(cls, channels: Sequence[ChannelSection]) -> "Calibration":
-        """The calibration in the configuration of `channels`."""
+        """The calibration from the configuration of `channels`."""
         return cls(
             gain=np.array([channel.gain for channel in channels], np.float64),
             offset=np.array([channel.offset for channel in channels], np.float64),
@@ -45,7 +45,7 @@ class Calibration:
         return np.asarray(codes, np.float64) * self.gain + self.offset
 
     def codes(self, values: ArrayLike) -> FloatArray:
-        """Codes that a converter without rails gives for `values`, shape (n, channels)."""
+        """Codes of a converter without rails for `values`, shape (n, channels)."""
         return np.rint((np.asarray(values, np.float64) - self.offset) / self.gain)
 
 

@@ -10,8 +10,8 @@ COBS replaces the zeros of the payload, so that a zero byte ends a frame and occ
 
     | count to next zero | ... payload without zeros ... | 0x00 |
 
-Three channels take 25 bytes, 56 % of a line of 115 200 baud at 256 Hz. `seq` and the microseconds
-wrap at 2³². A reader that joins in the middle of a frame is in step at the next zero byte. CRC-32
+Three channels take 25 bytes, 56 % of a 115 200 baud line at 256 Hz. `seq` and the microseconds
+wrap at 2³². A reader that joins in the middle of a frame synchronises at the next zero byte. CRC-32
 and not CRC-16: over ten million corrupted frames the shorter one let 150 wrong ones through.
 """
 
@@ -33,13 +33,13 @@ _CODES = [struct.Struct(f"<{n}h") for n in range(MAX_CHANNELS + 1)]
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One sample as the device sent it.
+    """One sample as sent by the device.
 
     Attributes:
-        boot: drawn by the device at its start, u32.
+        boot: random number that the device draws when it starts, u32.
         seq: number of the sample since then, u32, wraps.
         device_us: the device's clock [µs], u32, wraps.
-        codes: raw codes of the converter, one a channel, i16.
+        codes: raw codes of the converter, one per channel, i16.
     """
 
     boot: int
@@ -49,10 +49,10 @@ class Frame:
 
 
 def encode(frame: Frame) -> bytes:
-    """The bytes of `frame` on the line, delimiter included.
+    """Encode `frame` for the line, delimiter included.
 
     Raises:
-        FrameError: there are no channels or too many, or a number does not fit its field.
+        FrameError: no channels, too many channels, or a number does not fit its field.
     """
     n = len(frame.codes)
     if not 1 <= n <= MAX_CHANNELS:
@@ -70,7 +70,7 @@ def decode(encoded: bytes) -> Frame:
 
     Raises:
         ChecksumError: the checksum does not match.
-        FrameError: framing, length or version is not that of a frame.
+        FrameError: framing, length or version is wrong.
     """
     payload = _unstuff(encoded)
     n, odd = divmod(len(payload) - _HEAD.size - _CRC.size, 2)
@@ -85,17 +85,17 @@ def decode(encoded: bytes) -> Frame:
 
 
 class ChecksumError(FrameError):
-    """Length and framing are those of a frame, the checksum is not."""
+    """Length and framing are valid, the checksum is not."""
 
 
 class FrameDecoder:
-    """Bytes of a serial line to frames, in whatever pieces they come.
+    """Turns the bytes of a serial line, in any pieces, into frames.
 
     Attributes:
         good: frames accepted.
         crc_errors: frames of the right shape with a wrong checksum.
         skipped_bytes: bytes that belong to no accepted frame, delimiters not counted.
-        resyncs: times that a good frame followed skipped bytes.
+        resyncs: how often a good frame followed skipped bytes.
     """
 
     def __init__(self) -> None:
@@ -111,13 +111,13 @@ class FrameDecoder:
         *pieces, self._rest = (self._rest + data).split(DELIMITER)
         frames = [frame for piece in pieces if piece and (frame := self._try(piece))]
         if len(self._rest) > _LONGEST_ENCODED:
-            # Longer than any frame and still no delimiter: keep a bounded tail only.
+            # Longer than any frame without a delimiter: keep a bounded tail only.
             self._skip(len(self._rest) - _LONGEST_ENCODED)
             self._rest = self._rest[-_LONGEST_ENCODED:]
         return frames
 
     def forget(self) -> None:
-        """Drop an unfinished frame, as after the line was closed; its bytes count as skipped."""
+        """Drop an unfinished frame, as after a closed line; its bytes count as skipped."""
         self._skip(len(self._rest))
         self._rest = b""
 
@@ -139,7 +139,7 @@ class FrameDecoder:
 
 
 def _stuff(payload: bytes) -> bytes:
-    """COBS of at most 253 bytes, which needs no long blocks."""
+    """COBS for at most 253 bytes, which needs no long blocks."""
     return b"".join(bytes((len(part) + 1,)) + part for part in payload.split(DELIMITER))
 
 

@@ -3,10 +3,10 @@
 Input registers (function 4), 16 bits each; values of 32 bits take two, in an order that differs
 between devices::
 
-    0   identification    u32   0x52494757, "RIGW": tells a wrong word order or another device
+    0   identification    u32   0x52494757, "RIGW": detects a wrong word order or another device
     2   version of map    u16   1
     3   channels n        u16
-    4   boot              u32   drawn by the device at its start
+    4   boot              u32   drawn by the device when it starts
     6   samples           u32   taken since then; the newest is number samples - 1; wraps
     8   device µs         u32   the device's clock at the newest sample; wraps
     10  slots R           u16   length of the ring, a power of two
@@ -14,9 +14,9 @@ between devices::
     12… reserved up to 15
     16 + (s mod R)·(4 + n)    the slot of sample s:  s u32 | device µs u32 | n codes i16
 
-A poll reads the header and then the slots that it has not had, at most 125 registers at a time.
-Every slot carries its own number, so that a late reply, or one that was overwritten meanwhile,
-cannot be taken for something else. A reply is consistent in itself: the device copies it in one go.
+A poll reads the header and then the slots not read yet, at most 125 registers at a time. Every slot
+holds its sample number, so that a late reply, or an overwritten slot, is recognised. A reply is
+consistent: the device copies it atomically.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ _U32 = 1 << 32
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What the device says about itself and its ring."""
+    """The device's header: identification and state of its ring."""
 
     channels: int
     boot: int
@@ -56,7 +56,7 @@ class Header:
 
     @property
     def slots_a_read(self) -> int:
-        """Slots that fit into one read."""
+        """Number of slots per read."""
         return READ_LIMIT // self.slot_length
 
     def address(self, seq: int) -> int:
@@ -87,8 +87,8 @@ def decode_header(registers: list[int], order: WordOrder = "big") -> Header:
     """The header in `registers`.
 
     Raises:
-        ModbusError: too short, another device, a wrong word order or version, or sizes that
-            contradict each other.
+        ModbusError: too short, another device, a wrong word order or version, or inconsistent
+            sizes.
     """
     _check_length(registers, HEADER_LENGTH)
     _check_identification(registers[0:2], order)

@@ -2,14 +2,21 @@
 
 from rigwatch.wire.exchange.column_units import AMBIGUOUS, conversion
 from rigwatch.wire.exchange.exporting import export_session
+from rigwatch.wire.exchange.headers import Header, read_header
 from rigwatch.wire.exchange.importing import import_file
-from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option
+from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option, parse_source
+from rigwatch.wire.exchange.tables import columns_of, read_table
 
 __all__ = [
     "AMBIGUOUS",
+    "Header",
     "ImportMapping",
+    "columns_of",
     "conversion",
     "export_session",
     "import_file",
     "parse_map_option",
+    "parse_source",
+    "read_header",
+    "read_table",
 ]

@@ -1,6 +1,7 @@
 """Foreign files as tables of named columns, whose errors name file, line and column."""
 
 import csv
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +21,9 @@ FORMATS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv"} | {
     ".parquet": "parquet",
     ".json": "json",
 }
-_DELIMITERS = ",;\t"
+_DELIMITERS = ";\t,"
+"""Looked for in this order."""
+_DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
 
 
 @dataclass
@@ -134,6 +137,16 @@ def read_table(path: Path, mapping: ImportMapping) -> Table:
     return table
 
 
+def columns_of(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
+    """Cells of each column of a foreign file, and the single numbers beside them.
+
+    Raises:
+        ImportDataError: it cannot be read.
+    """
+    table = read_table(path, ImportMapping())
+    return dict(table.cells), table.scalars
+
+
 def _read_csv(path: Path, mapping: ImportMapping) -> Table:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
@@ -147,6 +160,11 @@ def _read_csv(path: Path, mapping: ImportMapping) -> Table:
         rows = _rows(lines, mapping.delimiter)
     except ImportDataError as error:
         raise ImportDataError(f"{path}: {error}") from None
+    if not mapping.columns and _all_numbers(rows[0]):
+        raise ImportDataError(
+            f"{path}:1: found numbers, expected names of columns; name the {len(rows[0])} columns"
+            " with --columns A,B,…"
+        )
     header = [name.strip() for name in (mapping.columns or rows.pop(0))]
     first_line = 1 if mapping.columns else 2
     if len(set(header)) < len(header):
@@ -155,15 +173,30 @@ def _read_csv(path: Path, mapping: ImportMapping) -> Table:
         if len(row) != len(header):
             where = f"{path}:{number + first_line}"
             raise ImportDataError(f"{where}: found {len(row)} cells, expected {len(header)}")
+    rows = _with_points(rows)
     columns = zip(*rows, strict=True) if rows else [()] * len(header)
     return Table(path, dict(zip(header, columns, strict=True)), first_line=first_line)
 
 
+def _all_numbers(cells: list[str]) -> bool:
+    return all(re.fullmatch(r"\s*[+-]?\d*[.,]?\d+([eE][+-]?\d+)?\s*", cell) for cell in cells)
+
+
+def _with_points(rows: list[list[str]]) -> list[list[str]]:
+    """Rows with decimal points where they came with decimal commas."""
+    if not any(_DECIMAL_COMMA.match(cell) for row in rows[:100] for cell in row):
+        return rows
+    return [[_pointed(cell) for cell in row] for row in rows]
+
+
+def _pointed(cell: str) -> str:
+    return cell.replace(",", ".") if _DECIMAL_COMMA.match(cell) else cell
+
+
 def _rows(lines: list[str], delimiter: str) -> list[list[str]]:
     if delimiter == "auto":
-        counts = {mark: lines[0].count(mark) for mark in _DELIMITERS}
-        best = max(counts, key=lambda mark: counts[mark])
-        delimiter = best if counts[best] else "whitespace"
+        # Where there is a semicolon or a tab, a comma is the decimal one.
+        delimiter = next((mark for mark in _DELIMITERS if mark in lines[0]), "whitespace")
     if delimiter == "whitespace":
         return [line.split() for line in lines]
     if len(delimiter) != 1:

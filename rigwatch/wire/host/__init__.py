@@ -1,6 +1,4 @@
-"""What a process asks of its machine: heartbeat to systemd, real-time priority, ports, and
-the signals that end it.
-"""
+"""Services of the operating system: systemd notifications, real-time priority, ports, signals."""
 
 from rigwatch.wire.host.ending import set_at_signal
 from rigwatch.wire.host.heartbeat import Heartbeat

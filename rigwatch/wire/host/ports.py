@@ -1,10 +1,10 @@
-"""Whether a TCP port of this machine is free, asked before anything is started on it."""
+"""Checks whether a TCP port of this machine is free, before a process uses it."""
 
 import socket
 
 
 def endpoint_address(endpoint: str) -> tuple[str, int] | None:
-    """Host and port of a bus endpoint such as "tcp/127.0.0.1:7447"; None for other kinds."""
+    """Host and port of a bus endpoint such as "tcp/127.0.0.1:7447"; None for other protocols."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.partition("?")[0].rpartition(":")
     if protocol not in ("tcp", "tls") or not port.isdigit():
@@ -13,7 +13,7 @@ def endpoint_address(endpoint: str) -> tuple[str, int] | None:
 
 
 def is_free(host: str, port: int) -> bool:
-    """Whether a server could listen there now."""
+    """Whether a server can listen there now."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -25,7 +25,7 @@ def is_free(host: str, port: int) -> bool:
 
 
 def free_port(host: str = "127.0.0.1") -> int:
-    """A port that is free now."""
+    """A currently free port."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.bind((host, 0))
         return int(probe.getsockname()[1])

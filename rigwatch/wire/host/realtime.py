@@ -1,4 +1,4 @@
-"""Settings for a process whose samples must not wait for Python's housekeeping."""
+"""Real-time settings for a process whose samples must not wait for Python's housekeeping."""
 
 import contextlib
 import gc
@@ -6,23 +6,23 @@ import os
 import sys
 
 SWITCH_INTERVAL = 0.0005
-"""A thread that waits for the interpreter lock gets it after this at the latest [s]."""
+"""Longest wait of a thread for the interpreter lock [s]."""
 
 NICENESS = -10
-"""Where real time is not allowed; of no use between sessions if the kernel groups by session."""
+"""Used if real time is not allowed; no effect between sessions if the kernel groups by session."""
 MONITOR, DAQ, ROUTER = 1, 2, 3
-"""A monitor that catches up must hold up neither the samples nor what carries them."""
+"""A monitor that catches up must not delay the samples or their transport."""
 
 
 def raise_priority(urgency: int) -> None:
-    """Be served before other work, where the system allows it (root, CAP_SYS_NICE, systemd).
+    """Raise the priority of this process, if permitted (root, CAP_SYS_NICE, systemd).
 
-    Takes the real-time class SCHED_RR, else a lower niceness, else nothing. To be called before
-    threads are started, which take it over, and after long work such as compiling. The kernel
-    keeps a share of each core for the rest even from a process that runs wild.
+    Sets the real-time class SCHED_RR, else a lower niceness, else nothing. Call it before threads
+    are started, which inherit it, and after long work such as compiling. The kernel reserves a
+    share of each core for other work even if the process never sleeps.
 
     Args:
-        urgency: who goes first among those that call this: `MONITOR`, `DAQ` or `ROUTER`.
+        urgency: rank among the processes that call this: `MONITOR`, `DAQ` or `ROUTER`.
     """
     with contextlib.suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(urgency))
@@ -32,10 +32,10 @@ def raise_priority(urgency: int) -> None:
 
 
 def prepare_for_real_time() -> None:
-    """To be called once, when everything is imported and built, before the loop begins.
+    """Tune the garbage collector; call it once, after all set-up, before the loop.
 
-    What lives now is never looked at by the garbage collector again, and collections of the old
-    generations become rare: they pause the whole process, growing with all that is alive.
+    Objects that exist now are never examined again, and collections of the old generations become
+    rare: they pause the whole process, for longer the more objects there are.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.collect()

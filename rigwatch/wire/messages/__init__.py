@@ -1,7 +1,7 @@
-"""What travels on the bus and is kept in session files: message types, their bytes and topics.
+"""Messages on the bus and in session files: their types, encoding and topics.
 
-`message_types` declares every message, `protobuf` turns it into bytes, `topics` is the table of
-what is published where. `blocks` cuts and joins blocks of samples without touching a value.
+`message_types` declares every message, `protobuf` turns it into bytes, `topics` is the
+table of topics. `blocks` cuts and joins blocks of samples without touching a value.
 """
 
 from rigwatch.wire.messages import blocks, protobuf, quality_flags

@@ -1,8 +1,7 @@
-"""Blocks of samples or estimates cut, joined and put in order, without touching a single value.
+"""Cuts, joins and orders blocks of samples or estimates, without changing a value.
 
 A block holds consecutive samples `seq`, `seq + 1`, … of one boot of one device. Two blocks are
-joined only where the second continues where the first ended and has the same columns; everything
-else stays apart.
+joined only if the second continues the first and has the same columns.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,7 +18,7 @@ B = TypeVar("B", SampleBlock, EstimateBlock)
 
 
 def columns_of(block: Block) -> tuple[Column, ...]:
-    """The block's columns, whichever kind of block it is."""
+    """The columns of a block of either kind."""
     return block.channels if isinstance(block, SampleBlock) else block.columns
 
 
@@ -45,7 +44,7 @@ def concatenate(blocks: Sequence[B]) -> B:
     """One block of all samples of `blocks`, each of which continues the one before.
 
     Raises:
-        ValueError: there is no block, or one does not continue the one before.
+        ValueError: there is no block, or one does not continue its predecessor.
     """
     if not blocks:
         raise ValueError("no block to concatenate")
@@ -94,9 +93,9 @@ def pieces(block: B, size: int) -> Iterator[B]:
 
 
 def between(block: B, start: int | None, end: int | None) -> B | None:
-    """The part of the block whose time stamps lie in [start, end) [ns], None where it is empty.
+    """The part of the block with time stamps in [start, end) [ns], None if it is empty.
 
-    Where the clock stepped inside the block, samples between two that belong to the part are kept.
+    If the clock steps inside the block, samples between two of the part are kept.
     """
     if not len(block):
         return None
@@ -117,9 +116,9 @@ def _inside(t_ns: NDArray[np.int64], start: int | None, end: int | None) -> NDAr
 
 
 def merged(blocks: Iterable[B], size: int) -> Iterator[B]:
-    """Blocks of `size` samples and a little more, in which no gap is bridged.
+    """Blocks of at least `size` samples that bridge no gap.
 
-    A block that does not continue the one before starts a new one, so that every gap, restart of
+    A block that does not continue its predecessor starts a new one, so that every gap, restart of
     the device and change of columns falls between two blocks. Memory is that of one merged block,
     whose arrays are its own.
     """
@@ -138,7 +137,7 @@ def merged(blocks: Iterable[B], size: int) -> Iterator[B]:
 
 
 def unseen(block: B, next_seq: int | None) -> B | None:
-    """The part of the block from `next_seq` on; None where all was seen before."""
+    """The part of the block from `next_seq` on; None if it is empty."""
     if next_seq is None or block.seq >= next_seq:
         return block
     known = next_seq - block.seq
@@ -146,5 +145,5 @@ def unseen(block: B, next_seq: int | None) -> B | None:
 
 
 def owned(block: B) -> B:
-    """The same block with arrays of its own: aligned and writable."""
+    """A copy of the block with aligned and writable arrays."""
     return _joined([block])

@@ -114,9 +114,10 @@ class EstimateBlock:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Samples that a reader knows it will never get: `first` to `last`, both lost.
+    """Samples, or messages of `topic`, that a reader will never get: `first` to `last`, both lost.
 
-    `last` below `first` says that the number is unknown (the device restarted meanwhile).
+    `last` below `first` says that the number is unknown (the device restarted meanwhile). Of
+    messages `device` is the process that said them, `boot` its run. An empty topic means samples.
     """
 
     device: str
@@ -126,6 +127,7 @@ class Gap:
     t_ns: int
     reporter: str
     reason: str
+    topic: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Protobuf bytes of the messages; schemas are built at run time from `message_types.py`.
 
-`encode` and `decode` are the only way a message becomes bytes and back. The descriptors need no
-compiler, and `file_descriptor_set` is what MCAP stores so that other tools can decode a session.
+All messages are encoded and decoded here. The descriptors need no compiler, and MCAP files store
+`file_descriptor_set` so that other tools can decode a session.
 """
 
 from collections.abc import Callable, Mapping
@@ -93,7 +93,7 @@ def _file_descriptor() -> descriptor_pb2.FileDescriptorProto:
 
 @cache
 def file_descriptor_set() -> bytes:
-    """The serialised FileDescriptorSet of all messages, as MCAP and other tools want it."""
+    """The serialised FileDescriptorSet of all messages, for MCAP and other tools."""
     bundle = descriptor_pb2.FileDescriptorSet()
     bundle.file.append(_file_descriptor())
     return bundle.SerializeToString()
@@ -101,7 +101,7 @@ def file_descriptor_set() -> bytes:
 
 @cache
 def field_tags(kind: type[Message] | type[Column]) -> Mapping[str, int]:
-    """The byte in front of each field on the wire: its number and how it is written."""
+    """The tag byte of each field: its number and wire type."""
     proto = next(p for p in _file_descriptor().message_type if p.name == kind.__name__)
     by_length = 2
     return {
@@ -149,7 +149,7 @@ def _from_wire(hint: Any) -> Callable[[Any], Any]:
     if _is_columns(hint):
         return lambda value: tuple(_read(Column, part) for part in value)
     if hint == ByteArray:
-        # A read-only view is another type to compiled kernels: they would compile anew for it.
+        # A read-only view is another type to compiled kernels, which would be recompiled for it.
         return lambda value: np.frombuffer(value, np.uint8).copy()
     if hint == FloatArray:
         return lambda value: np.array(value, np.float64)
@@ -185,17 +185,17 @@ def _read(kind: type[Any], proto: ProtoMessage) -> Any:
 
 
 def encode(message: Message) -> bytes:
-    """The message as protobuf bytes."""
+    """Encode a message as protobuf bytes."""
     kind = type(message)
-    # Counters are a map, whose order would change from run to run.
+    # Counters are a map, whose order changes from run to run.
     return _fill(_proto_class(kind.__name__)(), message).SerializeToString(deterministic=True)
 
 
 def decode(kind: type[M], data: bytes) -> M:
-    """The message of class `kind` that `data` holds.
+    """Decode a message of class `kind`.
 
     Raises:
-        MessageError: the bytes are no such message, or its columns differ in length.
+        MessageError: the bytes are not such a message, or its columns differ in length.
     """
     try:
         message: M = _read(kind, _proto_class(kind.__name__).FromString(data))

@@ -1,7 +1,7 @@
-"""Quality flags of a sample, one byte a channel.
+"""Quality flags of a sample, one byte per channel.
 
-A sample whose byte is zero is good. Any bit of `INVALID` keeps it out of every filter and estimate;
-the other bits are remarks that travel with it.
+A sample whose byte is zero is good. Any bit of `INVALID` excludes it from every filter and
+estimate; the other bits are remarks.
 """
 
 import numpy as np
@@ -13,11 +13,11 @@ STALE = 1 << 0
 SATURATED = 1 << 1
 """At a rail of the converter or outside the sensor's range."""
 STUCK = 1 << 2
-"""The raw code has not changed for longer than a live sensor could leave it."""
+"""The raw code has been constant for longer than with a working sensor."""
 NON_FINITE = 1 << 3
 """NaN or infinite."""
 SPIKE = 1 << 4
-"""A jump that the sensor cannot have made."""
+"""A change faster than the sensor can follow."""
 RESAMPLED = 1 << 5
 """A remark, not a defect: interpolated from samples with jittered time stamps."""
 
@@ -40,5 +40,5 @@ def valid(quality: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 def describe(flags: int) -> str:
-    """The names of the flags that are set, for people; "good" where none is."""
+    """The names of the set flags; "good" if there is none."""
     return ", ".join(name for bit, name in NAMES.items() if flags & bit) or "good"

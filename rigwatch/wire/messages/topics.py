@@ -27,6 +27,8 @@ class Topic:
         publisher: the process that says it.
         rate_hz: messages a second at most in normal running [Hz]; 0 for now and then.
         recorded: whether the recorder keeps it.
+        numbered: whether its messages are numbered and kept by the process that says them, so that
+            a listener gets each of them, once, or knows which are missing.
     """
 
     name: str
@@ -35,17 +37,22 @@ class Topic:
     publisher: str
     rate_hz: float
     recorded: bool
+    numbered: bool = False
 
 
 SAMPLES = Topic("samples", "daq/samples", SampleBlock, "daq", 256.0, recorded=True)
-ESTIMATES = Topic("estimates", "monitor/estimates", EstimateBlock, "monitor", 256.0, recorded=True)
-ALARMS = Topic("alarms", "monitor/alarms", Alarm, "monitor", 0.0, recorded=True)
+ESTIMATES = Topic(
+    "estimates", "monitor/estimates", EstimateBlock, "monitor", 256.0, recorded=True, numbered=True
+)
+ALARMS = Topic("alarms", "monitor/alarms", Alarm, "monitor", 0.0, recorded=True, numbered=True)
 COMMANDS = Topic("commands", "monitor/commands", AlarmCommand, "operator", 0.0, recorded=True)
 GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True)
 HEALTH = Topic("health", "health", Health, "any", 1.0, recorded=True)
 EVENTS = Topic("events", "events", Event, "any", 0.0, recorded=True)
 RUN = Topic("run", "run", RunInfo, "recorder", 0.0, recorded=True)
-MODELS = Topic("models", "monitor/models", ModelChange, "monitor", 0.0, recorded=True)
+MODELS = Topic(
+    "models", "monitor/models", ModelChange, "monitor", 0.0, recorded=True, numbered=True
+)
 
 TOPICS: tuple[Topic, ...] = (
     SAMPLES,

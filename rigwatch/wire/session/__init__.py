@@ -1,10 +1,10 @@
-"""Session files: MCAP recordings that survive kill -9 and say what is missing.
+"""Session files: MCAP recordings that survive kill -9 and report what is missing.
 
 `SessionWriter` writes, `SessionReader` reads and salvages, `edit` trims and recovers, `summary`
 describes.
 """
 
-from rigwatch.wire.session.edit import Written, first_time, iso_time, recover, trim
+from rigwatch.wire.session.edit import Written, first_time, iso_time, newest, recover, trim
 from rigwatch.wire.session.reader import (
     MERGED_SAMPLES,
     SUFFIX,
@@ -13,6 +13,7 @@ from rigwatch.wire.session.reader import (
     Session,
     open_session,
 )
+from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.summary import ChannelSummary, DeviceSummary, Summary, summarise
 from rigwatch.wire.session.writer import (
     LARGEST_BLOCK,
@@ -38,9 +39,11 @@ __all__ = [
     "iso_time",
     "merge_pending",
     "message_time",
+    "newest",
     "open_session",
     "recover",
     "run_info",
     "summarise",
+    "topic_counts",
     "trim",
 ]

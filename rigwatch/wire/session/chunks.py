@@ -4,10 +4,9 @@
     chunk   := start u64 | end u64 | raw size u64 | CRC-32 u32 | "zstd" | size u64 | compressed
     records
 
-A chunk counts only if its two lengths agree and the checksum of its unpacked bytes is right.
-Where they do not, the search continues at the next place that looks like a chunk, and the bytes
-between are reported. Records outside of chunks (indexes) are skipped, but none may hide a chunk
-whose opcode was flipped.
+A chunk is valid only if its two lengths agree and the checksum of its unpacked bytes matches. If
+not, the search continues at the next possible chunk, and the bytes in between are reported. Records
+outside of chunks (indexes) are skipped, unless they may hide a chunk with a corrupted opcode.
 """
 
 import os
@@ -24,9 +23,9 @@ from rigwatch.wire.errors import SessionError
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST_RECORD = 1 << 28
-"""No record of ours comes near this; a length beyond it is a flipped bit [bytes]."""
+"""Far above the length of any valid record; a larger one is a flipped bit [bytes]."""
 LARGEST_CHUNK = 1 << 26
-"""Nor do the unpacked records of a chunk, which are half a second of messages [bytes]."""
+"""The same for the unpacked records of a chunk, half a second of messages [bytes]."""
 _CHUNK, _MESSAGE, _MESSAGE_INDEX, _DATA_END, _FOOTER = 0x06, 0x05, 0x07, 0x0F, 0x02
 _KNOWN = frozenset(range(0x01, 0x10))
 _RECORD = struct.Struct("<BQ")
@@ -40,7 +39,7 @@ _STEP = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """The unpacked records of one intact chunk, and where in the file it began."""
+    """The unpacked records of one intact chunk, and its offset in the file."""
 
     offset: int
     records: bytes
@@ -48,7 +47,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """Bytes of a file that could not be read: `size` from `offset` on, and why."""
+    """Unreadable bytes of a file: `size` from `offset` on, and the reason."""
 
     offset: int
     size: int
@@ -56,11 +55,11 @@ class Damage:
 
 
 class _DamagedError(Exception):
-    """What is wrong with the record at hand."""
+    """The defect of the current record."""
 
 
 def magic_problem(head: bytes) -> str:
-    """What is wrong with a file's first eight bytes, in words; empty for an MCAP file."""
+    """The defect of a file's first eight bytes, as text; empty for an MCAP file."""
     if head == MAGIC:
         return ""
     if not head:
@@ -162,7 +161,7 @@ def _is_chunk(body: bytes) -> bool:
 
 
 def _check_other(opcode: int, body: bytes) -> None:
-    """Raise where a record other than a chunk cannot be what its opcode says."""
+    """Raise if a record other than a chunk contradicts its opcode."""
     if opcode not in _KNOWN:
         raise _DamagedError(f"a record of unknown kind {opcode:#04x}")
     if _is_chunk(body):

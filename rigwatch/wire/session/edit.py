@@ -1,4 +1,4 @@
-"""Makes new files of recorded sessions: `recover` saves what is intact, `trim` cuts by time."""
+"""Writes new files from recorded sessions: `recover` saves intact data, `trim` cuts by time."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -10,23 +10,23 @@ import numpy as np
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm, Message, RunInfo, SampleBlock, blocks
-from rigwatch.wire.session.reader import LostSpan, Recorded, Session
+from rigwatch.wire.session.reader import SUFFIX, LostSpan, Recorded, Session
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
 
 FLUSH_EVERY = 4096
-"""Messages after which a new chunk is begun."""
+"""Messages per chunk."""
 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What came into a new session file.
+    """The content of a new session file.
 
     Attributes:
         path: the new file.
-        messages: how many of each topic.
-        samples: how many samples.
-        lost: what of the old session could not be read.
-        notes: remarks for people, such as a description of the run that had to be made up.
+        messages: number of messages per topic.
+        samples: number of samples.
+        lost: unreadable parts of the old session.
+        notes: remarks for people, such as a reconstructed description of the run.
     """
 
     path: Path
@@ -56,7 +56,7 @@ def _run_or_substitute(session: Session) -> tuple[RunInfo, str]:
 
 
 def _rate(session: Session) -> float:
-    """Median rate of the first samples [Hz], 0 where there are too few."""
+    """Median rate of the first samples [Hz], 0 if there are too few."""
     first = next(session.samples(), None)
     if first is None or len(first) < 2:
         return 0.0
@@ -64,8 +64,20 @@ def _rate(session: Session) -> float:
     return 1e9 / step if step > 0 else 0.0
 
 
+def newest(folder: Path) -> Path:
+    """The newest of a recorder's sessions, one that it still writes included.
+
+    Raises:
+        SessionError: there is none.
+    """
+    found = list(folder.glob(f"*/*{SUFFIX}"))
+    if not found:
+        raise SessionError(f"{folder}: found no recording, expected one of a recorder")
+    return max(found, key=lambda path: path.stat().st_mtime).parent
+
+
 def first_time(session: Session) -> int:
-    """Time of the first sample, else of the first message [ns]; 0 where there is none."""
+    """Time of the first sample, else of the first message [ns]; 0 if there is none."""
     first = next(session.samples(size=1), None)
     if first is not None:
         return int(first.t_ns[0])
@@ -75,7 +87,7 @@ def first_time(session: Session) -> int:
 def trim(session: Session, target: Path, start: int | None, end: int | None) -> Written:
     """The part of `session` in [start, end) [ns], cut at the sample, as one new file at `target`.
 
-    The description of the run is kept, and so are alarms that stood when the part begins.
+    It keeps the description of the run and the alarms active at the start of the part.
 
     Raises:
         SessionError: nothing lies in the span, or the target exists or cannot be written.
@@ -94,14 +106,14 @@ def _text(t_ns: int | None, otherwise: str) -> str:
 
 
 def iso_time(t_ns: int) -> str:
-    """Unix time as people write it: UTC, to the millisecond."""
+    """Unix time as text: UTC, to the millisecond."""
     whole, rest = divmod(t_ns, 1_000_000_000)
     text = datetime.fromtimestamp(whole, UTC).strftime("%Y-%m-%dT%H:%M:%S")
     return f"{text}.{rest // 1_000_000:03d}Z"
 
 
 def _part(session: Session, start: int | None, end: int | None) -> Iterator[Recorded]:
-    """Messages of the span, behind the alarms that stood before it."""
+    """Messages of the span, preceded by the alarms active before it."""
     standing: dict[str, Recorded] = {}
     if start is not None:
         for item in session.messages(["alarms"], end=start):
@@ -119,12 +131,12 @@ def copy_messages(
     target: Path,
     progress: Callable[[int], None] = lambda _: None,
 ) -> Written:
-    """A new file at `target` with `run` at its head and `messages` behind it, each sample once.
+    """A new file at `target` with `run` at its head, followed by `messages`, each sample once.
 
     Args:
-        messages: what is copied; descriptions of runs among them only where they are new.
+        messages: messages to copy; descriptions of runs only if they are new.
         run: is written at the head.
-        target: the file to be made.
+        target: the new file.
         progress: called with the time of each message [ns].
 
     Raises:
@@ -162,7 +174,7 @@ def _copy(
 
 
 def _new_part(message: Message, following: dict[tuple[str, int], int]) -> Message | None:
-    """The message without samples that were copied before."""
+    """The message without samples already copied."""
     if not isinstance(message, SampleBlock):
         return message
     key = (message.device, message.boot)

@@ -1,9 +1,9 @@
 """Reads blocks of samples and estimates straight from their protobuf bytes, as numpy arrays.
 
 The general decoder makes a Python object of every number; here the packed doubles and integers are
-taken over as they lie. Blocks of one recording differ in nothing but `seq` and the numbers, so
-where they lie is worked out once, and checked against every byte between them for each further
-block. Whatever this module does not recognise is left to `schema.decode`, which says what is wrong.
+viewed in place. Blocks of one recording differ only in `seq` and the numbers, so their layout is
+determined once, and every other byte is compared for each further block. Anything that this module
+does not recognise is left to `protobuf.decode`, which reports what is wrong.
 """
 
 from collections.abc import Set
@@ -39,7 +39,7 @@ class _UnfamiliarError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class _ColumnPlace:
-    """Where a column's values and quality begin; -1 for none."""
+    """Offsets of a column's values and quality; -1 for none."""
 
     name: str
     unit: str
@@ -49,13 +49,13 @@ class _ColumnPlace:
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """Where everything lies in the blocks of one device, length and kind.
+    """The layout of the blocks of one device, length and kind.
 
     Attributes:
-        samples: samples in such a block.
-        seq: where its number stands, None for 0.
-        times: where its integer arrays begin.
-        fixed: all bytes that are neither seq nor numbers, with their places.
+        samples: samples per block.
+        seq: offset of its number, None for 0.
+        times: offsets of its integer arrays.
+        fixed: all bytes that are neither seq nor numbers, with their offsets.
     """
 
     samples: int
@@ -71,10 +71,10 @@ _layouts: dict[tuple[type[Any], int], _Layout] = {}
 
 
 def decode_block(kind: type[K], data: bytes) -> K:
-    """The block that `data` holds; its arrays may be unaligned views of `data`.
+    """Decode a block; its arrays may be unaligned views of `data`.
 
     Raises:
-        MessageError: the bytes are no such message, or its columns differ in length.
+        MessageError: the bytes are not such a message, or its columns differ in length.
     """
     try:
         layout = _layout_of(kind, data)
@@ -84,7 +84,7 @@ def decode_block(kind: type[K], data: bytes) -> K:
 
 
 def _layout_of(kind: type[Any], data: bytes) -> _Layout:
-    """The layout of `data`, worked out where no earlier block had the same."""
+    """The layout of `data`, computed unless an earlier block has the same."""
     known = _layouts.get((kind, len(data)))
     if known is not None and _fits(known, data):
         return known
@@ -120,7 +120,7 @@ def _read(kind: type[K], layout: _Layout, data: bytes) -> K:
 
 
 def _layout(kind: type[Any], data: bytes) -> _Layout:
-    """Where everything lies in `data`; lengths are checked."""
+    """The layout of `data`, with lengths checked."""
     fields = _fields(data, (0, len(data)), {_DEVICE, _BOOT, _SEQ, *_TIMES[kind], _COLUMNS[kind]})
     times = [_only(fields.get(tag)) for tag in _TIMES[kind]]
     n, rest = divmod(times[0][1] - times[0][0], _I8.itemsize)
@@ -159,7 +159,7 @@ def _between(data: bytes, variable: list[Span]) -> tuple[tuple[int, int, bytes],
 
 
 def _fields(data: bytes, within: Span, tags: Set[int]) -> dict[int, list[Span]]:
-    """Places of the fields of the message that lies `within`, by tag; it has no others."""
+    """Offsets of the fields of the message at `within`, by tag; it has no others."""
     at, end = within
     found: dict[int, list[Span]] = {}
     while at < end:

@@ -4,21 +4,15 @@
     for block in session.samples(): …
     for span in session.lost: …
 
-Everything intact is delivered, every checksum is checked, and what cannot be read is in `lost`.
-Memory is that of one chunk and one merged block, however long the recording is.
+All intact data are delivered, every checksum is verified, and unreadable parts are listed in
+`lost`. Memory use is one chunk and one merged block, whatever the length of the recording.
 """
 
-import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
-
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.records import Channel, Schema
 
 from rigwatch.wire.errors import MessageError, SessionError
 from rigwatch.wire.messages import (
@@ -34,31 +28,27 @@ from rigwatch.wire.messages import (
     topic,
 )
 from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.session.chunk_reader import ChunkReader
 from rigwatch.wire.session.chunks import Damage, ends_closed, scan
 from rigwatch.wire.session.packed import decode_block
 from rigwatch.wire.session.statistics import topic_counts
-from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY, message_time
+from rigwatch.wire.session.writer import message_time
 
 SUFFIX = ".mcap"
 MERGED_SAMPLES = 16384
-"""Samples in a block that `Session.samples` delivers, where nothing interrupts it."""
-_RECORD = struct.Struct("<BQ")
-_MESSAGE_HEAD = struct.Struct("<HIQQ")
-_SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
-_BY_NUMBER = dict(enumerate(TOPICS, start=1))
-_BY_NAMES = {(line.name, schema.type_name(line.message)): line for line in TOPICS}
+"""Samples in an uninterrupted block of `Session.samples`."""
 
 
 @dataclass(frozen=True, slots=True)
 class LostSpan:
-    """A part of a session that could not be read.
+    """An unreadable part of a session.
 
     Attributes:
         file: the segment.
-        offset, size: which bytes of it.
-        after_ns: time of the last message read before it [ns], None where there is none.
-        before_ns: time of the first message read after it [ns], None where there is none.
-        reason: what is wrong, in words.
+        offset, size: range of bytes.
+        after_ns: time of the last message read before it [ns], None if there is none.
+        before_ns: time of the first message read after it [ns], None if there is none.
+        reason: the defect, as text.
     """
 
     file: Path
@@ -71,7 +61,7 @@ class LostSpan:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One message of a session, with its topic and the time it was recorded under [ns]."""
+    """One message of a session, with its topic and recorded time [ns]."""
 
     topic: Topic
     t_ns: int
@@ -82,8 +72,8 @@ def open_session(path: Path | str) -> "Session":
     """The session at `path`, a file or a folder of segments.
 
     Raises:
-        SessionError: there is none, it is not an MCAP file, of a later version, or holds nothing of
-            rigwatch.
+        SessionError: there is none, it is not an MCAP file, has a later version, or holds no data
+            of rigwatch.
     """
     session = Session(Path(path), _segments(Path(path)))
     session.check_content()
@@ -107,7 +97,7 @@ class Session:
     """A recorded session; made by `open_session`.
 
     Attributes:
-        path: what was opened.
+        path: the opened file or folder.
         segments: its files, in order.
     """
 
@@ -117,20 +107,20 @@ class Session:
 
     @property
     def lost(self) -> tuple[LostSpan, ...]:
-        """Damage met so far, in order; complete after one pass through the session."""
+        """Damage found so far, in order; complete after one pass through the session."""
         return tuple(self._lost[key] for key in sorted(self._lost))
 
     @property
     def unclosed(self) -> tuple[Path, ...]:
-        """Segments that end without an index: still being written, killed, or truncated."""
+        """Segments without an index: still open, killed, or truncated."""
         return tuple(path for path in self.segments if not ends_closed(path))
 
     @cached_property
     def info(self) -> RunInfo:
-        """What the run was made with: the first `RunInfo` that can be read.
+        """The description of the run: the first readable `RunInfo`.
 
         Raises:
-            SessionError: no segment has one left.
+            SessionError: no segment has one.
         """
         for recorded in self.messages(["run"]):
             if isinstance(recorded.message, RunInfo):
@@ -138,14 +128,15 @@ class Session:
         raise SessionError(f"{self.path}: the description of the run (RunInfo) is lost")
 
     def may_hold(self, name: str) -> bool:
-        """False only where every segment is closed and says that it has no message of the topic
-        `name`; costs no pass through the session.
+        """False only if every segment is closed and reports no message of topic `name`.
+
+        It needs no pass through the session.
         """
         said = [topic_counts(path) for path in self.segments]
         return any(counts is None or counts.get(name, 0) > 0 for counts in said)
 
     def check_content(self) -> None:
-        """Raise where the session holds no message of rigwatch at all."""
+        """Raise if the session holds no message of rigwatch."""
         foreign: set[str] = set()
         for index in range(len(self.segments)):
             for _ in self._records(index, foreign):
@@ -160,15 +151,15 @@ class Session:
         start: int | None = None,
         end: int | None = None,
     ) -> Iterator[Recorded]:
-        """The messages in the order in which they were recorded.
+        """The messages in recorded order.
 
         Args:
             topics: names in the table of topics, None for all.
-            start: no messages before this time, and no samples of blocks that began before it [ns].
-            end: no messages and no samples from this time on [ns].
+            start: first time of messages, and of samples in blocks that began earlier [ns].
+            end: end time (exclusive) [ns].
 
         Raises:
-            SessionError: a segment cannot be opened, or there is no such topic.
+            SessionError: a segment cannot be opened, or the topic is unknown.
         """
         wanted = set(TOPICS) if topics is None else {_topic(name) for name in topics}
         for index in range(len(self.segments)):
@@ -186,14 +177,14 @@ class Session:
         end: int | None = None,
         size: int = MERGED_SAMPLES,
     ) -> Iterator[SampleBlock]:
-        """The samples as large merged blocks, none of which bridges a gap, restart or new channel.
+        """The samples as large merged blocks that bridge no gap, restart or new channel.
 
         A sample that was recorded twice is delivered once.
 
         Args:
-            device: whose samples, None for all (merged only while one device speaks).
+            device: name of the device, None for all (merged only while one device sends).
             start, end: time span [start, end) [ns].
-            size: samples after which a block is delivered.
+            size: samples per block.
         """
         return self._merged(SAMPLES, device, start, end, size)
 
@@ -237,8 +228,8 @@ class Session:
     def _records(
         self, index: int, foreign: set[str] | None = None
     ) -> Iterator[tuple[Topic, int, bytes]]:
-        """Topic, time and bytes of every message of one segment; damage is noted as it is met."""
-        reader = _ChunkReader(self.segments[index], set() if foreign is None else foreign)
+        """Topic, time and bytes of every message of one segment; records damage."""
+        reader = ChunkReader(self.segments[index], set() if foreign is None else foreign)
         damage: list[Damage] = []
         last: int | None = None
         try:
@@ -294,64 +285,3 @@ def _within(message: Message, start: int | None, end: int | None) -> Message | N
     t_ns = message_time(message)
     early = start is not None and t_ns < start
     return None if early or (end is not None and t_ns >= end) else message
-
-
-class _ChunkReader:
-    """Cuts the records of intact chunks into messages, with the channels that were declared so far.
-
-    The numbers of the table of topics are taken for channels that nobody declared, as their
-    declaration stands in a damaged chunk.
-    """
-
-    def __init__(self, path: Path, foreign: set[str]) -> None:
-        self._path, self._foreign = path, foreign
-        self._schemas: dict[int, str] = {}
-        self._lines: dict[int, Topic | None] = {}
-
-    def messages(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
-        """Topic, time and bytes of each message.
-
-        Raises:
-            SessionError: a record is none, although its checksum is right, or of a later version.
-        """
-        try:
-            yield from self._cut(records)
-        except (struct.error, McapError, ValueError, RecursionError) as error:
-            raise SessionError(f"{self._path}: a malformed record: {error}") from None
-
-    def _cut(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
-        at, end = 0, len(records)
-        while at + _RECORD.size <= end:
-            opcode, length = _RECORD.unpack_from(records, at)
-            at += _RECORD.size
-            if opcode == _MESSAGE:
-                number, _, t_ns, _ = _MESSAGE_HEAD.unpack_from(records, at)
-                line = self._line(number)
-                if line is not None:
-                    yield line, t_ns, records[at + _MESSAGE_HEAD.size : at + length]
-            elif opcode == _SCHEMA:
-                self._schemas |= _read_schema(records[at : at + length])
-            elif opcode == _CHANNEL:
-                self._declare(records[at : at + length])
-            at += length
-
-    def _line(self, number: int) -> Topic | None:
-        return self._lines[number] if number in self._lines else _BY_NUMBER.get(number)
-
-    def _declare(self, body: bytes) -> None:
-        channel = Channel.read(ReadDataStream(BytesIO(body)))
-        line = _BY_NAMES.get((channel.topic, self._schemas.get(channel.schema_id, "")))
-        self._lines[channel.id] = line
-        if line is None:
-            self._foreign.add(channel.topic)
-            return
-        version = channel.metadata.get(FORMAT_KEY, "1")
-        if not version.isdigit() or int(version) > FORMAT:
-            raise SessionError(
-                f"{self._path}: session format {version}, this rigwatch reads up to {FORMAT}"
-            )
-
-
-def _read_schema(body: bytes) -> dict[int, str]:
-    found = Schema.read(ReadDataStream(BytesIO(body)))
-    return {found.id: found.name}

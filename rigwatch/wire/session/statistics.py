@@ -1,10 +1,10 @@
-"""How many messages of each topic a closed segment says it holds, without reading its data.
+"""Message counts per topic from the summary of a closed segment, without reading its data.
 
     footer     := 0x02 | 20 u64 | summary start u64 | offsets start u64 | summary CRC-32 u32 | magic
     summary    := records, among them channels and one statistics record
     statistics := … | size u32 | (channel u16, messages u64)*
 
-A segment that is not closed, or whose summary has a wrong checksum, says nothing.
+A segment that is not closed, or whose summary has a wrong checksum, gives no counts.
 """
 
 import os
@@ -23,11 +23,11 @@ _FOOTER = struct.Struct("<BQQQI")
 _COUNT = struct.Struct("<HQ")
 _FOOTER_KIND, _CHANNEL, _STATISTICS = 0x02, 0x04, 0x0B
 _COUNTS_AT = 42
-"""Where the counts by channel begin in a statistics record."""
+"""Offset of the counts by channel in a statistics record."""
 
 
 def topic_counts(path: Path) -> dict[str, int] | None:
-    """Messages by topic, None where the segment does not say."""
+    """Messages by topic, None if unknown."""
     try:
         summary = _summary(path)
         return None if summary is None else _counts(summary)
@@ -36,7 +36,7 @@ def topic_counts(path: Path) -> dict[str, int] | None:
 
 
 def _summary(path: Path) -> bytes | None:
-    """The checked bytes of the summary, without the footer."""
+    """The verified bytes of the summary, without the footer."""
     tail = _FOOTER.size + len(MAGIC)
     with path.open("rb") as file:
         end = file.seek(0, os.SEEK_END) - tail

@@ -1,4 +1,4 @@
-"""What is in a session, in figures: rates, gaps, quality, topics, alarms, damage."""
+"""Summary of a session: rates, gaps, quality, topics, alarms, damage."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -17,16 +17,17 @@ from rigwatch.wire.messages import (
     blocks,
 )
 from rigwatch.wire.messages import quality_flags as quality
+from rigwatch.wire.session.losses import Losses, Span, count
 from rigwatch.wire.session.reader import LostSpan, Session
 from rigwatch.wire.session.writer import message_time
 
 
 @dataclass(slots=True)
 class ChannelSummary:
-    """One channel over a session; `low`, `high` and `mean` [unit] are those of its good samples.
+    """One channel over a session; `low`, `high` and `mean` [unit] are over its good samples.
 
     Attributes:
-        flags: how many samples carry which quality flag; "good" those that carry none.
+        flags: number of samples by quality flag; "good" for none.
     """
 
     name: str
@@ -42,12 +43,12 @@ class DeviceSummary:
     """The samples of one device.
 
     Attributes:
-        samples: how many there are.
-        boots: how often the device started.
+        samples: number of samples.
+        boots: number of starts of the device.
         rate_hz: mean rate inside unbroken stretches [Hz].
-        longest_step_s: longest time between two neighbours of a stretch [s].
-        gaps: places where numbers are missing.
-        missing: samples missing there.
+        longest_step_s: longest time between neighbours in a stretch [s].
+        gaps: number of gaps in the sequence numbers, reported ones at the end of a start included.
+        missing: number of missing samples.
     """
 
     name: str
@@ -62,13 +63,14 @@ class DeviceSummary:
 
 @dataclass(slots=True)
 class Summary:
-    """What is in a session.
+    """The summary of a session.
 
     Attributes:
-        run: what it was made with, None where that is lost.
+        run: description of the run, None if lost.
         start_ns, end_ns: times of the first and last message [ns], 0 where there is none.
-        topics: messages of each topic.
-        reported_lost: samples that readers reported as lost (Gap messages).
+        topics: messages per topic.
+        unknown_ends: starts of a device whose last samples are missing, number unknown.
+        lost_messages: missing messages per topic, such as alarms that no ring held any longer.
         lost: damage.
         unclosed: segments without an index, by name.
     """
@@ -81,18 +83,19 @@ class Summary:
     topics: dict[str, int] = field(default_factory=dict)
     devices: list[DeviceSummary] = field(default_factory=list)
     alarms: list[Alarm] = field(default_factory=list)
-    reported_lost: int = 0
+    unknown_ends: int = 0
+    lost_messages: dict[str, int] = field(default_factory=dict)
     lost: tuple[LostSpan, ...] = ()
     unclosed: list[str] = field(default_factory=list)
 
     @property
     def duration_s(self) -> float:
-        """Time from the first message to the last [s]."""
+        """Duration from the first to the last message [s]."""
         return (self.end_ns - self.start_ns) / 1e9
 
 
 def summarise(session: Session) -> Summary:
-    """The figures of the whole session.
+    """Summarise the whole session.
 
     Raises:
         SessionError: a segment cannot be opened.
@@ -100,18 +103,25 @@ def summarise(session: Session) -> Summary:
     summary = Summary(str(session.path), len(session.segments))
     devices: dict[str, _Device] = {}
     counts: Counter[str] = Counter()
+    losses = Losses()
     for item in session.messages():
         counts[item.topic.name] += 1
         message = item.message
         if isinstance(message, SampleBlock):
             devices.setdefault(message.device, _Device(message.device)).add(message)
+            losses.add(message)
         elif isinstance(message, Alarm):
             summary.alarms.append(message)
         elif isinstance(message, Gap):
-            summary.reported_lost += max(0, message.last - message.first + 1)
+            losses.add(message)
         _extend(summary, message)
     summary.topics = dict(sorted(counts.items()))
-    summary.devices = [device.result() for device in devices.values()]
+    summary.devices = [
+        # A start whose samples are all missing has no device but the only one there is.
+        device.result(losses.missing(device.boots if len(devices) > 1 else None))
+        for device in devices.values()
+    ]
+    summary.unknown_ends, summary.lost_messages = losses.unknown_ends, losses.messages
     summary.run = _run(session)
     summary.lost = session.lost
     summary.unclosed = [path.name for path in session.unclosed]
@@ -126,7 +136,7 @@ def _run(session: Session) -> RunInfo | None:
 
 
 def _extend(summary: Summary, message: Message) -> None:
-    """Widen the span of time; the description of the run does not, it may be years older."""
+    """Extend the time span; the description of the run is excluded, it may be years older."""
     if isinstance(message, RunInfo):
         return
     first = last = message_time(message)
@@ -137,7 +147,7 @@ def _extend(summary: Summary, message: Message) -> None:
 
 
 class _Device:
-    """Running figures of one device."""
+    """Accumulates the figures of one device."""
 
     def __init__(self, name: str) -> None:
         self._figures = DeviceSummary(name)
@@ -151,19 +161,12 @@ class _Device:
         part = blocks.unseen(block, known)
         if part is None or not len(part):
             return
-        self._count_gap(part, known)
+        self._figures.boots += known is None
         self._measure_steps(part)
         self._figures.samples += len(part)
         self._next[part.boot] = part.seq + len(part)
         for column in part.channels:
             self._channels.setdefault(column.name, _Channel(column)).add(column)
-
-    def _count_gap(self, block: SampleBlock, known: int | None) -> None:
-        if known is None:
-            self._figures.boots += 1
-        elif block.seq > known:
-            self._figures.gaps += 1
-            self._figures.missing += block.seq - known
 
     def _measure_steps(self, block: SampleBlock) -> None:
         t_ns = block.t_ns
@@ -176,15 +179,20 @@ class _Device:
             self._time_ns += int(t_ns[-1] - t_ns[0])
         self._last = (block.boot, block.seq + len(block), int(block.t_ns[-1]))
 
-    def result(self) -> DeviceSummary:
+    @property
+    def boots(self) -> tuple[int, ...]:
+        return tuple(self._next)
+
+    def result(self, missing: list[Span]) -> DeviceSummary:
         figures = self._figures
+        figures.gaps, figures.missing = len(missing), count(missing)
         figures.rate_hz = self._steps / self._time_ns * 1e9 if self._time_ns > 0 else 0.0
         figures.channels = [channel.result() for channel in self._channels.values()]
         return figures
 
 
 class _Channel:
-    """Running figures of one channel."""
+    """Accumulates the figures of one channel."""
 
     def __init__(self, column: Column) -> None:
         self._figures = ChannelSummary(column.name, column.unit)

@@ -1,14 +1,14 @@
-"""Writes one MCAP file: every flush is one chunk with its checksum, safely on the disk.
+"""Writes one MCAP file: every flush is one checksummed chunk, synced to the disk.
 
     magic, header
     chunk  schemas, channels, RunInfo
     chunk  everything between two flushes: samples and estimates each merged into one block
     …
-    summary, magic                          only where the file was closed; a killed one ends with
-    its last chunk
+    summary, magic                          only if the file was closed; a killed one ends with its
+                                            last chunk
 
-Channel numbers are the places in the table of topics, so that a file whose first chunk is damaged
-can still be read.
+Channel numbers are the positions in the table of topics, so that a file whose first chunk is
+damaged can still be read.
 """
 
 import errno
@@ -36,19 +36,19 @@ from rigwatch.wire.messages import protobuf as schema
 
 PROFILE = "rigwatch"
 FORMAT = 1
-"""Version of what is inside: readers refuse a higher one."""
+"""Version of the content: readers refuse a higher one."""
 FORMAT_KEY = "rigwatch_format"
 SOFTWARE = f"rigwatch {__version__}"
 LARGEST_BLOCK = 4096
-"""Samples in one message at most, which bounds a reader's memory [samples]."""
+"""Most samples per message, which bounds a reader's memory."""
 SPILL = 2 * LARGEST_BLOCK
-"""Samples that may wait before they are written without being asked for [samples]."""
+"""Most waiting samples before an automatic flush."""
 _NEVER = 1 << 62
 _CHANNEL_IDS = {line.message: number for number, line in enumerate(TOPICS, start=1)}
 
 
 def message_time(message: Message) -> int:
-    """Time of the message, of its first sample where it has samples [ns]."""
+    """Time of the message, or of its first sample [ns]."""
     if isinstance(message, SampleBlock | EstimateBlock):
         return int(message.t_ns[0]) if len(message) else 0
     return message.t_ns
@@ -57,17 +57,17 @@ def message_time(message: Message) -> int:
 class SessionWriter:
     """One session file being written.
 
-    `write` only remembers; `flush` merges what is remembered, writes it as one chunk and waits for
-    the disk. After a failed flush the file holds what it held before, `pending` what it does not,
-    and the writer is of no more use.
+    `write` buffers; `flush` merges the buffered messages, writes them as one chunk and waits for
+    the disk. After a failed flush the file is unchanged, `pending` holds the unwritten messages,
+    and the writer cannot be used any more.
 
     Args:
         path: the file; it must not exist.
-        run: stands at its head.
+        run: written at its head.
         sync: whether each flush waits for the disk.
 
     Raises:
-        SessionError: the file exists already or cannot be written.
+        SessionError: the file exists or cannot be written.
     """
 
     def __init__(self, path: Path | str, run: RunInfo, *, sync: bool = True) -> None:
@@ -95,11 +95,11 @@ class SessionWriter:
 
     @property
     def size(self) -> int:
-        """Bytes on the disk."""
+        """Number of bytes on the disk."""
         return self._output.committed
 
     def write(self, message: Message) -> None:
-        """Remember the message; it is on the disk after the next flush."""
+        """Buffer the message; it is on the disk after the next flush."""
         self.pending.append(message)
         if isinstance(message, SampleBlock | EstimateBlock):
             self._waiting += len(message)
@@ -107,7 +107,7 @@ class SessionWriter:
                 self.flush()
 
     def flush(self) -> None:
-        """Put everything remembered on the disk.
+        """Write all buffered messages to the disk.
 
         Raises:
             SessionError: the disk is full, gone or read-only. `pending` still holds the messages.
@@ -126,10 +126,10 @@ class SessionWriter:
         self._mcap.add_message(_CHANNEL_IDS[type(message)], t_ns, schema.encode(message), t_ns)
 
     def close(self) -> None:
-        """Write what is left and the index, and close the file.
+        """Write the rest and the index, and close the file.
 
         Raises:
-            SessionError: as `flush`.
+            SessionError: as in `flush`.
         """
         if self._output.closed:
             return
@@ -141,7 +141,7 @@ class SessionWriter:
             self.abandon()
 
     def abandon(self) -> None:
-        """Close the file as it stands on the disk, without an index."""
+        """Close the file as it is on the disk, without an index."""
         self._output.close()
 
     def __enter__(self) -> Self:
@@ -162,8 +162,8 @@ class SessionWriter:
 def merge_pending(messages: Iterable[Message], largest: int = LARGEST_BLOCK) -> list[Message]:
     """The messages, with consecutive blocks joined up to `largest` samples.
 
-    A joined block stands where its first part stood. Nothing is joined across an operator's
-    command, so that the command keeps its place between the samples.
+    A joined block takes the position of its first part. Nothing is joined across an operator's
+    command, so that the command keeps its position between the samples.
     """
     slots: list[list[Message]] = []
     runs: dict[tuple[type[Message], str], tuple[list[Message], int]] = {}

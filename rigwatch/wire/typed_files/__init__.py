@@ -1,16 +1,19 @@
 """Typed TOML files: loaded into declared sections, with errors that name file, key and value."""
 
 from rigwatch.wire.typed_files.bounded import loads
-from rigwatch.wire.typed_files.loading import Section, load, parse
+from rigwatch.wire.typed_files.loading import Section, load, parse, read_text
 from rigwatch.wire.typed_files.shipped import copy_out, find_config, find_file, shipped_names
+from rigwatch.wire.typed_files.writing import as_toml
 
 __all__ = [
     "Section",
+    "as_toml",
     "copy_out",
     "find_config",
     "find_file",
     "load",
     "loads",
     "parse",
+    "read_text",
     "shipped_names",
 ]

@@ -28,7 +28,7 @@ def load(path: Path | str, kind: type[S]) -> S:
     Raises:
         ConfigError: the file cannot be read, is not TOML, or does not fit `kind`.
     """
-    return parse(_read(Path(path)), kind, path)
+    return parse(read_text(Path(path)), kind, path)
 
 
 def parse(text: str, kind: type[S], file: Path | str) -> S:
@@ -47,7 +47,12 @@ def parse(text: str, kind: type[S], file: Path | str) -> S:
         raise explained(error, raw, kind, text, file) from None
 
 
-def _read(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """What a file says.
+
+    Raises:
+        ConfigError: it cannot be read, or is not UTF-8.
+    """
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:

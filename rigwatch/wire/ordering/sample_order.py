@@ -1,5 +1,7 @@
 """Samples in order, none twice, none silently missing: the logic of a reader, without clock or bus.
 
+Numbered messages take the same way: below, a sample may be a message as well.
+
 Blocks may come late, twice, in any order, or not at all; replies of the ring fill the holes. Each
 sample of the source in control leaves as exactly one of
 
@@ -12,10 +14,12 @@ block that comes in order leaves in the same call: only those wait that stand be
 
 from collections import deque
 from dataclasses import dataclass
+from typing import Generic, TypeAlias
 
-from rigwatch.wire.delivery.ring_protocol import OPEN, UNKNOWN, Ask, RingReply
-from rigwatch.wire.delivery.source_arbitration import Sources
-from rigwatch.wire.messages import SampleBlock, Severity, cut, unseen
+from rigwatch.wire.messages import Severity, cut, unseen
+from rigwatch.wire.ordering.numbered import Numbered
+from rigwatch.wire.ordering.ring_protocol import OPEN, UNKNOWN, Ask, RingReply, S
+from rigwatch.wire.ordering.source_arbitration import Sources
 
 LARGEST_SEQ = 2**53
 """No device counts so far: a number beyond it is a lie."""
@@ -48,7 +52,7 @@ FORGED = "FORGED SAMPLES"
 """Code of the remark that samples came which the source never sent."""
 POSITION_WRONG = "POSITION SET ASIDE"
 """Code of the remark that the position to go on from was beyond all that the source has sent."""
-Outcome = SampleBlock | Loss | Ask | Remark
+Outcome: TypeAlias = S | Loss | Ask | Remark
 
 
 @dataclass(slots=True)
@@ -70,7 +74,7 @@ class Counters:
     foreign: int = 0
 
 
-class Stream:
+class Stream(Generic[S]):
     """The samples of one boot: what comes next, and blocks that wait for those before them.
 
     Attributes:
@@ -84,10 +88,10 @@ class Stream:
         self.next = next_seq
         self.promised_from = promised_from
         self.ended = False
-        self.waiting: dict[int, SampleBlock] = {}
+        self.waiting: dict[int, S] = {}
         self.samples_waiting = 0
 
-    def hold(self, block: SampleBlock) -> None:
+    def hold(self, block: S) -> None:
         """Keep a block until its turn; of two with the same start the longer."""
         known = self.waiting.get(block.seq)
         if known is None or len(known) < len(block):
@@ -98,14 +102,14 @@ class Stream:
         """The lowest number among the waiting blocks; OPEN where none waits."""
         return min(self.waiting, default=OPEN)
 
-    def take(self) -> SampleBlock:
+    def take(self) -> S:
         """The waiting block with the lowest number."""
         block = self.waiting.pop(min(self.waiting))
         self.samples_waiting -= len(block)
         return block
 
 
-class SampleOrder:
+class SampleOrder(Generic[S]):
     """Turns what arrives into samples in order and reported losses.
 
     Args:
@@ -126,20 +130,20 @@ class SampleOrder:
         self.sources = Sources()
         self._history = history
         self._capacity = capacity
-        self._line: deque[Stream] = deque()
+        self._line: deque[Stream[S]] = deque()
         self._settled_boots: dict[int, int] = {}
         self._asked: Ask | None = None
         self._unanswered = 0
         self._heard_since_ask = False
         self._stale = 0
-        self._out: list[Outcome] = []
+        self._out: list[Outcome[S]] = []
         if resume_after is not None:
             # Taken for alive until the tokens that are there have been listed.
             self.sources.appeared(resume_after[0], 0)
             boot, seq = resume_after[0], resume_after[1] + 1
             self._control(Stream(boot, max(0, seq - history), promised_from=seq))
 
-    def on_block(self, block: SampleBlock) -> list[Outcome]:
+    def on_block(self, block: S) -> list[Outcome[S]]:
         """A block was received from the bus."""
         if 0 <= block.seq <= LARGEST_SEQ - len(block):
             if len(block):
@@ -148,7 +152,7 @@ class SampleOrder:
             self.counters.foreign += len(block)
         return self._outcomes()
 
-    def on_reply(self, ask: Ask, reply: RingReply | None) -> list[Outcome]:
+    def on_reply(self, ask: Ask, reply: RingReply[S] | None) -> list[Outcome[S]]:
         """The ring replied to `ask`, or nobody did (None)."""
         if ask == self._asked:
             self._asked = None
@@ -158,7 +162,7 @@ class SampleOrder:
                 self._settle(ask, reply)
         return self._outcomes()
 
-    def on_token(self, boot: int, since_ns: int, alive: bool) -> list[Outcome]:
+    def on_token(self, boot: int, since_ns: int, alive: bool) -> list[Outcome[S]]:
         """A source's liveliness token came or went."""
         if alive:
             self.sources.appeared(boot, since_ns)
@@ -166,7 +170,13 @@ class SampleOrder:
             self._vanished(boot, since_ns)
         return self._outcomes()
 
-    def on_silence(self) -> list[Outcome]:
+    def follow(self, boot: int) -> list[Outcome[S]]:
+        """A source that is there while the one in control is gone is heard from its first on."""
+        if self.sources.current != boot and not self.sources.is_alive(self.sources.current or 0):
+            self._change_control((boot, 0))
+        return self._outcomes()
+
+    def on_silence(self) -> list[Outcome[S]]:
         """Nothing has come for a while: what was missed at the end has no successor to show it."""
         self._change_control(self.sources.fell_silent())
         if self._line and self._asked is None and not self._line[0].ended:
@@ -180,7 +190,7 @@ class SampleOrder:
 
     # ---- which source -------------------------------------------------------------------
 
-    def _admit(self, block: SampleBlock) -> None:
+    def _admit(self, block: S) -> None:
         verdict = self.sources.judge(block)
         if verdict.remark:
             self._out.append(Remark("error", "DUPLICATE SOURCE", verdict.remark))
@@ -193,7 +203,7 @@ class SampleOrder:
         self._heard_since_ask = True
         self._store(stream, block)
 
-    def _drop(self, block: SampleBlock) -> None:
+    def _drop(self, block: S) -> None:
         if block.seq + len(block) <= self._settled_boots.get(block.boot, 0):
             self.counters.duplicates += len(block)
         else:
@@ -234,17 +244,17 @@ class SampleOrder:
         self._control(Stream(boot, max(0, seq - self._history), promised_from=seq))
         self._out.append(Remark("info", "JOINED", f"joined boot {boot} at seq {seq}"))
 
-    def _control(self, stream: Stream) -> None:
+    def _control(self, stream: Stream[S]) -> None:
         self._line.append(stream)
         self.sources.take_control(stream.boot)
 
-    def _stream(self, boot: int) -> Stream | None:
+    def _stream(self, boot: int) -> Stream[S] | None:
         return next((stream for stream in self._line if stream.boot == boot), None)
 
     # ---- order within the sources in line -----------------------------------------------
 
-    def _store(self, stream: Stream, block: SampleBlock) -> None:
-        fresh = unseen(block, stream.next)
+    def _store(self, stream: Stream[S], block: S) -> None:
+        fresh = _rest(block, stream.next)
         self.counters.duplicates += len(block) - (len(fresh) if fresh else 0)
         self._stale = 0 if fresh else self._stale + len(block)
         if fresh is None:
@@ -262,8 +272,8 @@ class SampleOrder:
             self._stale = 0
             self._ask(Ask(front.boot, front.next, OPEN))
 
-    def _deliver(self, stream: Stream, block: SampleBlock) -> None:
-        fresh = unseen(block, stream.next)
+    def _deliver(self, stream: Stream[S], block: S) -> None:
+        fresh = _rest(block, stream.next)
         if fresh is not None:
             stream.next = fresh.seq + len(fresh)
             self.counters.delivered += len(fresh)
@@ -273,7 +283,7 @@ class SampleOrder:
         self.counters.lost += max(0, last - first + 1)
         self._out.append(Loss(boot, first, last, reason))
 
-    def _outcomes(self) -> list[Outcome]:
+    def _outcomes(self) -> list[Outcome[S]]:
         self._advance()
         done, self._out = self._out, []
         return done
@@ -291,7 +301,7 @@ class SampleOrder:
             else:
                 return
 
-    def _release(self, front: Stream) -> None:
+    def _release(self, front: Stream[S]) -> None:
         """Deliver the waiting blocks whose turn it is, or that have become too many."""
         while front.waiting:
             if front.samples_waiting > self._capacity:
@@ -308,7 +318,7 @@ class SampleOrder:
         self._heard_since_ask = False
         self._out.append(ask)
 
-    def _settle(self, ask: Ask, reply: RingReply) -> None:
+    def _settle(self, ask: Ask, reply: RingReply[S]) -> None:
         front = self._line[0]
         self._unanswered = 0
         if reply.settled == UNKNOWN:
@@ -329,7 +339,7 @@ class SampleOrder:
         if ask.last == OPEN and front.ended and not self._progressed(ask, front):
             self._leave(front)
 
-    def _disbelieve(self, front: Stream) -> None:
+    def _disbelieve(self, front: Stream[S]) -> None:
         """Every sample is in the ring before it is published: what the ring has not seen is forged.
 
         A sample that came while the ring was asked is dropped as well, and recovered from it.
@@ -340,7 +350,7 @@ class SampleOrder:
         text = f"samples of boot {front.boot} that its source never sent; they are dropped"
         self._out.append(Remark("error", FORGED, text))
 
-    def _set_back(self, front: Stream, seq: int) -> None:
+    def _set_back(self, front: Stream[S], seq: int) -> None:
         """The position lies behind the newest sample of the source: it was never right."""
         told = f"sample {front.next - 1} of boot {front.boot} lies beyond its newest, {seq - 1}"
         self._out.append(Remark("error", POSITION_WRONG, f"{told}; reading continues from there"))
@@ -349,15 +359,14 @@ class SampleOrder:
         front.samples_waiting = 0
         front.next = front.promised_from = seq
 
-    def _take_recovered(self, front: Stream, block: SampleBlock, last: int) -> None:
-        wanted = cut(block, 0, max(0, min(len(block), last + 1 - block.seq)))
-        if len(wanted) and block.seq <= front.next:
-            self._deliver(front, wanted)
+    def _take_recovered(self, front: Stream[S], block: S, last: int) -> None:
+        if block.seq <= min(front.next, last):
+            self._deliver(front, _up_to(block, last))
 
-    def _progressed(self, ask: Ask, front: Stream) -> bool:
+    def _progressed(self, ask: Ask, front: Stream[S]) -> bool:
         return front.next > ask.first or bool(front.waiting)
 
-    def _skip(self, front: Stream, last: int, reason: str) -> None:
+    def _skip(self, front: Stream[S], last: int, reason: str) -> None:
         """Everything up to `last` that does not wait here is lost."""
         while front.next <= last:
             hole_end = min(last, front.first_waiting() - 1)
@@ -366,7 +375,7 @@ class SampleOrder:
             elif front.waiting:
                 self._deliver(front, front.take())
 
-    def _miss(self, front: Stream, last: int, reason: str) -> None:
+    def _miss(self, front: Stream[S], last: int, reason: str) -> None:
         if last >= front.promised_from:
             self._lose(front.boot, max(front.next, front.promised_from), last, reason)
         front.next = last + 1
@@ -381,13 +390,27 @@ class SampleOrder:
         self._unanswered = 0
         self._give_up(self._line[0], ask, "nobody could be asked for them")
 
-    def _give_up(self, front: Stream, ask: Ask, reason: str) -> None:
+    def _give_up(self, front: Stream[S], ask: Ask, reason: str) -> None:
         if ask.last != OPEN:
             self._skip(front, ask.last, reason)
         elif front.ended:
             self._lose(front.boot, front.next, front.next - 1, reason)
             self._leave(front)
 
-    def _leave(self, front: Stream) -> None:
+    def _leave(self, front: Stream[S]) -> None:
         self._settled_boots[front.boot] = front.next
         self._line.popleft()
+
+
+def _rest(block: S, next_seq: int) -> S | None:
+    """What of a block is due from `next_seq` on, None for nothing."""
+    if isinstance(block, Numbered):
+        return block if block.seq >= next_seq else None
+    return unseen(block, next_seq)
+
+
+def _up_to(block: S, last: int) -> S:
+    """The block without what comes after `last`, which is not before its first."""
+    if isinstance(block, Numbered):
+        return block
+    return cut(block, 0, min(len(block), last + 1 - block.seq))

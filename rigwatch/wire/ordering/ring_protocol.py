@@ -1,4 +1,4 @@
-"""What a reader asks of a ring of recent samples and what it gets, as bytes.
+"""What a reader asks of a ring of recent samples or messages and what it gets, as bytes.
 
     question    boot, first, last                    three int64, little endian
     reply       boot, settled, blocks in order       two int64, then each block's length and bytes
@@ -9,10 +9,16 @@ boot replies with `settled` of -1 and no block.
 """
 
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import SampleBlock, decode, encode
+from rigwatch.wire.ordering.numbered import Numbered
+
+S = TypeVar("S", SampleBlock, Numbered)
+"""What is put in order."""
 
 OPEN = 2**62
 """As `last` of a question: whatever there is up to now."""
@@ -51,40 +57,49 @@ class Ask:
 
 
 @dataclass(frozen=True, slots=True)
-class RingReply:
+class RingReply(Generic[S]):
     """What a ring has of the samples asked for, and up to where that is all there is."""
 
     boot: int
     settled: int
-    blocks: tuple[SampleBlock, ...]
+    blocks: tuple[S, ...]
 
     def to_bytes(self) -> bytes:
         """The reply as it travels."""
         parts = [_REPLY.pack(self.boot, self.settled)]
         for block in self.blocks:
-            data = encode(block)
+            data = block.to_bytes() if isinstance(block, Numbered) else encode(block)
             parts += (_LENGTH.pack(len(data)), data)
         return b"".join(parts)
 
     @classmethod
-    def from_bytes(cls, data: bytes) -> "RingReply":
-        """The reply that `data` holds.
+    def from_bytes(cls, data: bytes) -> "RingReply[SampleBlock]":
+        """The reply with samples that `data` holds.
 
         Raises:
             MessageError: the bytes are no reply.
         """
-        try:
-            boot, settled = _REPLY.unpack_from(data)
-            return cls(boot, settled, tuple(_blocks(data)))
-        except struct.error:
-            raise MessageError(f"reply of the ring: {len(data)} bytes that are none") from None
+        return _parsed(data, lambda part: decode(SampleBlock, part))
+
+    @classmethod
+    def of_messages(cls, data: bytes) -> "RingReply[Numbered]":
+        """The reply with messages that `data` holds.
+
+        Raises:
+            MessageError: the bytes are no reply.
+        """
+        return _parsed(data, Numbered.from_bytes)
 
 
-def _blocks(data: bytes) -> list[SampleBlock]:
-    blocks, at = [], _REPLY.size
-    while at < len(data):
-        (length,) = _LENGTH.unpack_from(data, at)
-        at += _LENGTH.size
-        blocks.append(decode(SampleBlock, data[at : at + length]))
-        at += length
-    return blocks
+def _parsed(data: bytes, read: Callable[[bytes], S]) -> RingReply[S]:
+    try:
+        boot, settled = _REPLY.unpack_from(data)
+        blocks, at = [], _REPLY.size
+        while at < len(data):
+            (length,) = _LENGTH.unpack_from(data, at)
+            at += _LENGTH.size
+            blocks.append(read(data[at : at + length]))
+            at += length
+    except struct.error:
+        raise MessageError(f"reply of the ring: {len(data)} bytes that are none") from None
+    return RingReply(boot, settled, tuple(blocks))

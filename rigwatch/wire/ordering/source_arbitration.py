@@ -10,6 +10,7 @@ no sample of the old one came in between.
 from dataclasses import dataclass
 
 from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.ordering.numbered import Numbered
 
 OLD_NS = 5_000_000_000
 """A new boot without a token whose samples are older than the last by this is a replay [ns]."""
@@ -104,7 +105,7 @@ class Sources:
         rival = self._rivals.get(boot)
         return max(resumed, rival.first) if rival and rival.from_seq > 0 else resumed
 
-    def judge(self, block: SampleBlock) -> Verdict:
+    def judge(self, block: SampleBlock | Numbered) -> Verdict:
         """What a block means for who has control."""
         if block.boot == self.current:
             return self._current_spoke(block)
@@ -112,7 +113,7 @@ class Sources:
             return Verdict(control_from=block.seq if self._is_oldest(block.boot) else None)
         return self._other_spoke(block)
 
-    def _current_spoke(self, block: SampleBlock) -> Verdict:
+    def _current_spoke(self, block: SampleBlock | Numbered) -> Verdict:
         self._silent = False
         self._latest_ns = max(self._latest_ns, int(block.t_ns[-1]))
         for rival in self._rivals.values():
@@ -120,7 +121,7 @@ class Sources:
         untold = [boot for boot, rival in self._rivals.items() if not rival.told]
         return Verdict(remark=self._conflict(untold[0])) if untold else Verdict()
 
-    def _other_spoke(self, block: SampleBlock) -> Verdict:
+    def _other_spoke(self, block: SampleBlock | Numbered) -> Verdict:
         boot, end = block.boot, block.seq + len(block) - 1
         if not self.is_alive(boot) and self._is_past(block):
             return Verdict()
@@ -133,7 +134,7 @@ class Sources:
         certain = self.is_alive(boot) and self.current in self._alive
         return Verdict(remark=self._conflict(boot)) if certain and not rival.told else Verdict()
 
-    def _is_past(self, block: SampleBlock) -> bool:
+    def _is_past(self, block: SampleBlock | Numbered) -> bool:
         """A straggler of a source that is gone, or a recording of one."""
         return block.boot in self._had_token or int(block.t_ns[0]) < self._latest_ns - OLD_NS
 

@@ -1,0 +1,109 @@
+"""Removes old segments by age and total size; segments with alarms stay longer.
+
+A closed segment states in its summary how many alarms it holds. One that does not (still open, or
+its recorder was killed) counts as one with alarms.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rigwatch.recorder.positions import FILE
+from rigwatch.wire.messages import ALARMS, Event
+from rigwatch.wire.rig_config import RecorderSection
+from rigwatch.wire.session import SUFFIX, topic_counts
+
+DAY = 86_400.0
+GIGABYTE = 1e9
+EVERY = 60.0
+"""Time between two looks at the folder [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A segment on the disk: path, end as Unix time [s], size [bytes], whether it has alarms."""
+
+    path: Path
+    ended: float
+    size: int
+    alarms: bool
+
+
+class Retention:
+    """The rules of one rig.
+
+    Args:
+        settings: section [recorder]; a limit of 0 is none.
+        rig: whose sessions in the folder are meant.
+    """
+
+    def __init__(self, settings: RecorderSection, rig: str) -> None:
+        self._settings, self._rig = settings, rig
+        self._alarms: dict[Path, bool] = {}
+        self._due = 0.0
+
+    def update(self, now: float, t_ns: int, current: Path) -> list[Event]:
+        """Remove what is due, at most once a minute, and report it.
+
+        Args:
+            now: time on a monotonic clock [s].
+            t_ns: Unix time [ns].
+            current: folder that is being recorded to; its newest segment stays.
+        """
+        if now < self._due:
+            return []
+        self._due = now + EVERY
+        removed = [one for one in self.expired(t_ns / 1e9, current) if _remove(one.path)]
+        if not removed:
+            return []
+        size = sum(one.size for one in removed) / 1e6
+        text = f"{len(removed)} segment(s) removed, {size:.1f} MB: older or larger than configured"
+        return [Event("recorder", t_ns, "info", "RECORDING_EXPIRED", text)]
+
+    def expired(self, now_s: float, current: Path) -> list[Segment]:
+        """Segments to be removed, oldest first, those without alarms before those with alarms."""
+        found = sorted(self._segments(current), key=lambda one: (one.alarms, one.ended))
+        old = [one for one in found if self._is_old(one, now_s)]
+        excess = sum(one.size for one in found) - sum(one.size for one in old)
+        limit = self._settings.keep_gigabytes * GIGABYTE
+        for one in found:
+            if not limit or excess <= limit:
+                break
+            if one not in old:
+                old.append(one)
+                excess -= one.size
+        return old
+
+    def _is_old(self, one: Segment, now_s: float) -> bool:
+        days = self._settings.keep_alarm_days if one.alarms else self._settings.keep_days
+        return days > 0 and now_s - one.ended > days * DAY
+
+    def _segments(self, current: Path) -> Iterator[Segment]:
+        root = Path(self._settings.folder)
+        newest = max(current.glob(f"*{SUFFIX}"), default=None)
+        for path in root.glob(f"{self._rig}-*Z*/*{SUFFIX}"):
+            if path == newest:
+                continue
+            try:
+                found = path.stat()
+            except OSError:
+                continue
+            yield Segment(path, found.st_mtime, found.st_size, self._has_alarms(path))
+
+    def _has_alarms(self, path: Path) -> bool:
+        if path not in self._alarms:
+            counts = topic_counts(path)
+            self._alarms[path] = counts is None or counts.get(ALARMS.name, 0) > 0
+        return self._alarms[path]
+
+
+def _remove(path: Path) -> bool:
+    """Remove a segment, and its folder with the last one; False if that is not possible."""
+    try:
+        path.unlink()
+        if not any(path.parent.glob(f"*{SUFFIX}")):
+            (path.parent / FILE).unlink(missing_ok=True)
+            path.parent.rmdir()
+    except OSError:
+        return not path.exists()
+    return True

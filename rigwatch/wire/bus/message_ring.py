@@ -1,0 +1,102 @@
+"""What a process has said lately, numbered and kept for listeners that missed some of it.
+
+Every message of a numbered topic goes into the ring before it is published, with the run of its
+process, drawn at the start, and its number in it. A token at
+`said/<process>/<run>/<since>/<identity>` shows who speaks; `ring/<process>/<topic>` answers for
+what was said.
+"""
+
+import secrets
+import threading
+import time
+from collections import deque
+from itertools import islice
+
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Transport
+from rigwatch.wire.messages import TOPICS, Topic, bus_key
+from rigwatch.wire.ordering import UNKNOWN, Ask, Numbered, RingReply
+
+SAID_KEY = "said"
+RING_BYTES = 32 << 20
+"""Kept of each topic [bytes]: two minutes of estimates, months of alarms."""
+REPLY_BYTES = MAX_PAYLOAD // 2
+LARGEST_NUMBERED = MAX_PAYLOAD - 64
+"""Largest payload of a numbered message: a ring replies with it and its place [bytes]."""
+
+
+def ring_key(process: str, topic: Topic) -> str:
+    """Where the ring of a process answers for a topic."""
+    return f"ring/{process}/{topic.name}"
+
+
+class MessageRing:
+    """The newest messages of one topic of one run.
+
+    Args:
+        run: the process's run.
+        capacity: what their payloads may take [bytes].
+    """
+
+    def __init__(self, run: int, capacity: int = RING_BYTES) -> None:
+        self._run, self._capacity = run, capacity
+        self._kept: deque[Numbered] = deque()
+        self._bytes = 0
+        self._next = 0
+        self._lock = threading.Lock()
+
+    def add(self, payload: bytes) -> Numbered:
+        """Number a payload and keep it, in place of the oldest."""
+        with self._lock:
+            message = Numbered(self._run, self._next, payload)
+            self._next += 1
+            self._kept.append(message)
+            self._bytes += len(payload)
+            while self._bytes > self._capacity:
+                self._bytes -= len(self._kept.popleft().payload)
+            return message
+
+    def reply(self, ask: Ask) -> RingReply[Numbered]:
+        """What is kept of the messages asked for, as far as one reply goes."""
+        if ask.boot != self._run:
+            return RingReply(ask.boot, UNKNOWN, ())
+        with self._lock:
+            oldest, newest = self._next - len(self._kept), self._next - 1
+            found: list[Numbered] = []
+            size = 0
+            for message in islice(self._kept, max(0, ask.first - oldest), None):
+                size += len(message.payload) + 64
+                if message.seq > ask.last or (found and size > REPLY_BYTES):
+                    break
+                found.append(message)
+        settled = found[-1].seq if found else min(ask.last, newest)
+        return RingReply(self._run, settled, tuple(found))
+
+
+class Outlet:
+    """The numbered topics of one process: whatever it says on them goes through here.
+
+    Args:
+        transport: what carries the bytes.
+        rig, process: whose messages these are.
+    """
+
+    def __init__(self, transport: Transport, rig: str, process: str) -> None:
+        self.run = 1 + secrets.randbits(52)
+        self._transport = transport
+        self._rig = rig
+        self._rings = {topic.name: MessageRing(self.run) for topic in TOPICS if topic.numbered}
+        for topic in TOPICS:
+            if topic.numbered:
+                self._serve(bus_key(rig, ring_key(process, topic)), self._rings[topic.name])
+        said = f"{SAID_KEY}/{process}/{self.run}/{time.time_ns()}/{transport.identity}"
+        transport.declare_token(bus_key(rig, said))
+
+    def _serve(self, key: str, ring: MessageRing) -> None:
+        self._transport.serve(
+            key, lambda question: [ring.reply(Ask.from_bytes(question)).to_bytes()]
+        )
+
+    def put(self, topic: Topic, payload: bytes) -> None:
+        """Keep a message, then send it."""
+        message = self._rings[topic.name].add(payload)
+        self._transport.put(bus_key(self._rig, topic.key), payload, message.mark)

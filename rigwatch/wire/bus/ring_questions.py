@@ -1,0 +1,61 @@
+"""Asks rings for what is missing, in a thread of its own, so that reading never waits."""
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from queue import SimpleQueue
+from typing import TYPE_CHECKING
+
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.ordering import Ask
+
+if TYPE_CHECKING:
+    from rigwatch.wire.bus.bus import Bus
+
+REPLY_TIMEOUT = 1.0
+PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
+"""Waits before a question that nobody answered goes out again [s]."""
+
+
+class RingQuestions:
+    """One reader's questions.
+
+    Args:
+        bus: where the rings answer.
+        answered: called in the thread that asks with each question's key, the question and the
+            replies, none where nobody replied.
+    """
+
+    def __init__(self, bus: "Bus", answered: Callable[[str, Ask, list[bytes]], None]) -> None:
+        self._bus, self._answered = bus, answered
+        self._questions: SimpleQueue[tuple[str, Ask] | None] = SimpleQueue()
+        self._closed = False
+        threading.Thread(target=self._ask_on, name="ring-questions", daemon=True).start()
+
+    def ask(self, key: str, ask: Ask) -> None:
+        """Put the question to the rings at `key`."""
+        self._questions.put((key, ask))
+
+    def close(self) -> None:
+        """Ask no more."""
+        self._closed = True
+        self._questions.put(None)
+
+    def _ask_on(self) -> None:
+        repeats: dict[str, tuple[Ask, int]] = {}
+        while (question := self._questions.get()) is not None:
+            key, ask = question
+            before, count = repeats.get(key, (None, 0))
+            count = count + 1 if ask == before else 0
+            repeats[key] = ask, count
+            if count:
+                time.sleep(PAUSES[min(count, len(PAUSES)) - 1])
+            self._answered(key, ask, self._replies(key, ask))
+
+    def _replies(self, key: str, ask: Ask) -> list[bytes]:
+        while not (self._bus.connected() or self._closed):
+            time.sleep(0.05)
+        with contextlib.suppress(BusError):
+            return self._bus.query(key, ask.to_bytes(), REPLY_TIMEOUT)
+        return []

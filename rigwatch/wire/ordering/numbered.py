@@ -1,0 +1,65 @@
+"""A message with its place in what one process has said: run and number.
+
+    bytes    run, number (int64, little endian), then the message's own bytes
+
+To the ordering logic a run is a boot and a message a block of one sample.
+"""
+
+import struct
+from dataclasses import dataclass
+from typing import ClassVar
+
+from rigwatch.wire.errors import MessageError
+
+_PLACE = struct.Struct("<qq")
+
+
+@dataclass(frozen=True, slots=True)
+class Numbered:
+    """One message.
+
+    Attributes:
+        boot: the run of the process, drawn at its start.
+        seq: its number in that run, from 0.
+        payload: the message's bytes.
+    """
+
+    boot: int
+    seq: int
+    payload: bytes
+    t_ns: ClassVar[tuple[int]] = (0,)
+    """Runs show by their tokens which is the newer one; no time is compared."""
+
+    def __len__(self) -> int:
+        return 1
+
+    @property
+    def mark(self) -> bytes:
+        """Run and number as they travel beside the message."""
+        return _PLACE.pack(self.boot, self.seq)
+
+    @classmethod
+    def marked(cls, mark: bytes, payload: bytes) -> "Numbered":
+        """The message that came with `mark`.
+
+        Raises:
+            MessageError: the mark is none.
+        """
+        try:
+            run, number = _PLACE.unpack(mark)
+        except struct.error:
+            raise MessageError(f"number of a message: {len(mark)} bytes, expected 16") from None
+        return cls(run, number, payload)
+
+    def to_bytes(self) -> bytes:
+        """Place and message, as a ring replies with them."""
+        return self.mark + self.payload
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> "Numbered":
+        """The message in a ring's reply.
+
+        Raises:
+            MessageError: the bytes are too few.
+        """
+        return cls.marked(data[: _PLACE.size], data[_PLACE.size :])

@@ -1,0 +1,82 @@
+"""Records of an MCAP chunk, cut into the messages of the table of topics."""
+
+import struct
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.records import Channel, Schema
+
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import TOPICS, Topic
+from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY
+
+_RECORD = struct.Struct("<BQ")
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
+_SCHEMA, _CHANNEL, _MESSAGE = 0x03, 0x04, 0x05
+_BY_NUMBER = dict(enumerate(TOPICS, start=1))
+_BY_NAMES = {(line.name, schema.type_name(line.message)): line for line in TOPICS}
+
+
+class ChunkReader:
+    """Splits the records of intact chunks into messages, with the channels declared so far.
+
+    Undeclared channels, whose declaration was in a damaged chunk, take the numbers of the table of
+    topics.
+    """
+
+    def __init__(self, path: Path, foreign: set[str]) -> None:
+        self._path, self._foreign = path, foreign
+        self._schemas: dict[int, str] = {}
+        self._lines: dict[int, Topic | None] = {}
+
+    def messages(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
+        """Topic, time and bytes of each message.
+
+        Raises:
+            SessionError: a record with a right checksum is malformed, or has a later version.
+        """
+        try:
+            yield from self._cut(records)
+        except (struct.error, McapError, ValueError, RecursionError) as error:
+            raise SessionError(f"{self._path}: a malformed record: {error}") from None
+
+    def _cut(self, records: bytes) -> Iterator[tuple[Topic, int, bytes]]:
+        at, end = 0, len(records)
+        while at + _RECORD.size <= end:
+            opcode, length = _RECORD.unpack_from(records, at)
+            at += _RECORD.size
+            if opcode == _MESSAGE:
+                number, _, t_ns, _ = _MESSAGE_HEAD.unpack_from(records, at)
+                line = self._line(number)
+                if line is not None:
+                    yield line, t_ns, records[at + _MESSAGE_HEAD.size : at + length]
+            elif opcode == _SCHEMA:
+                self._schemas |= _read_schema(records[at : at + length])
+            elif opcode == _CHANNEL:
+                self._declare(records[at : at + length])
+            at += length
+
+    def _line(self, number: int) -> Topic | None:
+        return self._lines[number] if number in self._lines else _BY_NUMBER.get(number)
+
+    def _declare(self, body: bytes) -> None:
+        channel = Channel.read(ReadDataStream(BytesIO(body)))
+        line = _BY_NAMES.get((channel.topic, self._schemas.get(channel.schema_id, "")))
+        self._lines[channel.id] = line
+        if line is None:
+            self._foreign.add(channel.topic)
+            return
+        version = channel.metadata.get(FORMAT_KEY, "1")
+        if not version.isdigit() or int(version) > FORMAT:
+            raise SessionError(
+                f"{self._path}: session format {version}, this rigwatch reads up to {FORMAT}"
+            )
+
+
+def _read_schema(body: bytes) -> dict[int, str]:
+    found = Schema.read(ReadDataStream(BytesIO(body)))
+    return {found.id: found.name}

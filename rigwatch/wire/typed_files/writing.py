@@ -1,0 +1,38 @@
+"""Plain values as TOML."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import msgspec
+
+
+def as_toml(tree: Mapping[str, Any], prefix: str = "") -> str:
+    """A tree of plain values as TOML, without None."""
+    return "\n".join(_lines(tree, prefix)) + "\n"
+
+
+def _lines(tree: Mapping[str, Any], prefix: str) -> Iterator[str]:
+    tables = {key: value for key, value in tree.items() if _is_table(value)}
+    for key, value in tree.items():
+        if key not in tables and value is not None:
+            yield f"{_key(key)} = {_value(value)}"
+    for key, value in tables.items():
+        name = f"{prefix}{_key(key)}"
+        is_one = isinstance(value, dict)
+        for table in [value] if is_one else value:
+            yield f"\n[{name}]" if is_one else f"\n[[{name}]]"
+            yield from _lines(table, f"{name}.")
+
+
+def _is_table(value: object) -> bool:
+    is_many = isinstance(value, list | tuple) and bool(value) and isinstance(value[0], dict)
+    return isinstance(value, dict) or is_many
+
+
+def _key(key: str) -> str:
+    return key if key.replace("_", "").replace("-", "").isalnum() else _value(key)
+
+
+def _value(value: object) -> str:
+    # JSON and TOML write text, numbers, booleans and lists alike.
+    return msgspec.json.encode(value).decode()
