@@ -7,7 +7,7 @@
 """
 
 from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, library, load_effects
-from rigwatch.physics.engine.equations.expression import FUNCTIONS, parse
+from rigwatch.physics.engine.equations.expression import FUNCTIONS, names_in, parse
 from rigwatch.physics.engine.equations.measured_motion import (
     along_measured_motion,
     balanced_states,
@@ -22,13 +22,18 @@ from rigwatch.physics.engine.equations.model import (
     Output,
     Parameter,
     Port,
+    Quantity,
     State,
     Variable,
+    Variant,
     load_model,
+    model_named,
+    model_text,
     shipped_models,
 )
-from rigwatch.physics.engine.equations.model_check import check_model, unused_ports
+from rigwatch.physics.engine.equations.model_check import check_model, check_variants, unused_ports
 from rigwatch.physics.engine.equations.plugins import offered
+from rigwatch.physics.engine.equations.quantities import spelt_out
 from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import (
     LEFT,
@@ -42,6 +47,7 @@ from rigwatch.physics.engine.equations.system import (
     compose,
     units_at,
 )
+from rigwatch.physics.engine.equations.variants import excludes, with_variants
 
 __all__ = [
     "FUNCTIONS",
@@ -60,23 +66,32 @@ __all__ = [
     "Parameter",
     "Placement",
     "Port",
+    "Quantity",
     "State",
     "System",
     "Variable",
+    "Variant",
     "along_measured_motion",
     "balanced_states",
     "check_model",
+    "check_variants",
     "compose",
+    "excludes",
     "has_hidden_states",
     "library",
     "load_effects",
     "load_model",
     "measured_states",
+    "model_named",
+    "model_text",
+    "names_in",
     "offered",
     "parse",
     "predicted_outputs",
     "shipped_models",
+    "spelt_out",
     "symbol",
     "units_at",
     "unused_ports",
+    "with_variants",
 ]

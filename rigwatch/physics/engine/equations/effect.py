@@ -92,9 +92,15 @@ class Effect(Section, frozen=True, kw_only=True):
         str,
         Meta(description="effects of one family say the same in other words; its name if empty"),
     ] = ""
+    confused_with: Annotated[
+        tuple[str, ...], Meta(description="effects that look like it on many recordings")
+    ] = ()
     refines: Annotated[
         str, Meta(description="effect of lower order, tried first where it does most of the same")
     ] = ""
+    elective: Annotated[
+        bool, Meta(description="ranked only in studies that say whole_library = true")
+    ] = False
     parameters: dict[str, EffectParameter]
     states: dict[str, EffectState] = field(default_factory=dict)
 

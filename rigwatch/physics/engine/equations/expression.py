@@ -83,6 +83,28 @@ def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) ->
     return value
 
 
+def check_size(text: str, where: str) -> None:
+    """Refuse an expression that is too long or too deep to work with.
+
+    Raises:
+        ModelError: it is, or it does not parse.
+    """
+    _tree(text, where)
+
+
+def names_in(text: str, where: str) -> frozenset[str]:
+    """Every name in the expression `text` that is no function.
+
+    Raises:
+        ModelError: it does not parse.
+    """
+    tree = _tree(text, where)
+    called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    return frozenset(
+        node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in called
+    )
+
+
 def _tree(text: str, where: str) -> ast.expr:
     """Python's syntax tree of an expression that is neither too long nor too deep to work with."""
     if len(text) > LONGEST:

@@ -22,14 +22,14 @@ wherever the state does, so that the transformed model has no port for it.
 The workbench takes such an effect out of the recording instead.
 """
 
-import ast
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from rigwatch.physics.engine.equations.expression import FUNCTIONS
+from rigwatch.physics.engine.equations.expression import names_in
 from rigwatch.physics.engine.equations.model import Input, Model, Output
+from rigwatch.physics.engine.equations.quantities import spelt_out
 from rigwatch.wire.errors import ModelError
 
 RATE_SUFFIX = "_rate"
@@ -70,17 +70,16 @@ def has_hidden_states(model: Model) -> bool:
 
 def balanced_states(model: Model) -> tuple[MeasuredState, ...]:
     """Measured states whose rate says more than that it is another measured state."""
-    measured = measured_states(model)
+    measured, states = measured_states(model), spelt_out(model).states
     names = {state.name for state in measured}
-    return tuple(s for s in measured if not _named(model.states[s.name].derivative) <= names)
+    return tuple(s for s in measured if not _named(states[s.name].derivative) <= names)
 
 
 def predicted_outputs(model: Model) -> tuple[str, ...]:
     """Outputs that are more than a measured state, by name."""
     given = {state.name for state in measured_states(model)} | set(model.parameters)
-    return tuple(
-        name for name, output in model.outputs.items() if not _named(output.expression) <= given
-    )
+    outputs = spelt_out(model).outputs
+    return tuple(n for n, output in outputs.items() if not _named(output.expression) <= given)
 
 
 def along_measured_motion(model: Model) -> Model:
@@ -89,6 +88,7 @@ def along_measured_motion(model: Model) -> Model:
     Raises:
         ModelError: no channel shows any of its states, or nothing is left to predict.
     """
+    model = spelt_out(model)
     motion = {state.name for state in measured_states(model)}
     if not motion:
         raise ModelError(
@@ -141,7 +141,5 @@ def _all_named(texts: Iterable[str]) -> set[str]:
     return {name for text in texts for name in _named(text)}
 
 
-def _named(text: str) -> set[str]:
-    """Every name in an expression that is no function."""
-    tree = ast.walk(ast.parse(text.strip(), mode="eval"))
-    return {node.id for node in tree if isinstance(node, ast.Name)} - set(FUNCTIONS)
+def _named(text: str) -> frozenset[str]:
+    return names_in(text, "model")

@@ -11,9 +11,9 @@
     variables.v = { expression = "v", unit = "m/s" }
 
 Numbers stand in the unit beside them (mm, bar, kN/mm) and are SI once they are read; equations
-compute in SI. A port's name stands in the equations. A force port is a sum that is 0 until an
-effect is put there; an actuator port is its input as it arrives, and a sensor port is an output as
-it is read.
+compute in SI. `[quantities]` gives names to what equations share. A port's name stands in the
+equations. A force port is a sum that is 0 until an effect is put there; an actuator port is its
+input as it arrives, and a sensor port is an output as it is read.
 """
 
 import math
@@ -26,7 +26,9 @@ from msgspec import Meta, field
 from msgspec.structs import force_setattr
 
 from rigwatch.physics.engine.equations.in_si import into_si
+from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.wire.typed_files import Section, load, parse
+from rigwatch.wire.units import unit_of
 
 Text = Annotated[str, Meta(min_length=1)]
 
@@ -81,6 +83,10 @@ class Parameter(Section, frozen=True, kw_only=True):
     kept: Annotated[
         bool, Meta(description="fitted to a healthy recording where there is one, then fixed")
     ] = False
+    deviation: Annotated[
+        float,
+        Meta(ge=0, description="standard deviation of what is known of it, where it is fixed"),
+    ] = 0.0
     meaning: Annotated[str, Meta(description="what it is, in words")] = ""
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
@@ -89,7 +95,11 @@ class Parameter(Section, frozen=True, kw_only=True):
             if self.fixed:
                 raise ValueError("a value, as it is fixed")
             force_setattr(self, "value", _within(self.low, self.high))
+        unit = unit_of(self.unit)
+        width = unit.to_si(self.value + self.deviation) - unit.to_si(self.value)
         into_si(self, "value", "low", "high")
+        if not unit.plain:
+            force_setattr(self, "deviation", width)
 
 
 def _within(low: float, high: float) -> float:
@@ -105,7 +115,9 @@ class Output(Section, frozen=True, kw_only=True):
     """A signal that the model predicts."""
 
     unit: Annotated[str, Meta(description="its unit")]
-    expression: Annotated[Text, Meta(description="what it is, in states, inputs and parameters")]
+    expression: Annotated[
+        Text, Meta(description="what it is, in states, inputs, parameters and quantities")
+    ]
     channel: Annotated[str, Meta(description="channel it is held against, its name if empty")] = ""
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
@@ -113,15 +125,21 @@ class Output(Section, frozen=True, kw_only=True):
         into_si(self)
 
 
-class Variable(Section, frozen=True, kw_only=True):
-    """A quantity that effects at a port may use."""
+class Quantity(Section, frozen=True, kw_only=True):
+    """An expression with a name, for equations that share it or to be read."""
 
-    expression: Annotated[Text, Meta(description="what it is, in states, inputs and parameters")]
+    expression: Annotated[
+        Text, Meta(description="what it is, in states, inputs, parameters and quantities")
+    ]
     unit: Annotated[str, Meta(description="its unit")]
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
     def __post_init__(self) -> None:
         into_si(self)
+
+
+class Variable(Quantity, frozen=True, kw_only=True):
+    """A quantity that effects at a port may use."""
 
 
 class Port(Section, frozen=True, kw_only=True):
@@ -148,6 +166,21 @@ class Port(Section, frozen=True, kw_only=True):
         into_si(self)
 
 
+class Variant(Section, frozen=True, kw_only=True):
+    """Another law for a part of the model, see `variants.py`."""
+
+    physics: Annotated[Text, Meta(description="what it says of the rig, in a sentence")]
+    source: Annotated[str, Meta(description="where it comes from")] = ""
+    group: Annotated[str, Meta(description="at most one variant of a group is taken")] = ""
+    parameters: dict[str, Parameter] = field(default_factory=dict)
+    quantities: dict[str, Quantity] = field(default_factory=dict)
+    states: dict[str, State] = field(default_factory=dict)
+    outputs: dict[str, Output] = field(default_factory=dict)
+    without: Annotated[
+        tuple[str, ...], Meta(description="states, quantities and parameters that fall away")
+    ] = ()
+
+
 class Model(Section, frozen=True, kw_only=True):
     """The whole file."""
 
@@ -164,8 +197,14 @@ class Model(Section, frozen=True, kw_only=True):
     inputs: dict[str, Input]
     states: dict[str, State] = field(default_factory=dict)
     parameters: dict[str, Parameter]
+    quantities: Annotated[
+        dict[str, Quantity], Meta(description="expressions with names, for equations and ports")
+    ] = field(default_factory=dict)
     outputs: Annotated[dict[str, Output], Meta(min_length=1)]
     ports: dict[str, Port] = field(default_factory=dict)
+    variants: Annotated[
+        dict[str, Variant], Meta(description="other laws for parts of it, for `study base`")
+    ] = field(default_factory=dict)
 
     def held(self, name: str) -> Hold:
         """What an input does between samples: a line where nothing is said."""
@@ -188,8 +227,39 @@ def load_model(path: Path | str) -> Model:
 @cache
 def shipped_models() -> dict[str, Model]:
     """The base models that ship with rigwatch, by name."""
+    return {name: parse(text, Model, name) for name, text in _shipped_texts().items()}
+
+
+@cache
+def _shipped_texts() -> dict[str, str]:
+    """The files of the models that ship, by the models' names."""
     folder = resources.files("rigwatch.physics") / "models"
     files = sorted(folder.iterdir(), key=lambda entry: entry.name)
-    texts = {file.name: file.read_text("utf-8") for file in files if file.name.endswith(".toml")}
-    models = [parse(text, Model, name) for name, text in texts.items()]
-    return {model.name: model for model in models}
+    texts = [(file.name, file.read_text("utf-8")) for file in files if file.name.endswith(".toml")]
+    return {parse(text, Model, name).name: text for name, text in texts}
+
+
+def model_text(name: str) -> str:
+    """The file of a model that ships, or of one's own.
+
+    Raises:
+        ConfigError: it cannot be read.
+        ModelError: nothing has this name.
+    """
+    model_named(name)
+    return Path(name).read_text("utf-8") if name.endswith(".toml") else _shipped_texts()[name]
+
+
+def model_named(name: str) -> Model:
+    """A model that ships, by its name, or a file of one's own.
+
+    Raises:
+        ConfigError: the file does not fit.
+        ModelError: nothing has this name.
+    """
+    if name.endswith(".toml"):
+        return load_model(Path(name))
+    known = shipped_models()
+    if name not in known:
+        raise ModelError(f"found model {name!r}{nearest(name, known)}")
+    return known[name]

@@ -5,13 +5,16 @@ A model is checked when a study opens, so that a slip of the pen is one line and
 
 import keyword
 
+from msgspec.structs import replace
+
 from rigwatch.physics.engine.equations.expression import FUNCTIONS, parse
 from rigwatch.physics.engine.equations.model import Model
 from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import PROBE, TIME, UNTIL, System, compose
+from rigwatch.physics.engine.equations.variants import with_variants
 from rigwatch.wire.errors import ModelError
 
-_TABLES = ("inputs", "states", "parameters", "ports")
+_TABLES = ("inputs", "states", "parameters", "quantities", "ports")
 
 
 def check_model(model: Model, where: str = "") -> System:
@@ -28,10 +31,8 @@ def check_model(model: Model, where: str = "") -> System:
     try:
         _check_names(model)
         _check_channels(model)
+        _check_quantities(model)
         system = compose(model)
-        for name, port in model.ports.items():
-            for variable, own in port.variables.items():
-                _check_variable(model, system, f"port {name}: variable {variable}", own.expression)
     except ModelError as error:
         raise ModelError(f"{where}: {error}" if where else str(error)) from None
     unused = unused_ports(system)
@@ -45,6 +46,17 @@ def check_model(model: Model, where: str = "") -> System:
             f" expected {meant} in a derivative or an output"
         )
     return system
+
+
+def check_variants(model: Model, where: str = "") -> None:
+    """Each variant, by itself, makes a model that holds together.
+
+    Raises:
+        ModelError: one does not; see `check_model`.
+    """
+    for name in model.variants:
+        alone = replace(with_variants(model, (name,)), variants={})
+        check_model(alone, f"{where}: variants.{name}" if where else f"variants.{name}")
 
 
 def unused_ports(system: System) -> tuple[str, ...]:
@@ -87,6 +99,10 @@ def _check_channels(model: Model) -> None:
                 )
 
 
-def _check_variable(model: Model, system: System, where: str, text: str) -> None:
-    names = (*system.states, *system.parameters, *model.inputs, *model.ports, TIME)
-    parse(text, {name: symbol(name) for name in names}, where)
+def _check_quantities(model: Model) -> None:
+    """Each names what there is; which of them may use which port is found as they are composed."""
+    ports = [name for name, port in model.ports.items() if port.kind != "sensor"]
+    tables = (model.inputs, model.states, model.parameters, model.quantities, ports, [TIME])
+    known = {name: symbol(name) for table in tables for name in table}
+    for name, own in model.quantities.items():
+        parse(own.expression, known, f"quantity {name}")

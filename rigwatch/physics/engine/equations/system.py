@@ -11,7 +11,9 @@ from dataclasses import dataclass, field
 import sympy
 
 from rigwatch.physics.engine.equations.effect import Effect
+from rigwatch.physics.engine.equations.expression import names_in
 from rigwatch.physics.engine.equations.model import Input, Model, Output, Parameter, Port, State
+from rigwatch.physics.engine.equations.quantities import in_order, spelt_out
 from rigwatch.physics.engine.equations.scope import Scope, symbol
 from rigwatch.wire.errors import ModelError
 
@@ -51,7 +53,7 @@ class System:
     """Equations of a model with its effects.
 
     Attributes:
-        model: the model as it was written.
+        model: the model with its quantities spelt out.
         placements: the effects, in order.
         states: by name, those of the model first.
         parameters: by name, those of the model first.
@@ -109,21 +111,27 @@ class _Composer:
     """Builds the scope in the order in which things depend on each other.
 
     Inputs and states come first, then actuators, then forces, then the equations and outputs, then
-    the sensors: each is read in a scope where all that it may use is already known.
+    the sensors: each is read in a scope where all that it may use is already known. A quantity
+    joins as soon as all that it uses has.
     """
 
     def __init__(self, model: Model, placements: tuple[Placement, ...]) -> None:
         self._model, self._placements = model, placements
         self._states, self._parameters = dict(model.states), dict(model.parameters)
         self._rates: dict[str, sympy.Expr] = {}
+        self._variables: dict[str, dict[str, sympy.Expr]] = {}
         self._updates: dict[str, sympy.Expr] = {}
         self._scope = Scope()
+        self._spelt_out = spelt_out(model)
+        self._waiting = list(in_order(model))
         self._scope.define(TIME, symbol(TIME), "s")
         for table in (model.inputs, model.states, model.parameters):
             self._scope.define_all({n: item.shown or item.unit for n, item in table.items()})
 
     def system(self) -> System:
+        self._join(self._known())
         ports = self._entered("actuator") | self._entered("force")
+        self._join(self._waiting)
         model_rates = {
             name: self._scope.read(state.derivative, f"({state.unit})/s", f"state {name}")
             for name, state in self._model.states.items()
@@ -138,7 +146,7 @@ class _Composer:
         sensors = self._entered("sensor")
         outputs |= {self._model.ports[name].signal: value for name, value in sensors.items()}
         return System(
-            self._model,
+            self._spelt_out,
             self._placements,
             self._states,
             self._parameters,
@@ -149,14 +157,33 @@ class _Composer:
             self._updates,
         )
 
+    def _known(self) -> list[str]:
+        """Quantities that wait for nothing any more, in the order in which they use each other."""
+        known, found = set(self._scope.meanings), []
+        for name in self._waiting:
+            if names_in(self._model.quantities[name].expression, f"quantity {name}") <= known:
+                known.add(name)
+                found.append(name)
+        return found
+
+    def _join(self, names: list[str]) -> None:
+        """Let quantities stand for their expressions."""
+        for name in names:
+            own = self._model.quantities[name]
+            meaning = self._scope.read(own.expression, own.unit, f"quantity {name}")
+            self._scope.define(name, meaning, own.shown or own.unit)
+        self._waiting = [name for name in self._waiting if name not in names]
+
     def _entered(self, kind: str) -> dict[str, sympy.Expr]:
         """The ports of one kind with their effects; each is known to the scope from then on."""
         values = {}
         for name, port in self._model.ports.items():
             if port.kind == kind:
                 probe = symbol(PROBE + name) if kind != "sensor" else sympy.Integer(0)
+                self._variables[name] = self._port_variables(name, port)
                 values[name] = self._port_value(name, port) + probe
                 self._scope.define(name, values[name], self._port_unit(name, port))
+                self._join(self._known())
         return values
 
     def _port_unit(self, name: str, port: Port) -> str:
@@ -200,9 +227,8 @@ class _Composer:
         """Names as the effect sees them; its own parameters and states join the system."""
         scope = Scope()
         scope.define(TIME, symbol(TIME), "s")
-        for name, variable in port.variables.items():
-            meaning = self._scope.read(variable.expression, variable.unit, f"port {placement.port}")
-            scope.define(name, meaning, variable.unit)
+        for name, meaning in self._variables[placement.port].items():
+            scope.define(name, meaning, port.variables[name].unit)
         if port.kind != "force":
             scope.define("u", arriving, unit)
             scope.define(LEFT, symbol(UNTIL), "s")
@@ -212,6 +238,19 @@ class _Composer:
             own = self._parameters.get(label) or self._states[label]
             scope.define(name, symbol(label), own.shown or own.unit)
         return scope
+
+    def _port_variables(self, name: str, port: Port) -> dict[str, sympy.Expr]:
+        """What effects at a port may use; it is known before any of them."""
+        found = {}
+        for key, own in port.variables.items():
+            where = f"port {name}: variable {key}"
+            for waiting in names_in(own.expression, where) & {name, *self._waiting}:
+                raise ModelError(
+                    f"{where}: found {waiting!r}, which depends on what enters at {name} or at a"
+                    " port behind it, expected what does not"
+                )
+            found[key] = self._scope.read(own.expression, own.unit, where)
+        return found
 
     def _adopt(self, placement: Placement) -> None:
         effect = placement.effect.at(units_at(self._model, placement.port), str(placement))

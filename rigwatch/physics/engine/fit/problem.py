@@ -6,7 +6,7 @@ and V. Pereyra, Inverse Problems 19, 2003), so that a solver sees the parameters
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit.effect_states import Recall
 from rigwatch.physics.engine.fit.initial_state_projection import Tangent
-from rigwatch.physics.engine.fit.recording import Recording, cut_for, initial_states
+from rigwatch.physics.engine.fit.recording import Recording, cut_for, initial_states, shown_states
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
@@ -80,12 +80,13 @@ class Problem:
         scale: FloatArray | None,
         substeps: int,
         initial: FloatArray | None,
+        apart: bool = False,
     ) -> None:
         self.compiled, self.recording, self._substeps = compiled, recording, substeps
         system = self.system = compiled.system
         names = list(system.parameters)
         self.free = np.array([names.index(name) for name in system.free], dtype=np.int64)
-        self._cut = cut_for(system, recording, horizon)
+        self._cut = cut_for(system, recording, horizon, apart=apart)
         rows = self._cut.starts[:, None] + np.arange(self._cut.length)
         self.measured = recording.outputs[np.minimum(rows, len(recording) - 1)]
         self._inputs = recording.inputs
@@ -96,19 +97,55 @@ class Problem:
             self._inputs = np.pad(recording.inputs, ((0, beyond), (0, 0)), mode="edge")
         self.scale = np.nanstd(recording.outputs, axis=0) if scale is None else scale
         self.scale = np.where(self.scale > 0, self.scale, 1.0)
-        shown = initial_states(system, recording)
-        self._initial = shown[self._cut.starts]
+        begun = initial_states(system, recording)
+        self.initial = begun[self._cut.starts]
         self._offered = initial
-        self._memory = Recall(system, recording.inputs, shown, recording.dt, compiled.parameters)
+        self._memory = Recall(system, recording.inputs, begun, recording.dt, compiled.parameters)
         known = self._memory.exact
         self._every = np.arange(len(system.states))
         self._unknown = np.array([i for i in self._every if i not in known], np.int64)
+        shown = shown_states(system)
+        self.hidden = np.array([i for i in self._unknown if i not in shown], np.int64)
+        self._told = False
         self._low, self._high = (
             np.array([getattr(state, end) for state in system.states.values()])
             for end in ("low", "high")
         )
         self._best: _Met | None = None
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
+
+    @property
+    def starts(self) -> IntArray:
+        """First sample of each window."""
+        return self._cut.starts
+
+    @property
+    def length(self) -> int:
+        """Samples of a window."""
+        return self._cut.length
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Samples of each window that a recording has."""
+        return self._cut.parts or (self._cut.length,) * len(self._cut.starts)
+
+    @cached_property
+    def first_windows(self) -> IntArray:
+        """The first window of each recording."""
+        ends = np.cumsum(self.recording.parts or (len(self.recording),))
+        begins = np.concatenate([[0], ends[:-1]])
+        return np.unique(np.searchsorted(self._cut.starts, begins))
+
+    def begin_at(self, rows: IntArray, columns: IntArray, values: FloatArray) -> None:
+        """Let some windows begin with these values of some states."""
+        self.initial = self.initial.copy()
+        self.initial[np.ix_(rows, columns)] = values
+
+    def hold(self, initial: FloatArray, columns: IntArray) -> None:
+        """Let windows begin there, and no longer move some of their states."""
+        self.initial = initial.copy()
+        self._unknown = np.setdiff1d(self._unknown, columns)
+        self._told = True
 
     def whole(self, begin: FloatArray, theta: FloatArray) -> FloatArray:
         """All parameters, with the free ones replaced."""
@@ -122,15 +159,15 @@ class Problem:
         Windows begin as the channels show them or, where it is better, as they are offered.
         """
         self._remember(parameters, self._memory.columns)
-        if self._offered is None or len(self._offered) != len(self._initial):
+        if self._offered is None or len(self._offered) != len(self.initial):
             return
-        rows, own = np.arange(len(self._initial)), len(self.system.model.states)
-        other = np.column_stack([self._offered[:, :own], self._initial[:, own:]])
+        rows, own = np.arange(len(self.initial)), len(self.system.model.states)
+        other = np.column_stack([self._offered[:, :own], self.initial[:, own:]])
         shown, offered = (
-            np.sum(self._simulated(parameters, rows, each)[0] ** 2, axis=1)
-            for each in (self._initial, other)
+            np.sum(self.simulated(parameters, rows, each)[0] ** 2, axis=1)
+            for each in (self.initial, other)
         )
-        self._initial = np.where((offered < shown)[:, None], other, self._initial)
+        self.initial = np.where((offered < shown)[:, None], other, self.initial)
 
     def _follow_inputs(self, parameters: FloatArray) -> None:
         """Let memory at actuators begin where the inputs lead it; what came first is fitted."""
@@ -139,11 +176,11 @@ class Problem:
     def _remember(self, parameters: FloatArray, columns: list[int], since: int = 0) -> None:
         if columns and not self._cut.parts:
             led = self._memory.at(parameters)
-            self._initial = self._initial.copy()
+            self.initial = self.initial.copy()
             for column in columns:
-                self._initial[since:, column] = led[column][self._cut.starts[since:]]
+                self.initial[since:, column] = led[column][self._cut.starts[since:]]
 
-    def _simulated(
+    def simulated(
         self, parameters: FloatArray, rows: IntArray, initial: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Scaled residuals (rows, k), slopes (rows, k, free + states); 0 if unmeasured."""
@@ -171,7 +208,7 @@ class Problem:
         found = np.zeros((len(rows), max(self._lengths), *signals.shape[2:]))
         for at, row in enumerate(rows):
             length = self._cut.parts[row]
-            alone = replace(thinning, parts=(length,))
+            alone = thinning.of_part(length)
             found[at, : self._lengths[row]] = alone.apply(signals[at : at + 1, :length])[0]
         return found
 
@@ -181,7 +218,7 @@ class Problem:
         thinning, parts = self.recording.thinning, self._cut.parts
         if thinning is None:
             return parts
-        alone = [replace(thinning, parts=(n,)).apply(np.zeros((1, n, 1))) for n in parts]
+        alone = [thinning.of_part(n).apply(np.zeros((1, n, 1))) for n in parts]
         return tuple(each.shape[1] for each in alone)
 
     def whole_recording(self, windowed: FloatArray) -> FloatArray:
@@ -194,33 +231,33 @@ class Problem:
         Initial states have local minima of their own.
         """
         if self._best is not None and np.array_equal(self._best.parameters, parameters):
-            self._initial = self._best.initial
+            self.initial = self._best.initial
         error, slopes = self.settle(parameters)
-        found, rows = Started(parameters, self._initial, error, slopes), _astray(error)
+        found, rows = Started(parameters, self.initial, error, slopes), _astray(error)
         if not (self.system.states and len(rows)) or self._cut.parts:
             return found
-        self._initial = self._initial.copy()
-        self._initial[rows] = self._ends_before(parameters, rows)
+        self.initial = self.initial.copy()
+        self.initial[rows] = self.ends_before(parameters, rows)
         try:
             again, again_slopes = self.settle(parameters, rows=rows)
         except ModelError:
-            self._initial = found.initial
+            self.initial = found.initial
             return found
         back = np.sum(again**2, axis=1) < BACK * np.sum(error[rows] ** 2, axis=1)
         error[rows[back]], slopes[rows[back]] = again[back], again_slopes[back]
-        self._initial[rows[~back]] = found.initial[rows[~back]]
+        self.initial[rows[~back]] = found.initial[rows[~back]]
         self._best = self._last = None
-        return Started(parameters, self._initial, error, slopes, bool(back.any()))
+        return Started(parameters, self.initial, error, slopes, bool(back.any()))
 
-    def _ends_before(self, parameters: FloatArray, rows: IntArray) -> FloatArray:
+    def ends_before(self, parameters: FloatArray, rows: IntArray) -> FloatArray:
         """States in which the windows before some have ended, shape (rows, states)."""
         r, before = self.recording, rows - 1
         run = self.compiled.simulate(
             r.inputs, r.dt, self._cut.starts[before], self._cut.length + 1,
-            initial=self._initial[before], parameters=parameters, substeps=self._substeps,
+            initial=self.initial[before], parameters=parameters, substeps=self._substeps,
         )  # fmt: skip
         ended = np.clip(run.last, self._low, self._high)
-        return np.where(np.isfinite(ended), ended, self._initial[rows])
+        return np.where(np.isfinite(ended), ended, self.initial[rows])
 
     def settle(
         self,
@@ -243,9 +280,9 @@ class Problem:
             rows: windows that are settled, all if None.
         """
         self._follow_inputs(parameters)
-        rows = np.arange(len(self._initial)) if rows is None else rows
-        best = self._initial[rows]
-        error, slopes = self._simulated(parameters, rows, best)
+        rows = np.arange(len(self.initial)) if rows is None else rows
+        best = self.initial[rows]
+        error, slopes = self.simulated(parameters, rows, best)
         if not (np.isfinite(slopes).all() and np.isfinite(error).all()):
             raise ModelError(
                 f"{self.system.model.name}: the simulation diverged (NaN or infinite);"
@@ -260,8 +297,9 @@ class Problem:
             if not len(going):
                 break
             there = np.clip(best[going] + step[going], self._low, self._high)
-            tried, tried_slopes = self._simulated(parameters, rows[going], there)
-            better = np.sum(tried**2, axis=1) < size[going]
+            tried, tried_slopes = self.simulated(parameters, rows[going], there)
+            usable = np.isfinite(tried_slopes).all(axis=tuple(range(1, tried_slopes.ndim)))
+            better = (np.sum(tried**2, axis=1) < size[going]) & usable
             took = going[better]
             best[took], error[took], slopes[took] = (
                 there[better],
@@ -271,8 +309,8 @@ class Problem:
             if further:
                 step[took] = self._steps(error[took], slopes[took], rows[took])
                 step[going[~better]] /= 4
-        self._initial = self._initial.copy()
-        self._initial[rows] = best
+        self.initial = self.initial.copy()
+        self.initial[rows] = best
         return error, slopes
 
     def _promise(self, step: FloatArray, slopes: FloatArray) -> FloatArray:
@@ -286,6 +324,9 @@ class Problem:
 
     def _tangent(self, slopes: FloatArray, rows: IntArray) -> Tangent:
         """What an input led to is known, but at the recording's beginning."""
+        if self._told:
+            every = np.arange(len(rows))
+            return Tangent(slopes[..., len(self.free) :], [(every, self._unknown)])
         first = np.nonzero(rows == 0)[0], np.nonzero(rows > 0)[0]
         groups = list(zip(first, (self._every, self._unknown), strict=True))
         if len(self._unknown) == len(self._every):
@@ -301,11 +342,11 @@ class Problem:
 
     def tried(self, parameters: FloatArray) -> FloatArray:
         """Residuals for the solver; NaN where the simulation blows up, and it steps back."""
-        before = self._initial
+        before = self.initial
         try:
             return self.projected(parameters)[0]
         except ModelError:
-            self._initial = before
+            self.initial = before
             return np.full(self.count, np.nan)
 
     @property
@@ -317,11 +358,11 @@ class Problem:
 
     def _project(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         if self._best is not None:
-            self._initial = self._best.initial
+            self.initial = self._best.initial
         found = self.cleaned(*self.settle(parameters, START_STEPS, worth=ENOUGH))
         size = float(found[0] @ found[0])
         if self._best is None or size < self._best.size:
-            self._best = _Met(size, parameters.copy(), self._initial)
+            self._best = _Met(size, parameters.copy(), self.initial)
         return found
 
     def cleaned(self, error: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -73,13 +73,32 @@ def windows(system: System, samples: int, horizon: int) -> Windows:
     return Windows(np.arange(0, samples - length + 1, length, dtype=np.int64), length)
 
 
-def cut_for(system: System, recording: Recording, horizon: int) -> Windows:
-    """`windows`, but one a recording where a model without states has effects with memory.
+def joined(recordings: Sequence[Recording]) -> Recording:
+    """Recordings of one kind, one behind the other."""
+    first = recordings[0]
+    if len(recordings) == 1:
+        return first
+    inputs, outputs = (
+        np.concatenate([getattr(each, signals) for each in recordings])
+        for signals in ("inputs", "outputs")
+    )
+    return Recording(first.dt, inputs, outputs, first.thinning, tuple(map(len, recordings)))
+
+
+def beginning(recording: Recording, samples: int) -> Recording:
+    """The first samples of a recording, as one part."""
+    inputs, outputs = recording.inputs[:samples], recording.outputs[:samples]
+    thinning = recording.thinning and recording.thinning.of_part(len(inputs))
+    return Recording(recording.dt, inputs, outputs, thinning)
+
+
+def cut_for(system: System, recording: Recording, horizon: int, *, apart: bool = False) -> Windows:
+    """`windows`, but one a recording where that is asked for, or effects alone have memory.
 
     What an effect remembers of one recording says nothing about the next.
     """
     parts = recording.parts
-    if system.model.states or not system.states or len(parts) < 2:
+    if len(parts) < 2 or not (apart or (system.states and not system.model.states)):
         return windows(system, len(recording), horizon)
     starts = np.cumsum([0, *parts[:-1]]).astype(np.int64)
     return Windows(starts, max(parts), parts)
@@ -108,6 +127,17 @@ def initial_states(system: System, recording: Recording, smoothed: int = 11) -> 
             if width >= 5:
                 found[:, index] = savgol_filter(signal, width, 3, deriv=1, delta=recording.dt)
     return found
+
+
+def shown_states(system: System) -> set[int]:
+    """Columns of the states that a channel shows, or the rate of one."""
+    outputs = system.model.outputs.items()
+    channels = {output.channel or name for name, output in outputs}
+    return {
+        index
+        for index, state in enumerate(system.states.values())
+        if state.measured in channels or state.rate_of in channels
+    }
 
 
 def filled(signal: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.equations import System
+from rigwatch.physics.engine.fit.continued_windows import continued
 from rigwatch.physics.engine.fit.problem import Problem, Started
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import BoolArray, FloatArray
@@ -22,8 +23,28 @@ ROUNDS = 2
 FAR, CLOSE = 100.0, 0.01
 """Deviations: where a search begins, and steps that are not worth another simulation."""
 
+SETTLED = 1e-10
+"""The same where a prior counts, which is next to nothing beside the recording."""
+
 CONVERGED = 1e-6
 """Fall of the squared error, over all of it, at which a fit ends; noise moves it by 1/samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known of the free parameters beside the recording.
+
+    Attributes:
+        centre: where they probably are, shape (m,).
+        slopes: of scaled residuals by the distance from there, shape (k, m).
+    """
+
+    centre: FloatArray
+    slopes: FloatArray
+
+    def error(self, theta: FloatArray) -> FloatArray:
+        """Scaled residuals of the free parameters, shape (k,)."""
+        return np.asarray(self.slopes @ (theta - self.centre))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +106,7 @@ def fit(
     scale: FloatArray | None = None,
     initial: FloatArray | None = None,
     substeps: int = 4,
+    prior: Prior | None = None,
 ) -> Fit:
     """Parameters that make the short-horizon error of `compiled` smallest.
 
@@ -97,6 +119,7 @@ def fit(
         initial: states that the search begins with, those of the model first, shape (windows, …);
             as the channels show them if None.
         substeps: Runge-Kutta steps between samples, where nothing is stiff.
+        prior: what pulls at the parameters beside the recording.
 
     Raises:
         ModelError: the recording is too short, or the model diverges at the start.
@@ -107,14 +130,16 @@ def fit(
     problem.recall(problem.whole(begin, theta))
     found = problem.start_windows(problem.whole(begin, theta))
     for _ in range(ROUNDS if len(theta) else 0):
-        theta = _smallest_error(problem, begin, theta)
+        theta = _smallest_error(problem, begin, theta, prior)
         found = problem.start_windows(problem.whole(begin, theta))
         if not found.came_back:
             break
     return result_of(problem, found)
 
 
-def _smallest_error(problem: Problem, begin: FloatArray, theta: FloatArray) -> FloatArray:
+def _smallest_error(
+    problem: Problem, begin: FloatArray, theta: FloatArray, prior: Prior | None
+) -> FloatArray:
     """Free parameters at which SciPy's solver ends.
 
     It moves them in deviations, as the data at the start tell them, and calls a step small by the
@@ -126,14 +151,23 @@ def _smallest_error(problem: Problem, begin: FloatArray, theta: FloatArray) -> F
     def parameters(moved: FloatArray) -> FloatArray:
         return problem.whole(begin, np.clip(theta + unit * (moved - FAR), low, high))
 
+    def residuals(moved: FloatArray) -> FloatArray:
+        at = parameters(moved)
+        own = problem.tried(at)
+        return own if prior is None else np.append(own, prior.error(at[problem.free]))
+
+    def slopes(moved: FloatArray) -> FloatArray:
+        own = problem.projected(parameters(moved))[1]
+        return (own if prior is None else np.vstack([own, prior.slopes])) * unit
+
     try:
         found = least_squares(
-            lambda moved: problem.tried(parameters(moved)),
+            residuals,
             np.full(len(theta), FAR),
-            jac=lambda moved: problem.projected(parameters(moved))[1] * unit,
+            jac=slopes,
             bounds=(FAR + (low - theta) / unit, FAR + (high - theta) / unit),
             x_scale="jac",
-            ftol=CONVERGED,
+            ftol=CONVERGED if prior is None else SETTLED,
             xtol=CLOSE / FAR,
             max_nfev=60,
         )
@@ -163,13 +197,22 @@ def evaluate(
     horizon: int,
     substeps: int = 4,
     initial: FloatArray | None = None,
+    *,
+    judging: bool = False,
 ) -> Fit:
-    """The same parameters on another recording: only its windows' initial states are fitted."""
+    """The same parameters on another recording: only its windows' initial states are fitted.
+
+    Args:
+        fitted: the parameters.
+        recording, horizon, substeps, initial: as in `fit`.
+        judging: whether samples that count may tell only states that channels show.
+    """
     problem = Problem(
         fitted.compiled, recording, horizon, scale=fitted.scale, substeps=substeps, initial=initial
     )
     problem.recall(fitted.parameters)
-    found = problem.start_windows(fitted.parameters)
+    start = continued if judging else Problem.start_windows
+    found = start(problem, fitted.parameters)
     return replace(result_of(problem, found), covariance=fitted.covariance)
 
 
@@ -179,7 +222,7 @@ def error_at(  # noqa: PLR0917 -- they belong together
     recording: Recording,
     horizon: int,
     parameters: FloatArray,
-    scale: FloatArray,
+    scale: FloatArray | None,
     substeps: int = 4,
 ) -> float:
     """Root mean square of the scaled error at given parameters; infinite where it blows up.
@@ -187,7 +230,7 @@ def error_at(  # noqa: PLR0917 -- they belong together
     Args:
         compiled, recording, horizon, substeps: as in `fit`.
         parameters: all of them, shape (n_p,).
-        scale: divisor of each output's residuals, shape (outputs,).
+        scale: divisor of each output's residuals, shape (outputs,); its standard deviation if None.
     """
     problem = Problem(compiled, recording, horizon, scale=scale, substeps=substeps, initial=None)
     try:

@@ -1,10 +1,9 @@
 """Which effects can stand where, and which strengths of them make sense."""
 
-import ast
 import re
 from string import Formatter
 
-from rigwatch.physics.engine.equations import LEFT, RATE, Effect, Model, Port
+from rigwatch.physics.engine.equations import LEFT, RATE, Effect, Model, Port, names_in
 from rigwatch.physics.engine.score.candidates import Candidate
 
 
@@ -49,17 +48,10 @@ def _units_named(effect: Effect) -> set[str]:
     return (in_units | set(re.findall(r"[A-Za-z_]\w*", scales))) - {"dt", "rate"}
 
 
-def _named(effect: Effect) -> set[str]:
+def _named(effect: Effect) -> frozenset[str]:
     """Every name in an effect's equations that is no function."""
     texts = [effect.expression, *(s.derivative or s.update for s in effect.states.values())]
-    used = {n.id for text in texts for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)}
-    functions = {
-        n.func.id
-        for text in texts
-        for n in ast.walk(ast.parse(text))
-        if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
-    }
-    return used - functions
+    return frozenset().union(*(names_in(text, "effect") for text in texts))
 
 
 def possible(candidate: Candidate, strength: float) -> bool:

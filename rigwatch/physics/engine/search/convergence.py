@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigwatch.physics.engine.fit.windowed_fit import Fit, bounds
+from rigwatch.physics.engine.fit import Fit, bounds
 from rigwatch.wire.arrays import FloatArray
 
 PROMISED = 0.02

@@ -19,9 +19,7 @@ from scipy.signal import savgol_filter
 
 from rigwatch.physics.engine.compile import CompiledSystem, derivative, numpy_function
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
-from rigwatch.physics.engine.fit.effect_states import Recall
-from rigwatch.physics.engine.fit.recording import Recording, filled, initial_states
-from rigwatch.physics.engine.fit.windowed_fit import bounds
+from rigwatch.physics.engine.fit import Recall, Recording, bounds, filled, initial_states
 from rigwatch.wire.arrays import FloatArray
 
 TARGET = "target_"

@@ -1,0 +1,84 @@
+"""Named intermediate quantities of a model: a balance is written once and used by its name.
+
+    [quantities]
+    push = { expression = "A1*(P1 - Pe) - A2*(P2 - Pe)", unit = "N" }
+    acceleration = { expression = "(push - c*v + load)/m", unit = "m/s^2" }
+
+They are no states: a quantity means its expression wherever it stands, and kernels compute what
+equations share once.
+"""
+
+import re
+from collections.abc import Mapping
+from graphlib import CycleError, TopologicalSorter
+
+from msgspec.structs import replace
+
+from rigwatch.physics.engine.equations.expression import LONGEST, check_size, names_in
+from rigwatch.physics.engine.equations.model import Model
+from rigwatch.wire.errors import ModelError
+
+
+def in_order(model: Model) -> tuple[str, ...]:
+    """Names of the quantities, each behind those that it uses.
+
+    Raises:
+        ModelError: one uses itself, also through others.
+    """
+    known = model.quantities
+    uses = {n: names_in(q.expression, f"quantity {n}") & known.keys() for n, q in known.items()}
+    try:
+        return tuple(TopologicalSorter(uses).static_order())
+    except CycleError as error:
+        circle = " uses ".join(reversed(error.args[1]))
+        raise ModelError(
+            f"quantities: found the circle {circle}, expected each to use others alone"
+        ) from None
+
+
+def spelt_out(model: Model) -> Model:
+    """The model with the expressions of its quantities in place of their names.
+
+    Raises:
+        ModelError: they use each other in a circle, or are too long once they are spelt out.
+    """
+    if not model.quantities:
+        return model
+    texts: dict[str, str] = {}
+    for name in in_order(model):
+        texts[name] = f"({_spelt(model.quantities[name].expression, texts, f'quantity {name}')})"
+    states = {
+        n: replace(s, derivative=_spelt(s.derivative, texts, f"state {n}"))
+        for n, s in model.states.items()
+    }
+    outputs = {
+        n: replace(o, expression=_spelt(o.expression, texts, f"output {n}"))
+        for n, o in model.outputs.items()
+    }
+    ports = {
+        name: replace(
+            port,
+            variables={
+                n: replace(v, expression=_spelt(v.expression, texts, f"port {name}: variable {n}"))
+                for n, v in port.variables.items()
+            },
+        )
+        for name, port in model.ports.items()
+    }
+    return replace(model, states=states, outputs=outputs, ports=ports, quantities={})
+
+
+def _spelt(text: str, texts: Mapping[str, str], where: str) -> str:
+    """An expression with texts in place of names; a name alone needs no brackets."""
+    if text.strip() in texts:
+        return texts[text.strip()][1:-1]
+    words = re.findall(r"\b[A-Za-z_]\w*", text)
+    length = len(text) + sum(len(texts.get(word, "")) for word in words)
+    if length > LONGEST:
+        raise ModelError(
+            f"{where}: found {length} characters once its quantities are spelt out,"
+            f" expected at most {LONGEST}"
+        )
+    spelt = re.sub(r"\b[A-Za-z_]\w*", lambda word: texts.get(word[0], word[0]), text)
+    check_size(spelt, where)
+    return spelt
