@@ -1,10 +1,10 @@
-"""The dashboard: what the rig does, what the model expected, and what to do about the difference.
+"""The dashboard: measured and modelled signals, alarms, and what to do about them.
 
     messages ──▶ Dashboard.show ──▶ batches ──flush──▶ Rerun viewer
                      └─▶ AlarmBook, Survey ──▶ status text, layout
 
-Only this package knows Rerun, and nothing here is imported by the other processes. Call
-`require_rerun` before importing a module of this package that draws.
+Only this package depends on Rerun, and no other process imports it. Call `require_rerun` before
+importing a module of this package that draws.
 """
 
 import importlib.util
@@ -13,7 +13,7 @@ from rigwatch.wire.errors import MissingExtraError
 
 
 def require_rerun() -> None:
-    """Say in one plain line that the viewer is not installed.
+    """Raise a plain one-line error if the viewer is not installed.
 
     Raises:
         MissingExtraError: the package rerun-sdk is not installed.

@@ -1,4 +1,4 @@
-"""The feed drawn into one viewer, in a thread of its own: a viewer that hangs holds whoever draws.
+"""Draws the feed into one viewer, in a thread of its own: a viewer that hangs blocks its writer.
 
 A drawer lives as long as its viewer. The next one continues with the same facts, so that a verdict
 survives the viewer in which it was shown.
@@ -17,13 +17,13 @@ _FLUSH_TIMEOUT = 5.0
 
 
 class Drawer:
-    """Takes from the feed at a steady rate and draws.
+    """Reads the feed at a steady rate and draws.
 
     Args:
-        feed: what is drawn.
-        url: the viewer's.
-        facts: what is known already.
-        rate: updates a second [Hz].
+        feed: source of messages.
+        url: address of the viewer.
+        facts: known facts.
+        rate: updates per second [Hz].
     """
 
     def __init__(self, feed: Feed, url: str, facts: Facts, rate: float) -> None:
@@ -37,11 +37,11 @@ class Drawer:
 
     @property
     def held_for(self) -> float:
-        """Time since it last finished a turn [s]; large where the viewer takes nothing."""
+        """Time since the last completed update [s]; large if the viewer accepts no data."""
         return time.monotonic() - self._turned_at
 
     def stop(self, patience: float = 2.0) -> None:
-        """Ask it to end; one that is held by a viewer is left to end with that viewer."""
+        """Ask it to end; one blocked by a viewer ends with that viewer."""
         self._stop.set()
         self._thread.join(patience)
 
@@ -61,8 +61,8 @@ class Drawer:
             self._turned_at = time.monotonic()
             for message in self._feed.drain():
                 dashboard.show(message)
-            self.facts.skipped = self._feed.skipped
+            self.facts.skipped, self.facts.lost_alarms = self._feed.skipped, self._feed.lost_alarms
             dashboard.flush(time.time_ns())
-            # Waiting for each turn's data bounds what piles up before a viewer that takes none.
+            # Waiting for each update's data bounds the backlog of a viewer that accepts none.
             stream.flush(timeout_sec=_FLUSH_TIMEOUT)
         stream.disconnect()

@@ -1,10 +1,10 @@
-"""What the bus says, as far as it is drawn: a bounded queue a topic, emptied a few times a second.
+"""The drawn messages of the bus: a bounded queue per topic, emptied a few times a second.
 
-A screen may leave something out, so that nothing is asked of anybody twice: what a full queue
-drops is counted and shown.
+A screen may skip messages, so nothing is requested again: what a full queue drops is counted and
+shown. Alarms are the exception: missed ones are requested from the monitor.
 """
 
-from rigwatch.wire.bus import Bus, ask_alarm_list
+from rigwatch.wire.bus import Bus, Subscription, ask_alarm_list
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import (
     ALARMS,
@@ -21,26 +21,29 @@ from rigwatch.wire.messages import (
 _DRAWN = (RUN, SAMPLES, ESTIMATES, ALARMS, GAPS, HEALTH, EVENTS)
 _ASK_TIMEOUT = 0.5
 _CAPACITY = 2048
-"""Messages a topic: eight seconds of one message a sample."""
+"""Messages per topic: eight seconds at one message per sample."""
 
 
 class Feed:
     """Everything that the dashboard draws, from one bus.
 
     Args:
-        bus: where the rig's processes speak.
+        bus: the rig's bus.
     """
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
-        self._subscriptions = [bus.subscribe(topic, _CAPACITY) for topic in _DRAWN]
+        self._alarms = bus.listen(ALARMS, capacity=_CAPACITY)
+        self._subscriptions: list[Subscription] = [
+            self._alarms if topic is ALARMS else bus.overhear(topic, _CAPACITY) for topic in _DRAWN
+        ]
 
     def drain(self) -> list[Message]:
-        """All that waits, topic by topic; within a topic the oldest first."""
+        """All waiting messages, topic by topic; within a topic oldest first."""
         return [message for waiting in self._subscriptions for message in waiting.drain()]
 
     def standing(self) -> list[Alarm]:
-        """Alarms that were raised before anybody looked; none where no monitor answers."""
+        """Alarms raised before this start; none if no monitor answers."""
         try:
             return ask_alarm_list(self._bus, _ASK_TIMEOUT)
         except BusError:
@@ -48,10 +51,15 @@ class Feed:
 
     @property
     def skipped(self) -> int:
-        """Messages that were dropped because drawing was too slow."""
+        """Messages dropped because drawing was too slow."""
         return sum(waiting.dropped for waiting in self._subscriptions)
 
+    @property
+    def lost_alarms(self) -> int:
+        """Alarms that were said and will never be known."""
+        return self._alarms.lost
+
     def close(self) -> None:
-        """Listen no more."""
+        """Close the subscriptions."""
         for waiting in self._subscriptions:
             waiting.close()

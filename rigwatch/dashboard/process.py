@@ -1,10 +1,10 @@
-"""The dashboard's process: feed, drawer and viewer, and what happens when the viewer goes.
+"""The dashboard's process: feed, drawer and viewer, and the restart of a lost viewer.
 
     bus ──▶ Feed ──▶ Drawer (thread) ──▶ viewer (process)
-                        this loop watches both and speaks of them
+                        this loop monitors both and reports
 
-Nothing waits for the dashboard: its queues are bounded, and it asks nobody for anything. A viewer
-that dies or takes no data is started again; a window that was closed by a person ends the process.
+Nothing waits for the dashboard: its queues are bounded and it sends no requests. A viewer that dies
+or accepts no data is restarted; a window closed by its user ends the process.
 """
 
 import threading
@@ -31,15 +31,15 @@ class LiveDashboard:
     """One rig's screen, live.
 
     Args:
-        bus: where the rig's processes speak.
+        bus: the rig's bus.
         settings: section [dashboard] of the configuration.
         choice: which viewer.
-        say: takes remarks for people.
+        say: called with messages for people.
 
     Attributes:
         stop: ends `run` when set.
         viewer: the viewer in use, None before the first.
-        facts: what is known when no viewer is in use.
+        facts: known facts, kept between viewers.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class LiveDashboard:
         self._told_at = 0.0
 
     def run(self) -> None:
-        """Show the rig until stopped, or until a person closes the window.
+        """Show the rig until stopped, or until the user closes the window.
 
         Raises:
             ViewerError: no viewer can be started, or it dies again and again.
@@ -69,7 +69,7 @@ class LiveDashboard:
             self._feed.close()
 
     def _show(self) -> str:
-        """One viewer's life: why another one is wanted, empty where none is."""
+        """Run one viewer; returns why another one is needed, empty if none is."""
         self.viewer = open_viewer(
             self._choice, self._settings, self.stop, self._say, self._tell_supervisor
         )
@@ -91,7 +91,7 @@ class LiveDashboard:
             self._tell_rig()
             code = viewer.exit_code()
             if code is None and drawer.failure is not None:
-                # A viewer that dies cuts the line first: then its end is the reason to give.
+                # A viewer that dies closes the connection first: report its end, not that.
                 self.stop.wait(_LAST_MOMENT)
                 code = viewer.exit_code()
             if code == 0:
@@ -122,7 +122,7 @@ class LiveDashboard:
         self._bus.publish(HEALTH, health)
 
     def _count_end(self, reason: str) -> None:
-        """Give up on a viewer that ends again and again; a foreign one is waited for instead."""
+        """Give up on a viewer that ends repeatedly; wait for an external one instead."""
         now = time.monotonic()
         self._ends.append(now)
         recent = [end for end in self._ends if now - end < _WITHIN]

@@ -1,6 +1,6 @@
-"""A recording on the same screen as a live rig: drawn whole, with the cursor at what matters.
+"""Draws a whole recording on the same screen as a live rig, with the cursor at the fault.
 
-What matters is the first alarm that means a fault, and where there is none, the end.
+The cursor is at the first alarm that indicates a fault, or at the end if there is none.
 """
 
 import time
@@ -26,12 +26,12 @@ _DRAWING_TIMEOUT = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """What was drawn of a recording.
+    """The drawn part of a recording.
 
     Attributes:
-        samples: how many.
-        start_ns, end_ns: first and last time [ns]; 0 where nothing was drawn.
-        fault_ns: time of the first alarm that names a fault, else of the first fault [ns]; 0 where
+        samples: number of samples.
+        start_ns, end_ns: first and last time [ns]; 0 if nothing was drawn.
+        fault_ns: time of the first alarm that names a fault, else of the first fault [ns]; 0 if
             there was none.
     """
 
@@ -41,19 +41,19 @@ class Drawn:
     fault_ns: int
 
     def cursor_ns(self) -> int:
-        """Where the cursor is to stand: the fault in the middle of the signals' window."""
+        """Position of the cursor: the fault in the middle of the signals' window."""
         if not self.fault_ns:
             return self.end_ns
         return min(self.end_ns, self.fault_ns + round(0.5e9 * _SIGNALS))
 
 
 def windows_for(seconds: float) -> Windows:
-    """How much time the plots show of a recording of that length [s]."""
+    """Time span of the plots for a recording of that length [s]."""
     return Windows(_SIGNALS, None if seconds <= _LONGEST_WHOLE else _HISTORY)
 
 
 def new_stream(name: str) -> rr.RecordingStream:
-    """A recording of the viewer's, not connected to anything yet."""
+    """A viewer recording, not connected yet."""
     return rr.RecordingStream(APPLICATION, recording_id=name)
 
 
@@ -66,15 +66,15 @@ def draw(
     *,
     bare: bool = False,
 ) -> Drawn:
-    """Draw the messages of a recording, in the order in which they were recorded.
+    """Draw the messages of a recording, in recorded order.
 
     Args:
         messages: of any topic.
         stream: connected to a viewer or a file.
         facts: the rig, its model and marks.
-        windows: how much time the plots show.
-        progress: told the number of samples drawn, now and then.
-        bare: leave out what serves to operate the viewer, for pictures.
+        windows: time span of the plots.
+        progress: called with the number of samples drawn.
+        bare: hide the controls of the viewer, for pictures.
     """
     dashboard = Dashboard(stream, facts, windows, bare=bare)
     flushed = 0
@@ -94,16 +94,16 @@ def draw(
 
 
 def _most_telling(faults: dict[str, int]) -> int:
-    """The time of the fault that says most: one with a name, else any; 0 where there is none."""
+    """The time of the first named fault, else of any fault; 0 if there is none."""
     named = [t_ns for name, t_ns in faults.items() if name in NAMED_FAULTS]
     return min(named or faults.values(), default=0)
 
 
 def point_cursor(url: str, t_ns: int) -> None:
-    """Let the viewer at `url` stand still at a time [ns], once it has got so far.
+    """Pause the viewer at `url` at a time [ns], once it has received data up to it.
 
     Raises:
-        ViewerError: it does not get so far.
+        ViewerError: it does not receive them in time.
     """
     client = ViewerClient.connect(url)
     deadline = time.monotonic() + _DRAWING_TIMEOUT
@@ -120,7 +120,7 @@ def take_picture(viewer: Viewer, path: Path) -> None:
 
 
 def headless_viewer() -> Viewer:
-    """A viewer that draws into memory; needs a graphics driver, if only Mesa's in software.
+    """A viewer that draws into memory; needs a graphics driver, such as Mesa's software one.
 
     Raises:
         ViewerError: it does not start.

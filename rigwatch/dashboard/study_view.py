@@ -1,7 +1,7 @@
-"""A study in the viewer: measured and modelled signals of every step and what is left, on one
-timeline; for a structure that is watched for damage also the test that judges what is left.
+"""A study in the viewer: measured and modelled signals and the residual of every step, on one
+timeline; for a structure monitored for damage also the test of the residual.
 
-Nothing of workbench and structures is known here: what is drawn comes as plain columns.
+Independent of workbench and structures: the data come as plain columns.
 
     <output>/signals/measured, <output>/signals/<step>      [unit of the output]
     <output>/residual/<step>, <output>/residual/<bound>     [unit of the output]
@@ -25,7 +25,7 @@ from rigwatch.wire.arrays import FloatArray
 TIMELINE = "recording"
 _STORY, _TEST = "story", "test"
 _SHOWN = 3
-"""Outputs that are seen first; the others stand on a second tab."""
+"""Number of outputs on the first tab; the others are on a second one."""
 _TALL = 3.0
 """Upper end of the test's axis, in thresholds."""
 _FLUSH_TIMEOUT = 60.0
@@ -39,8 +39,8 @@ class Output:
     Attributes:
         name, unit: of the channel.
         measured: shape (n,); NaN where nothing valid was measured.
-        modelled: by step, the first one the model alone, each of shape (n,).
-        bound: name and size of the residual that is remarkable, None where nothing is.
+        modelled: by step, the first being the model alone, each of shape (n,).
+        bound: name and size of a significant residual, None if there is none.
     """
 
     name: str
@@ -52,11 +52,11 @@ class Output:
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """The test that what is left was put to.
+    """The test of the residual.
 
     Attributes:
-        statistic: over its threshold, shape (n,); NaN where nothing was tested.
-        instants: what happened then [s], by name.
+        statistic: statistic over its threshold, shape (n,); NaN where not tested.
+        instants: times of events [s], by name.
     """
 
     statistic: FloatArray
@@ -75,12 +75,12 @@ def draw_study(
     """Draw a whole study; the number of samples.
 
     Args:
-        stream: connected to a viewer or a file; is disconnected afterwards.
+        stream: connected to a viewer or a file; disconnected afterwards.
         seconds: time of the samples [s], shape (n,).
-        outputs: what was measured and modelled then, the most telling first.
-        story: the steps in words, as Markdown.
-        judged: the test for damage, where there was one.
-        bare: leave out what serves to operate the viewer, for pictures.
+        outputs: measured and modelled signals, the most telling first.
+        story: the steps as Markdown text.
+        judged: the test for damage, if there was one.
+        bare: hide the controls of the viewer, for pictures.
     """
     stream.send_blueprint(_blueprint(outputs, judged, bare=bare))
     stream.log(_STORY, rr.TextDocument(story, media_type=rr.MediaType.MARKDOWN), static=True)
@@ -119,7 +119,7 @@ def _draw_test(stream: rr.RecordingStream, seconds: FloatArray, judged: Judged) 
 
 
 def new_stream(name: str) -> rr.RecordingStream:
-    """A recording of the viewer's, not connected to anything yet."""
+    """A viewer recording, not connected yet."""
     return rr.RecordingStream(APPLICATION, recording_id=name)
 
 
@@ -127,7 +127,7 @@ def take_picture(viewer: Viewer, seconds: float, path: Path) -> None:
     """Write what a headless viewer shows once it has data up to `seconds` [s].
 
     Raises:
-        ViewerError: it does not get so far.
+        ViewerError: it does not receive them in time.
     """
     client = ViewerClient.connect(viewer.url)
     deadline = time.monotonic() + _ARRIVAL_TIMEOUT
@@ -154,7 +154,7 @@ def _look(
     name: str,
     policy: rr.components.AggregationPolicy = rr.components.AggregationPolicy.Average,
 ) -> rr.SeriesLines:
-    """Measured stands out behind everything; the steps have a colour each."""
+    """The measurement is drawn behind everything; each step has a colour."""
     colour = palette.OTHERS[(place - 1) % len(palette.OTHERS)] if place else palette.SIGNATURE
     width = 1.3 if place else 3.0
     return rr.SeriesLines(colors=[colour], names=[name], widths=[width], aggregation_policy=policy)

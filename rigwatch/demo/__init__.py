@@ -2,12 +2,14 @@
 
 rig_file.py      the rig's configuration with everything it writes in one folder
 commissioning.py recordings of the simulated rig, and the monitor's model made from them
-narrator.py      what happens, in plain words, as it happens
-verdict.py       whether the fault was found and named, and whether the recording is whole
+narrator.py      live narration of events
+workbench_pages.py  the workbench in a browser beside it
+verdict.py       whether the fault was detected and named, and whether the recording is complete
 """
 
 from rigwatch.demo.commissioning import ensure_model
 from rigwatch.demo.rig_file import forget_alarms, write_rig_file
 from rigwatch.demo.show import Show
+from rigwatch.demo.workbench_pages import workbench_pages
 
-__all__ = ["Show", "ensure_model", "forget_alarms", "write_rig_file"]
+__all__ = ["Show", "ensure_model", "forget_alarms", "workbench_pages", "write_rig_file"]

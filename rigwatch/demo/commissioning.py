@@ -1,7 +1,6 @@
 """The monitor's model for the demonstration, made as on a real rig: record, then commission.
 
-The commands are shown as they run. What they make is kept, under a hash of everything it was made
-from.
+The commands are shown as they run. Their results are cached under a hash of all inputs.
 """
 
 import hashlib
@@ -24,11 +23,11 @@ RECORDINGS = {
     "healthy": "scenarios/healthy_sine_8hz_1v4.toml",
     "friction": "scenarios/known_friction.toml",
 }
-"""The recordings that commissioning asks for, by role, and the scenario that each is of."""
+"""The recordings for commissioning, by role, and the scenario of each."""
 
 
 def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path:
-    """The model for the simulated rig of `config`, remade where anything has changed.
+    """The model for the simulated rig of `config`, rebuilt if anything has changed.
 
     Raises:
         ModelError: a step failed.
@@ -47,7 +46,7 @@ def ensure_model(config: Path, folder: Path, say: Callable[[str], None]) -> Path
         _run(["plant", "--session", session, scenario], say)
     roles = [part for role, session in sessions.items() for part in (f"--{role}", session)]
     _run(["commission", *roles, "--scheme", "transfer", "--output", model], say)
-    # Trying it also compiles the monitor's kernels, so that it is quick to start on the live rig.
+    # The trial also compiles the monitor's kernels, so that the live monitor starts quickly.
     say("the model is tried on the recording with known friction")
     _run(["replay", sessions["friction"], "--model", model], say)
     stamp.write_text(made_from, encoding="utf-8")
@@ -65,7 +64,7 @@ def _run(arguments: list[str | Path], say: Callable[[str], None]) -> None:
 
 
 def _made_from(config: Path) -> str:
-    """A hash of the configuration, the scenarios and the code that the model comes from."""
+    """A hash of the configuration, the scenarios and the code behind the model."""
     scenarios = [find_config(name) for name in RECORDINGS.values()]
     found = hashlib.sha256()
     for path in [config, *scenarios, *_sources()]:

@@ -1,6 +1,6 @@
-"""What happens in the demonstration, in plain words.
+"""Narrates the demonstration.
 
-Told are what is done to the rig, which the monitor does not know, and what the monitor says.
+It reports what is done to the rig, which the monitor does not know, and the monitor's alarms.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,12 +15,12 @@ ACTS = {
 }
 NEUTRAL = {"coulomb": 0.0, "actuator_gain": 1.0}
 NAMELESS = "departure"
-"""The alarm that says that something is wrong, and not yet what."""
+"""The alarm that reports a fault without naming it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """One thing that is done to the simulated rig: at which sample, and in words."""
+    """A change to the simulated rig: its sample, and a description."""
 
     seq: int
     effect: str
@@ -29,7 +29,7 @@ class Act:
 
 
 def acts(scenario: Scenario) -> Iterator[Act]:
-    """All that happens to the rig, cycle after cycle, without end where the scenario repeats."""
+    """All changes to the rig, cycle by cycle; endless if the scenario repeats."""
     rate, cycle = scenario.plant.sample_rate, 0.0
     while scenario.events:
         for event in sorted(scenario.events, key=lambda event: event.at_s):
@@ -44,11 +44,11 @@ def acts(scenario: Scenario) -> Iterator[Act]:
 
 
 class Narrator:
-    """Tells the acts as the samples reach them, and the alarms as they come.
+    """Reports the changes as the samples reach them, and the alarms as they arrive.
 
     Args:
-        scenario: what is done to the rig.
-        say: takes a line.
+        scenario: the changes to the rig.
+        say: called with each line.
 
     Attributes:
         alarms: raised so far.
@@ -64,7 +64,7 @@ class Narrator:
         self._ended: Alarm | None = None
 
     def samples(self, seq: int) -> None:
-        """The rig has come to this sample."""
+        """Report the changes up to this sample."""
         if self._ended is not None and seq > self._ended.seq + self._rate:
             self._tell_end()
         while self._next is not None and seq >= self._next.seq:
@@ -73,12 +73,12 @@ class Narrator:
             self._next = next(self._acts, None)
 
     def alarm(self, alarm: Alarm) -> None:
-        """An alarm has changed."""
+        """Report a change of an alarm."""
         if alarm.seq >= 0:
             self.samples(alarm.seq)
         if alarm.state == "unacknowledged":
             if self._ended is not None and alarm.onset_seq <= self._ended.onset_seq:
-                self._ended = None  # the fault stands on, under its name
+                self._ended = None  # the fault persists, under its name
             self.alarms.append(alarm)
             self._say(f"{self._time(alarm.seq)} ALARM: {alarm.cause}{self._delay(alarm)}")
             self._say(f"            what to do: {alarm.guidance}")
@@ -89,7 +89,7 @@ class Narrator:
                 self._tell_end()
 
     def _tell_end(self) -> None:
-        """An alarm has ended; a departure is told only once no name has taken its place."""
+        """Report the end of an alarm; that of a departure only if no named fault replaced it."""
         if self._ended is not None:
             name = self._ended.name.replace("_", " ")
             self._say(f"{self._time(self._ended.seq)} {name}: the condition has gone")

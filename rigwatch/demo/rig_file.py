@@ -1,10 +1,8 @@
-"""The demonstration's configuration: a rig's file with all that it writes in one folder."""
+"""The demonstration's configuration: a rig's file with all output in one folder."""
 
 import os
 import time
-from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import msgspec
 from msgspec import structs
@@ -22,7 +20,7 @@ from rigwatch.wire.rig_config import (
     SerialSection,
     load_rig,
 )
-from rigwatch.wire.typed_files import find_file
+from rigwatch.wire.typed_files import as_toml, find_file
 
 NAME = "rig.toml"
 MODEL = "model.toml"
@@ -31,12 +29,12 @@ _HOST = "127.0.0.1"
 
 
 def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
-    """Write the rig's configuration into `folder`; ports that are taken give way to free ones.
+    """Write the rig's configuration into `folder`, with free ports in place of used ones.
 
     Args:
         source: configuration of a simulated rig on a serial line.
-        folder: where the rig's model, journal, recordings and serial line go.
-        viewer: how the dashboard is shown.
+        folder: for the rig's model, journal, recordings and serial line.
+        viewer: kind of viewer for the dashboard.
     """
     config = load_rig(source)
     if config.plant is None:
@@ -55,8 +53,8 @@ def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
         dashboard=_free_dashboard(config.dashboard or DashboardSection(), viewer),
     )
     target = folder / NAME
-    # The time makes each run's file another one: the recorder continues with the last session where
-    # the configuration is the same.
+    # The time makes each run's file unique: the recorder continues the last session if
+    # the configuration is unchanged.
     head = f"# Made by `rigwatch demo` from {source}, {time.strftime('%Y-%m-%d %H:%M:%S')}.\n"
     target.write_text(head + as_toml(msgspec.to_builtins(own)), encoding="utf-8")
     load_rig(target)
@@ -64,7 +62,7 @@ def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
 
 
 def forget_alarms(folder: Path) -> None:
-    """Begin without the alarms of an earlier run, which a real rig's monitor would restore."""
+    """Start without the alarms of an earlier run, which a real rig's monitor restores."""
     for journal in folder.glob(f"{JOURNAL}*"):
         journal.unlink()
 
@@ -78,7 +76,7 @@ def _free_bus(bus: BusSection) -> BusSection:
 
 
 def _another(rig: RigSection, bus: BusSection) -> RigSection:
-    """The rig under a name of its own, beside one that is up already."""
+    """The rig under a unique name, beside one that is already running."""
     return structs.replace(rig, id=f"{rig.id}-{bus.listen.rpartition(':')[2]}")
 
 
@@ -111,39 +109,7 @@ def _free_dashboard(dashboard: DashboardSection, viewer: str) -> DashboardSectio
     return structs.replace(dashboard, viewer=viewer, **ports)
 
 
-def as_toml(tree: Mapping[str, Any], prefix: str = "") -> str:
-    """A tree of plain values as TOML; None is left out."""
-    return "\n".join(_lines(tree, prefix)) + "\n"
-
-
-def _lines(tree: Mapping[str, Any], prefix: str) -> Iterator[str]:
-    tables = {key: value for key, value in tree.items() if _is_table(value)}
-    for key, value in tree.items():
-        if key not in tables and value is not None:
-            yield f"{_key(key)} = {_value(value)}"
-    for key, value in tables.items():
-        name = f"{prefix}{_key(key)}"
-        is_one = isinstance(value, dict)
-        for table in [value] if is_one else value:
-            yield f"\n[{name}]" if is_one else f"\n[[{name}]]"
-            yield from _lines(table, f"{name}.")
-
-
-def _is_table(value: object) -> bool:
-    is_many = isinstance(value, list | tuple) and bool(value) and isinstance(value[0], dict)
-    return isinstance(value, dict) or is_many
-
-
-def _key(key: str) -> str:
-    return key if key.replace("_", "").replace("-", "").isalnum() else _value(key)
-
-
-def _value(value: object) -> str:
-    # JSON writes text, numbers, truth and lists of them as TOML does.
-    return msgspec.json.encode(value).decode()
-
-
 def relative(path: Path) -> str:
-    """A path as one would type it here."""
+    """A path relative to the working folder, if it is below it."""
     found = os.path.relpath(path)
     return str(path) if found.startswith("..") else found

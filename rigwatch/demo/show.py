@@ -1,4 +1,4 @@
-"""The demonstration itself: `rigwatch up` runs the rig, and what happens is told as it happens."""
+"""The demonstration: `rigwatch up` runs the rig, and events are reported as they happen."""
 
 import json
 import signal
@@ -27,14 +27,14 @@ STOP_TIMEOUT = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a demonstration."""
+    """The result of a demonstration."""
 
     alarms: tuple[Alarm, ...]
     recording: Recording
     complaints: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """For `--json`."""
+        """The result as plain values, for `--json`."""
         return {
             "recording": str(self.recording.path),
             "samples": self.recording.samples,
@@ -48,8 +48,8 @@ class Show:
 
     Args:
         rig: configuration of the rig.
-        folder: where its files are.
-        say: takes lines for people.
+        folder: its files.
+        say: called with lines for people.
     """
 
     def __init__(self, rig: Path, folder: Path, say: Callable[[str], None]) -> None:
@@ -61,11 +61,11 @@ class Show:
         self._up: subprocess.Popen[str] | None = None
 
     def play(self, seconds: float, after_named: float) -> Outcome:
-        """Run, then judge what was recorded.
+        """Run, then judge the recording.
 
         Args:
-            seconds: longest time of the rig's own; Ctrl-C ends it too [s].
-            after_named: ends so long after dry friction was named [s].
+            seconds: longest rig time; Ctrl-C ends it too [s].
+            after_named: time from the naming of dry friction to the end [s].
         """
         self._say(f"starting the rig: $ rigwatch up {relative(self._rig)}")
         self._up = subprocess.Popen(
@@ -92,7 +92,7 @@ class Show:
             while self._seen < min(seconds, self._named_at() + after_named) * rate:
                 self._check_running(give_up)
                 alarm: Alarm | None = alarms.get(timeout=0.1)
-                # Before the simulated device is up, that it is missing is no news.
+                # A missing device is not reported before the simulated device is up.
                 if alarm is not None and self._seen:
                     self._narrator.alarm(alarm)
                 blocks: list[SampleBlock] = samples.drain()
@@ -103,7 +103,7 @@ class Show:
             bus.close()
 
     def _named_at(self) -> float:
-        """Time of the rig's own at which dry friction was named, infinite before [s]."""
+        """Rig time at which dry friction was named, infinite before [s]."""
         named = [alarm.seq for alarm in self._narrator.alarms if alarm.name == ALARM]
         return named[0] / self._config.rig.sample_rate if named else float("inf")
 
@@ -122,7 +122,7 @@ class Show:
             raise DeviceError(f"no samples for {START_TIMEOUT:g} s")
 
     def _relay(self) -> None:
-        """Pass on what people should see of the supervisor's events."""
+        """Pass on the supervisor's events that matter to people."""
         assert self._up is not None
         assert self._up.stdout is not None
         for line in self._up.stdout:

@@ -1,4 +1,4 @@
-"""Whether the demonstration did what it is for: the fault named, the recording whole."""
+"""Judges the demonstration: fault named, recording complete."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ WORDS = "dry friction"
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """What a session file holds of the run.
+    """The run's content in a session file.
 
     Attributes:
         path: the session.
-        first, end: number of the first sample, and of the one after the last.
-        samples: how many of the rig's samples are in it.
-        estimates: how many samples the monitor's estimates cover.
-        alarms: names of the alarms raised in it.
-        faults: what is wrong with it, in words.
+        first, end: number of the first sample, and one past the last.
+        samples: number of the rig's samples in it.
+        estimates: number of samples with estimates.
+        alarms: names of the raised alarms.
+        faults: descriptions of its defects.
     """
 
     path: Path
@@ -36,7 +36,7 @@ class Recording:
 
 
 def newest_session(folder: Path) -> Path:
-    """The session begun last below `folder`.
+    """The newest session below `folder`.
 
     Raises:
         SessionError: there is none.
@@ -48,7 +48,7 @@ def newest_session(folder: Path) -> Path:
 
 
 def read_recording(path: Path) -> Recording:
-    """Read the whole session and find out whether any sample is missing.
+    """Read the whole session and check it for missing samples.
 
     Raises:
         SessionError: it cannot be read.
@@ -78,12 +78,12 @@ def _missing(blocks: Sequence[tuple[int, int, int]]) -> Iterator[str]:
 
 
 def complaints(alarms: Sequence[Alarm], recording: Recording, seen: range) -> list[str]:
-    """Why the demonstration failed; empty where it did what it is for.
+    """Why the demonstration failed; empty if it succeeded.
 
     Args:
-        alarms: raised while it ran.
-        recording: what was left.
-        seen: numbers of the samples that another reader of the bus saw meanwhile.
+        alarms: alarms raised during the run.
+        recording: the recording.
+        seen: sample numbers received by another reader of the bus.
     """
     found = list(recording.faults)
     if seen and not (recording.first <= seen.start and seen.stop <= recording.end):

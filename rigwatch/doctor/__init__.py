@@ -1,9 +1,9 @@
-"""Checks an installation, this machine and a rig's configuration, and says what to do.
+"""Checks an installation, this machine and a rig's configuration, and suggests remedies.
 
 finding.py   one result: ok, warn or fail, with a remedy
 machine.py   Python, packages, compiled kernels, clock, scheduling, disk
-viewer.py    what the dashboard can be shown with
-rig.py       a configuration: files it names, ports, device
+viewer.py    how the dashboard can be displayed
+rig.py       a configuration: the files it names, ports, device
 """
 
 from rigwatch.doctor.alive import check_alive

@@ -1,4 +1,4 @@
-"""Asks a running process of a rig how it is, over the bus: what a container's health check runs."""
+"""Checks the health of a running process over the bus: what a container's health check runs."""
 
 import socket
 import time
@@ -13,13 +13,13 @@ from rigwatch.wire.rig_config import PlantSection, RigConfig
 
 ROUTER_TIMEOUT = 3.0
 WORD_TIMEOUT = 3.0
-"""Longest wait for a process's health, which it tells every second [s]."""
+"""Longest wait for a process's health, which it publishes every second [s]."""
 WELL = ("running", "recording")
-"""What a process says of itself when all is well."""
+"""The states of a healthy process."""
 
 
 def check_alive(config: RigConfig, process: str) -> Finding:
-    """Whether `process` of the rig runs and says that all is well."""
+    """Whether `process` of the rig runs and reports that it is healthy."""
     if process == "plant":
         return _check_plant(config.plant)
     try:
@@ -49,7 +49,7 @@ def _check_on_bus(bus: Bus, process: str) -> Finding:
 
 
 def _check_plant(plant: PlantSection | None) -> Finding:
-    """The simulated device is not on the bus: whether its line is there."""
+    """Whether the line of the simulated device, which is not on the bus, exists."""
     if plant is None:
         return Finding("plant", "fail", "no section [plant]", "leave it out")
     if plant.serve != "modbus-tcp":

@@ -11,10 +11,10 @@ class Finding:
     """The result of one check.
 
     Attributes:
-        what: what was looked at.
-        level: fail where rigwatch cannot run, warn where a part of it cannot.
+        what: what was checked.
+        level: fail if rigwatch cannot run, warn if a part of it cannot.
         text: what was found.
-        remedy: what to do, empty where all is well.
+        remedy: what to do, empty if nothing is needed.
     """
 
     what: str
@@ -24,5 +24,5 @@ class Finding:
 
 
 def judged(what: str, good: bool, text: str, remedy: str, otherwise: Level = "fail") -> Finding:
-    """A finding that is ok where `good` holds and carries the remedy where it does not."""
+    """A finding that is ok if `good` holds and carries the remedy if not."""
     return Finding(what, "ok", text) if good else Finding(what, otherwise, text, remedy)

@@ -1,4 +1,4 @@
-"""The smallest kernel: whether it can be compiled and kept tells about all others."""
+"""The smallest kernel: if it compiles and is cached, so do all others."""
 
 from numba import njit
 

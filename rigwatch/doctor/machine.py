@@ -1,4 +1,4 @@
-"""Checks of the installation and of the machine it is on."""
+"""Checks of the installation and the machine."""
 
 import ctypes
 import importlib.metadata
@@ -15,11 +15,11 @@ from rigwatch.doctor.finding import Finding, judged
 
 OLDEST, NEWEST = (3, 11), (3, 13)
 LOW_DISK, NO_DISK = 0.10, 0.02
-"""Free part of a disk below which the recorder warns, and below which it is about to stop."""
+"""Free share of a disk below which the recorder warns, and below which it is about to stop."""
 LATE = 0.004
 """A wake-up later than one sample period at 256 Hz costs latency [s]."""
 TIME_ERROR = 5
-"""What adjtimex returns for a clock that nothing synchronises."""
+"""The return value of adjtimex for an unsynchronised clock."""
 
 
 def check_machine(folder: Path) -> Iterator[Finding]:
@@ -33,14 +33,14 @@ def check_machine(folder: Path) -> Iterator[Finding]:
 
 
 def check_python() -> Finding:
-    """Python is one of those that the pinned packages are made for."""
+    """Python is a version that the pinned packages support."""
     version = sys.version_info[:2]
     remedy = "make the environment with Python 3.11, 3.12 or 3.13"
     return judged("python", OLDEST <= version <= NEWEST, platform.python_version(), remedy, "warn")
 
 
 def check_packages() -> Iterator[Finding]:
-    """Everything that the distribution asks for is there and new enough."""
+    """Every required package is installed and recent enough."""
     for requirement in importlib.metadata.requires("rigwatch") or []:
         needed, _, marker = requirement.partition(";")
         match = re.match(r"[A-Za-z0-9._-]+", needed)
@@ -68,7 +68,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def check_kernels() -> Finding:
-    """Numba compiles, and keeps what it has compiled."""
+    """Numba compiles, and caches what it has compiled."""
     what = "compiled kernels"
     started = time.perf_counter()
     try:
@@ -76,7 +76,7 @@ def check_kernels() -> Finding:
 
         result = add_one(1.0)
     except Exception as error:
-        # Whatever goes wrong inside the compiler, the person asked for is told in one line.
+        # Any failure inside the compiler becomes one line for the user.
         remedy = "set NUMBA_CACHE_DIR to a folder you may write to, or install numba again"
         return Finding(what, "fail", " ".join(str(error).split())[:200], remedy)
     cache = Path(str(add_one.stats.cache_path))
@@ -98,7 +98,7 @@ def check_disk(folder: Path) -> Finding:
 
 
 def check_clock() -> Finding:
-    """The system's clock is kept right by something; samples are stamped with it."""
+    """The system clock, which stamps the samples, is synchronised."""
     state = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(512))
     text = "synchronised" if state != TIME_ERROR else "nothing synchronises the system's clock"
     remedy = "enable systemd-timesyncd or chrony, so that recordings carry the right time"
@@ -106,7 +106,7 @@ def check_clock() -> Finding:
 
 
 def check_scheduling(turns: int = 100) -> Finding:
-    """How late this machine wakes a process that asked to sleep for a millisecond."""
+    """How late this machine wakes a process from a sleep of one millisecond."""
     late = []
     for _ in range(turns):
         asleep = time.perf_counter()

@@ -14,7 +14,7 @@ LOOPBACK = "127.0.0.1"
 
 
 def check_rig(path: Path) -> Iterator[Finding]:
-    """The configuration at `path` and all that it names."""
+    """The configuration at `path` and everything that it names."""
     try:
         config = load_rig(path)
     except RigwatchError as error:
@@ -55,7 +55,7 @@ def check_ports(config: RigConfig) -> Iterator[Finding]:
 
 
 def check_device(config: RigConfig) -> Iterator[Finding]:
-    """The serial line is there and may be used; a simulated rig makes its own."""
+    """The serial line exists and may be used; a simulated rig makes its own."""
     device = config.daq.device
     if isinstance(device, SerialSection | ModbusRtuSection) and config.plant is None:
         yield check_serial(device.port)

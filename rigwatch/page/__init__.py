@@ -1,10 +1,10 @@
-"""Web pages that hold everything and ask the network for nothing: templates and plots in SVG.
+"""Self-contained web pages that need no network: templates and SVG plots.
 
-Shared by the reports of workbench and structures; it knows neither of them.
+Shared by the reports of workbench and structures, and independent of both.
 """
 
-from rigwatch.page.html import page
+from rigwatch.page.html import STYLE, page, templates
 from rigwatch.page.scale import limits
 from rigwatch.page.svg import Plot
 
-__all__ = ["Plot", "limits", "page"]
+__all__ = ["STYLE", "Plot", "limits", "page", "templates"]

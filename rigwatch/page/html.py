@@ -1,4 +1,4 @@
-"""Pages from templates: each is one HTML file with its style inside.
+"""Renders pages from templates: each is one HTML file with inline style.
 
 A report keeps its templates beside its code, in a folder `templates`. They extend `base.html` and
 take tables, figures and numbers from `parts.html`, both of this package.
@@ -16,7 +16,7 @@ STYLE = files(HERE).joinpath("style.css").read_text(encoding="utf-8")
 
 @cache
 def templates(package: str = HERE) -> Environment:
-    """Templates of a package and of this one; what they print is escaped but for `Markup`."""
+    """The templates of a package and of this one; output is escaped except for `Markup`."""
     made = Environment(
         loader=ChoiceLoader([PackageLoader(package), PackageLoader(HERE)]),
         autoescape=True,
@@ -29,11 +29,11 @@ def templates(package: str = HERE) -> Environment:
 
 
 def page(package: str, template: str, **values: object) -> str:
-    """A whole page.
+    """Render a whole page.
 
     Args:
         package: whose template it is, such as "rigwatch.structures.report".
         template: its name, such as "modes.html".
-        values: what the template shows.
+        values: values for the template.
     """
     return templates(package).get_template(template).render(values)

@@ -1,4 +1,4 @@
-"""Axes: data to pixels, round ticks, ends that show all values."""
+"""Axes: data to pixels, round ticks, limits that include all values."""
 
 from dataclasses import dataclass
 from math import ceil, floor, log10
@@ -10,12 +10,12 @@ from rigwatch.wire.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """Data to pixels along one axis.
+    """Maps data to pixels along one axis.
 
     Attributes:
         low, high: ends of the data.
         start, end: the same in pixels.
-        log: whether decades are equally long.
+        log: whether the axis is logarithmic.
     """
 
     low: float
@@ -52,7 +52,7 @@ def _decades(low: float, high: float) -> list[float]:
 
 
 def limits(*values: FloatArray, zero: bool = False, room: float = 0.06) -> tuple[float, float]:
-    """Ends of an axis that shows all finite values, with some room."""
+    """Limits of an axis for all finite values, with a margin."""
     every = np.concatenate([np.ravel(v) for v in values])
     every = every[np.isfinite(every)]
     if not every.size:
@@ -67,6 +67,6 @@ def limits(*values: FloatArray, zero: bool = False, room: float = 0.06) -> tuple
 
 
 def label(value: float) -> str:
-    """A tick's number."""
+    """The label of a tick."""
     text = f"{value:.4g}"
     return text.replace("e-0", "e-").replace("e+0", "e").replace("-", "−")

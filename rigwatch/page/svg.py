@@ -1,7 +1,7 @@
-"""Plots as inline SVG: axes with round ticks, lines, steps, marks, bars and maps, nothing else.
+"""Plots as inline SVG: axes with round ticks, lines, steps, markers, bars and maps.
 
-Colours are names of CSS variables, so that the page decides them, and a dark page has dark plots.
-Numbers keep one decimal of a pixel: a page stays small.
+Colours are names of CSS variables, which the page defines, so that a dark page has dark plots.
+Coordinates have one decimal of a pixel, to keep pages small.
 """
 
 import re
@@ -17,7 +17,7 @@ from rigwatch.page.scale import Scale, label
 from rigwatch.wire.arrays import FloatArray
 
 MOST_POINTS = 900
-"""Points of a line; longer ones show the highest and lowest sample of each pixel."""
+"""Most points of a line; longer lines show the highest and lowest sample of each pixel."""
 _TEMPLATE = templates().get_template("plot.svg")
 _RULES = Markup("\n".join(re.findall(r"^svg.*?\}", STYLE, re.DOTALL | re.MULTILINE)))
 _LIGHT = dict(re.findall(r"--(\w+): (#\w+);", STYLE.partition("@media")[0]))
@@ -28,10 +28,10 @@ class Shape:
     """One element of a plot.
 
     Attributes:
-        tag: of SVG.
-        attributes: of SVG; None where there is none.
-        told: what it says when it is pointed at.
-        words: that it shows.
+        tag: SVG tag.
+        attributes: SVG attributes; None omits one.
+        told: tooltip.
+        words: its text.
     """
 
     tag: str
@@ -42,16 +42,16 @@ class Shape:
 
 @dataclass
 class Plot:
-    """One pair of axes and what is drawn in them.
+    """One pair of axes with its content.
 
     Attributes:
-        title: what a screen reader says of it.
+        title: description for screen readers.
         x, y: ends of the axes.
         x_label, y_label: with the unit in brackets.
         width, height: [pixels].
-        names: labels of categories at x = 0, 1, …, in place of numbers.
-        left: where the axes begin [pixels].
-        legend: colours and their words, above the axes.
+        names: category labels at x = 0, 1, … in place of numbers.
+        left: left edge of the axes [pixels].
+        legend: colours and their labels, above the axes.
     """
 
     title: str
@@ -75,7 +75,7 @@ class Plot:
 
     def line(self, x: FloatArray, y: FloatArray, colour: str, *, width: float = 1.5,
              dash: str = "", marks: bool = False, name: str = "") -> None:  # fmt: skip
-        """A line that breaks where a value is not finite and stays within the axes."""
+        """A line, broken at values that are not finite and clipped to the axes."""
         path = " ".join(_segments(*_thinned(x, np.clip(y, *self.y)), self))
         drawn = {"d": path, "fill": "none", "stroke": f"var(--{colour})",
                  "stroke-width": f"{width}", "stroke-linejoin": "round",
@@ -86,7 +86,7 @@ class Plot:
                 self.mark(a, b, colour, f"{name}: {b:.4g}")
 
     def mark(self, x: float, y: float, colour: str, told: str, *, hollow: bool = False) -> None:
-        """A dot that says its number when it is pointed at."""
+        """A dot with its value as a tooltip."""
         ring = f"var(--{colour})"
         drawn = {"cx": _px(self.across.at(x)), "cy": _px(self.up.at(y)), "r": "4.5",
                  "fill": "var(--card)" if hollow else ring, "stroke": ring,
@@ -104,27 +104,27 @@ class Plot:
 
     def text(self, x: float, y: float, words: str, colour: str = "soft", *, anchor: str = "start",
              up: float = 0.0) -> None:  # fmt: skip
-        """Words at a place of the data, `up` pixels above it."""
+        """Text at a data point, `up` pixels above it."""
         drawn = {"x": _px(self.across.at(x)), "y": _px(self.up.at(y) - up),
                  "fill": f"var(--{colour})", "text-anchor": anchor}  # fmt: skip
         self.shapes.append(Shape("text", drawn, words=words))
 
     def drawn(self) -> Markup:
-        """The whole plot as an <svg> element of a page, which gives it colours."""
+        """The plot as an <svg> element, coloured by its page."""
         return Markup(_TEMPLATE.render(plot=self, rules=""))
 
     def document(self) -> str:
-        """The same as a file: in a light page's colours, as only browsers know CSS variables."""
+        """The plot as a file, in a light page's colours, as only browsers support CSS variables."""
         text = _TEMPLATE.render(plot=self, rules=_RULES)
         return re.sub(r"var\(--(\w+)\)", lambda found: _LIGHT[found[1]], text)
 
     def y_ticks(self) -> list[tuple[float, str]]:
-        """Pixel and words of each tick of the vertical axis."""
+        """Pixel and label of each tick of the vertical axis."""
         wanted = max(4, round(self.height / 50))
         return [(self.up.at(value), label(value)) for value in self.up.ticks(wanted)]
 
     def x_ticks(self) -> list[tuple[float, str]]:
-        """Pixel and words of each tick of the horizontal axis."""
+        """Pixel and label of each tick of the horizontal axis."""
         if self.names:
             return [(self.across.at(k), name) for k, name in enumerate(self.names)]
         wanted = max(2, round((self.width - self.left) / 90))

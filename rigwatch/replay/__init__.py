@@ -1,4 +1,4 @@
-"""The monitor over recordings: replayed for people, and compared with references in CI."""
+"""Runs the monitor over recordings: replay for people, comparison with references in CI."""
 
 from rigwatch.replay.cases import Verdict, load_cases, verify
 from rigwatch.replay.choice import monitor_for

@@ -5,7 +5,7 @@ name = "friction"
 recording = "friction.mcap"         paths are relative to the file
 model = "model.toml"
 reference = "friction.reference.mcap"
-block = 8                           samples handed over at a time
+block = 8                           samples passed at a time
 ignore = ["condition.gap.*"]        fields that are not compared
 tolerance = { theta2 = 1e-4 }       relative to the field's largest value
 """
@@ -28,14 +28,14 @@ Text = Annotated[str, Meta(min_length=1)]
 class Case(Section, frozen=True):
     """One case."""
 
-    name: Annotated[Text, Meta(description="what it is called in reports")]
+    name: Annotated[Text, Meta(description="name in reports")]
     recording: Annotated[Text, Meta(description="session file or folder")]
     model: Annotated[Text, Meta(description="model file")]
     reference: Annotated[Text, Meta(description="session file with the reference")]
     config: Annotated[
-        str, Meta(description="configuration of the rig; empty: the one recorded with it")
+        str, Meta(description="configuration of the rig; empty: the recorded one")
     ] = ""
-    block: Annotated[int, Meta(ge=1, description="samples handed over at a time")] = 8
+    block: Annotated[int, Meta(ge=1, description="samples passed at a time")] = 8
     ignore: Annotated[tuple[Text, ...], Meta(description="patterns of fields not compared")] = ()
     tolerance: Annotated[
         dict[Text, Annotated[float, Meta(ge=0)]],
@@ -51,15 +51,15 @@ class CaseFile(Section, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What came of one case.
+    """The result of one case.
 
     Attributes:
         name: the case.
         samples: samples judged.
         fields: fields published.
-        differences: what differs from the reference.
-        has_reference: whether there was one.
-        updated: whether the reference was renewed.
+        differences: differences from the reference.
+        has_reference: whether there is one.
+        updated: whether the reference was rewritten.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        """Whether everything is as the reference says, or was renewed."""
+        """Whether everything agrees with the reference, or the reference was rewritten."""
         return self.updated or (self.has_reference and not self.differences)
 
 
@@ -85,12 +85,12 @@ def load_cases(path: Path) -> tuple[Case, ...]:
 
 
 def verify(case: Case, folder: Path, *, update: bool = False) -> Verdict:
-    """Replay one case and compare; with `update`, renew the reference where it differs.
+    """Replay one case and compare; with `update`, rewrite a reference that differs.
 
     Args:
-        case: what is replayed.
-        folder: that the case's paths are relative to.
-        update: renew the reference.
+        case: the case to replay.
+        folder: base of the case's relative paths.
+        update: rewrite a reference that differs.
 
     Raises:
         RigwatchError: recording, model, configuration or reference cannot be read.
@@ -109,6 +109,6 @@ def verify(case: Case, folder: Path, *, update: bool = False) -> Verdict:
 
 
 def replayed(case: Case, folder: Path, session: Session, block: int) -> Output:
-    """What the monitor publishes over the case's recording, handed over in blocks of `block`."""
+    """What the monitor publishes over the case's recording, in blocks of `block` samples."""
     config = folder / case.config if case.config else None
     return output_of(session, monitor_for(session, folder / case.model, config), block)

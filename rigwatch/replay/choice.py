@@ -1,4 +1,4 @@
-"""Which model and which alarm settings a session is replayed with."""
+"""Chooses the model and the alarm settings for the replay of a session."""
 
 from pathlib import Path
 
@@ -17,11 +17,11 @@ def monitor_for(session: Session, model: Path | None, config: Path | None) -> Ri
 
     Args:
         session: the recording.
-        model: the model file; None takes that of the configuration.
-        config: the rig's configuration; None takes the one that was recorded with the session.
+        model: the model file; None takes the one in the configuration.
+        config: the rig's configuration; None takes the one recorded with the session.
 
     Raises:
-        ConfigError: model or configuration are wrong.
+        ConfigError: the model or the configuration is wrong.
         SessionError: no model is named anywhere, or it was made for another rate.
     """
     section, file = _section(session, config)
@@ -47,5 +47,5 @@ def _section(session: Session, config: Path | None) -> tuple[MonitorSection | No
     try:
         return parse(session.info.configuration, RigConfig, name).monitor, name
     except ConfigError:
-        # Recorded by another version: its alarm settings are not ours, the samples are.
+        # Recorded by another version: its alarm settings may not apply, its samples do.
         return None, name

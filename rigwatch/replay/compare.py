@@ -18,7 +18,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.messages import Alarm, EstimateBlock
 
 TOLERANCE = 1e-6
-"""Of a field that no pattern names, relative to the field's largest value."""
+"""Tolerance of a field that no pattern names, relative to the field's largest value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +27,10 @@ class Difference:
 
     Attributes:
         field: column, condition or place in the list of announcements.
-        sample: "boot:seq" of the first sample that differs, empty where none is meant.
+        sample: "boot:seq" of the first sample that differs, empty if none applies.
         t_ns: its time [ns].
-        old, new: the values there, in words.
-        further: samples that differ behind it.
+        old, new: the values there, as text.
+        further: number of later samples that differ.
     """
 
     field: str
@@ -48,11 +48,11 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Rules:
-    """What counts as a difference.
+    """Defines what counts as a difference.
 
     Attributes:
         ignore: patterns of fields that are not compared.
-        tolerance: tolerance by pattern of field, the first that fits counts.
+        tolerance: tolerance by pattern of field; the first match counts.
     """
 
     ignore: Sequence[str] = ()
@@ -84,7 +84,7 @@ def _span(block: EstimateBlock) -> str:
 
 
 def _fields(old: Output, new: Output) -> list[str]:
-    """Names of all fields of either, in order."""
+    """Names of all fields of both, in order."""
     blocks = (*old.blocks, *new.blocks)
     return list(dict.fromkeys(column.name for block in blocks for column in block.columns))
 

@@ -1,7 +1,7 @@
-"""Everything that the monitor publishes over a recording, kept as a reference and read back.
+"""References: everything that the monitor publishes over a recording, stored and read back.
 
-A reference is a session file: blocks with every field, conditions among them, and the alarms and
-events. Values are kept to 24 bits, which halves the file; tolerances lie far above that.
+A reference is a session file: blocks with every field, conditions included, and the alarms and
+events. Values are stored to 24 bits, which halves the file; tolerances are far larger than that.
 """
 
 from dataclasses import dataclass
@@ -38,12 +38,12 @@ class Output:
 
     @property
     def samples(self) -> int:
-        """Samples judged."""
+        """Number of samples judged."""
         return sum(map(len, self.blocks))
 
 
 def output_of(session: Session, monitor: RigMonitor, size: int) -> Output:
-    """What `monitor` publishes over `session`, handed to it in blocks of `size` samples.
+    """What `monitor` publishes over `session`, in blocks of `size` samples.
 
     Raises:
         SessionError: samples lack a channel that the model needs.
@@ -75,7 +75,7 @@ def _as_floats(values: "np.ndarray[tuple[int], np.dtype[np.generic]]") -> FloatA
 
 
 def write_reference(path: Path, run: RunInfo, output: Output) -> None:
-    """Keep `output` as the reference at `path`, in place of what was there.
+    """Write `output` as the reference at `path`, replacing an earlier one.
 
     Raises:
         SessionError: it cannot be written.
@@ -90,7 +90,7 @@ def write_reference(path: Path, run: RunInfo, output: Output) -> None:
 
 
 def _rounded(block: EstimateBlock) -> EstimateBlock:
-    """The block with values of 24 bits; those too large for it stay as they are."""
+    """The block with values rounded to 24 bits; larger ones stay as they are."""
     with np.errstate(over="ignore"):
         columns = tuple(
             Column(

@@ -1,4 +1,4 @@
-"""Runs the monitor over a session: the same pure object as live, fed from a file.
+"""Runs the monitor over a session: the same object as live, fed from a file.
 
 session ─▶ samples, commands ─▶ RigMonitor ─▶ estimates, alarms ─▶ caller, new session
 """
@@ -18,19 +18,19 @@ from rigwatch.wire.messages import Alarm, AlarmCommand, Event, ModelChange, Samp
 from rigwatch.wire.session import MERGED_SAMPLES, LostSpan, Session, SessionWriter
 
 PACED_BLOCK = 0.05
-"""Length of a block where the replay keeps time [s of the wall clock]."""
+"""Length of a block in a timed replay [s of the wall clock]."""
 
 
 @dataclass(slots=True)
 class Replay:
-    """What came of a replay.
+    """The result of a replay.
 
     Attributes:
-        samples: how many were judged.
+        samples: number of samples judged.
         first_ns, last_ns: times of the first and the last of them [ns].
-        elapsed_s: time that it took [s].
+        elapsed_s: duration of the replay [s].
         alarms: transitions, in order.
-        events: what else was said.
+        events: the events, in order.
         lost: damage of the session.
     """
 
@@ -43,7 +43,7 @@ class Replay:
     lost: tuple[LostSpan, ...] = ()
 
     def count(self, judged: "Judged") -> None:
-        """Add what came of one item."""
+        """Add the result of one item."""
         if isinstance(judged.item, SampleBlock):
             self.first_ns = self.first_ns if self.samples else int(judged.item.t_ns[0])
             self.last_ns = int(judged.item.t_ns[-1])
@@ -61,15 +61,15 @@ class Replay:
 
     @property
     def times_real_time(self) -> float:
-        """Recorded time over the time that it took."""
+        """Recorded time over the duration of the replay."""
         return self.duration_s / self.elapsed_s if self.elapsed_s > 0 else 0.0
 
 
 def check_suits(session: Session, model: RigModel) -> None:
-    """Refuse a model that was made for another rate.
+    """Refuse a model made for another sample rate.
 
     Raises:
-        SessionError: the session's rate is another one.
+        SessionError: the session's sample rate differs.
     """
     rate = session.info.sample_rate_hz
     if abs(rate - model.sample_rate) > 1e-6 * model.sample_rate:
@@ -79,7 +79,7 @@ def check_suits(session: Session, model: RigModel) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """One item of a recording, and what the monitor made of it."""
+    """One item of a recording and the monitor's output for it."""
 
     item: Item
     watched: Watched | None
@@ -87,7 +87,7 @@ class Judged:
 
 
 def judge(session: Session, monitor: RigMonitor, found: Iterable[Item]) -> Iterator[Judged]:
-    """Hand each item to the monitor.
+    """Pass each item to the monitor.
 
     Raises:
         SessionError: samples lack a channel that the model needs.
@@ -109,7 +109,7 @@ def judge(session: Session, monitor: RigMonitor, found: Iterable[Item]) -> Itera
 
 
 def _adopted(monitor: RigMonitor, change: ModelChange, session: Session) -> list[Announcement]:
-    """Go on with the model promoted; one that no monitor can have granted is told and left out."""
+    """Continue with the promoted model; report and skip one that no monitor can accept."""
     try:
         monitor.adopt(parse_model(change.model, f"{session.path}: the model promoted"))
     except RigwatchError as error:
@@ -130,11 +130,11 @@ def replay(
 
     Args:
         session: the recording.
-        monitor: new, or as an earlier part left it.
-        span: start and end of the part that is replayed [ns].
-        speed: times real time; 0 for as fast as it goes.
+        monitor: new, or in the state that an earlier part left.
+        span: start and end of the part to replay [ns].
+        speed: multiple of real time; 0 for as fast as possible.
         out: session file for samples, estimates and alarms.
-        say: told each alarm as it comes.
+        say: called with each alarm.
 
     Raises:
         SessionError: the samples lack a channel, or `out` cannot be written.
@@ -156,7 +156,7 @@ def replay(
 
 
 def _paced(found: Iterator[Item], speed: float) -> Iterator[Item]:
-    """The items, each held back until its last sample would have been there."""
+    """The items, each delayed until its last sample would have arrived."""
     began, first = time.monotonic(), None
     for item in found:
         if speed > 0 and isinstance(item, SampleBlock):
@@ -167,7 +167,7 @@ def _paced(found: Iterator[Item], speed: float) -> Iterator[Item]:
 
 
 class _Sink:
-    """The session file that a replay leaves, or nothing."""
+    """The session file that a replay writes, or nothing."""
 
     def __init__(self, session: Session, out: Path | None) -> None:
         self._writer: SessionWriter | None = None

@@ -1,7 +1,7 @@
-"""A recorded session as the monitor met it: samples in order, operators' commands between.
+"""A recorded session as the monitor received it: samples in order, commands between them.
 
-A command takes effect between two samples, so that where it falls does not depend on how the
-samples were cut.
+A command takes effect between two samples, so its position does not depend on how the samples
+were cut into blocks.
 """
 
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ def items(
     size: int = MERGED_SAMPLES,
     device: str | None = None,
 ) -> Iterator[Item]:
-    """Samples in blocks of at most `size`, and commands and changes of the model between them."""
+    """Samples in blocks of at most `size`, with commands and model changes between them."""
     waiting = _orders(session, start, end)
     for whole in session.samples(device, start, end):
         for block in pieces(whole, size):
@@ -31,7 +31,7 @@ def items(
 
 
 def _orders(session: Session, start: int | None, end: int | None) -> list[Order]:
-    """The session's commands and changes of the model in order of time."""
+    """The session's commands and model changes in order of time."""
     topics = [name for name in ("commands", "models") if session.may_hold(name)]
     if not topics:
         return []
@@ -41,7 +41,7 @@ def _orders(session: Session, start: int | None, end: int | None) -> list[Order]
 
 
 def _interleaved(block: SampleBlock, waiting: list[Order]) -> Iterator[Item]:
-    """The block, cut where commands fall, which are taken off `waiting`."""
+    """The block, cut at the commands, which are removed from `waiting`."""
     done = 0
     while waiting and waiting[0].t_ns <= int(block.t_ns[-1]):
         command = waiting.pop(0)

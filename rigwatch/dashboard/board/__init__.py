@@ -1,4 +1,4 @@
-"""What the dashboard shows: plots, lanes of alarms, status text, layout."""
+"""The content of the dashboard: plots, alarm lanes, status text, layout."""
 
 from rigwatch.dashboard.board import entities, palette
 from rigwatch.dashboard.board.alarm_book import NAMED_FAULTS, is_active

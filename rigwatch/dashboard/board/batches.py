@@ -1,6 +1,6 @@
-"""Samples on their way to the viewer: gathered by plot, sent as one batch of columns a plot.
+"""Collects samples for the viewer by plot and sends one batch of columns per plot.
 
-Drawing sample by sample costs ten times as much of a core, and many small chunks make the viewer
+Drawing sample by sample takes ten times the processor time, and many small chunks make the viewer
 lag by seconds.
 """
 
@@ -20,12 +20,12 @@ NANOSECONDS = "datetime64[ns]"
 
 @dataclass(slots=True)
 class Batches:
-    """What has not been sent yet, by path of the plot.
+    """The data not sent yet, by path of the plot.
 
     Attributes:
-        marks: figures that stay the same, such as "theta1_signature", by name.
+        marks: constant figures, such as "theta1_signature", by name.
         waiting: times and values, by path.
-        styled: paths whose colours and names the viewer already knows.
+        styled: paths whose colours and names the viewer already has.
     """
 
     marks: Mapping[str, float]
@@ -33,7 +33,7 @@ class Batches:
     styled: set[str] = field(default_factory=set)
 
     def add(self, plot: Plot, t_ns: IntArray, columns: Iterable[Column]) -> FloatArray:
-        """Gather the plot's columns; returns what will be drawn, shape (n, series)."""
+        """Collect the plot's columns; returns the values to draw, shape (n, series)."""
         by_name = {column.name: column.values for column in columns}
         drawn = np.empty((len(t_ns), len(plot.series)))
         for place, series in enumerate(plot.series):
@@ -43,7 +43,7 @@ class Batches:
         return drawn
 
     def send(self, stream: rr.RecordingStream, plots: dict[str, Plot]) -> None:
-        """Send all that waits to the viewer, one batch a plot."""
+        """Send everything to the viewer, one batch per plot."""
         waiting, self.waiting = self.waiting, {}
         for path, parts in waiting.items():
             if path not in self.styled:

@@ -1,8 +1,7 @@
-"""The drawing core: messages in, drawings out; no bus, no clock, no viewer of its own.
+"""The drawing core: messages in, drawings out; no bus, clock or viewer of its own.
 
-`Dashboard.show` takes one message and draws at most a few words; samples wait in batches until
-`flush`. Live, the process calls `flush` a few times a second; for a recording it is called once in
-a while.
+`Dashboard.show` takes one message and draws at most some text; samples wait in batches until
+`flush`. Live, the process calls `flush` a few times a second; for a recording, at intervals.
 """
 
 from collections.abc import Callable
@@ -42,10 +41,10 @@ class Dashboard:
     """Draws the messages of one rig into one Rerun recording.
 
     Args:
-        stream: where to; already connected to a viewer or a file.
-        facts: what is known already; carried on.
-        windows: how much time the plots show.
-        bare: leave out what serves to operate the viewer, for pictures.
+        stream: target, already connected to a viewer or a file.
+        facts: known facts, updated in place.
+        windows: time span of the plots.
+        bare: hide the controls of the viewer, for pictures.
     """
 
     def __init__(
@@ -79,16 +78,16 @@ class Dashboard:
         stream.log(at.WAITING, _markdown(advice(facts)), static=True)
 
     def show(self, message: Message) -> None:
-        """Take one message of any topic; kinds that are not drawn are left out."""
+        """Process one message of any topic; kinds that are not drawn are ignored."""
         if draw := self._draw.get(type(message)):
             draw(message)
             self._keep_up()
 
     def flush(self, now_ns: int | None = None) -> None:
-        """Send what waits, lay out anew where something new has come, renew the words.
+        """Send waiting data, update the layout if needed, refresh the text.
 
         Args:
-            now_ns: the time now [ns], so that silence can be told; None for recordings.
+            now_ns: current time [ns], to detect silence; None for recordings.
         """
         self.facts.tell_time(now_ns)
         self._batches.send(self._stream, self._survey.plots)
@@ -96,12 +95,12 @@ class Dashboard:
         self._keep_up(changed=self.facts.silent_s > 0)
 
     def finish(self) -> None:
-        """Draw the last of a recording."""
+        """Draw the remainder of a recording."""
         self._finished = True
         self.flush()
 
     def _keep_up(self, *, changed: bool = False) -> None:
-        """Let verdict and words follow, not with every message."""
+        """Update verdict and text, but not with every message."""
         if self.now_ns and (changed or self.now_ns - self._said_ns >= _WORDS_EVERY_NS):
             self._lanes.verdict(self.facts.verdict(), self.now_ns)
             self._say()
@@ -170,7 +169,7 @@ class Dashboard:
         self._stream.set_time(at.TIMELINE, timestamp=np.datetime64(t_ns, "ns"))
 
     def _lay_out(self) -> None:
-        """Lay out anew where something new has come; rarely, since it undoes a person's choices."""
+        """Update the layout if needed; rarely, since it resets the user's choices."""
         plan = self._survey.plan()
         due = not self._plan or self.now_ns - self._laid_out_ns >= _LAYOUT_EVERY_NS
         if plan != self._plan and (due or self._finished):

@@ -1,4 +1,4 @@
-"""Names in the viewer that more than one module here speaks of: the timeline, entities, titles."""
+"""Names in the viewer that several modules share: the timeline, entities, titles."""
 
 TIMELINE = "time"
 

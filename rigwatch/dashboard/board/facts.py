@@ -1,4 +1,4 @@
-"""What is known of the rig now, as far as people are told: no drawing, no bus, no clock."""
+"""What is currently known of the rig: no drawing, bus or clock."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,13 +10,13 @@ from rigwatch.dashboard.board.palette import VERDICTS
 from rigwatch.wire.messages import EstimateBlock, Health, SampleBlock
 
 SILENCE = 2.0
-"""Time without samples after which the screen says so [s]."""
+"""Time without samples after which the screen reports it [s]."""
 _FORGET = 0.02
 
 
 @dataclass(slots=True)
 class Age:
-    """Of the newest sample on the screen: now, mean and worst [ms]."""
+    """Age of the newest sample on the screen: current, mean and worst [ms]."""
 
     now: float = 0.0
     mean: float = 0.0
@@ -24,25 +24,26 @@ class Age:
     known: bool = False
 
     def add(self, age_ms: float) -> None:
-        """Take the age at one update."""
+        """Record the age at one update."""
         self.mean = age_ms + (1 - _FORGET) * (self.mean - age_ms) if self.known else age_ms
         self.now, self.worst, self.known = age_ms, max(self.worst, age_ms), True
 
 
 @dataclass(slots=True)
 class Facts:
-    """What the words on the screen are made of.
+    """The facts behind the text on the screen.
 
     Attributes:
         rig: the rig's id.
         book: states of the alarms.
         health: last health message of each process, by source.
-        figures: last value of each estimated figure, by column name.
-        age: of the newest sample drawn; known only live.
-        marks: figures of the model that stay the same, such as "theta1_signature".
+        figures: last value of each estimate, by column name.
+        age: age of the newest sample drawn; live only.
+        marks: constant figures of the model, such as "theta1_signature".
         model: the model's name.
         silent_s: time without samples [s], 0 while they come.
         skipped: messages that the dashboard left out because it was slow.
+        lost_alarms: alarms that never reached this screen.
         samples: samples drawn.
     """
 
@@ -55,25 +56,26 @@ class Facts:
     model: str = ""
     silent_s: float = 0.0
     skipped: int = 0
+    lost_alarms: int = 0
     samples: int = 0
     _newest_ns: int = 0
     _fresh_ns: int = 0
     _drawn: int = 0
 
     def see_samples(self, block: SampleBlock) -> None:
-        """Take notice of samples that are drawn."""
+        """Record the drawn samples."""
         self.samples += len(block)
         if len(block):
             self._newest_ns = int(block.t_ns[-1])
 
     def see_estimates(self, block: EstimateBlock) -> None:
-        """Take notice of the last of the estimates."""
+        """Record the last estimates."""
         for column in block.columns if len(block) else ():
             if np.isfinite(value := column.values[-1]):
                 self.figures[column.name] = float(value)
 
     def tell_time(self, now_ns: int | None) -> None:
-        """How old the newest sample is, and whether samples still come."""
+        """Record how old the newest sample is, and whether samples still arrive."""
         if now_ns is None or not self.samples:
             return
         if self.samples > self._drawn:

@@ -1,4 +1,4 @@
-"""Counters of the processes as plots; what differs in unit or in meaning has a view of its own."""
+"""Counters of the processes as plots; different units and meanings have separate views."""
 
 from collections.abc import Iterator
 

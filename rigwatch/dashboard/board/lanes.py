@@ -1,4 +1,4 @@
-"""Coloured lanes over time: the verdict on the rig, and one lane an alarm."""
+"""Coloured lanes over time: the verdict on the rig, and one lane per alarm."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,10 +13,10 @@ from rigwatch.wire.messages import Alarm
 
 
 class Lanes:
-    """What the lanes show; a lane begins with the first time that is known.
+    """Draws the lanes; a lane begins at the first known time.
 
     Args:
-        stream: where to draw.
+        stream: target.
         book: states of the alarms so far.
     """
 
@@ -29,20 +29,20 @@ class Lanes:
             self._add(name)
 
     def begin(self, t_ns: int) -> None:
-        """Let the lanes start; to be called once, when a first time is known."""
+        """Start the lanes; called once, when the first time is known."""
         for name in self._names:
             self._start(name, t_ns)
 
     def alarm(self, alarm: Alarm) -> None:
         """One transition, on its own lane."""
         if alarm.severity == "info":
-            return  # a remark: it stands in the words and the log, and would only fill the screen
+            return  # a remark: it is in the text and the log, and would only fill the screen
         if alarm.name not in self._names:
             self._add(alarm.name)
         self._change(_path(alarm.name), alarm.state, alarm.t_ns)
 
     def verdict(self, verdict: str, t_ns: int) -> None:
-        """The verdict from now on; drawn where it changes."""
+        """Set the verdict; drawn when it changes."""
         if verdict != self._verdict:
             self._verdict = verdict
             self._change(at.VERDICT, verdict, t_ns)

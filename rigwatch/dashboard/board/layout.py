@@ -1,7 +1,7 @@
-"""Where everything stands on the screen: the blueprint of the viewer.
+"""The layout of the screen: the blueprint of the viewer.
 
-    Watch    signals and residual on the left, verdict, alarm states and friction estimates on the
-    right Health   what the processes report: rates, losses, errors, latency
+    Watch    signals and residual on the left; verdict, alarm states and estimates on the right
+    Health   what the processes report: rates, losses, errors, latency
 
 Short windows follow the cursor for signals, long ones for estimates and alarms, so that both the
 motion and the history can be read.
@@ -20,11 +20,11 @@ from rigwatch.dashboard.board.survey import PlotPlan
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """How much time the plots show, up to the cursor.
+    """The time span of the plots, up to the cursor.
 
     Attributes:
-        signals: of signals and residual [s]; None shows everything.
-        history: of estimates and alarm states [s]; None shows everything.
+        signals: span of signals and residual [s]; None shows everything.
+        history: span of estimates and alarm states [s]; None shows everything.
     """
 
     signals: float | None = 5.0
@@ -36,8 +36,8 @@ def blueprint(plan: Sequence[PlotPlan], windows: Windows, *, bare: bool) -> rrb.
 
     Args:
         plan: the plots, with units and ranges.
-        windows: how much time they show.
-        bare: leave out what serves to operate the viewer.
+        windows: their time span.
+        bare: hide the controls of the viewer.
     """
     return rrb.Blueprint(
         rrb.Tabs(*_tabs(plan, windows), active_tab=0),
@@ -76,7 +76,7 @@ def _watch(plan: Sequence[PlotPlan], windows: Windows) -> rrb.Container:
     shares = [3.7, 2.3, *[1.65] * len(friction), 1.4]
     columns: list[rrb.Container] = [rrb.Vertical(*right, row_shares=shares)]
     if left := _signal_views(plan, windows):
-        # A drive needs less room than what it moves.
+        # The drive needs less room than the motion.
         columns.insert(0, rrb.Vertical(*left, row_shares=[4, *[5] * (len(left) - 1)]))
     return rrb.Vertical(
         _states_view(at.VERDICT, at.VERDICT_VIEW, windows),
@@ -97,7 +97,7 @@ def _log_view(origin: str, name: str) -> rrb.View:
 
 
 def _signal_views(plan: Sequence[PlotPlan], windows: Windows) -> list[rrb.View]:
-    """One view a signal, in the order of the table, strangers last; both accelerations in one."""
+    """One view per signal, in the order of the table, others last; both accelerations in one."""
     order = [plot.path for plot in (*quantities.SAMPLE_PLOTS, *quantities.ESTIMATE_PLOTS)]
     shown = [
         line for line in plan if not line.plot.path.startswith((*quantities.FRICTION, DETAILS))

@@ -1,7 +1,7 @@
-"""One colour a quantity, in plots, tests and manual, chosen for a dark background.
+"""One colour per quantity, in plots, tests and manual, chosen for a dark background.
 
-Colours are (red, green, blue) from 0 to 255. Measured things are warm or saturated, modelled ones
-pale, limits red.
+Colours are (red, green, blue) from 0 to 255. Measured quantities are warm or saturated, modelled
+ones pale, limits red.
 """
 
 from rigwatch.wire.messages import AlarmState
@@ -30,7 +30,7 @@ OTHERS: tuple[Colour, ...] = (
     (80, 200, 215),
     (235, 100, 90),
 )
-"""For channels and counters that have no colour of their own."""
+"""Colours of channels and counters that have none of their own."""
 
 STATES: dict[AlarmState, tuple[str, Colour]] = {
     "normal": ("normal", (38, 92, 62)),

@@ -1,9 +1,8 @@
-"""Which column of a message is drawn where: one row a plot, one line a series.
+"""Maps the columns of messages to plots: one row per plot, one line per series.
 
-A plot is one entity with several scalars, so that one batch a plot travels to the viewer. Its `key`
-decides whether the plot exists; other columns that a message lacks come from the marks, figures
-that stay the same such as the signature of a fault, or are left out. Columns without a row get a
-plot of their own.
+A plot is one entity with several scalars, sent to the viewer as one batch. The plot exists if the
+message has its `key` column. Other missing columns come from the marks, constant figures such as
+the signature of a fault, or are omitted. Columns without a row get a plot of their own.
 """
 
 from collections.abc import Collection
@@ -20,7 +19,7 @@ class Series:
 
     Attributes:
         column: name of the column in the message, or of a mark.
-        label: what the legend says.
+        label: text in the legend.
         colour: (red, green, blue).
         width: stroke width in points.
     """
@@ -37,9 +36,9 @@ class Plot:
 
     Attributes:
         path: the entity.
-        key: the column that must be there.
+        key: the required column.
         series: its scalars, in order.
-        title: of its view, without the unit.
+        title: title of its view, without the unit.
         scale: the drawn value is the SI value times this.
         unit: unit of the drawn value; "" takes the column's own.
     """
@@ -57,7 +56,7 @@ def _single(path: str, column: str, title: str, colour: Colour) -> Plot:
 
 
 def _limits(column: str) -> tuple[Series, Series]:
-    """Both limits under one name, so that the legend shows them once."""
+    """Both limits under one name, so that the legend lists them once."""
     return (
         Series(f"{column}_low", "limit", palette.LIMIT, 1.2),
         Series(f"{column}_high", "limit", palette.LIMIT, 1.2),
@@ -152,7 +151,7 @@ _PLACED = _IN_WORDS | {s.column for p in (*SAMPLE_PLOTS, *ESTIMATE_PLOTS) for s 
 
 
 def plots_of(columns: Collection[Column], table: tuple[Plot, ...], others: str) -> list[Plot]:
-    """The rows of `table` for these columns, and a plot below `others` for each that has no row."""
+    """The rows of `table` for these columns, and a plot below `others` for each other column."""
     names = {column.name for column in columns}
     strangers = [column.name for column in columns if column.name not in _PLACED]
     own = [
@@ -163,5 +162,5 @@ def plots_of(columns: Collection[Column], table: tuple[Plot, ...], others: str) 
 
 
 def colour_at(place: int) -> Colour:
-    """The colour of the line at a place among those without a colour of their own."""
+    """The colour of a line by its index among those without a colour of their own."""
     return palette.OTHERS[place % len(palette.OTHERS)]

@@ -1,7 +1,7 @@
-"""Axis ranges that stand still: learnt from what was seen, growing in round steps when needed.
+"""Stable axis ranges: derived from the data so far, growing in round steps when needed.
 
-A range that follows every sample makes noise look like motion; one that is set by the sensor's
-range makes motion look like noise.
+A range that follows every sample makes noise look like motion; the sensor's full range makes motion
+look like noise.
 """
 
 import math
@@ -21,7 +21,7 @@ def nice_above(value: float) -> float:
 
 
 def symmetric(peak: float) -> Range | None:
-    """A round range around zero that holds `peak` with a margin; None where that is nothing."""
+    """A round range around zero that holds `peak` with a margin; None if `peak` is 0."""
     if not math.isfinite(peak) or peak <= 0:
         return None
     edge = nice_above(1.1 * peak)
@@ -29,10 +29,10 @@ def symmetric(peak: float) -> Range | None:
 
 
 def around_signature(signature: float, low: float, high: float) -> Range | None:
-    """A round range that holds zero, thresholds and signature, whatever the estimate does.
+    """A round range that holds zero, thresholds and signature, independent of the estimate.
 
     Estimates have no physical meaning before a fault and may be huge when the rig hardly moves; the
-    plot is about how they stand to thresholds and signature. None where these are unknown.
+    plot compares them with thresholds and signature. None if these are unknown.
     """
     if not math.isfinite(signature):
         return None
@@ -44,6 +44,6 @@ def around_signature(signature: float, low: float, high: float) -> Range | None:
 
 
 def peak(values: FloatArray) -> float:
-    """The largest finite magnitude in `values`, 0 where there is none."""
+    """The largest finite magnitude in `values`, 0 if there is none."""
     finite = np.abs(values[np.isfinite(values)])
     return float(finite.max()) if finite.size else 0.0

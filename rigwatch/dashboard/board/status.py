@@ -1,6 +1,6 @@
-"""The verdict in words, as Markdown: is there a fault, what is it probably, what to do, how sure.
+"""The verdict as Markdown: is there a fault, what is it probably, what to do, how certain.
 
-Made so that the first line answers the question that people walk up to the screen with.
+The first line answers the question that brings people to the screen.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +22,7 @@ _CALM = {
     "healthy": ("# Healthy", "The rig moves as its model says. Nothing to do."),
 }
 _ALWAYS = ("rate_hz", "lost_samples", "crc_errors")
-_WHEN_NOT_ZERO = ("recovered", "skipped", "dropped", "reconnects", "restarts", "rejected")
+_WHEN_NOT_ZERO = ("lost", "recovered", "skipped", "dropped", "reconnects", "restarts", "rejected")
 
 
 def advice(facts: Facts) -> str:
@@ -31,7 +31,7 @@ def advice(facts: Facts) -> str:
 
 
 def status(facts: Facts) -> str:
-    """How far to trust the verdict: figures of the processes, and what they complain of."""
+    """How reliable the verdict is: counters of the processes, and their warnings."""
     rows = [*_counter_rows(facts)]
     if facts.age.known:
         rows.append(_row("age of the picture [ms]", facts.age.now, facts.age.mean, facts.age.worst))
@@ -39,6 +39,8 @@ def status(facts: Facts) -> str:
     complaints += [f"* over, not yet seen: {title(a.name)}" for a in facts.book.unseen()]
     if facts.skipped:
         complaints.append(f"* this screen left out {facts.skipped} messages to keep up")
+    if facts.lost_alarms:
+        complaints.append(f"* {facts.lost_alarms} alarms never reached this screen")
     return _paragraphs(_model(facts), _table(_COUNTER_HEAD, rows), "\n".join(complaints))
 
 
@@ -68,7 +70,7 @@ def _table(head: str, rows: Sequence[str]) -> str:
 
 
 def _model(facts: Facts) -> str:
-    """With which model, and whether it is in a state to judge."""
+    """The model, and whether it is able to judge."""
     parts = [f"model **{facts.model}**" if facts.model else "", f"{facts.samples} samples"]
     for name, yes, no in (
         ("armed", "armed", "not armed yet"),
@@ -108,7 +110,7 @@ def _friction_rows(facts: Facts) -> Iterator[str]:
 
 
 def _counter_rows(facts: Facts) -> Iterator[str]:
-    """One row a counter, from the process with the largest figure; the most wanted first."""
+    """One row per counter, from the process with the largest figure; the most important first."""
     found: dict[str, Mapping[str, float]] = {}
     for health in facts.health.values():
         for name, value in health.counters.items():
@@ -126,7 +128,7 @@ def _wanted(name: str) -> tuple[int, str]:
 
 
 def _worth_a_row(name: str, value: float) -> bool:
-    """The screen has room for what people ask for; everything is on the tab of the health."""
+    """The screen has room for the most requested figures; the Health tab has all."""
     shown = name in _ALWAYS or name.startswith("latency")
     return shown or (value != 0.0 and any(word in name for word in _WHEN_NOT_ZERO))
 

@@ -1,7 +1,6 @@
-"""What has been seen, as far as the layout depends on it: plots, units, reach of the axes.
+"""The data seen so far, as far as the layout depends on them: plots, units, axis ranges.
 
-The layout is sent anew when `Survey.plan` changes; its ranges move in wide steps, so that this is
-rare.
+The layout is resent when `Survey.plan` changes, which is rare as its ranges move in wide steps.
 """
 
 from collections.abc import Iterable
@@ -16,12 +15,12 @@ from rigwatch.wire.messages import Column
 
 @dataclass(frozen=True, slots=True)
 class PlotPlan:
-    """How one plot is to be shown.
+    """The display of one plot.
 
     Attributes:
         plot: the row of the table.
         unit: unit of the drawn values.
-        range: of the vertical axis; None where nothing is known yet.
+        range: range of the vertical axis; None if nothing is known yet.
     """
 
     plot: Plot
@@ -40,8 +39,8 @@ class Survey:
     """Peaks, limits and units by plot.
 
     Attributes:
-        plots: by path, in the order in which they were first seen.
-        units: of the drawn values, by path.
+        plots: by path, in order of first appearance.
+        units: unit of the drawn values, by path.
         peaks: largest magnitude drawn so far, by path.
         marks: last (signature, low, high) of plots that have a signature, by path.
     """
@@ -52,7 +51,7 @@ class Survey:
     marks: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
     def see(self, plot: Plot, columns: Iterable[Column], drawn: FloatArray) -> None:
-        """Take notice of values drawn in a plot, shape (n, series)."""
+        """Record values drawn in a plot, shape (n, series)."""
         if plot.path not in self.plots:
             self.plots[plot.path] = plot
             own = next(c.unit for c in columns if c.name == plot.key)
@@ -63,7 +62,7 @@ class Survey:
             self.marks[plot.path] = (float(signature), float(low), float(high))
 
     def plan(self) -> tuple[PlotPlan, ...]:
-        """How each plot is to be shown, given all that was seen."""
+        """The display of each plot, given all data so far."""
         return tuple(
             PlotPlan(plot, self.units[path], self._range(path)) for path, plot in self.plots.items()
         )

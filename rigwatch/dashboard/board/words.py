@@ -15,12 +15,12 @@ LEVELS: dict[Severity, str] = {
 
 
 def alarm_level(alarm: Alarm) -> str:
-    """Level of an alarm's line: its severity while nobody has seen it, information after."""
+    """Level of an alarm's line: its severity until acknowledged, information after."""
     return LEVELS[alarm.severity] if alarm.state == "unacknowledged" else "INFO"
 
 
 def alarm_line(alarm: Alarm) -> str:
-    """What happened, why probably, what to do; and by which figure that was decided."""
+    """What happened, the probable cause, what to do, and the deciding figure."""
     label = STATES[alarm.state][0]
     head = f"{title(alarm.name)}: {label}{f' by {alarm.user}' if alarm.user else ''}"
     if alarm.state != "unacknowledged":
@@ -42,9 +42,7 @@ def _why(alarm: Alarm) -> str:
 
 
 def gap_line(gap: Gap) -> str:
-    """How many samples are missing, as far as that is known."""
-    lost = gap.last - gap.first + 1
-    many = (
-        f"{lost} samples lost from {gap.first} on" if lost > 0 else "samples lost, number unknown"
-    )
+    """The number of missing samples or messages, if known."""
+    what, lost = gap.topic or "samples", gap.last - gap.first + 1
+    many = f"{lost} {what} lost from {gap.first} on" if lost > 0 else f"{what} lost, number unknown"
     return f"{gap.reporter}: {gap.device}: {many}: {gap.reason}"

@@ -1,4 +1,4 @@
-"""The Rerun viewer: started, found, served as a page, photographed."""
+"""The Rerun viewer: start it, find it, serve it as a page, take pictures of it."""
 
 from rigwatch.dashboard.viewer.opening import Choice, open_viewer
 from rigwatch.dashboard.viewer.picture import save_picture

@@ -1,4 +1,4 @@
-"""Which viewer is opened: a window where there is a display, else a page for a browser here."""
+"""Chooses the viewer: a window if there is a display, else a page for a local browser."""
 
 import threading
 from collections.abc import Callable
@@ -29,15 +29,15 @@ def open_viewer(
     *,
     memory: Memory = LIVE_MEMORY,
 ) -> Viewer | ForeignViewer | None:
-    """A viewer that takes data; None when stopped while waiting for one.
+    """A viewer that accepts data; None if stopped while waiting for one.
 
     Args:
-        choice: "auto", one kind of viewer, or "connect" for one that is there already.
+        choice: "auto", a kind of viewer, or "connect" for one that is already running.
         settings: ports.
-        stop: ends waiting.
-        say: takes remarks for people.
+        stop: ends the wait.
+        say: called with messages for people.
         tick: called a few times a second while waiting.
-        memory: how much it may keep.
+        memory: memory limits.
 
     Raises:
         ViewerError: none can be started.
@@ -61,7 +61,7 @@ def _start(
     tick: Callable[[], None],
     memory: Memory,
 ) -> Viewer:
-    # A browser's address should stay the same; a window does not care where it takes its data.
+    # A browser's address should stay the same; a window may use any data port.
     port = settings.grpc_port if kind == "web" or not answers(settings.grpc_port) else 0
     viewer = Viewer(kind, port, settings.web_port, memory).await_answer(tick)
     if kind == "web":

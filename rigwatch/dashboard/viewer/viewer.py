@@ -1,7 +1,7 @@
-"""Rerun's viewer as a process of its own: started, asked whether it lives, ended.
+"""Rerun's viewer as a separate process: start, liveness check, end.
 
 It listens on 127.0.0.1 only, drops its oldest data at a memory limit, ends with the process that
-started it, and neither reports its use nor looks for examples on the network.
+started it, and neither reports usage nor fetches examples from the network.
 """
 
 import importlib.util
@@ -26,11 +26,11 @@ _STOP_TIMEOUT = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """How much may be kept before the oldest data go, in words of the viewer.
+    """Memory limits above which the oldest data are dropped, in the viewer's notation.
 
     Attributes:
-        viewer: by the viewer.
-        server: for browsers that come later.
+        viewer: limit of the viewer.
+        server: limit of the data kept for browsers that connect later.
     """
 
     viewer: str
@@ -50,10 +50,10 @@ class Viewer:
     """One viewer process.
 
     Args:
-        kind: a window, a web page, or drawn into memory for pictures and tests.
-        port: where it takes data; 0 for any that is free.
-        web_port: where a browser finds it; 0 for any that is free.
-        memory: how much it may keep.
+        kind: a window, a web page, or off-screen for pictures and tests.
+        port: data port; 0 for any free one.
+        web_port: port for browsers; 0 for any free one.
+        memory: memory limits.
 
     Raises:
         ViewerError: a port is taken.
@@ -80,7 +80,7 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Where data are sent to."""
+        """The address for data."""
         return f"rerun+http://{HOST}:{self.port}/proxy"
 
     @property
@@ -90,11 +90,11 @@ class Viewer:
 
     @property
     def web_url(self) -> str:
-        """What a browser opens."""
+        """The address for a browser."""
         return f"http://{HOST}:{self.web_port}/"
 
     def await_answer(self, tick: Callable[[], None] = lambda: None) -> Self:
-        """Wait until it takes data, calling `tick` meanwhile; returns itself.
+        """Wait until it accepts data, calling `tick` meanwhile; returns itself.
 
         Raises:
             ViewerError: it ended, or did not answer in time.
@@ -111,11 +111,11 @@ class Viewer:
         return self
 
     def exit_code(self) -> int | None:
-        """None while it runs; 0 where a person closed the window."""
+        """None while it runs; 0 if the user closed the window."""
         return self._process.poll()
 
     def stop(self) -> None:
-        """End the process, with force where it does not listen."""
+        """End the process; kill it if it does not respond."""
         if self._page is not None:
             self._page.close()
         self._process.terminate()
@@ -126,7 +126,7 @@ class Viewer:
             self._process.wait()
 
     def last_words(self) -> str:
-        """The last line that it said."""
+        """The last line of its output."""
         self._words.seek(0)
         lines = self._words.read().decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else "it said nothing"
@@ -144,10 +144,10 @@ class Viewer:
 
 
 class ForeignViewer:
-    """A viewer that somebody else has started on this machine.
+    """A viewer started by somebody else on this machine.
 
     Args:
-        port: where it takes data.
+        port: its data port.
     """
 
     def __init__(self, port: int) -> None:
@@ -155,11 +155,11 @@ class ForeignViewer:
         self.url = f"rerun+http://{HOST}:{port}/proxy"
 
     def exit_code(self) -> int | None:
-        """None while it answers, 1 after."""
+        """None while it answers, 1 afterwards."""
         return None if answers(self.port) else 1
 
     def stop(self) -> None:
-        """Leave it to its owner."""
+        """Leave it running."""
 
 
 def has_display() -> bool:
@@ -168,21 +168,21 @@ def has_display() -> bool:
 
 
 def answers(port: int) -> bool:
-    """Whether somebody listens at a port of this machine."""
+    """Whether a process listens on a port of this machine."""
     with socket.socket() as probe:
         probe.settimeout(0.5)
         return probe.connect_ex((HOST, port)) == 0
 
 
 def free_port() -> int:
-    """A port of this machine at which nobody listens."""
+    """A free port of this machine."""
     with socket.socket() as probe:
         probe.bind((HOST, 0))
         return int(probe.getsockname()[1])
 
 
 def _binary() -> Path:
-    """The viewer itself rather than its Python starter, which would survive in its place."""
+    """The viewer's executable; its Python launcher would survive the viewer."""
     found = importlib.util.find_spec("rerun_cli")
     if found is None or found.origin is None:
         raise ViewerError("the package rerun-sdk is incomplete: its viewer is missing")
@@ -190,11 +190,11 @@ def _binary() -> Path:
 
 
 def _environment() -> dict[str, str]:
-    """The environment of the viewer: CI is what switches its usage reports off for one process."""
+    """The environment of the viewer: CI switches off its usage reports for one process."""
     return {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true", "RUST_LOG": "warn"}
 
 
 def _dying_with_parent() -> list[str]:
-    """What lets the viewer end when its starter is killed; nothing where there is no such tool."""
+    """The command prefix that ends the viewer when its parent is killed; empty if unavailable."""
     tool = shutil.which("setpriv")
     return [tool, "--pdeathsig", "TERM", "--"] if tool else []

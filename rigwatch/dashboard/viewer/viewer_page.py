@@ -1,8 +1,7 @@
-"""The viewer's web page, handed on with a rule for the browser: talk to this machine only.
+"""Serves the viewer's web page with a rule for the browser: connect to this machine only.
 
-Opened as it comes, the page reports its use to its makers, asks for updates and loads fonts and
-examples from the internet, and it has no switch for that. The rule is a Content-Security-Policy,
-which browsers obey.
+As shipped, the page reports usage, asks for updates and loads fonts and examples from the internet,
+with no switch for that. The rule is a Content-Security-Policy, which browsers enforce.
 """
 
 import threading
@@ -27,9 +26,9 @@ class Page:
     """A page server on this machine only.
 
     Args:
-        port: where browsers find it.
-        source_port: where the viewer serves the page.
-        data_port: where the page gets its data.
+        port: port for browsers.
+        source_port: port on which the viewer serves the page.
+        data_port: data port for the page.
 
     Raises:
         PageError: the port is taken.
@@ -48,13 +47,13 @@ class Page:
         threading.Thread(target=self._server.serve_forever, name="page", daemon=True).start()
 
     def close(self) -> None:
-        """Serve no more."""
+        """Stop serving."""
         self._server.shutdown()
         self._server.server_close()
 
 
 def policy(data_port: int) -> str:
-    """What the page may load and whom it may talk to."""
+    """The policy: what the page may load and where it may connect."""
     data = " ".join(f"http://{name}:{data_port}" for name in (HOST, "localhost"))
     return (
         "default-src 'self' 'unsafe-inline' 'wasm-unsafe-eval' data: blob:; "
@@ -68,7 +67,7 @@ class _Handler(BaseHTTPRequestHandler):
     start = "/"
 
     def do_GET(self) -> None:
-        """Hand on what the viewer has at this path; the bare page is told where its data are."""
+        """Forward the viewer's content at this path; the bare page gets the address of its data."""
         if self.path == "/":
             self._send_to_start()
             return
@@ -98,4 +97,4 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002
-        """Say nothing: this is not a process's business to tell."""
+        """Log nothing: requests are of no interest to users."""

@@ -1,4 +1,4 @@
-"""Damage of a structure: when it begins, which spring it is, and how much is left."""
+"""Damage of a structure: when it begins, which spring is damaged, and what stiffness remains."""
 
 from rigwatch.structures.damage import signals
 from rigwatch.structures.damage.detector import Innovations, rounded

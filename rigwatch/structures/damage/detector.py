@@ -1,9 +1,9 @@
-"""The residual on line: model less observed, sample by sample, and when it is no noise any more.
+"""The online residual: model minus observation, sample by sample, and when it exceeds noise.
 
     r_j = x_j(model) − x_j(observed)                                                  (4.34)
 
-Two ways to judge it: a fixed limit as in the thesis (±0.001), or `damage_threshold.CumulativeSum`,
-whose false-alarm rate is calculated.
+Two tests: a fixed limit as in the thesis (±0.001), or `threshold.CumulativeSum`, whose false-alarm
+rate is calculated.
 """
 
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ from rigwatch.structures.damage.threshold import CumulativeSum, threshold_for
 from rigwatch.wire.arrays import FloatArray
 
 FLOOR = 1e-4
-"""Share of a signal's rms below which its residual is taken for an error of the integration."""
+"""Share of a signal's rms below which its residual counts as integration error."""
 RATE = 0.01
 """Probability of any false alarm in a whole record."""
 
 
 @dataclass(frozen=True)
 class Alarm:
-    """The moment at which the residual became too large.
+    """The moment at which the residual becomes too large.
 
     Attributes:
-        sample: at which it was noticed.
-        onset: first sample of the surplus that led to it.
+        sample: sample at which it is detected.
+        onset: first sample of the excess that led to it.
     """
 
     sample: int
@@ -35,15 +35,15 @@ class Alarm:
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """What watching a record gave.
+    """The result of monitoring a record.
 
     Attributes:
-        first: the sample that it began with.
-        residual: model less observed, shape (samples, m).
+        first: the first sample.
+        residual: model minus observed, shape (samples, m).
         states: of the model, shape (samples, n).
         statistic: cumulative sum, or the largest residual over the limit, shape (samples,).
-        threshold: that it is compared with.
-        alarm: None where there was none.
+        threshold: threshold of the statistic.
+        alarm: None if there was none.
     """
 
     first: int
@@ -56,13 +56,13 @@ class Watch:
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """How residuals are judged.
+    """The test of residuals.
 
     Attributes:
         sigma: standard deviation of each signal's residual, shape (m,).
-        calibration: undamaged samples that it comes from.
+        calibration: number of undamaged samples behind `sigma`.
         rate: probability of a false alarm over a whole record.
-        limit: fixed limit instead [the signals' units], None for the cumulative sum.
+        limit: fixed limit instead [the signals' units]; None for the cumulative sum.
     """
 
     sigma: FloatArray
@@ -84,11 +84,11 @@ class Judge:
 
         Args:
             model: structure and record.
-            parameters: that it has now, shape (n_p,).
+            parameters: current parameters, shape (n_p,).
             state: at sample `first`, shape (n,).
-            first, last: the stretch [samples].
+            first, last: the range [samples].
             spread: covariance of the springs' coefficients and the state, shape (c + n, c + n);
-                None where they are known.
+                None if they are known.
         """
         run = model.run(parameters, state, first, last)
         residual = run.outputs - model.observed[first:last]
@@ -103,7 +103,7 @@ class Judge:
     ) -> tuple[FloatArray, float, Alarm | None]:
         """Statistic (samples,), threshold and first alarm of residuals (samples, m).
 
-        `scaled` are those of standard deviation 1 where only noise is there, same shape.
+        `scaled`, of the same shape, have standard deviation 1 if they are only noise.
         """
         if self.limit is not None:
             return _by_limit(residual, self.limit, first)
@@ -119,19 +119,19 @@ class Judge:
 
 
 def innovations(scaled: FloatArray, slopes: FloatArray, spread: FloatArray) -> FloatArray:
-    """What of the residuals the past and the uncertainty of the figures do not explain.
+    """The part of the residuals that past samples and parameter uncertainty do not explain.
 
-    An error θ of the figures moves all residuals together, slopes·θ, so that they are no
-    independent noise. Updating what is known of θ sample by sample leaves innovations that are
-    (R. E. Kalman, 1960); each is divided by the root of its covariance.
+    A parameter error θ moves all residuals together, by slopes·θ, so they are not independent.
+    Updating the estimate of θ sample by sample leaves independent innovations (R. E. Kalman,
+    1960); each is divided by the root of its covariance.
 
     Args:
-        scaled: residuals over the noise's deviation, NaN where missing, shape (samples, m).
-        slopes: scaled alike, by θ, shape (samples, m, p).
+        scaled: residuals over their standard deviation, NaN where missing, shape (samples, m).
+        slopes: derivatives by θ, scaled alike, shape (samples, m, p).
         spread: covariance of θ, shape (p, p).
 
     Returns:
-        Shape (samples, m), standard deviation 1 and independent where only noise is there.
+        Shape (samples, m), standard deviation 1 and independent if they are only noise.
     """
     filtered, found = Innovations(spread), np.empty(scaled.shape)
     for k, row in enumerate(scaled):
@@ -143,12 +143,12 @@ class Innovations:
     """`innovations` one sample at a time.
 
     Args:
-        spread: covariance of the figures' errors θ, shape (p, p).
+        spread: covariance of the parameter errors θ, shape (p, p).
     """
 
     def __init__(self, spread: FloatArray) -> None:
         self._used = np.flatnonzero(np.diag(spread) > 0)
-        # In units of their own deviations: stiffnesses and positions differ by many orders.
+        # In units of their standard deviations: stiffnesses and positions differ by many orders.
         self._size = np.sqrt(np.diag(spread)[self._used])
         self._covariance = spread[np.ix_(self._used, self._used)] / np.outer(self._size, self._size)
         self._theta = np.zeros(len(self._used))
@@ -182,12 +182,12 @@ def _by_limit(
 
 
 def rounded(samples: int) -> int:
-    """Up to the next of a few lengths, so that few thresholds have to be computed."""
+    """Rounded up to one of a few lengths, so that few thresholds are computed."""
     return int(100 * np.ceil(samples / 100))
 
 
 def noise(residual: FloatArray, observed: FloatArray) -> FloatArray:
-    """Standard deviation of undamaged residuals, not below the integration's errors, shape (m,)."""
+    """Standard deviation of undamaged residuals, at least the integration error, shape (m,)."""
     size = np.sqrt(np.nanmean(observed**2, axis=0))
     found = np.sqrt(np.nanmean(residual**2, axis=0))
     return np.asarray(np.maximum(np.nan_to_num(found), FLOOR * np.nan_to_num(size)) + 1e-300)

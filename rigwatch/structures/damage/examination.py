@@ -1,7 +1,7 @@
-"""Damage of a structure found in a record: when, where, how much, and what comes after it.
+"""Finds damage of a structure in a record: when, where, how much, and what follows.
 
-The undamaged structure's model runs beside the record. Where the residual is no noise any more,
-only data from there on are used (a fit to the whole record mixes two structures, thesis 4.6.1): the
+The undamaged structure's model runs beside the record. Once the residual exceeds noise, only data
+from there on are used (a fit to the whole record mixes two structures, thesis 4.6.1): the
 springs are ranked, the best is identified with unknown first states, and monitoring continues with
 the changed model until the next damage.
 """
@@ -25,28 +25,28 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 LATE = 0.1
-"""Share of the data after an alarm that the way from onset to alarm may cost."""
+"""Largest share of the data after an alarm that lies between onset and alarm."""
 STARTS = 5
-"""Starts before the onset, and from onset to alarm, that are tried where an alarm came late."""
+"""Starts before the onset, and from onset to alarm, that are tried if an alarm is late."""
 CLEAR = 0.01
-"""Probability below which a candidate's score is taken for more than chance."""
+"""Probability below which a candidate's score counts as significant."""
 SHORTEST = 50
-"""Samples without which nothing is identified."""
+"""Fewest samples for an identification."""
 MOST = 20
-"""Damages after which a record is given up."""
+"""Number of damages after which the examination ends."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a record is examined.
+    """Settings of an examination.
 
     Attributes:
-        undamaged: length of its start that is taken as undamaged [s], a fifth of it if None.
+        undamaged: length of the undamaged start [s]; a fifth of the record if None.
         rate: probability of any false alarm over the record.
         limit: fixed limit of the residual instead, in the signals' units.
-        settle: data from which a damage is identified at first [s]; damages that follow one another
-            faster are taken for one.
-        known: take the file's values as true where it marks them as unknown.
+        settle: length of data for the first identification [s]; damages closer together
+            count as one.
+        known: take the file's values as true even if it marks them as unknown.
     """
 
     undamaged: float | None = None
@@ -61,13 +61,13 @@ class Damage:
     """One damage.
 
     Attributes:
-        alarm: time at which it was noticed [s].
-        instant: when it happened.
-        ranking: of its places, best first.
-        figures: coefficients after it: those that the file marks and the one that changed.
-        before: the same before it.
-        explained: whether the change, or the two at once, explain the data until the next damage.
-        until: end of the data that it was identified from [s].
+        alarm: time of detection [s].
+        instant: time of the damage.
+        ranking: candidate places, best first.
+        figures: coefficients after it: those marked in the file and the changed one.
+        before: the same coefficients before it.
+        explained: whether one change, or two simultaneous ones, explain the data until the next.
+        until: end of the data used to identify it [s].
     """
 
     alarm: float
@@ -81,13 +81,13 @@ class Damage:
 
 @dataclass(frozen=True, eq=False)
 class Examination:
-    """What a record showed.
+    """The result of an examination.
 
     Attributes:
         reference: the undamaged structure.
-        settings: how it was examined.
-        watches: the first beside the undamaged model, one more after each damage.
-        damages: in the order of time.
+        settings: settings of the examination.
+        watches: the first with the undamaged model, one more after each damage.
+        damages: in order of time.
     """
 
     reference: Reference
@@ -107,13 +107,13 @@ def examine(
 
     Args:
         structure: the undamaged structure.
-        record: what was measured, undamaged at first.
-        settings: how.
-        progress: is told what is being done.
-        model: of an earlier examination of the same structure, whose kernel may serve again.
+        record: the measurement, undamaged at first.
+        settings: settings of the examination.
+        progress: called with what is being done.
+        model: of an earlier examination of the same structure, to reuse its kernel.
 
     Raises:
-        ModelError: structure and record do not fit, its undamaged start does not suffice, or a
+        ModelError: structure and record do not match, the undamaged start is too short, or a
             setting is out of range.
     """
     chosen = settings or Settings()
@@ -139,7 +139,7 @@ def _check(settings: Settings) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Now:
-    """The structure as it is believed to be from a sample on."""
+    """The structure as estimated from a sample on."""
 
     parameters: FloatArray
     state: FloatArray
@@ -158,7 +158,7 @@ class _Work:
     damages: list[Damage] = field(default_factory=list)
 
     def through(self) -> None:
-        """Watch, identify, watch again, to the record's end."""
+        """Monitor, identify, monitor again, to the record's end."""
         base = self.base
         now = _Now(base.parameters, base.model.start(), 0, base.spread, base.figures)
         while len(self.damages) < MOST:
@@ -168,7 +168,7 @@ class _Work:
                 return
             now = self._identified(now, watch, watch.alarm)
             if not self.damages[-1].explained:
-                # Beside a model that is known to be wrong, every sample would be an alarm.
+                # With a model known to be wrong, every sample would be an alarm.
                 return
 
     def _watched(self, now: _Now) -> Watch:
@@ -202,9 +202,9 @@ class _Work:
     def _begin(self, now: _Now, path: FloatArray, watch: Watch, alarm: Alarm) -> int:
         """First sample of the data to identify from.
 
-        Where the alarm came late the change is small, and the onset is only known to lie before.
-        Taken is the start from which a changed spring explains more of the undamaged model's
-        residual than from any other: too early mixes two structures, too late leaves some of it.
+        If the alarm is late the change is small, and the onset is only known to be earlier.
+        The chosen start is the one from which a changed spring explains most of the undamaged
+        model's residual: an earlier one mixes two structures, a later one wastes data.
         """
         end = len(self.base.model)
         if alarm.sample - alarm.onset <= LATE * (end - alarm.sample):
@@ -225,16 +225,16 @@ class _Work:
         return Stretch(self.base.model, now.parameters, first, last, self.base.sigma)
 
     def _located(self, now: _Now, path: FloatArray, begin: int) -> tuple[Ranking, bool]:
-        """Rank with ever more data as long as a change explains them, with less where not.
+        """Rank with more and more data as long as a change explains them, else with less.
 
-        Two changes at once are only thought of where a single one does not do.
+        Two simultaneous changes are considered only if a single one does not suffice.
         """
         end = len(self.base.model)
         length = max(SHORTEST, round(self.settings.settle / self.base.model.dt))
         shortest = min(length, end - begin) // 4
         kept: Ranking | None = None
         while True:
-            # A rest too short to stand for itself goes with the data before it.
+            # A remainder too short on its own joins the data before it.
             last = end if begin + 1.5 * length > end else begin + length
             ranking, holds = self._ranked(now, path, begin, last)
             if not holds:
@@ -250,7 +250,7 @@ class _Work:
             length *= 2
 
     def _ranked(self, now: _Now, path: FloatArray, begin: int, last: int) -> tuple[Ranking, bool]:
-        """One change, or else two at once; and whether they explain the data."""
+        """One change, or else two simultaneous ones; and whether they explain the data."""
         stretch = self._stretch(now, begin, last)
         single = locate(stretch, path)
         if self._holds(now, single):
@@ -259,7 +259,7 @@ class _Work:
         return (pair, True) if pair.second and self._holds(now, pair) else (single, False)
 
     def _extended(self, now: _Now, path: FloatArray, kept: Ranking) -> Ranking:
-        """The ranking from all data until the next damage, where it holds there."""
+        """The ranking from all data until the next damage, if it holds there."""
         refit, end = kept.best.refit, len(self.base.model)
         if refit is None:
             return kept
@@ -273,7 +273,7 @@ class _Work:
         return ranking if holds else kept
 
     def _holds(self, now: _Now, ranking: Ranking) -> bool:
-        """Whether what changed says something, and leaves nothing but noise."""
+        """Whether the change is significant and leaves only noise."""
         refit = ranking.best.refit
         chance = max(candidate.p_value for candidate in ranking.changed)
         if refit is None or not np.isfinite(refit.chi2) or chance > CLEAR:
@@ -285,7 +285,7 @@ class _Work:
         return watch.alarm is None
 
     def _refitted(self, now: _Now, path: FloatArray, ranking: Ranking, onset: int) -> Refit:
-        """The changed coefficient with those that the file marks, from the instant on."""
+        """The changed coefficient and those marked in the file, from the instant on."""
         best, known = ranking.best, self.base.model.candidates
         first = max(ranking.first, min(onset, ranking.last - SHORTEST))
         marked = {n: f.value for n, f in now.figures.items() if n in known}
@@ -305,7 +305,7 @@ class _Work:
         return Figure(float(now.parameters[names.index(name)]), float("nan"), float("nan"))
 
     def _spread(self, refit: Refit) -> FloatArray:
-        """The refit's covariance in the places of all coefficients and states."""
+        """The refit's covariance, expanded to all coefficients and states."""
         known = self.base.model.candidates
         n = len(refit.state)
         spread = np.zeros((len(known) + n, len(known) + n))

@@ -1,11 +1,11 @@
-"""Which spring changed: every coefficient of every spring tried against what was observed.
+"""Locates a changed spring: tests every coefficient of every spring against the observation.
 
 First pass: one linear sweep along the observed trajectory gives the residual and its derivative by
 every candidate and every unknown first state at once (thesis 4.13, 4.14); the engine's score test
 ranks the candidates. Second pass: the best few are refitted with unknown first states and ranked by
-what they leave unexplained. Candidates form a class that the record cannot tell apart where their
-directions, freed of the first states, have a cosine above 0.95 and the data do not prefer the best
-of them: what it explains beyond another is no more than chance would give.
+what they leave unexplained. Candidates form an indistinguishable class if their directions, with
+the first states projected out, have a cosine above 0.95 and the data do not prefer the best: what
+it explains beyond another is no more than chance would give.
 """
 
 from collections.abc import Mapping
@@ -31,11 +31,11 @@ from rigwatch.wire.arrays import FloatArray
 REFITTED = 4
 """Candidates of the first pass that are refitted."""
 WORTH = 0.4
-"""Share of the best candidate's score that one must reach to be refitted."""
+"""Share of the best candidate's score above which a candidate is refitted."""
 CHANCE = float(chi2.isf(0.01, 1))
-"""χ² by which the best may be better than another of its class."""
+"""Largest χ² advantage of the best over others of its class."""
 SCREENING = 6
-"""Gauss-Newton steps that candidates get; the best continues from there."""
+"""Gauss-Newton steps per candidate; the best continues from there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +44,15 @@ class Candidate:
 
     Attributes:
         name: of the coefficient.
-        spring: where it is.
+        spring: its spring.
         kind: stiffness, quadratic or cubic.
         score: χ²(1) of the first pass.
-        p_value: of this score as the best of all candidates by chance.
+        p_value: of this score by chance, as the best of all candidates.
         before: its value in the undamaged structure.
-        after: its value now, refitted where it was, else to first order.
-        deviation: standard deviation of `after`, NaN where it was not refitted.
-        chi2: what the refit leaves per degree of freedom, NaN where there was none.
-        alike: other candidates that the record cannot tell from it.
+        after: its value now, refitted if it was, else to first order.
+        deviation: standard deviation of `after`; NaN if not refitted.
+        chi2: χ² of the refit per degree of freedom; NaN if not refitted.
+        alike: other candidates that the record cannot distinguish from it.
         refit: the whole refit.
     """
 
@@ -70,7 +70,7 @@ class Candidate:
 
     @property
     def words(self) -> str:
-        """What happened to the spring."""
+        """The change of the spring."""
         up = self.after > self.before
         return {
             "stiffness": "stiffer" if up else "softer",
@@ -85,9 +85,9 @@ class Ranking:
 
     Attributes:
         candidates: all of them.
-        first, last: samples that were used, the last excluded.
-        unseen: coefficients that hardly move the record, whatever becomes of them.
-        second: what changed together with the best, None where one change is enough.
+        first, last: range of samples used, the last excluded.
+        unseen: coefficients that hardly affect the record, however they change.
+        second: the change simultaneous with the best; None if one change suffices.
     """
 
     candidates: tuple[Candidate, ...]
@@ -103,7 +103,7 @@ class Ranking:
 
     @property
     def changed(self) -> tuple[Candidate, ...]:
-        """The best, and what changed together with it."""
+        """The best candidate and the simultaneous change."""
         return (self.best,) if self.second is None else (self.best, self.second)
 
 
@@ -113,7 +113,7 @@ def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Rank
     Args:
         stretch: data after the damage, with the undamaged parameters.
         path: the undamaged model's states over the whole record, shape (samples, n).
-        refitted: how many candidates the second pass takes.
+        refitted: number of candidates in the second pass.
     """
     model, count = stretch.model, len(stretch.model.candidates)
     residual, rows, fitted, scores = scored(stretch, path)
@@ -134,14 +134,14 @@ def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Rank
 
 
 def unexplained(stretch: Stretch, path: FloatArray) -> float:
-    """χ² that the best candidate leaves to first order; arguments as of `locate`."""
+    """χ² that the best candidate leaves to first order; arguments as in `locate`."""
     scores = scored(stretch, path)[3]
     best = int(np.argmax(scores.score))
     return float(scores.score[best] * (1.0 / max(scores.explained[best], 1e-12) - 1.0))
 
 
 def scored(stretch: Stretch, path: FloatArray) -> tuple[FloatArray, FloatArray, Projector, Scores]:
-    """Scaled residual (k,), slopes (k, c + n), what the first states explain, and the scores."""
+    """Scaled residual (k,), slopes (k, c + n), share of the first states, and the scores."""
     model = stretch.model
     errors, slopes = model.along_record(stretch.parameters, path, stretch.first, stretch.last)
     use, count = np.isfinite(errors), len(model.candidates)
@@ -191,12 +191,12 @@ def _refitted(
 
 
 def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) -> Candidate:
-    """The best with what looks like it along its own refitted trajectory.
+    """The best, with the candidates that resemble it along its refitted trajectory.
 
     Args:
         best: refitted.
         model: structure and record.
-        left: χ² after their refits, by name.
+        left: χ² after the refits, by name.
     """
     if best.refit is None or not len(best.refit.slopes):
         return best
@@ -204,7 +204,7 @@ def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) 
     slopes = best.refit.slopes
     unit = freed(slopes[:, :count], slopes[:, count:])
     cosines = cosines_with(unit, place)
-    # What is lost, to first order, where the best's direction is replaced by another.
+    # The loss, to first order, if another direction replaces the best's.
     shares = (1.0 - cosines**2) * ((best.after - best.before) / max(best.deviation, 1e-300)) ** 2
     alike = []
     for i in np.argsort(-cosines).tolist():
@@ -218,7 +218,7 @@ def _with_class(best: Candidate, model: SpringModel, left: Mapping[str, float]) 
 def _unseen(
     model: SpringModel, stretch: Stretch, rows: FloatArray, fitted: Projector, count: int
 ) -> tuple[str, ...]:
-    """Springs of which the record would not show that they lost a tenth of their stiffness."""
+    """Springs whose loss of a tenth of their stiffness the record would not show."""
     names = list(model.problem.sweeper.compiled.system.parameters)
     left = fitted.clean(rows[None, :, :count])
     size = np.linalg.norm(left, axis=0)

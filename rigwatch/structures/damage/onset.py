@@ -1,8 +1,8 @@
-"""The instant of a damage whose place is known: positions and velocities do not jump there.
+"""Dates a damage at a known place: positions and velocities are continuous there.
 
-For each instant τ that comes into question the undamaged model runs until τ and the damaged one
-from its state there. The likeliest τ has the smallest sum of squared residuals over the noise, and
-the 95 % interval holds those whose sum is at most 3.84 above that.
+For each candidate instant τ the undamaged model runs until τ and the damaged one continues from its
+state. The likeliest τ has the smallest sum of squared residuals over the noise; the 95 % interval
+holds those whose sum is at most 3.84 above it.
 """
 
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ from rigwatch.structures.damage.spring_model import SpringModel
 from rigwatch.wire.arrays import FloatArray
 
 TRIED = 13
-"""Instants in each of the rounds that narrow it down."""
+"""Instants in each refinement round."""
 ROOM = 20
-"""Samples that are looked at before the onset at least."""
+"""Fewest samples considered before the onset."""
 AFTER = 100
-"""Samples after the alarm that are compared."""
+"""Samples compared after the alarm."""
 
 
 @dataclass(frozen=True)
 class Instant:
-    """When a damage happened.
+    """The time of a damage.
 
     Attributes:
         sample: the last one before it.
@@ -46,7 +46,7 @@ def instant(
     Args:
         model: structure and record.
         damaged: parameters after the damage, shape (n_p,).
-        watch: the undamaged model beside the record.
+        watch: the undamaged model's run beside the record.
         alarm: of that watch.
         sigma: standard deviation of each signal's noise, shape (m,).
     """
@@ -73,6 +73,6 @@ def instant(
 
 
 def _cost(errors: FloatArray) -> float:
-    """Sum of squares after the first sample; infinite where the simulation ran away."""
+    """Sum of squares after the first sample; infinite if the simulation diverged."""
     found = float(np.nansum(errors[1:] ** 2))
     return found if np.isfinite(found) else float("inf")

@@ -1,8 +1,8 @@
-"""Which two springs changed at the same moment, where no single change explains the data.
+"""Locates two springs that changed at the same moment, if no single change explains the data.
 
 Along the observed trajectory the response is linear in every coefficient, so that all pairs are
-judged by one regression (as `locate` does with single ones); the best few are refitted. A pair is
-only believed where each of its two changes is significant beside the other.
+judged by one regression (as `locate` judges single ones); the best few are refitted. A pair is
+accepted only if each of its two changes is significant beside the other.
 """
 
 from collections.abc import Mapping
@@ -24,23 +24,23 @@ from rigwatch.structures.damage.refit import STEPS, Refit, Stretch
 from rigwatch.wire.arrays import FloatArray
 
 REFITTED = 6
-"""Pairs of the regression that are refitted."""
+"""Number of pairs that are refitted."""
 PARALLEL = 0.999
-"""Cosine from which two directions cannot both be told."""
+"""Cosine above which two directions cannot be separated."""
 
 Pair = tuple[int, int]
 
 
 def locate_pair(stretch: Stretch, path: FloatArray, singles: Ranking) -> Ranking:
-    """The single ranking with the likeliest pair in front.
+    """The ranking of single changes with the likeliest pair in front.
 
     Args:
         stretch: data after the damage, with the undamaged parameters.
         path: the undamaged model's states over the whole record, shape (samples, n).
-        singles: of the same stretch.
+        singles: ranking of the same stretch.
 
     Returns:
-        The ranking, its `second` the other spring of the pair; `singles` where no pair is told.
+        The ranking, its `second` the other spring of the pair; `singles` if no pair is accepted.
     """
     residual, rows, _, scores = scored(stretch, path)
     pairs, strengths = _pairs(scores.units, scores.strength, residual)
@@ -110,7 +110,7 @@ def _ranked(
 
 
 def _member(single: Candidate, refit: Refit, count: int) -> Candidate:
-    """One of a pair; its chance is that of its change beside the other, as the best of all."""
+    """One of a pair; its p-value is that of its change beside the other, as the best of all."""
     after, deviation = refit.values[single.name], refit.deviations[single.name]
     score = ((after - single.before) / max(deviation, 1e-300)) ** 2
     alone = chi2.sf(score, 1)
@@ -128,7 +128,7 @@ def _member(single: Candidate, refit: Refit, count: int) -> Candidate:
 def _alike(
     stretch: Stretch, pair: Pair, members: list[Candidate], refit: Refit, left: Mapping[Pair, float]
 ) -> list[tuple[str, ...]]:
-    """For each member what could stand in its place."""
+    """The possible substitutes of each member."""
     if not len(refit.slopes):
         return [(), ()]
     names, count = stretch.model.candidates, len(stretch.model.candidates)
@@ -141,7 +141,7 @@ def _alike(
         found[side] |= set(np.flatnonzero((cosines > ALIKE) & (lost < CHANCE)).tolist())
     for rival, rest in left.items():
         if rest - refit.chi2 < CHANCE:
-            # What the rival pair has instead stands for the member that it lacks.
+            # The other spring of the rival pair substitutes for the missing member.
             lacking = [side for side in (0, 1) if pair[side] not in rival]
             for side in lacking:
                 found[side] |= set(rival)

@@ -1,4 +1,4 @@
-"""Coefficients of springs fitted over a stretch of a record whose first state is unknown.
+"""Fits spring coefficients over a stretch of a record whose first state is unknown.
 
 Gauss-Newton with the kernel's exact sensitivities; the states at the stretch's first sample are
 unknowns beside the coefficients (thesis 4.6.1: "the case of unknown initial conditions").
@@ -16,26 +16,26 @@ from rigwatch.wire.arrays import FloatArray
 STEPS = 15
 HALVINGS = 6
 SETTLED = 1e-3
-"""Change of a step, in standard deviations, that no reader of the result would see."""
+"""Negligible change of a step, in standard deviations."""
 HUGE = 1e12
-"""Standard deviations beyond which a simulation has run away."""
+"""Standard deviations beyond which a simulation counts as diverged."""
 GAIN = 1e-3
-"""Share of the error that a step has to take away where its figures are not known better."""
+"""Share of the error that a step must remove unless its parameters are already precise."""
 
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """A stretch fitted.
+    """The result of a fit.
 
     Attributes:
-        names: the coefficients that were fitted.
+        names: the fitted coefficients.
         values: by name.
         deviations: standard deviations by name.
         state: at the first sample, shape (n,).
         covariance: of coefficients and state, shape (names + n, names + n).
         chi2: sum of the squared residuals over their standard deviations.
-        freedom: valid samples less unknowns.
-        slopes: scaled, by all coefficients and states where it ended, shape (k, c + n).
+        freedom: valid samples minus unknowns.
+        slopes: scaled derivatives by all coefficients and states at the solution, shape (k, c + n).
     """
 
     names: tuple[str, ...]
@@ -50,11 +50,11 @@ class Refit:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Part of a record to be fitted.
+    """The part of a record to fit.
 
     Attributes:
         model: the structure with its record.
-        parameters: where the coefficients are not fitted, shape (n_p,).
+        parameters: values of those that are not fitted, shape (n_p,).
         first, last: samples, the last excluded.
         sigma: standard deviation of each signal's noise, shape (m,).
     """
@@ -66,11 +66,11 @@ class Stretch:
     sigma: FloatArray
 
     def refit(self, start: Mapping[str, float], state: FloatArray, steps: int = STEPS) -> Refit:
-        """The coefficients named in `start`, from there on, with the first state.
+        """Fit the coefficients in `start`, and the first state.
 
         Args:
-            start: where each begins.
-            state: where the first state begins, shape (n,).
+            start: initial guesses, by name.
+            state: initial guess of the first state, shape (n,).
             steps: most Gauss-Newton steps.
         """
         names = tuple(start)
@@ -114,12 +114,12 @@ class Stretch:
     def _shorter(
         self, names: Sequence[str], now: FloatArray, change: FloatArray, cost: float
     ) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
-        """The step, halved until the error falls; None where nothing is gained."""
+        """The step, halved until the error falls; None if nothing is gained."""
         for _ in range(HALVINGS):
             moved = now + change
             for place, name in enumerate(names):
                 if name in self.model.structure.springs:
-                    # No spring pushes where it should pull.
+                    # A stiffness stays positive.
                     moved[place] = max(moved[place], 0.0)
             errors, slopes = self._errors(names, moved)
             if _finite(errors, slopes) and (found := _cost(errors)) <= cost:
@@ -128,7 +128,7 @@ class Stretch:
         return None
 
     def _lost(self, names: tuple[str, ...], now: FloatArray) -> Refit:
-        """What stands for a fit whose simulation diverges (NaN or infinite)."""
+        """The result of a fit whose simulation diverges (NaN or infinite)."""
         values = dict(zip(names, now.tolist(), strict=False))
         blank = np.zeros((0, len(self.model.candidates) + len(self.model.start())))
         unknown = dict.fromkeys(names, float("inf"))
@@ -156,7 +156,7 @@ class Stretch:
 
 
 def _finite(errors: FloatArray, slopes: FloatArray) -> bool:
-    """Whether a simulation stayed where its squares can be computed."""
+    """Whether a simulation stayed small enough to be squared."""
     return bool(np.isfinite(slopes).all() and np.nanmax(np.abs(errors), initial=0.0) < HUGE)
 
 

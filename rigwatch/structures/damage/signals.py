@@ -1,4 +1,4 @@
-"""What an examination watched, as series along the whole record: positions and test statistic."""
+"""The time series of an examination over the whole record: signals and test statistic."""
 
 from collections.abc import Mapping
 
@@ -8,12 +8,12 @@ from rigwatch.structures.damage.examination import Examination
 from rigwatch.wire.arrays import FloatArray
 
 SIGMAS = 3.0
-"""Standard deviations of noise beyond which a single residual is remarkable."""
+"""Standard deviations of noise beyond which a single residual is significant."""
 UNDAMAGED, FOUND = "undamaged model", "with the damage found"
 
 
 def statistic(found: Examination) -> FloatArray:
-    """Test statistic over its threshold at every sample, NaN where nothing was watched."""
+    """Test statistic over its threshold at every sample, NaN where nothing was monitored."""
     values = np.full(len(found.reference.model), np.nan)
     for first, part in reversed(pieces(found)):  # an alarm's own sample shows what raised it
         values[first : first + len(part)] = part
@@ -34,7 +34,7 @@ def pieces(found: Examination) -> list[tuple[int, FloatArray]]:
 
 
 def modelled(found: Examination) -> Mapping[str, FloatArray]:
-    """Signals of the undamaged model and, where there is damage, of the one with it.
+    """Signals of the undamaged model and, if there is damage, of the damaged one.
 
     Each of shape (samples, m), NaN where nothing was measured.
     """
@@ -55,12 +55,12 @@ def loudness(found: Examination) -> FloatArray:
 
 
 def loudest(found: Examination) -> int:
-    """The signal whose residual stands out most over its noise."""
+    """The signal with the largest residual relative to its noise."""
     return int(np.argmax(loudness(found)))
 
 
 def band(found: Examination) -> tuple[str, FloatArray]:
-    """Name and size of the residual that is remarkable, of each signal, shape (m,)."""
+    """Name and size of a significant residual of each signal, shape (m,)."""
     sigma = found.reference.sigma
     if found.settings.limit is not None:
         return "limit", np.full(len(sigma), found.settings.limit)

@@ -1,8 +1,8 @@
-"""A structure with every spring's coefficients ready to move, beside a record of it.
+"""A structure whose spring coefficients are all free, with a record of it.
 
-One kernel serves the undamaged structure and every candidate damage, as stiffness, quadratic and
-cubic coefficient of all springs are its free parameters. Its outputs are the observed signals, then
-positions and velocities of all nodes that are not among them, so that states can be read off.
+One kernel serves the undamaged structure and every candidate damage, as the stiffness, quadratic
+and cubic coefficients of all springs are its free parameters. Its outputs are the observed signals,
+then the positions and velocities of all other nodes, so that states can be read from them.
 """
 
 from collections.abc import Mapping
@@ -20,9 +20,9 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 KINDS = {"": "stiffness", "_quadratic": "quadratic", "_cubic": "cubic"}
-"""What may change at a spring, by the ending of its coefficient's name."""
+"""What may change at a spring, by the suffix of its coefficient's name."""
 FINER = 2
-"""Integration steps for each one that a fit would take; errors add up over the whole record."""
+"""Integration steps per step of a fit; errors accumulate over the whole record."""
 BETWEEN = 4
 """Steps between samples in the linear sweep along the record."""
 
@@ -33,7 +33,7 @@ class Run:
 
     Attributes:
         outputs: of the observed signals, shape (samples, m).
-        slopes: by the springs' coefficients, then the initial states, shape (samples, m, c + n).
+        slopes: derivatives by spring coefficients, then initial states, shape (samples, m, c + n).
         states: shape (samples, n).
     """
 
@@ -47,9 +47,9 @@ class SpringModel:
     """A structure, its kernel and a record.
 
     Attributes:
-        structure: as described.
-        problem: kernel and record for the method's use.
-        signals: names of the observed signals that the record holds.
+        structure: its description.
+        problem: kernel and record for the identification.
+        signals: names of the observed signals in the record.
     """
 
     structure: Structure
@@ -58,7 +58,7 @@ class SpringModel:
 
     @property
     def candidates(self) -> tuple[str, ...]:
-        """Names of the springs' coefficients, as the kernel's slopes have them."""
+        """Names of the spring coefficients, in the order of the kernel's slopes."""
         return tuple(self.problem.sweeper.compiled.system.free)
 
     @property
@@ -75,7 +75,7 @@ class SpringModel:
         return len(self.problem.recording)
 
     def vector(self, values: Mapping[str, float]) -> FloatArray:
-        """All parameters, those named in `values` replaced; shape (n_p,)."""
+        """All parameters, with those in `values` replaced; shape (n_p,)."""
         return self.problem.sweeper.compiled.vector(values)
 
     def start(self) -> FloatArray:
@@ -84,7 +84,7 @@ class SpringModel:
         return np.array([state.start for state in states], np.float64)
 
     def run(self, parameters: FloatArray, state: FloatArray, first: int, last: int) -> Run:
-        """From `state` at sample `first` to the sample before `last`."""
+        """Simulate from `state` at sample `first` to the sample before `last`."""
         recording, system = self.problem.recording, self.problem.sweeper.compiled.system
         made = self.problem.sweeper.compiled.simulate(
             recording.inputs, recording.dt, np.array([first]), last - first,
@@ -98,14 +98,14 @@ class SpringModel:
     def along_record(
         self, parameters: FloatArray, path: FloatArray, first: int, last: int
     ) -> tuple[FloatArray, FloatArray]:
-        """Error of the linear sweep along what was observed, and what would move it.
+        """Errors of the linear sweep along the observation, and their derivatives.
 
         Along the observed trajectory the response to a changed coefficient is linear in the change,
         however large it is; about the undamaged model's own trajectory it is not.
 
         Args:
             parameters: of the undamaged structure, shape (n_p,).
-            path: states to take where a node was not observed, shape (samples of the record, n).
+            path: states of nodes that are not observed, shape (samples of the record, n).
             first, last: the stretch [samples].
 
         Returns:
@@ -127,7 +127,7 @@ class SpringModel:
         return self.observed[first:last] - outputs, slopes
 
     def shown_state(self, path: FloatArray, at: int) -> FloatArray:
-        """States at a sample as the record shows them, `path` where it does not, shape (n,)."""
+        """States at a sample from the record, else from `path`, shape (n,)."""
         return np.asarray(self._observed_path(path)[at])
 
     def _observed_path(self, path: FloatArray) -> FloatArray:
@@ -142,7 +142,7 @@ class SpringModel:
 def spring_model(
     structure: Structure, record: Record, values: Mapping[str, float] | None = None
 ) -> SpringModel:
-    """The structure with its springs' coefficients free, `values` in place of the file's.
+    """The structure with its spring coefficients free, and `values` in place of the file's.
 
     Raises:
         ModelError: the record holds none of the structure's observed signals, or is too coarse.
@@ -161,14 +161,14 @@ def spring_model(
     numbers = coefficients(whole)
     names = [spring + end for spring in structure.springs for end in KINDS]
     guess = {name: numbers[name].value for name in names}
-    # A node's sensor that is not listed as observed is not looked at.
+    # A sensor that is not listed as observed is ignored.
     kept = {name: column for name, column in record.columns.items() if name not in hidden}
     problem = problem_of(whole, Record(record.dt, kept), names, guess)
     return SpringModel(whole, problem, signals)
 
 
 def beside(model: SpringModel, record: Record) -> SpringModel:
-    """The same kernel beside another record of the same signals and time step."""
+    """The same kernel with another record of the same signals and time step."""
     equations = model.problem.sweeper.compiled.system.model
     wanted = {*model.signals, *(i.channel or name for name, i in equations.inputs.items())}
     kept = {name: column for name, column in record.columns.items() if name in wanted}

@@ -1,7 +1,7 @@
-"""The undamaged structure: what is unknown of it identified from the record's undamaged start.
+"""The undamaged structure: its unknowns, identified from the record's undamaged start.
 
-Also how large its residual is there (noise), and how well the identified figures are known: both
-say which residual is to be expected later.
+Also its residual there (noise), and the covariance of the identified coefficients: both determine
+which residual is to be expected later.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,14 +18,14 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 NEAR = 0.1
-"""Change of an iteration, in standard deviations, that will do."""
+"""Change of an iteration, in standard deviations, at which it has converged."""
 LEAST = 20
-"""Undamaged samples without which nothing is said about noise."""
+"""Fewest undamaged samples for an estimate of the noise."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A coefficient with its 95 % interval; both ends NaN where it was taken as known."""
+    """A coefficient with its 95 % interval; both ends NaN if it is taken as known."""
 
     value: float
     low: float
@@ -39,10 +39,10 @@ class Reference:
     Attributes:
         model: structure and record.
         parameters: all of them, shape (n_p,).
-        figures: the coefficients that the file marks as unknown, as identified.
-        spread: covariance of the springs' coefficients and the first state, shape (c + n, c + n).
+        figures: the identified coefficients, those marked as unknown in the file.
+        spread: covariance of the spring coefficients and the first state, shape (c + n, c + n).
         sigma: standard deviation of each signal's residual, shape (m,).
-        samples: undamaged samples that all of this comes from.
+        samples: number of undamaged samples used.
     """
 
     model: SpringModel
@@ -61,17 +61,17 @@ def reference(
     known: bool = False,
     model: SpringModel | None = None,
 ) -> Reference:
-    """The structure as the first `undamaged` seconds of the record show it.
+    """The structure identified from the first `undamaged` seconds of the record.
 
     Args:
-        structure: as described; what it marks as unknown is identified.
+        structure: the description; what it marks as unknown is identified.
         record: the whole record.
-        undamaged: length of its start that is taken as undamaged [s].
+        undamaged: length of the undamaged start [s].
         known: take the file's values as true instead of identifying.
-        model: the structure with another record, whose kernel may serve where `known` is set.
+        model: the structure with another record, to reuse its kernel if `known` is set.
 
     Raises:
-        ModelError: the undamaged start is too short, or does not determine what is unknown.
+        ModelError: the undamaged start is too short, or does not determine the unknowns.
     """
     samples = round(undamaged / record.dt)
     if not LEAST <= samples <= len(record):
@@ -100,7 +100,7 @@ def reference(
 def _identified(
     structure: Structure, record: Record, samples: int, *, known: bool
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-    """Names, values and covariance of what is unknown."""
+    """Names, values and covariance of the unknowns."""
     if known or not any(number.unknown for number in coefficients(structure).values()):
         return (), np.zeros(0), np.zeros((0, 0))
     start = Record(record.dt, {name: column[:samples] for name, column in record.columns.items()})
@@ -116,7 +116,7 @@ def _identified(
 
 
 def _settled(turns: Sequence[FloatArray], covariance: FloatArray) -> bool:
-    """Whether the last iteration changed less than the figures are known to."""
+    """Whether the last iteration changed less than the standard deviations."""
     if len(turns) < 2:
         return False
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -124,7 +124,7 @@ def _settled(turns: Sequence[FloatArray], covariance: FloatArray) -> bool:
 
 
 def _spread(model: SpringModel, names: tuple[str, ...], covariance: FloatArray) -> FloatArray:
-    """The covariance in the places of the springs' coefficients and the states."""
+    """The covariance, expanded to all spring coefficients and states."""
     states = [f"{state}(0)" for state in model.problem.sweeper.compiled.system.states]
     places = {name: index for index, name in enumerate((*model.candidates, *states))}
     spread = np.zeros((len(places), len(places)))

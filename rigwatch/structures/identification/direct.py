@@ -2,9 +2,9 @@
 
     m·ẍ + a1·x + a2·x³ + a3·ẋ + a4·ẋ³ = p(t),   J(a) = ∫ ( … − p )² dt,   A·a = b     (2.4)-(2.10)
 
-Where accelerations are measured, velocity and position are their integrals. What is not measured is
-made from what is: a velocity from the acceleration by the trapezoidal rule, else as the slope of a
-spline through the position, and an acceleration likewise. Nothing is simulated, so it is fast, and
+If accelerations are measured, velocities and positions are their integrals. What is not measured is
+derived: a velocity from the acceleration by the trapezoidal rule, else as the slope of a spline
+through the position, and an acceleration likewise. Nothing is simulated, so the method is fast, and
 every error of the accelerations goes straight into the result.
 """
 
@@ -22,15 +22,15 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 DEGREE = 5
-"""Of the splines that are differentiated."""
+"""Degree of the splines that are differentiated."""
 
 
 def solve(problem: Problem, *, iterations: int = 25) -> Outcome:
-    """One linear problem; more where an unknown does not enter linearly, such as a mass.
+    """Solve one linear problem; several if an unknown enters nonlinearly, such as a mass.
 
     Raises:
-        ModelError: an initial state is unknown, a state is not shown by any signal, or the record
-            does not determine the unknowns.
+        ModelError: an initial state is unknown, no signal shows a state, or the record does not
+            determine the unknowns.
     """
     system = problem.sweeper.compiled.system
     if len(problem.loose):
@@ -55,7 +55,7 @@ def solve(problem: Problem, *, iterations: int = 25) -> Outcome:
 
 
 def motion(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """States and their rates as the record shows them, each of shape (samples, n)."""
+    """States and their rates from the record, each of shape (samples, n)."""
     system = problem.sweeper.compiled.system
     signals = _measured(problem)
     states = list(system.states)
@@ -84,7 +84,7 @@ def motion(problem: Problem) -> tuple[FloatArray, FloatArray]:
 
 
 def _measured(problem: Problem) -> dict[sympy.Expr, FloatArray]:
-    """What the record holds, by its meaning: a state, or the rate of one."""
+    """The signals of the record, by meaning: a state, or the rate of one."""
     system = problem.sweeper.compiled.system
     rates = set(system.derivatives.values())
     known = {symbol(name) for name in system.states} | rates

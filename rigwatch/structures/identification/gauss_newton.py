@@ -1,11 +1,11 @@
 """Gauss-Newton with sensitivity equations over the whole record (Distefano and Rath; thesis 2.1).
 
-The augmented state u = {x, ẋ, a} starts at c, of which some is known. About an estimate of c
+The augmented state u = {x, ẋ, a} starts at c, of which a part is known. About an estimate of c
 
     du_c/dt = g_u·u_c,   A·Δc = b,   A = ∫ u_cᵀ·Γᵀ·Γ·u_c dt + Λ                     (2.21)-(2.24)
 
-with the model's own trajectory as the nominal one. It takes full steps, as published: from a guess
-too far off the trajectories part from the record and it fails.
+with the model's own trajectory as the nominal one. It takes full steps, as published: from a poor
+guess the trajectories diverge from the record and it fails.
 """
 
 import numpy as np
@@ -17,19 +17,19 @@ from rigwatch.structures.identification.problem import Problem
 from rigwatch.wire.arrays import FloatArray
 
 SMALL = 0.02
-"""Share of the signals up to which errors may be the model's own faults."""
+"""Share of the signals below which errors count as model error."""
 LASTING = 0.4
-"""Correlation of consecutive errors from which they are no noise."""
+"""Correlation of consecutive errors above which they are not noise."""
 
 
 def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outcome:
-    """Iterate until four digits stay the same.
+    """Iterate until four digits are stable.
 
     Args:
-        problem: what is unknown.
-        iterations: most of them.
-        trust: Λ of the guess, as samples' worth of one standard deviation of every signal for a
-            guess that is off by its own size; 0 for none.
+        problem: the identification problem.
+        iterations: largest number of iterations.
+        trust: weight Λ of the guess, as the number of samples with an error of one standard
+            deviation that equals a guess wrong by its own size; 0 for none.
 
     Raises:
         ModelError: the record does not determine the unknowns.
@@ -58,10 +58,10 @@ def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outc
 
 
 def _doubts(errors: FloatArray, scale: FloatArray) -> tuple[str, ...]:
-    """Why it settled at a wrong minimum, empty where it did not: what it leaves is no noise.
+    """Why the solution is a wrong minimum (its residual is not noise), empty if it is not.
 
-    Errors of consecutive samples are independent where only noise is left. Where the model's
-    trajectory is another than the record's they go on from sample to sample, however large.
+    Errors of consecutive samples are independent if only noise is left. If the model's trajectory
+    differs from the record's they are correlated, whatever their size.
     """
     share = float(np.sqrt(np.nanmean((errors / scale) ** 2)))
     along = np.nan_to_num(errors / scale)
@@ -82,7 +82,7 @@ def _with_prior(  # noqa: PLR0917 -- a step's rows with what belongs to them
     trust: float,
     scale: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The rows with those of (u(0) − u0, Λ·(u(0) − u0)) below them."""
+    """The rows, with those of (u(0) − u0, Λ·(u(0) − u0)) appended."""
     if trust <= 0:
         return errors, slopes, problem.weight
     count, width = len(now), errors.shape[1]

@@ -1,4 +1,4 @@
-"""What an identified model does where the record was taken."""
+"""The output of an identified model over its record."""
 
 import numpy as np
 
@@ -8,9 +8,9 @@ from rigwatch.wire.arrays import FloatArray
 
 
 def modelled(problem: Problem, found: Identification) -> FloatArray:
-    """Outputs of the model with what was found, shape (samples, outputs).
+    """Outputs of the identified model, shape (samples, outputs).
 
-    Not finite where the figures let it run away.
+    Not finite if the model diverges.
     """
     unknowns = np.array([found.parameters[name] for name in found.names])
     with np.errstate(all="ignore"):

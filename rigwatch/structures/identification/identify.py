@@ -1,9 +1,9 @@
-"""One interface to every method that identifies unknowns from a record.
+"""One interface to all identification methods.
 
     found = identify("shooting", structure, record)
     found.parameters["k1_6"], found.intervals["k1_6"]
 
-Each method is a function of a `Problem` that gives an `Outcome`; `METHODS` names them all.
+Each method is a function from a `Problem` to an `Outcome`; `METHODS` lists them.
 """
 
 import importlib
@@ -32,18 +32,18 @@ METHODS: dict[str, str] = {
 CONFIDENCE = 1.959964
 """Standard deviations on each side of a 95 % interval."""
 SETTLED = 5e-5
-"""Relative change from one iteration to the next of what is the same to four digits."""
+"""Relative change between iterations below which four digits are stable."""
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a method found.
+    """The outcome of a method.
 
     Attributes:
         iterations: unknowns after each iteration, each of shape (m,).
-        covariance: of the last, shape (m, m); None where the method knows none.
-        converged: whether it settled.
-        remarks: what a reader of the figures has to know.
+        covariance: of the last iteration, shape (m, m); None if the method gives none.
+        converged: whether it converged.
+        remarks: caveats for the reader.
         undetermined: unknowns that the record does not determine.
     """
 
@@ -56,17 +56,17 @@ class Outcome:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """What a method found, by name.
+    """The result of an identification, by name.
 
     Attributes:
         method: its name.
         names: the unknowns, in order.
         iterations: after each iteration, shape (iterations, m).
-        parameters: the last, by name.
-        intervals: 95 % interval, by name; (nan, nan) where the method knows none.
-        converged: whether it settled to four digits.
-        seconds: time it took, compilation not counted [s].
-        remarks: what a reader of the figures has to know.
+        parameters: the final values, by name.
+        intervals: 95 % intervals, by name; (nan, nan) if the method gives none.
+        converged: whether four digits are stable.
+        seconds: run time without compilation [s].
+        remarks: caveats for the reader.
         undetermined: unknowns that the record does not determine.
     """
 
@@ -93,22 +93,22 @@ def identify(
     substeps: int | None = None,
     **options: Any,
 ) -> Identification:
-    """Identify what is unknown of a structure from a record of its motion.
+    """Identify the unknowns of a structure from a record of its motion.
 
     Args:
         method: one of `METHODS`.
         structure: a structure, or any model of the engine.
-        record: what was measured.
-        unknowns: their names; those that the file marks if None.
-        guess: where they start; the file's guesses where left out.
+        record: the measurement.
+        unknowns: their names; those marked in the file if None.
+        guess: initial guesses; the file's for those left out.
         weighting: uniform, exponential:SECONDS or jacobi:A,B.
         first: first sample that counts.
-        substeps: integration steps a sample where the method chooses its own, automatic if None.
-        options: of the method.
+        substeps: integration steps per sample, for methods that allow a choice; automatic if None.
+        options: options of the method.
 
     Raises:
-        ModelError: the method or a name is unknown, the record does not suit, or it cannot
-            determine so many unknowns.
+        ModelError: the method or a name is unknown, the record is unsuitable, or it cannot
+            determine that many unknowns.
     """
     problem = problem_of(
         structure, record, unknowns, guess, weighting=weighting, first=first, substeps=substeps
@@ -117,7 +117,7 @@ def identify(
 
 
 def solved(method: str, problem: Problem, **options: Any) -> Identification:
-    """The result of a method on a prepared problem; errors as of `identify`."""
+    """The result of a method on a prepared problem; errors as in `identify`."""
     solve = solver(method)
     started = time.perf_counter()
     outcome = solve(problem, **options)
@@ -138,7 +138,7 @@ def solver(method: str) -> Callable[..., Outcome]:
 
 
 def settled(before: FloatArray, after: FloatArray) -> bool:
-    """Whether no unknown changed in its first four digits."""
+    """Whether the first four digits of every unknown are stable."""
     size = np.maximum(np.abs(after), 1e-9 * np.max(np.abs(after), initial=1e-300))
     return bool(np.all(np.abs(after - before) < SETTLED * size))
 

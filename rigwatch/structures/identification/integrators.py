@@ -1,12 +1,12 @@
-"""Explicit Runge-Kutta methods for the linear sweep of quasilinearization, one step a sample.
+"""Explicit Runge-Kutta methods for the linear sweep of quasilinearization, one step per sample.
 
     z ← z + h·Σ_j b_j·k_j,   k_j = rate(t + c_j·h, z + h·Σ_l a_jl·k_l)
 
 `dormand-prince` reproduces the thesis: Simulink's default for a fixed step (its `ode5`), fed with
-x, x² and x³ of the record as signals of their own, each on a straight line from sample to sample.
-Of all methods and ways to read between samples that were tried, it alone gives the printed first
-iterations of Tables 4.1 to 4.6, and to all printed digits. As the line through x² is not the
-square of the line through x, its nonlinear coefficients settle 1 to 2 % too high at h = 0.01 s.
+x, x² and x³ of the record as separate signals, each linear between samples. Of all methods and
+interpolations tried, it alone gives the printed first iterations of Tables 4.1 to 4.6, to all
+printed digits. As the interpolated x² is not the square of the interpolated x, its nonlinear
+coefficients converge to values 1 to 2 % too high at h = 0.01 s.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Integrator:
         a: shape (stages, stages), strictly lower triangle.
         b: shape (stages,).
         c: shape (stages,).
-        apart: whether rates, not states, run straight between the record's samples.
+        apart: whether rates, not states, are interpolated linearly between samples.
     """
 
     a: FloatArray
@@ -63,10 +63,10 @@ INTEGRATORS = {"runge-kutta": CLASSICAL, "dormand-prince": DORMAND_PRINCE}
 
 
 def integrator(name: str) -> Integrator:
-    """The method of that name.
+    """The method with that name.
 
     Raises:
-        ModelError: there is none.
+        ModelError: no such method.
     """
     if name not in INTEGRATORS:
         expected = " or ".join(INTEGRATORS)

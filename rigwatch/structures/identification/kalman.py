@@ -5,9 +5,9 @@ The augmented state X = {x, a} is predicted and corrected sample by sample,
     X(k+1/k) by integration,   P(k+1/k) = Φ·P·Φᵀ + W                                 (2.37), (2.38)
     K = P·Hᵀ·(H·P·Hᵀ + V)⁻¹,   P ← (I − K·H)·P·(I − K·H)ᵀ + K·V·Kᵀ                   (2.40)-(2.42)
 
-and the record is gone through again and again: the parameters start from what the last pass found,
-with their covariance enlarged by a weight. Φ is exact here, not I + Δt·∂g/∂X. The filter has to be
-told the noise, as published; nothing else gives it.
+and the filter passes over the record repeatedly: the parameters start from the result of the last
+pass, with their covariance enlarged by a weight. Φ is exact here, not I + Δt·∂g/∂X. The noise is an
+input, as published; the method does not estimate it.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from rigwatch.structures.identification.identify import Outcome, settled
 from rigwatch.structures.identification.problem import Problem
 from rigwatch.wire.arrays import FloatArray
 
-REMARK = "the filter was told the noise; its intervals are no wider than that makes them"
+REMARK = "the noise was given to the filter; its intervals rest on that figure"
 
 
 def solve(
@@ -30,16 +30,16 @@ def solve(
     weight: float = 100.0,
     drift: float = 1e-6,
 ) -> Outcome:
-    """Pass over the record until four digits stay the same.
+    """Pass over the record until four digits are stable.
 
     Args:
-        problem: what is unknown.
-        iterations: most passes.
+        problem: the identification problem.
+        iterations: largest number of passes.
         noise: standard deviation of each output's noise, shape (outputs,); or one number, as a
             share of each output's rms.
         spread: standard deviation of the guess, as a share of it.
-        weight: what the parameters' covariance is multiplied by from one pass to the next.
-        drift: standard deviation of the system noise a sample, as a share of each state's rms.
+        weight: factor on the parameters' covariance from one pass to the next.
+        drift: standard deviation of the system noise per sample, as a share of each state's rms.
     """
     run = _Filter(problem, noise, drift)
     found, covariance = [problem.guess], run.prior(problem.guess, spread)
@@ -80,9 +80,9 @@ class _Filter:
     def through(
         self, unknowns: FloatArray, covariance: FloatArray
     ) -> tuple[FloatArray | None, FloatArray]:
-        """Unknowns and their covariance after the pass; None where it diverged.
+        """Unknowns and their covariance after the pass; None if it diverged.
 
-        Initial states are smoothed only through the parameters; they keep what they started from.
+        Initial states are smoothed only through the parameters; they keep their initial values.
         """
         problem, sweeper = self.problem, self.problem.sweeper
         parameters, x = problem.split(unknowns)
@@ -107,7 +107,7 @@ class _Filter:
         return np.concatenate([parameters[problem.free], unknowns[m:]]), after
 
     def _joined(self, covariance: FloatArray, m: int, n: int) -> FloatArray:
-        """Covariance of {a, x} at the first sample; known initial states have none."""
+        """Covariance of {a, x} at the first sample; zero for known initial states."""
         whole = np.zeros((m + n, m + n))
         places = np.concatenate([np.arange(m), m + self.problem.loose])
         whole[np.ix_(places, places)] = covariance

@@ -1,7 +1,7 @@
-"""Linear least squares as all methods here need it: weights, gaps, noise by signal, what is blind.
+"""Linear least squares with weights, gaps, noise per signal, and a test of determinacy.
 
-Rows are samples of signals, columns unknowns. Columns are scaled to one length before anything is
-decomposed, so that stiffnesses of 1000 N/m and masses of 1 g are judged alike.
+Rows are samples of signals, columns unknowns. Columns are scaled to equal length before the
+decomposition, so that stiffnesses of 1000 N/m and masses of 1 g are treated alike.
 """
 
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 FOUR_DIGITS = 1e-4
-"""Share of a signal's rms below which no signal's error is believed, whatever the fit says."""
+"""Smallest error of a signal that is believed, as a share of its rms, whatever the fit says."""
 BLIND = 1e-9
-"""Share of the largest singular value below which a combination of unknowns is not determined."""
+"""Share of the largest singular value below which a combination of unknowns is undetermined."""
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Solution of one linear problem.
+    """The solution of one linear problem.
 
     Attributes:
-        change: of the unknowns, shape (m,).
-        covariance: for the residuals that are left, shape (m, m).
-        blind: which unknowns stand in a combination that the rows do not determine, shape (m,).
+        change: change of the unknowns, shape (m,).
+        covariance: from the remaining residuals, shape (m, m).
+        blind: which unknowns are part of an undetermined combination, shape (m,).
     """
 
     change: FloatArray
@@ -41,14 +41,14 @@ def solve(
     *,
     least_variance: float = 0.0,
 ) -> Step:
-    """The change of the unknowns that makes errors smallest: errors ≈ slopes·change.
+    """The change of the unknowns that minimises the errors: errors ≈ slopes·change.
 
     Args:
-        errors: measured less predicted, shape (samples, outputs), NaN where nothing was measured.
+        errors: measured minus predicted, shape (samples, outputs), NaN where not measured.
         slopes: shape (samples, outputs, m).
-        weight: of each sample's square, shape (samples,).
-        scale: standard deviation to expect of each output, shape (outputs,).
-        least_variance: of the scaled errors, for the covariance, however well they fit.
+        weight: weight of each squared sample, shape (samples,).
+        scale: expected standard deviation of each output, shape (outputs,).
+        least_variance: lower bound of the scaled errors' variance in the covariance.
     """
     factor = np.sqrt(weight)[:, None] / scale
     use = np.isfinite(errors) & (factor > 0)
@@ -72,7 +72,7 @@ def require_determined(names: tuple[str, ...], blind: NDArray[np.bool_], where: 
     """Refuse more unknowns than the record determines.
 
     Raises:
-        ModelError: some unknowns are blind; they are named.
+        ModelError: some unknowns are undetermined; they are named.
     """
     if blind.any():
         found = ", ".join(name for name, flag in zip(names, blind, strict=True) if flag)

@@ -1,4 +1,4 @@
-"""What every method of identification is given: equations, a record, and what is unknown.
+"""The input of every identification method: equations, a record, and the unknowns.
 
 Unknowns are parameters of the model, by name, and initial states, called x6(0) and v6(0).
 """
@@ -23,19 +23,19 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.wire.units import unit_of
 
 TURN = 0.1
-"""Radians of the fastest motion per integration step of the methods that may choose it."""
+"""Phase of the fastest motion per integration step, for methods that may choose the step [rad]."""
 LOAD_TURN = 0.5
-"""The same for the fastest sine among the loads, which only has to be averaged well."""
+"""The same for the fastest sine among the loads, which only needs to be averaged well."""
 MOST_SUBSTEPS = 256
 
 
 class Speed(NamedTuple):
-    """How fast a model moves about the record.
+    """Time scales of a model along the record.
 
     Attributes:
-        whole: largest eigenvalue of its Jacobian, decay included [rad/s].
-        turning: of its oscillations [rad/s].
-        growing: largest rate at which a disturbance grows [1/s]; 0 where all is stable.
+        whole: largest eigenvalue of the Jacobian, decay included [rad/s].
+        turning: fastest oscillation [rad/s].
+        growing: largest growth rate of a disturbance [1/s]; 0 if stable.
     """
 
     whole: float
@@ -45,18 +45,18 @@ class Speed(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One identification.
+    """One identification problem.
 
     Attributes:
         sweeper: the compiled equations.
-        recording: inputs and outputs, whole.
-        first: first sample that counts.
-        start: all parameters, guesses where unknown, shape (n_p,).
-        initial: states at `first`, guesses where unknown, shape (n,).
-        loose: which of them are unknown, shape (k,).
+        recording: all inputs and outputs.
+        first: first sample used.
+        start: all parameters, with guesses for unknowns, shape (n_p,).
+        initial: states at `first`, with guesses for unknowns, shape (n,).
+        loose: indices of the unknown initial states, shape (k,).
         weight: of each sample from `first` on, shape (samples,).
-        substeps: integration steps a sample, where a method may choose.
-        speed: of the fastest motion at the guess.
+        substeps: integration steps per sample, for methods that may choose.
+        speed: fastest motion at the guess.
     """
 
     sweeper: Sweeper
@@ -78,13 +78,13 @@ class Problem:
 
     @property
     def free(self) -> IntArray:
-        """Places of the free parameters among all of them, shape (m,)."""
+        """Indices of the free parameters, shape (m,)."""
         names = list(self.sweeper.compiled.system.parameters)
         return np.array([names.index(n) for n in self.sweeper.compiled.system.free], np.int64)
 
     @property
     def guess(self) -> FloatArray:
-        """Where the unknowns start, shape (m + k,)."""
+        """Initial guesses of the unknowns, shape (m + k,)."""
         return np.concatenate([self.start[self.free], self.initial[self.loose]])
 
     @property
@@ -99,12 +99,12 @@ class Problem:
 
     @cached_property
     def shown(self) -> FloatArray:
-        """States as the record shows them, whole, shape (all samples, n)."""
+        """All states from the record, shape (all samples, n)."""
         return initial_states(self.sweeper.compiled.system, self.recording)
 
     @cached_property
     def hidden(self) -> NDArray[np.bool_]:
-        """States of nodes of which the record holds neither position nor velocity, shape (n,)."""
+        """States of nodes whose position and velocity are not in the record, shape (n,)."""
         system, outputs = self.sweeper.compiled.system, self.recording.outputs
         there = [bool(np.isfinite(column).any()) for column in outputs.T]
         channels = {
@@ -116,7 +116,7 @@ class Problem:
         return ~np.array([s.measured in channels or s.rate_of in channels for s in states], bool)
 
     def split(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """All parameters and initial states with the unknowns in their places."""
+        """All parameters and initial states, with the unknowns filled in."""
         parameters, initial = self.start.copy(), self.initial.copy()
         count = len(self.free)
         parameters[self.free], initial[self.loose] = unknowns[:count], unknowns[count:]
@@ -153,17 +153,17 @@ def problem_of(
     first: int = 0,
     substeps: int | None = None,
 ) -> Problem:
-    """The identification of `unknowns` from a record.
+    """Set up the identification of `unknowns` from a record.
 
     Args:
         subject: a structure, or any model of the engine.
-        record: what was measured.
-        unknowns: names; those that the file marks as unknown if None.
-        guess: where they start; the file's guesses where left out.
+        record: the measurement.
+        unknowns: names; those marked as unknown in the file if None.
+        guess: initial guesses; the file's for those left out.
         weighting: see `weighting.weights`.
-        first: first sample that counts; with another than 0, every initial state that is unknown
-            has to be named, and starts where the record shows it.
-        substeps: integration steps a sample, chosen from the fastest motion if None.
+        first: first sample used; if it is not 0, every unknown initial state must be named, and
+            starts from the record.
+        substeps: integration steps per sample; chosen from the fastest motion if None.
 
     Raises:
         ModelError: a name is unknown, nothing is unknown, or the record is too coarse or too short.
@@ -191,7 +191,7 @@ def problem_of(
 
 
 def _fastest(problem: Problem) -> Speed:
-    """The fastest motion at the guess, about some of the states that the record shows."""
+    """The fastest motion at the guess, linearised about some states of the record."""
     nominal = problem.shown[problem.first :]
     some = np.unique(np.linspace(0, len(nominal) - 1, 25).astype(int))
     _, slopes = problem.sweeper.rates(
@@ -209,7 +209,7 @@ def require_fine_enough(problem: Problem, omega: float, limit: float, reason: st
     """Refuse a record whose step times `omega` [rad/s] exceeds `limit`.
 
     Raises:
-        ModelError: it does; the message says which step would do.
+        ModelError: it does; the message says which step suffices.
     """
     dt = problem.recording.dt
     if omega * dt > limit:
@@ -220,7 +220,7 @@ def require_fine_enough(problem: Problem, omega: float, limit: float, reason: st
 
 
 def _substeps(problem: Problem, omega: float) -> int:
-    """Integration steps a sample, for the fastest motion and the fastest sine of the loads."""
+    """Integration steps per sample, for the fastest motion and the fastest sine of the loads."""
     system, dt = problem.sweeper.compiled.system, problem.recording.dt
     loads = [
         abs(parameter.value)
@@ -243,7 +243,7 @@ def _require_samples(problem: Problem) -> None:
 def _model(
     subject: Structure | Model, unknowns: Sequence[str] | None, guess: Mapping[str, float]
 ) -> tuple[Model, list[str]]:
-    """The model with exactly the wanted parameters free, and the unknown initial states."""
+    """The model with exactly the requested parameters free, and the unknown initial states."""
     if isinstance(subject, Structure):
         numbers = coefficients(subject)
         chosen = [n for n, c in numbers.items() if c.unknown] if unknowns is None else unknowns
@@ -264,7 +264,7 @@ def _freed(model: Model, unknowns: Sequence[str], guess: Mapping[str, float]) ->
             raise ModelError(
                 f"{model.name}: found the unknown {name!r}, expected one of {', '.join(known)}"
             )
-    # A person guesses in the unit that the model's file is written in.
+    # Guesses are in the unit of the model's file.
     values = {
         name: unit_of(p.shown or p.unit).to_si(guess[name]) if name in guess else p.value
         for name, p in model.parameters.items()
@@ -279,7 +279,7 @@ def _freed(model: Model, unknowns: Sequence[str], guess: Mapping[str, float]) ->
 def _initial(
     tools: Sweeper, recording: Recording, first: int, loose: IntArray, guess: Mapping[str, float]
 ) -> FloatArray:
-    """States at the first sample: as the model starts, or as the record shows unknown ones."""
+    """States at the first sample: the model's, or from the record if unknown."""
     system = tools.compiled.system
     known = np.array([state.start for state in system.states.values()], np.float64)
     if not len(known):

@@ -1,10 +1,10 @@
-"""Where nodes have no sensor: the record from its start, fitted over ever longer parts of it.
+"""Fits structures with unmeasured nodes: over ever longer parts of the record, from its start.
 
-Windows anywhere in a record need their initial states from the data, and noise hides those of nodes
-without a signal. From the record's own start, where states are known or few, one trajectory is
-followed instead; each part is half as long again as the last, so that what it found keeps the
-trajectory in step with the record. Where the first part is too short, its figures go astray, where
-it is too long, the guess is out of step: several lengths are tried, and the smallest error counts.
+Windows in the middle of a record need initial states from the data, and noise hides those of nodes
+without a signal. Instead one trajectory starts at the record's beginning, where states are known or
+few. Each part is half as long again as the last, so that the last estimate keeps the trajectory in
+phase with the record. If the first part is too short its estimates are poor; if it is too long the
+guess is out of phase. Several lengths are tried, and the smallest error wins.
 """
 
 from collections.abc import Iterator
@@ -20,18 +20,18 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 FIRST = (4.0, 8.0, 2.0, 16.0)
-"""Lengths of the first part, in periods of the fastest motion; the most promising first."""
+"""Lengths of the first part, in periods of the fastest motion, the most promising first."""
 GROWTH = 1.5
 STEPS = 8
 """Most Gauss-Newton steps over each part but the last."""
 ENOUGH = 2
-"""Lengths that have to end at the same error before the others are left out."""
+"""Lengths that must reach the same error before the others are skipped."""
 SAME = 1.01
 
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """One trajectory along the whole record.
+    """A fitted trajectory over the whole record.
 
     Attributes:
         turns: unknowns after each part, then after each step over the whole record.
@@ -45,11 +45,11 @@ class Followed:
 
 
 def followed(problem: Problem, iterations: int, scale: FloatArray | None) -> Followed | None:
-    """The best trajectory over the whole record; None where none settled.
+    """The best trajectory over the whole record; None if none converged.
 
     Args:
-        problem: what is unknown.
-        iterations: most over the whole record.
+        problem: the identification problem.
+        iterations: largest number over the whole record.
         scale: standard deviation of each output's noise; from the residuals if None.
     """
     ends: list[Followed] = []

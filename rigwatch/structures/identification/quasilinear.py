@@ -4,13 +4,13 @@
 
 The equations are linearised about a nominal trajectory, which is the observed record itself: only
 the parameters change from one iteration to the next. The integration step is the record's, as in
-1999; `integrators` says which methods there are, and which one was the thesis's. What a record of
-positions does not show is filled in thus:
+1999; `integrators` lists the methods, and names the thesis's. States that a record of positions
+does not show are filled in:
 
-* velocities of observed positions are their local slopes (they matter only where forces are not
-  linear in velocity);
-* states of nodes that are not observed come from a simulation at the guess, then from the linear
-  solution of the iteration before.
+* velocities of observed positions are their local slopes (they matter only if forces are
+  nonlinear in velocity);
+* states of unobserved nodes come from a simulation at the guess, then from the linear solution of
+  the previous iteration.
 """
 
 import numpy as np
@@ -25,9 +25,9 @@ from rigwatch.structures.identification.sweep import Swept
 from rigwatch.wire.arrays import FloatArray
 
 STABLE = 2.78
-"""Radians a step up to which the classical Runge-Kutta method does not blow up."""
+"""Stability limit of the classical Runge-Kutta method [rad per step]."""
 BLOWN_UP = 1e60
-"""What no sensitivity of a stable linear solution reaches."""
+"""Bound that the sensitivities of a stable linear solution never reach."""
 UNOBSERVED = (
     "states that no signal shows follow the model from the guess, not the record",
     "they are replaced by the linear solution of each iteration",
@@ -41,17 +41,17 @@ def solve(
     scale: FloatArray | None = None,
     integrator: str = "dormand-prince",
 ) -> Outcome:
-    """Iterate until four digits stay the same.
+    """Iterate until four digits are stable.
 
     Args:
-        problem: what is unknown.
-        iterations: most of them.
-        scale: standard deviation of each output's noise; all alike if None, as published.
-        integrator: dormand-prince, the thesis's own, or runge-kutta.
+        problem: the identification problem.
+        iterations: largest number of iterations.
+        scale: standard deviation of each output's noise; equal if None, as published.
+        integrator: dormand-prince, the thesis's, or runge-kutta.
 
     Raises:
-        ModelError: there is no such integrator, the step is too coarse, or the record does
-            not determine the unknowns.
+        ModelError: no such integrator, the step is too coarse, or the record does not
+            determine the unknowns.
     """
     require_fine_enough(problem, problem.speed.whole, STABLE, "its Runge-Kutta step is stable")
     follower = _Nominal(problem, integrator_of(integrator))
@@ -79,7 +79,7 @@ def _outcome(found: list[FloatArray], step: Step | None, remarks: tuple[str, ...
 
 
 class _Nominal:
-    """The nominal trajectory: the record where it shows a state."""
+    """The nominal trajectory: the record, for the states that it shows."""
 
     def __init__(self, problem: Problem, method: Integrator) -> None:
         self._problem, self._method = problem, method
@@ -101,13 +101,13 @@ class _Nominal:
         )  # fmt: skip
 
     def learn(self, swept: Swept, change: FloatArray) -> None:
-        """Take the linear solution for the states that the record does not show."""
+        """Use the linear solution for the states that the record does not show."""
         if self._hidden.any():
             solution = swept.states + swept.state_slopes @ change
             self._states[:, self._hidden] = solution[:, self._hidden]
 
     def _simulated(self) -> FloatArray:
-        """All states from the guess on, shape (samples, n)."""
+        """All states simulated at the guess, shape (samples, n)."""
         problem, states = self._problem, np.empty_like(self._states)
         parameters, x = problem.split(problem.guess)
         for row in range(len(states)):

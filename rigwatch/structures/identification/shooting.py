@@ -1,16 +1,16 @@
 """Multiple shooting with exact sensitivities: short windows first, the whole record last.
 
-Over a short window a trajectory cannot part from the record, whatever the guess: there the fit is
-almost linear in the unknowns. Each window's initial states are free and projected out. What is
-found serves as the guess for windows four times as long, and so on. Last comes one window over the
-whole record (`whole_record.py`).
+Over a short window a trajectory cannot diverge from the record, whatever the guess: there the fit
+is almost linear in the unknowns. Each window's initial states are free and projected out. The
+estimate is the guess for windows four times as long, and so on. The last window is the whole record
+(`whole_record.py`).
 
-A longer window is believed as long as its errors stay what they were over shorter ones. Where they
-do not, disturbances grow along the way (a plant that runs away, a strongly nonlinear structure that
-is chaotic), and the longest windows that could be followed have the last word.
+A longer window is accepted as long as its errors match those over shorter ones. If they do not,
+disturbances grow (an unstable plant, a strongly nonlinear structure that is chaotic), and the
+longest accepted windows give the result.
 
-Where nodes have no signal, `progressive_fit.py` follows one
-trajectory from the record's start instead.
+For nodes without a signal, `progressive_fit.py` follows one trajectory from the record's start
+instead.
 """
 
 from dataclasses import dataclass, replace
@@ -33,15 +33,15 @@ GROWTH = 4
 STEPS = 12
 """Most Gauss-Newton steps at each horizon but the last."""
 WORSE = 1.25
-"""How much larger errors may be over longer windows: noise alone leaves them as they are."""
+"""Allowed growth of errors over longer windows: under noise alone they stay the same."""
 SMALL = 2.0 * FOUR_DIGITS
-"""Share of the signals up to which errors are always small enough."""
+"""Share of the signals below which errors are always small enough."""
 MOST_GROWTH = 4.0
-"""Natural logarithm of what a disturbance may grow by within a window."""
+"""Natural logarithm of the largest growth of a disturbance within a window."""
 UNCERTAIN = 0.5
-"""Share of an unknown's size that its standard deviation may reach before it is named."""
+"""Largest standard deviation of a determined unknown, relative to its size."""
 FINEST = 1e-6
-"""Relative change of the parameters at which windows that have the last word are done."""
+"""Relative change of the parameters at which the longest windows have converged."""
 FOLLOWED = "longer trajectories part from the record: fitted over windows of {samples} samples"
 
 
@@ -52,12 +52,12 @@ def solve(
     partial: bool = False,
     scale: FloatArray | None = None,
 ) -> Outcome:
-    """Grow the horizon to the whole record.
+    """Fit over growing horizons, up to the whole record.
 
     Args:
-        problem: what is unknown.
-        iterations: most over the whole record.
-        partial: name unknowns that the record does not determine instead of refusing.
+        problem: the identification problem.
+        iterations: largest number over the whole record.
+        partial: name undetermined unknowns instead of refusing.
         scale: standard deviation of each output's noise; from the residuals if None.
 
     Raises:
@@ -72,7 +72,7 @@ def solve(
 
 
 def _solved(problem: Problem, iterations: int, scale: FloatArray | None) -> tuple[Outcome, Step]:
-    """Over the whole record where that can be followed, else over windows."""
+    """Fit over the whole record if it can be followed, else over windows."""
     tame = not _runs_away(problem)
     if tame and problem.hidden.any() and (found := _followed(problem, iterations, scale)):
         return found
@@ -81,7 +81,7 @@ def _solved(problem: Problem, iterations: int, scale: FloatArray | None) -> tupl
     if tame and (grown.accepted or grown.windows is None):
         ended = _over_the_whole(problem, grown, iterations, scale)
     if ended is None and tame and not problem.hidden.any():
-        # Heavy noise can look like a trajectory that parts from the record.
+        # Heavy noise can look like a trajectory that diverges from the record.
         ended = _followed(problem, iterations, scale)
     return ended or _over_windows(problem, grown, iterations)
 
@@ -89,19 +89,19 @@ def _solved(problem: Problem, iterations: int, scale: FloatArray | None) -> tupl
 def _followed(
     problem: Problem, iterations: int, scale: FloatArray | None
 ) -> tuple[Outcome, Step] | None:
-    """The end along one trajectory from the record's start; None where none settled."""
+    """The final fit along one trajectory from the record's start; None if none converged."""
     found = followed(problem, iterations, scale)
     return (Outcome(found.turns, found.step.covariance, True), found.step) if found else None
 
 
 @dataclass(eq=False)
 class _Grown:
-    """How far the windows have grown.
+    """The progress of growing windows.
 
     Attributes:
         found: unknowns after each horizon.
-        windows: the longest that could be followed, with all parameters that it found.
-        accepted: whether every horizon could be followed.
+        windows: the longest accepted windows, with all estimated parameters.
+        accepted: whether every horizon was accepted.
     """
 
     found: list[FloatArray]
@@ -111,7 +111,7 @@ class _Grown:
 
 
 def _grown(problem: Problem) -> _Grown:
-    """Windows grown as far as they can be followed."""
+    """The windows, grown as far as they are accepted."""
     grown, count = _Grown([problem.guess], None, problem.start), len(problem.free)
     if not count:
         return grown
@@ -133,7 +133,7 @@ def _grown(problem: Problem) -> _Grown:
 def _over_the_whole(
     problem: Problem, grown: _Grown, iterations: int, scale: FloatArray | None
 ) -> tuple[Outcome, Step] | None:
-    """The end over the whole record; None where windows can do better."""
+    """The final fit over the whole record; None if windows do better."""
     expected = np.inf
     if grown.windows and not len(problem.loose):
         expected = max(WORSE * grown.windows.rms, SMALL)
@@ -150,7 +150,7 @@ def _over_the_whole(
 
 
 def _over_windows(problem: Problem, grown: _Grown, iterations: int) -> tuple[Outcome, Step]:
-    """The end over the longest windows that could be followed."""
+    """The final fit over the longest accepted windows."""
     if len(problem.loose) or grown.windows is None:
         raise ModelError(
             f"{problem.sweeper.compiled.system.model.name}: found trajectories that part from the"
@@ -167,7 +167,7 @@ def _over_windows(problem: Problem, grown: _Grown, iterations: int) -> tuple[Out
 
 
 def _runs_away(problem: Problem) -> bool:
-    """Whether a disturbance would grow beyond use over the whole record."""
+    """Whether a disturbance grows too much over the whole record."""
     duration = (len(problem.recording) - problem.first) * problem.recording.dt
     return problem.speed.growing * duration > MOST_GROWTH
 
@@ -179,9 +179,9 @@ def _uncertain(problem: Problem, found: FloatArray, step: Step) -> tuple[str, ..
 
 
 def _regressed(problem: Problem) -> list[FloatArray]:
-    """All parameters as the direct approach finds them, where it finds any: a rival of the guess.
+    """All parameters from the direct approach, if it finds any: an alternative to the guess.
 
-    Nothing is simulated there, so that no guess is too far off for it.
+    It simulates nothing, so no guess is too poor for it.
     """
     try:
         found = regression(replace(problem, loose=problem.loose[:0]))

@@ -1,12 +1,12 @@
-"""The linear sweep of quasilinearization, and a model's rates along a record.
+"""The linear sweep of quasilinearization, and the rates of a model along a record.
 
 Along a nominal trajectory X̄ (states at the samples, straight lines between them) and parameters p̄
 
     dP/dt = f(X̄, p̄) + J·(P − X̄),   dH/dt = J·H + ∂f/∂p,   J = ∂f/∂x at (X̄, p̄)      (4.13), (4.14)
 
-with an explicit Runge-Kutta method, one step a sample. The parameters count from p̄, so X = P +
-H·δ with the change δ to be found. The columns of H are the free parameters, then the unknown
-initial states. J comes from the model's own machine code: it is exact, and its zeros cost nothing.
+with an explicit Runge-Kutta method, one step per sample. Parameters are relative to p̄, so X = P +
+H·δ with the unknown change δ. The columns of H are the free parameters, then the unknown initial
+states. J comes from the model's machine code: it is exact, and its zeros cost nothing.
 """
 
 from dataclasses import dataclass
@@ -23,11 +23,11 @@ from rigwatch.wire.errors import ModelError
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """Result of a sweep, for m unknowns.
+    """The result of a sweep, for m unknowns.
 
     Attributes:
         outputs: of P, shape (samples, outputs).
-        slopes: by the unknowns, shape (samples, outputs, m).
+        slopes: derivatives by the unknowns, shape (samples, outputs, m).
         states: P, shape (samples, n).
         state_slopes: H, shape (samples, n, m).
     """
@@ -128,7 +128,7 @@ class Sweeper:
         x: FloatArray,
         parameters: FloatArray,
     ) -> FloatArray:
-        """Move the states x by a sample, in place; slopes by free parameters and states before."""
+        """Advance the states x by a sample, in place; slopes by free parameters and old states."""
         slopes = np.empty((len(x), self.compiled.columns))
         rates, _ = self.compiled.kernel.with_sensitivities(self.compiled.columns)
         kernel.forward(rates, inputs, dt, row, substeps, self.compiled.hold, x, parameters, slopes)

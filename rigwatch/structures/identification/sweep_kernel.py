@@ -1,7 +1,7 @@
 """The loops of quasilinearization and of a filter's steps, around a system's machine code.
 
-Sensitivities are kept as [H | P]: a column an unknown, the solution itself last. The equations
-come as addresses of functions, as `engine.compile.integrator` calls them.
+Sensitivities are stored as [H | P]: a column per unknown, the solution last. The equations come as
+addresses of functions, as in `engine.compile.integrator`.
 """
 
 import numpy as np
@@ -43,7 +43,7 @@ def _add(dt: float, shares: FloatArray, ks: FloatArray, out: FloatArray) -> None
 
 @njit(cache=True, error_model="numpy")
 def _between(nominal: FloatArray, k: int, share: float, xs: FloatArray) -> None:
-    """The nominal trajectory on the straight line from sample k to the next."""
+    """The nominal trajectory, interpolated linearly from sample k to the next."""
     for i in range(xs.size):
         xs[i] = nominal[k, i]
         if share > 0.0:
@@ -56,7 +56,7 @@ def sweep(  # noqa: C901, PLR0917 -- a kernel
     b: FloatArray, c: FloatArray, apart: bool, nominal: FloatArray, p: FloatArray, s: FloatArray,
     y: FloatArray, dy: FloatArray, path: FloatArray,
 ) -> None:  # fmt: skip
-    """Fill outputs y of P, their slopes dy by H, and path = [H | P] at the samples, from s on."""
+    """Fill outputs y of P, their slopes dy by H, and path = [H | P] at the samples, from s."""
     count, n = nominal.shape
     width, last = s.shape[1], s.shape[1] - 1
     xs, us, ss = np.empty(n), np.empty(u.shape[1] + 1), np.empty((n, width))
@@ -120,7 +120,7 @@ def forward(  # noqa: PLR0917 -- a kernel
     rates: int, u: FloatArray, dt: float, row: int, substeps: int, hold: FloatArray,
     x: FloatArray, p: FloatArray, s: FloatArray,
 ) -> None:  # fmt: skip
-    """Move x by a sample; s becomes its derivative by free parameters and the state before."""
+    """Advance x by a sample; s becomes its derivative by free parameters and the old state."""
     n, m = s.shape
     size = n * (1 + m)
     z, zs, dz, acc = np.zeros(size), np.empty(size), np.empty(size), np.empty(size)

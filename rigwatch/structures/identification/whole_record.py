@@ -1,7 +1,7 @@
 """The last stage of multiple shooting: one window over the whole record.
 
-Initial states that are known are held fixed, each signal is counted by the noise that it turned out
-to have, and steps are halved until the error falls.
+Known initial states are fixed, each signal is weighted by its estimated noise, and steps are halved
+until the error falls.
 """
 
 from dataclasses import dataclass
@@ -17,24 +17,24 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 FINER = 2
-"""How much shorter the integration steps are over the whole record, where errors add up."""
+"""Reduction of the integration step over the whole record, where errors accumulate."""
 SMALLEST = 1e-150
-"""Noise of a signal that is always zero."""
+"""Noise assumed for a signal that is always zero."""
 ROUNDING = 0.01
-"""Share of the last step that may not matter where rounding keeps the errors from falling."""
+"""Share of the last step that is negligible if rounding keeps the errors from falling."""
 HALVINGS = 12
 PATIENCE = 8
-"""Steps after which the errors must have come down to what they were over windows."""
+"""Steps after which the errors must have fallen to their level over windows."""
 
 
 @dataclass(eq=False)
 class WholeRecord:
-    """Damped Gauss-Newton over the whole record, counting each signal by its noise.
+    """Damped Gauss-Newton over the whole record, each signal weighted by its noise.
 
     Attributes:
-        problem: what is unknown.
+        problem: the identification problem.
         scale: standard deviation of each output's noise; from the residuals if None.
-        expected: rms error, in standard deviations of each signal, that it has to come down to.
+        expected: rms error to reach, in standard deviations of each signal.
     """
 
     problem: Problem
@@ -42,7 +42,7 @@ class WholeRecord:
     expected: float = np.inf
 
     def refined(self, start: FloatArray, iterations: int) -> tuple[list[FloatArray], Step, bool]:
-        """Unknowns after each step, the last linear problem, and whether they settled."""
+        """Unknowns after each step, the last linear problem, and whether it converged."""
         now, found, good = start, list[FloatArray](), False
         errors, slopes = self._errors(now)
         if not np.isfinite(slopes).all():
@@ -74,13 +74,13 @@ class WholeRecord:
         return bool(np.sqrt(np.nanmean(share**2)) <= self.expected)
 
     def spread_cost(self, unknowns: FloatArray) -> float:
-        """Sum of the squared errors, each signal over its own spread."""
+        """Sum of the squared errors, each signal over its spread."""
         return self._cost(self._errors(unknowns)[0], spreads(self.problem.observed))
 
     def _shorter(
         self, now: FloatArray, change: FloatArray, errors: FloatArray, scale: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-        """The step, halved until the error falls; None where no step is left that lowers it."""
+        """The step, halved until the error falls; None if no step lowers it."""
         cost = self._cost(errors, scale)
         for _ in range(HALVINGS):
             moved = self._inside(now + change)
@@ -106,7 +106,7 @@ class WholeRecord:
         return float(np.nansum(self.problem.weight[:, None] * (errors / scale) ** 2))
 
     def _noise(self, errors: FloatArray) -> FloatArray:
-        """Standard deviation of each output's errors, not below four digits of the signal."""
+        """Standard deviation of each output's errors, at least four digits of the signal."""
         if self.scale is not None:
             return self.scale
         weight = self.problem.weight[:, None] * np.isfinite(errors)

@@ -1,9 +1,9 @@
-"""Gauss-Newton over many short windows at once, each with its own free initial states.
+"""Gauss-Newton over many short windows at once, each with free initial states.
 
 For errors e_w of window w and its derivatives A_w by the parameters and B_w by its initial states,
 one step solves min Σ_w |e_w − A_w·δp − B_w·δx_w|². The δx_w are projected out window by window
-(Q_w·Q_wᵀ of B_w), so that only a small problem in δp is left, and follow from it afterwards. The
-windows' states are iterated together with the parameters (lifted), hence one simulation a step.
+(Q_w·Q_wᵀ of B_w), which leaves a small problem in δp, and follow from δp. The windows' states are
+iterated together with the parameters (lifted), so a step takes one simulation.
 """
 
 from dataclasses import dataclass, replace
@@ -17,12 +17,12 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 ENOUGH = 1e-3
-"""Relative change of the parameters that will do for a guess of the next horizon."""
+"""Relative change of the parameters that suffices as a guess for the next horizon."""
 HALVINGS = 8
 
 
 def spreads(signals: FloatArray) -> FloatArray:
-    """Standard deviation of each column (samples, k) over what is not missing; 1 if that is 0."""
+    """Standard deviation of each column (samples, k) over valid samples; 1 if that is 0."""
     there = np.isfinite(signals)
     count = np.maximum(there.sum(axis=0), 1)
     mean = np.where(there, signals, 0.0).sum(axis=0) / count
@@ -48,18 +48,18 @@ class _Starts:
         return cls(np.where(seen[:, None, :], left, 0.0), back)
 
     def without(self, columns: FloatArray) -> FloatArray:
-        """What no initial states could have made of `columns` (windows, k, c)."""
+        """The part of `columns` (windows, k, c) that no initial states explain."""
         return np.asarray(columns - self.left @ (np.swapaxes(self.left, 1, 2) @ columns))
 
     def solved(self, errors: FloatArray) -> FloatArray:
-        """The initial states that explain `errors` (windows, k) best, shape (windows, n)."""
+        """The initial states that best explain `errors` (windows, k), shape (windows, n)."""
         along = np.einsum("wki,wk->wi", self.left, errors)
         return np.asarray(np.einsum("wni,wi->wn", self.inverse, along))
 
 
 @dataclass(eq=False)
 class Windows:
-    """A record from its first sample on, cut into windows of one length.
+    """A record cut into windows of equal length.
 
     Attributes:
         cost: sum of the scaled squares of the errors after the last refinement.
@@ -72,7 +72,7 @@ class Windows:
     def __post_init__(self) -> None:
         problem, length = self.problem, self.length
         last = len(problem.recording) - length + 1
-        # No sample stands in two windows: its error would be counted twice.
+        # No sample is in two windows: its error would count twice.
         self._starts = np.arange(problem.first, last, length, dtype=np.int64)
         rows = self._starts[:, None] + np.arange(length)
         self._measured = problem.recording.outputs[rows]
@@ -89,9 +89,9 @@ class Windows:
         return float(np.sqrt(self.cost / max(used, 1)))
 
     def refined(self, parameters: FloatArray, most: int, enough: float = ENOUGH) -> FloatArray:
-        """Better values of the free parameters; all of them are given and returned, shape (n_p,).
+        """Improved free parameters; takes and returns all of them, shape (n_p,).
 
-        What diverges (NaN or infinite), or does not lower the errors, is left as it was.
+        A step that diverges (NaN or infinite), or does not lower the errors, is discarded.
         """
         free = self.problem.free
         now, errors, slopes = parameters, *self._run(parameters, self._initial)
@@ -110,9 +110,9 @@ class Windows:
         return now
 
     def weigh(self, parameters: FloatArray) -> None:
-        """From now on count each signal by the noise that it has shown, not by its spread.
+        """From now on weight each signal by its estimated noise, not by its spread.
 
-        Signals of unequal noise that are counted alike give intervals that are too narrow.
+        Equal weights for signals of unequal noise give intervals that are too narrow.
         """
         errors, slopes = self._run(parameters, self._initial)
         if not np.isfinite(slopes).all():
@@ -148,7 +148,7 @@ class Windows:
         return change, starts.solved(errors - slopes[..., :count] @ change)
 
     def judged(self, parameters: FloatArray) -> Step:
-        """The last linear problem at what `refined` returned, with its covariance.
+        """The last linear problem at the result of `refined`, with its covariance.
 
         Raises:
             ModelError: a window's trajectory diverges (NaN or infinite).
@@ -173,7 +173,7 @@ class Windows:
     def _shorter(
         self, now: FloatArray, change: FloatArray, shift: FloatArray, errors: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-        """The step, halved until the errors fall; None where none is left that lowers them."""
+        """The step, halved until the errors fall; None if none lowers them."""
         cost = float(np.sum(errors**2))
         for _ in range(HALVINGS):
             moved = self._inside(now, change)

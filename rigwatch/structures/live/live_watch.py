@@ -1,13 +1,13 @@
-"""Damage of a structure on line: sample blocks in; residuals, an alarm and the damage's place out.
+"""Online damage detection: sample blocks in; residuals, an alarm and the damage's place out.
 
     learning ──undamaged seconds──▶ watching ──alarm──▶ gathering ──settle──▶ told
 
 The undamaged structure is identified from the first seconds, then its model runs beside the samples
 (4.34) and the residual is judged as `damage.examine` judges a record. Some seconds after an alarm
-the record so far is examined, which names the place. A device that restarts begins a new record.
+the record so far is examined, which names the place. A restarted device begins a new record.
 
-Nothing here reads a clock, bus or file, and every sample is dealt with by itself: the messages are
-bit for bit the same however the samples are cut into blocks, live or from a recording.
+Nothing here reads a clock, bus or file, and every sample is processed on its own: the messages are
+identical to the bit however the samples are cut into blocks, live or from a recording.
 """
 
 from dataclasses import dataclass, replace
@@ -43,14 +43,14 @@ GUIDANCE = "unload the structure and inspect it; its place follows as an event"
 
 @dataclass(frozen=True)
 class LiveSettings:
-    """How a structure is watched.
+    """Settings of the monitoring of a structure.
 
     Attributes:
-        undamaged: seconds from the first sample on that are taken as undamaged.
+        undamaged: length of the undamaged start, from the first sample on [s].
         rate: probability of any false alarm within `span`.
-        span: [s].
-        settle: data after an alarm from which its place is found [s].
-        known: take the file's values as true where it marks them as unknown.
+        span: period that `rate` refers to [s].
+        settle: length of data after an alarm used to find its place [s].
+        known: take the file's values as true even if it marks them as unknown.
     """
 
     undamaged: float = 2.0
@@ -61,12 +61,12 @@ class LiveSettings:
 
 
 class LiveDamage:
-    """A structure watched on line.
+    """A structure monitored online.
 
     Args:
-        structure: the undamaged one; at its first sample it is as the file has it.
+        structure: the undamaged structure; at its first sample it is in the state of the file.
         dt: time between samples [s].
-        settings: how.
+        settings: settings of the monitoring.
 
     Raises:
         ModelError: a setting is out of range.
@@ -80,7 +80,7 @@ class LiveDamage:
         self._boot: int | None = None
 
     def prepare(self) -> None:
-        """Compile now what the first samples will need; nothing is remembered."""
+        """Compile what the first samples need; no state is kept."""
         settings = replace(self._settings, known=True, undamaged=LEAST * self._dt)
         trial, count = LiveDamage(self._structure, self._dt, settings), LEAST + 2
         names = (*self._structure.signals, *self._loads)
@@ -89,7 +89,7 @@ class LiveDamage:
         trial.update(SampleBlock("", 0, 0, numbers, numbers, tuple(still)))
 
     def update(self, block: SampleBlock) -> list[Said]:
-        """What there is to say about the next samples.
+        """The messages about the next samples.
 
         Raises:
             ModelError: the block lacks a channel of the structure.
@@ -126,7 +126,7 @@ class LiveDamage:
         return [self._estimates(begin, rows), *said] if rows else said
 
     def _learn(self, row: int) -> list[Said]:
-        """The undamaged structure, and the same samples judged by it."""
+        """The undamaged structure, and the judgement of the same samples."""
         settings, head = self._settings, self._record.record(row + 1)
         try:
             base = reference(self._structure, head, self._learnt * self._dt, known=settings.known)
@@ -151,7 +151,7 @@ class LiveDamage:
         return []
 
     def _place(self, row: int) -> str:
-        """What the record up to a row shows, in words."""
+        """What the record up to a row shows, as text."""
         chosen, head = self._settings, self._record.record(row + 1)
         settings = Settings(
             self._learnt * self._dt, chosen.rate, settle=chosen.settle, known=chosen.known
@@ -186,7 +186,7 @@ class LiveDamage:
 
 
 class _Beside:
-    """The undamaged model beside the samples, one step at a time."""
+    """The undamaged model run beside the samples, one step at a time."""
 
     def __init__(self, base: Reference, settings: LiveSettings, dt: float) -> None:
         self.model = base.model
@@ -203,9 +203,9 @@ class _Beside:
         self.judge = CumulativeSum(len(base.sigma), threshold)
 
     def step(self, record: GrowingRecord, row: int) -> tuple[FloatArray, bool]:
-        """Residuals, then the statistic over its threshold, shape (m + 1,); and whether it is over.
+        """Residuals and statistic over threshold, shape (m + 1,); and whether that exceeds 1.
 
-        Rows have to come one after the other.
+        Rows must be passed in order.
         """
         if row:
             self._advance(record, row - 1)

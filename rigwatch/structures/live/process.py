@@ -1,4 +1,4 @@
-"""A structure watched on a rig's bus: the loop around `live.LiveDamage`."""
+"""Monitors a structure on a rig's bus: the loop around `live_watch.LiveDamage`."""
 
 import time
 
@@ -26,13 +26,13 @@ PROCESS = "structure"
 
 
 class StructureProcess:
-    """What one run has open.
+    """The resources of one run.
 
     Args:
         bus: where samples come from and results go.
         watched: the structure.
-        history: samples before the first one heard that are wanted too, as far as the ring has
-            them: a structure's record begins with its device.
+        history: number of samples to fetch from the ring before the first one received: a
+            structure's record begins when its device starts.
     """
 
     def __init__(self, bus: Bus, watched: LiveDamage, history: int) -> None:
@@ -41,7 +41,7 @@ class StructureProcess:
         self.reader = SampleReader(bus, history=history)
 
     def turn(self, timeout: float = TURN) -> None:
-        """Deal with what has come, waiting for at most `timeout` [s]."""
+        """Process what has arrived, waiting at most `timeout` [s]."""
         for item in self.reader.read(timeout):
             if isinstance(item, SampleBlock):
                 self._take(item)
@@ -50,7 +50,7 @@ class StructureProcess:
             self._bus.publish(HEALTH, self._health())
 
     def close(self) -> None:
-        """Leave the bus in order."""
+        """Close the connection to the bus."""
         self.reader.close()
 
     def _take(self, block: SampleBlock) -> None:
@@ -73,7 +73,7 @@ class StructureProcess:
 
 
 def watch_rig(config: RigConfig, watched: LiveDamage) -> None:
-    """Watch the rig until a signal ends it.
+    """Monitor the rig until a signal ends the process.
 
     Raises:
         BusError: the bus cannot be joined.

@@ -1,4 +1,4 @@
-"""What cannot stand is refused before anything is computed: one line, with the key to look at."""
+"""Refuses invalid structures before any computation, in one line that names the key."""
 
 import re
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ def load_structure(path: Path | str) -> Structure:
     """The structure file at `path`, checked.
 
     Raises:
-        ConfigError: it does not fit, or describes what cannot stand (see `check`).
+        ConfigError: it is malformed, or the structure is invalid (see `check`).
     """
     structure = load(path, Structure)
     check(structure, path)
@@ -32,11 +32,11 @@ def load_structure(path: Path | str) -> Structure:
 
 
 def check(structure: Structure, file: Path | str) -> None:
-    """Refuse a structure that cannot stand.
+    """Refuse an invalid structure.
 
     Raises:
-        ConfigError: a name is unfit, an end or a loaded node is unknown, a mass is not positive, a
-            law lacks its length, a node is unconnected, or a part floats freely (rigid mode).
+        ConfigError: a name is invalid, an end or a loaded node is unknown, a mass is not positive,
+            a law lacks its length, a node is unconnected, or a part floats freely (rigid mode).
     """
     for key, found, expected in _complaints(structure):
         raise ConfigError(file, key, found, expected)
@@ -110,7 +110,7 @@ def _bad_signals(structure: Structure) -> Iterator[tuple[str, str, str]]:
 
 
 def _loose_nodes(structure: Structure) -> Iterator[tuple[str, str, str]]:
-    """Nodes without any spring, and groups of nodes that no spring ties to ground."""
+    """Refuse nodes without a spring, and groups of nodes that no spring connects to ground."""
     held = {end for spring in structure.springs.values() for end in spring.between}
     for name in structure.nodes:
         if name not in held:

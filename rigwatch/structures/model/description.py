@@ -1,4 +1,4 @@
-"""A structure as a file: nodes with a mass that move along one axis, and what holds them.
+"""The structure file: nodes with mass that move along one axis, with springs, dampers and loads.
 
     [nodes.6]
     mass = 1.0
@@ -32,17 +32,17 @@ INFINITE = float("inf")
 
 
 class Coefficient(Section, frozen=True, kw_only=True):
-    """A number that may have to be identified."""
+    """A number, known or to be identified."""
 
-    value: Annotated[float, Meta(description="what it is taken for where it is known")]
+    value: Annotated[float, Meta(description="its value if known")]
     unknown: Annotated[bool, Meta(description="whether it is to be identified")] = False
-    guess: Annotated[float | None, Meta(description="where to start, the value if left out")] = None
+    guess: Annotated[float | None, Meta(description="initial guess; the value if left out")] = None
     low: Annotated[float, Meta(description="lower bound")] = -INFINITE
     high: Annotated[float, Meta(description="upper bound")] = INFINITE
 
     @property
     def start(self) -> float:
-        """Where an identification starts."""
+        """The initial guess of an identification."""
         return self.value if self.guess is None else self.guess
 
     @property
@@ -61,11 +61,11 @@ def coefficient(number: Number) -> Coefficient:
 
 
 class Node(Section, frozen=True, kw_only=True):
-    """A point that moves along the structure's axis."""
+    """A point mass that moves along the structure's axis."""
 
     mass: Annotated[Number, Meta(description="[kg]")]
-    x: Annotated[Number, Meta(description="position at the start [m]")] = 0.0
-    v: Annotated[Number, Meta(description="velocity at the start [m/s]")] = 0.0
+    x: Annotated[Number, Meta(description="initial position [m]")] = 0.0
+    v: Annotated[Number, Meta(description="initial velocity [m/s]")] = 0.0
 
 
 class Spring(Section, frozen=True, kw_only=True):
@@ -101,7 +101,7 @@ class Sine(Section, frozen=True, kw_only=True):
 class Load(Section, frozen=True, kw_only=True):
     """A force on a node, or with `base` an acceleration of the ground: the sum of its parts."""
 
-    node: Annotated[str, Meta(description="node that it pushes")] = ""
+    node: Annotated[str, Meta(description="node that it acts on")] = ""
     base: Annotated[bool, Meta(description="whether it moves the ground instead")] = False
     step: Annotated[float, Meta(description="[N], or [m/s^2] at the base")] = 0.0
     start: Annotated[float, Meta(description="time of the step [s]")] = 0.0
@@ -113,7 +113,7 @@ class Structure(Section, frozen=True, kw_only=True):
     """The whole file."""
 
     name: Text
-    summary: Annotated[Text, Meta(description="what it is, in a sentence")]
+    summary: Annotated[Text, Meta(description="description, a sentence")]
     source: Annotated[str, Meta(description="where it is from")] = ""
     nodes: Annotated[dict[str, Node], Meta(min_length=1)]
     springs: dict[str, Spring]
@@ -131,7 +131,7 @@ class Structure(Section, frozen=True, kw_only=True):
 
 
 def label(kind: str, node: str) -> str:
-    """Name of a node's own quantity: x6, or x_roof where the node's name is no number."""
+    """Name of a node's quantity: x6, or x_roof if the node's name is not a number."""
     return f"{kind}{node}" if node[:1].isdigit() else f"{kind}_{node}"
 
 
@@ -140,7 +140,7 @@ DAMPER_PARTS = {"damping": "", "quadratic": "_quadratic", "cubic": "_cubic"}
 
 
 def coefficients(structure: Structure) -> dict[str, Coefficient]:
-    """Every number of the structure by the name it has in the equations, absent ones too.
+    """Every coefficient of the structure by its name in the equations, absent ones included.
 
     A node's mass is m6; a spring's stiffness has the spring's own name, k1_6, and its other parts
     k1_6_cubic and so on; a node's start is x6(0) and v6(0).

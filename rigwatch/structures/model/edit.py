@@ -23,7 +23,7 @@ T = TypeVar("T", bound=msgspec.Struct)
 
 @dataclass(frozen=True)
 class Change:
-    """What becomes of one coefficient; None leaves a part as it is."""
+    """The change of one coefficient; None leaves an attribute unchanged."""
 
     value: float | None = None
     unknown: bool | None = None
@@ -62,7 +62,7 @@ def changed(structure: Structure, changes: Mapping[str, Change]) -> Structure:
 
 
 def with_values(structure: Structure, values: Mapping[str, float]) -> Structure:
-    """The structure with other values of some coefficients."""
+    """The structure with new values of some coefficients."""
     return changed(structure, {name: Change(value=value) for name, value in values.items()})
 
 

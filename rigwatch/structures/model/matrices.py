@@ -1,6 +1,6 @@
-"""Mass and stiffness matrices of a structure, its natural frequencies, and what is not tied down.
+"""Mass and stiffness matrices of a structure, its natural modes, and its unconstrained nodes.
 
-Linear parts only: M diagonal [kg], K = Σ_s k_s·B_sᵀ·B_s [N/m], modes K·φ = ω²·M·φ.
+Linear terms only: M diagonal [kg], K = Σ_s k_s·B_sᵀ·B_s [N/m], modes K·φ = ω²·M·φ.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ class Modes:
 
     Attributes:
         omega: natural frequencies, shape (n,) [rad/s].
-        shapes: mass-normalised, one column a mode, shape (n, n) [kg^-1/2].
+        shapes: mass-normalised, one column per mode, shape (n, n) [kg^-1/2].
     """
 
     omega: FloatArray
@@ -64,7 +64,7 @@ def modes(structure: Structure) -> Modes:
 
 
 def afloat(structure: Structure) -> list[list[str]]:
-    """Groups of nodes that springs tie to each other but not to ground."""
+    """Groups of nodes that springs connect to each other but not to ground."""
     groups = {node: {node} for node in structure.nodes}
     grounded: set[str] = set()
     for spring in structure.springs.values():

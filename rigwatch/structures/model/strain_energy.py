@@ -1,8 +1,8 @@
-"""Which spring to suspect: modal strain energy (thesis Appendix A).
+"""Observability of springs from modal strain energy (thesis Appendix A).
 
     U_ij = ½·φ̂iᵀ·[K]_j·φ̂i,   φ̂i mass-normalised, [K]_j with every spring but j set to zero    (A.1)
 
-as a share of the mode's total. A spring that carries much energy in many modes shows itself in the
+as a share of the mode's total. A spring that carries much energy in many modes shows in the
 motion under any load; one that carries little is hard to identify.
 """
 
@@ -38,7 +38,7 @@ class StrainEnergy:
         return [self.springs[j] for j in order]
 
     def grouped(self, groups: dict[str, tuple[str, ...]]) -> "StrainEnergy":
-        """Springs counted together under one name, such as all those of stiffness k1."""
+        """A group of springs under one name, such as all those of stiffness k1."""
         places = {name: index for index, name in enumerate(self.springs)}
         columns = [[places[spring] for spring in members] for members in groups.values()]
         return StrainEnergy(
@@ -65,7 +65,7 @@ def strain_energy(structure: Structure) -> StrainEnergy:
 
 
 def by_family(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """Springs by the part of their name before the underscore: k1_6 and k1_7 belong to k1."""
+    """Springs grouped by their name before the underscore: k1_6 and k1_7 belong to k1."""
     families: dict[str, tuple[str, ...]] = {}
     for name in names:
         family = name.partition("_")[0]

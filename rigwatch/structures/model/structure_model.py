@@ -6,7 +6,7 @@ the row of a spring or damper s (+1 at its first node, −1 at its second) and d
     m_i·dv_i/dt = load_i − Σ_s B_si·( F_s(d_s, ḋ_s) − port_s )
 
 Each spring is also a port `at_<spring>` between its nodes, so that an effect there (a softer, a
-harder, a broken spring) enters with the signs of the spring itself.
+harder, a broken spring) has the sign convention of the spring.
 """
 
 from collections.abc import Iterator, Mapping
@@ -65,7 +65,7 @@ def to_model(structure: Structure, *, ports: bool = True) -> Model:
     """The structure as equations.
 
     Args:
-        structure: what to describe; its unknown coefficients become free parameters.
+        structure: its unknown coefficients become free parameters.
         ports: whether effects may enter at the springs (the kernel is smaller without).
 
     Raises:

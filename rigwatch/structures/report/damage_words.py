@@ -1,4 +1,4 @@
-"""What an examination found, in words for people."""
+"""The result of an examination as text."""
 
 from rigwatch.structures.damage import Damage, Examination, Ranking
 from rigwatch.structures.model import label
@@ -18,12 +18,12 @@ def verdict(found: Examination) -> str:
 
 
 def changes(damage: Damage) -> str:
-    """What changed, in words."""
+    """The change, as text."""
     return " and ".join(f"{c.spring} {c.words}" for c in damage.ranking.changed)
 
 
 def remark(found: Examination) -> str:
-    """What a reader has to know of the sensors, empty where every position was measured."""
+    """Caveats about the sensors, empty if every position is measured."""
     model = found.reference.model
     nodes = [label("x", node) for node in model.structure.nodes]
     hidden = [name for name in nodes if name not in model.signals]
@@ -36,7 +36,7 @@ def remark(found: Examination) -> str:
 
 
 def rule(found: Examination) -> str:
-    """What counts as an alarm."""
+    """The definition of an alarm."""
     if found.settings.limit is not None:
         return f"An alarm is a residual beyond {found.settings.limit:g}, the limit that was set."
     share = 100 * found.settings.rate
@@ -47,7 +47,7 @@ def rule(found: Examination) -> str:
 
 
 def alike(ranking: Ranking) -> str:
-    """Which places this record cannot tell apart."""
+    """The places that this record cannot distinguish."""
     changed = ranking.changed
     known = "No change of a single spring explains the data. " if ranking.second else ""
     vague = [
@@ -59,7 +59,7 @@ def alike(ranking: Ranking) -> str:
 
 
 def doubt(damage: Damage) -> str:
-    """A warning where nothing explains the damage, else nothing."""
+    """A warning if nothing explains the damage, else empty."""
     if damage.explained:
         return ""
     return (
@@ -69,7 +69,7 @@ def doubt(damage: Damage) -> str:
 
 
 def unseen(damage: Damage, found: Examination) -> str:
-    """At which springs the data would not show a damage."""
+    """The springs at which the data would not show damage."""
     weak = damage.ranking.unseen
     total = len(found.reference.model.structure.springs)
     if not weak:

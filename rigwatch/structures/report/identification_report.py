@@ -1,4 +1,4 @@
-"""What one method or several found of a structure, as one web page that needs no network."""
+"""The results of identification methods as one web page that needs no network."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,25 +20,25 @@ from rigwatch.wire.arrays import FloatArray
 Series = Mapping[str, FloatArray]
 
 COLOURS = ("held", "before", "model", "rest", "good")
-"""Of the methods, as the page's style names them; there are five methods."""
+"""Colour classes of the five methods in the page's style."""
 SMALLEST = 1e-8
-"""Relative change that is drawn for all that are smaller."""
+"""Smallest relative change drawn."""
 MOST = 1e6
 FOLLOWS = 0.5
-"""Share of the signals up to which a trajectory follows them."""
+"""Residual share of the signals below which a trajectory follows them."""
 MARKED = 60
-"""Iterations up to which each has its mark."""
+"""Number of iterations up to which each has a marker."""
 
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What is reported.
+    """The contents of the report.
 
     Attributes:
-        problem: what was asked.
+        problem: the identification problem.
         record: name of the record.
         found: by method, in the order in which they are shown.
-        failed: message of each method that gave nothing.
+        failed: message of each method that failed.
     """
 
     problem: Problem
@@ -77,7 +77,7 @@ def report_html(findings: Findings) -> str:
 
 
 def _headline(f: Findings) -> str:
-    """The method that explains most, where one explains anything."""
+    """The method that explains most, if any explains something."""
     if not f.converged:
         return "no method converged"
     shares = {m: np.nan_to_num(_share(f, m), nan=np.inf) for m in f.converged}
@@ -93,7 +93,7 @@ def _left(f: Findings, method: str) -> str:
 
 
 def _share(f: Findings, method: str) -> float:
-    """Part of the signals that is not explained, each signal over its own rms."""
+    """Unexplained share of the signals, each over its rms."""
     observed = f.problem.observed
     seen = np.isfinite(observed).any(axis=0)
     with np.errstate(all="ignore"):
@@ -102,7 +102,7 @@ def _share(f: Findings, method: str) -> float:
 
 
 def _iterations(f: Findings) -> str:
-    """How fast each method settled."""
+    """The convergence of each method."""
     changes = {method: _changes(f.problem, one) for method, one in f.found.items()}
     longest = max((len(c) for c in changes.values()), default=1)
     high = max((float(c.max()) for c in changes.values() if len(c)), default=1.0)
@@ -123,7 +123,7 @@ def _iterations(f: Findings) -> str:
 def _changes(problem: Problem, one: Identification) -> FloatArray:
     """Largest relative change at each iteration, the first from the guess; shape (iterations,).
 
-    0 where nothing changed.
+    0 if nothing changed.
     """
     path = np.vstack([problem.guess, one.iterations])
     size = np.maximum(np.abs(path[1:]), 1e-9 * np.abs(path[1:]).max(initial=1e-300))
@@ -133,7 +133,7 @@ def _changes(problem: Problem, one: Identification) -> FloatArray:
 
 
 def _signals(f: Findings) -> Iterator[tuple[str, str, str]]:
-    """Name of each measured output, its drawing, and that of what is left of it."""
+    """Name of each measured output, its plot, and the plot of its residual."""
     seconds, outputs = seconds_of(f.problem), f.problem.sweeper.compiled.system.model.outputs
     for k, (name, output) in enumerate(outputs.items()):
         measured = f.problem.observed[:, k]
@@ -171,6 +171,6 @@ def _residual(
 
 
 def _usual(residuals: Sequence[FloatArray], measured: FloatArray) -> tuple[float, float]:
-    """Ends of the axis, which a method that runs away does not stretch."""
+    """Limits of the axis, unaffected by a method that diverges."""
     most = 1.5 * float(np.nanmax(np.abs(measured)))
     return limits(np.zeros(1), *(np.clip(r, -most, most) for r in residuals))

@@ -4,11 +4,11 @@ from rigwatch.page import Plot
 from rigwatch.structures.model import StrainEnergy
 
 COLOURS = 8
-"""Of series in the page's style; more springs begin with the first colour again."""
+"""Colours of series in the page's style; more springs reuse them in order."""
 
 
 def shares_plot(energy: StrainEnergy, title: str) -> Plot:
-    """One group of bars a mode, one bar a spring."""
+    """One group of bars per mode, one bar per spring."""
     modes, springs = energy.shares.shape
     names = [f"{mode}: {omega:.1f}" for mode, omega in enumerate(energy.omega.tolist(), start=1)]
     colours = [f"series{j % COLOURS + 1}" for j in range(springs)]

@@ -1,7 +1,7 @@
 """Modes of a structure as one web page: both figures of the thesis's Appendix A and the shares.
 
-Figure A.1 counts springs of one stiffness together; figure A.2 takes apart those of the family
-that is most to suspect.
+Figure A.1 counts springs of one stiffness together; figure A.2 splits the family that
+is most suspect.
 """
 
 from rigwatch.page import page
@@ -9,15 +9,15 @@ from rigwatch.structures.model import StrainEnergy, Structure, by_family
 from rigwatch.structures.report.mode_drawing import shares_plot
 
 TOLD = 6
-"""Springs that are named as most to suspect."""
+"""Number of springs named as most suspect."""
 
 
 def modes_html(structure: Structure, energy: StrainEnergy) -> str:
     """The page.
 
     Args:
-        structure: as described.
-        energy: of each of its springs.
+        structure: the structure.
+        energy: strain energy of each of its springs.
     """
     families = energy.grouped(by_family(energy.springs))
     leading = families.ranking()[0]

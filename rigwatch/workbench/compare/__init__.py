@@ -1,6 +1,7 @@
 """The model beside the measurements: errors against the noise floor, and where they arise."""
 
 from rigwatch.workbench.compare.compare import Comparison, compare, comparison
+from rigwatch.workbench.compare.horizon import with_horizon_of
 from rigwatch.workbench.compare.locate import Region, locate, motion, sample_numbers
 from rigwatch.workbench.compare.preparation import (
     Bench,
@@ -10,11 +11,13 @@ from rigwatch.workbench.compare.preparation import (
     told_by_healthy,
 )
 from rigwatch.workbench.compare.uncertainty_budget import apparent_strength, beyond
+from rigwatch.workbench.compare.warm import Warm
 
 __all__ = [
     "Bench",
     "Comparison",
     "Region",
+    "Warm",
     "apparent_strength",
     "bench_of",
     "beyond",
@@ -26,4 +29,5 @@ __all__ = [
     "prepared",
     "sample_numbers",
     "told_by_healthy",
+    "with_horizon_of",
 ]

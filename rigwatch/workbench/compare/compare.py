@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import Convergence
+from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.compare.preparation import Bench, open_bench
 from rigwatch.workbench.compare.uncertainty_budget import beyond
 from rigwatch.workbench.data import METHODS

@@ -5,9 +5,10 @@ remainder), then the fit of the model with the effects accepted so far, and the 
 alone would leave.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.compare.horizon import with_horizon
 from rigwatch.workbench.data import (
     Data,
     NoiseFloor,
@@ -23,6 +24,7 @@ from rigwatch.workbench.fit import (
     fit_base,
     fit_model,
     learns_from_healthy,
+    loosely_told,
     referenced,
     with_healthy_remainder,
     with_hold,
@@ -64,6 +66,7 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
         ModelError: data have changed, or do not suit the model.
     """
     check_data(study)
+    study = with_horizon(study)
     return told_by_healthy(study, prepare(study))
 
 
@@ -81,6 +84,10 @@ def told_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray |
     scale = quiet_scale(data.train) if several else None
     study = with_hold(study, data, scale)
     study = commissioned(study, data, scale)
+    if study.kept is not None and data.healthy is not None:
+        seconds = len(data.healthy) * data.healthy.dt
+        loose = loosely_told(study.kept, study.model, seconds)
+        data = replace(data, remarks=(*data.remarks, *loose))
     return *referenced(study, data, scale), scale
 
 
@@ -111,4 +118,4 @@ def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> Nois
     if base.placements:
         fits.append(fit_base(study, healthy, base.train.scale, afar=True))
     method = "healthy motion" if healthy.along_motion else "healthy"
-    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).train.rms, method)
+    return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).held_out.rms, method)

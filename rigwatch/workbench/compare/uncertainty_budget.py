@@ -1,8 +1,9 @@
 """What an interval must hold that no single recording shows: the healthy recording's part.
 
 Two things make a fit wrong in the same way all along a recording. The parameters that were taken
-from the healthy recording (`kept`) are uncertain themselves: with S their covariance, J_θ and J_κ
-the slopes of the residual by what is fitted and by what is kept,
+from the healthy recording (`kept`), and those that are known to some deviation, such as a mass, are
+uncertain themselves: with S their covariance, J_θ and J_κ the slopes of the residual by what is
+fitted and by what is kept,
 
     Cov θ ← Cov θ + A·S·Aᵀ,   A = J_θ⁺·J_κ
 
@@ -47,7 +48,7 @@ def beyond(study: Study, data: Data, bare: Fitted | None, fitted: Fitted) -> dic
 def _from_kept(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str, float]:
     """What the uncertainty of the kept parameters does to the fitted ones."""
     train = fitted.train
-    compiled = compile_system(compose(loosened(study.model), fitted.placements))
+    compiled = compile_system(compose(loosened(study.model, kept.names), fitted.placements))
     loose = dataclasses.replace(
         train, compiled=compiled, parameters=compiled.vector(train.values())
     )

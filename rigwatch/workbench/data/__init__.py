@@ -1,5 +1,6 @@
 """What a study measures: signals on one grid, their scales, and the noise floor."""
 
+from rigwatch.workbench.data.columns import Columns
 from rigwatch.workbench.data.motion import along_motion, goes_along_motion
 from rigwatch.workbench.data.noise_floor import (
     METHODS,
@@ -8,14 +9,23 @@ from rigwatch.workbench.data.noise_floor import (
     from_residual,
     quiet_scale,
 )
+from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
+from rigwatch.workbench.data.proposals import (
+    Part,
+    proposed_low_pass,
+    proposed_split,
+)
 from rigwatch.workbench.data.signal_scales import port_sizes
-from rigwatch.workbench.data.signals import Data, MotionSensor, parameters_of, prepare
+from rigwatch.workbench.data.signals import Data, MotionSensor, parameters_of, prepare, read_columns
 
 __all__ = [
     "METHODS",
+    "RATES_ALIKE",
+    "Columns",
     "Data",
     "MotionSensor",
     "NoiseFloor",
+    "Part",
     "along_motion",
     "find_period",
     "from_residual",
@@ -23,5 +33,8 @@ __all__ = [
     "parameters_of",
     "port_sizes",
     "prepare",
+    "proposed_low_pass",
+    "proposed_split",
     "quiet_scale",
+    "read_columns",
 ]

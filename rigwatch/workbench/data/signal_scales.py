@@ -4,7 +4,7 @@ import numpy as np
 from scipy.signal import detrend
 
 from rigwatch.physics.engine.compile import evaluated
-from rigwatch.physics.engine.equations import Model, Port, compose
+from rigwatch.physics.engine.equations import Model, Port, compose, spelt_out
 from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.physics.engine.score import sizes_at_port
 from rigwatch.wire.arrays import FloatArray
@@ -18,6 +18,7 @@ def port_sizes(model: Model, recording: Recording) -> dict[str, Sizes]:
     Beside the port's own variables there are `dt`, the time between samples [s], and at a signal
     `u` and `rate`, the size of its rate of change.
     """
+    model = spelt_out(model)
     signals = _measured(model, recording)
     return {name: _sizes(port, model, signals, recording) for name, port in model.ports.items()}
 

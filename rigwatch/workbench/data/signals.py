@@ -6,6 +6,7 @@ simulation needs it everywhere, and the outputs beside it are not counted.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -13,13 +14,15 @@ from scipy.signal import butter, sosfiltfilt
 from rigwatch.physics.engine.equations import Input, Model, Output
 from rigwatch.physics.engine.fit import Recording, Thinning
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.errors import ModelError
+from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.wire.session import open_session
 from rigwatch.workbench.data.columns import Columns, bridged
 from rigwatch.workbench.data.one_rate import on_one_rate
 from rigwatch.workbench.data.signal_units import check_unit, in_si
-from rigwatch.workbench.study import Derive, Span, Study, StudyFile, nearest
+from rigwatch.workbench.study import Derive, Span, Study, StudyFile
 
+USUAL = 0.5
+"""Horizon where nothing else is known [s]."""
 MOST_MISSING = 0.2
 """Share of samples that may be missing from an input."""
 
@@ -67,14 +70,14 @@ class Data:
         return replace(self, train=self.healthy, held_out=self.healthy, healthy=None, remarks=())
 
 
-def read_columns(study: Study, span: Span) -> Columns:
+def read_columns(folder: Path, span: Span) -> Columns:
     """The channels of a session, or of a part of it.
 
     Raises:
         SessionError: it cannot be read.
         ModelError: it holds no samples there.
     """
-    blocks = list(open_session(study.folder / span.session).samples())
+    blocks = list(open_session(folder / span.session).samples())
     boots = {(b.device, b.boot) for b in blocks}
     if not blocks or len(boots) > 1:
         raise ModelError(f"{span.session}: found {len(boots)} runs of a device, expected one")
@@ -142,7 +145,7 @@ def prepare(study: Study) -> Data:
     """
     file, remarks = study.file, list[str]()
     tables = {
-        use: [with_derived(read_columns(study, span), file.derive) for span in spans]
+        use: [with_derived(read_columns(study.folder, span), file.derive) for span in spans]
         for use, spans in (
             ("train", file.train),
             ("held_out", file.held_out),
@@ -151,14 +154,33 @@ def prepare(study: Study) -> Data:
     }
     tables = _on_one_rate(study, tables, remarks)
     dt = tables["train"][0].dt
-    horizon = max(round(file.horizon / dt), 2)
+    horizon = max(round((file.horizon or USUAL) / dt), 2)
     made = {
         use: _recording(study, group, horizon, use, remarks) if group else None
-        for use, group in tables.items()
+        for use, group in _with_known(study, tables).items()
     }
     assert made["train"] is not None
     assert made["held_out"] is not None
+    if study.horizon_from:
+        remarks.append(
+            f"horizon {file.horizon:g} s, chosen from {study.horizon_from}; `horizon` in the study"
+            " says otherwise"
+        )
     return Data(made["train"], made["held_out"], made["healthy"], horizon, tuple(remarks))
+
+
+def _with_known(study: Study, tables: Mapping[str, list[Columns]]) -> dict[str, list[Columns]]:
+    """Channels, and what is known of each recording beside them, as if it had been measured."""
+    spans = {use: getattr(study.file, use) for use in tables}
+    return {
+        use: [_beside(span, table) for span, table in zip(spans[use], group, strict=True)]
+        for use, group in tables.items()
+    }
+
+
+def _beside(span: Span, table: Columns) -> Columns:
+    known = {name: np.full(len(table), value) for name, value in span.parameters.items()}
+    return replace(table, values={**table.values, **known})
 
 
 def _on_one_rate(

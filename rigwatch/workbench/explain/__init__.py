@@ -11,6 +11,18 @@ from rigwatch.workbench.explain.explain import (
     explanation,
     ranking,
 )
+from rigwatch.workbench.explain.next_experiment import Experiment, excitation
 from rigwatch.workbench.explain.verdict import Verdict, judge
 
-__all__ = ["Explanation", "Row", "Verdict", "as_data", "explain", "explanation", "judge", "ranking"]
+__all__ = [
+    "Experiment",
+    "Explanation",
+    "Row",
+    "Verdict",
+    "as_data",
+    "excitation",
+    "explain",
+    "explanation",
+    "judge",
+    "ranking",
+]

@@ -13,10 +13,14 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import METHODS, from_residual
 from rigwatch.workbench.explain.verdict import Verdict
+from rigwatch.workbench.study import Study
 
 MOST = 5.0
 """Error on the healthy recording over its noise up to which a model can judge."""
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
+VARIED = (
+    "`rigwatch study base {study} --take enough` looks for variants of the model that do better"
+)
 
 UNTOLD = (
     "the model could not be checked on a healthy recording: record one with nothing wrong and list"
@@ -42,6 +46,13 @@ def inadequate(bench: Bench) -> Verdict | None:
         f" {METHODS[noise.method]}), expected at most {MOST:g}: {ADVICE}"
     )
     return Verdict("model_inadequate", None, (), (), text)
+
+
+def with_base_offered(study: Study, found: Verdict) -> Verdict:
+    """The verdict with the command that looks for a better base, where the model has variants."""
+    if found.word != "model_inadequate" or not study.model.variants or not study.file.healthy:
+        return found
+    return replace(found, text=f"{found.text}; {VARIED.format(study=study.folder)}")
 
 
 def unchecked(bench: Bench, found: Verdict) -> Verdict:

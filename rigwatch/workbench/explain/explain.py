@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rigwatch.workbench.compare import Bench, Comparison, beyond, comparison, open_bench
-from rigwatch.workbench.explain.adequacy import inadequate, unchecked
+from rigwatch.workbench.explain.adequacy import inadequate, unchecked, with_base_offered
 from rigwatch.workbench.explain.believed import believed
+from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
-from rigwatch.workbench.explain.rough_verdict import leaves_much, modest
+from rigwatch.workbench.explain.rough_verdict import leaves_much, modest, not_alone
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.explain.verdict_calibration import seen
 from rigwatch.workbench.fit import Value, as_written, values
@@ -90,20 +91,23 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     """The ranking, what the verdict names in front, and the verdict."""
     stopped = _stopped(bench)
     if stopped is not None:
-        return rank_all(bench.study, bench.data, bench.base), stopped
+        rows = rank_all(bench.study, bench.data, bench.base)
+        return rows, with_base_offered(bench.study, stopped)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = believed(bench, rows)
-    rough = bench.study.model.rough and bench.data.along_motion
+    along = bench.data.along_motion
     much = verdict.word == "unknown_effect" or (
-        rough and leaves_much(bench.base, bench.floor, verdict)
+        along and leaves_much(bench.base, bench.floor, verdict)
     )
     if much and verdict.best is not None:
         progress(f"{verdict.best.label} leaves much: trying two effects at once")
         verdict = two_effects(bench, rows, verdict, progress)
     verdict = with_motion_sensor(bench, verdict)
-    if rough:
+    if along and bench.study.model.rough:
         verdict = modest(bench.base, rows, bench.floor, verdict)
-    verdict = unchecked(bench, verdict)
+    elif along:
+        verdict = not_alone(bench.base, bench.floor, verdict)
+    verdict = with_base_offered(bench.study, unchecked(bench, verdict))
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
@@ -117,7 +121,7 @@ def _stopped(bench: Bench) -> Verdict | None:
         "the model to the healthy recording": bare.convergence if bare else None,
         "the kept parameters to the healthy recording": kept.convergence if kept else None,
     }
-    return not_converged(ended) or inadequate(bench)
+    return not_converged(ended) or inadequate(bench) or unexcited(bench)
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:

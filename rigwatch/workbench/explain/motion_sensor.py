@@ -21,10 +21,9 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import Data, MotionSensor
-from rigwatch.workbench.explain.rough_verdict import NEARLY
-from rigwatch.workbench.explain.verdict import EQUAL, Verdict, Word
+from rigwatch.workbench.explain.verdict import EQUAL, NEARLY, Verdict, Word
 from rigwatch.workbench.explain.verdict_calibration import Evidence
-from rigwatch.workbench.fit import Fitted, block_errors, fit_model
+from rigwatch.workbench.fit import Fitted, block_differences, fit_model
 from rigwatch.workbench.ranking import Ranked, judge_fit
 
 STEPS = 2
@@ -188,5 +187,5 @@ def _ahead(one: Ranked, other: Ranked) -> bool:
     """Whether one does better on the recordings held out, beyond chance."""
     assert one.fitted is not None
     assert other.fitted is not None
-    difference = block_errors(other.fitted.held_out) - block_errors(one.fitted.held_out)
+    difference = block_differences(other.fitted.held_out, one.fitted.held_out)
     return bool(difference.mean() > EQUAL * difference.std(ddof=1) / np.sqrt(len(difference)))

@@ -19,6 +19,7 @@ import numpy as np
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.explain.rough_verdict import much_left
 from rigwatch.workbench.explain.verdict import Verdict, Word, judge
 from rigwatch.workbench.fit import Fitted, fit_model
 from rigwatch.workbench.ranking import SIMILAR, Progress, Ranked, judge_fit, refit
@@ -26,8 +27,6 @@ from rigwatch.workbench.ranking import SIMILAR, Progress, Ranked, judge_fit, ref
 LIKELY = 0.7
 """Share of the energy above the floor that a pair must explain to first order to be fitted."""
 MOST_PAIRS = 4
-ROUGHLY = 1.5
-"""Error over the noise floor that two effects may leave of a rough model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,14 +140,14 @@ def _fitted(bench: Bench, pairs: Sequence[Pair], progress: Progress) -> list[tup
 def _enough(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pair, Fitted]]:
     """Pairs that leave so little that they are worth naming.
 
-    Nothing but noise, as two wrong ones together explain much. A rough model leaves more, since
-    what it leaves on a healthy rig changes with the fault.
+    Nothing but noise, as two wrong ones together explain much. Along the measured motion the model
+    leaves more, since what it leaves on a healthy rig changes with the fault.
     """
-    rough, floor = bench.study.model.rough, bench.floor
+    floor, tolerant = bench.floor, bench.data.along_motion
     return [
         (pair, fitted)
         for pair, fitted in fits
-        if floor.reached(fitted.held_out) or (rough and floor.ratio(fitted.held_out) < ROUGHLY)
+        if floor.reached(fitted.held_out) or (tolerant and not much_left(bench.base, floor, fitted))
     ]
 
 

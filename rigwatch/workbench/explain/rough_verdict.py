@@ -1,4 +1,4 @@
-"""What a verdict on a rough model may claim.
+"""What a verdict on a model along its measured motion may claim, and on a rough one.
 
 A model that has learned what a healthy rig does knows it along the motions that it was shown. A
 fault changes the motion, and a little of what is left then is the model's own. So
@@ -6,7 +6,7 @@ fault changes the motion, and a little of what is left then is the model's own. 
 * where no more is left than on the healthy rig, nothing is missing, whatever would fit that better;
 * where hardly more is left, an effect that fits it is not named;
 * where the best effect leaves much more than the healthy rig does, another effect hides beside it
-  or in its place, and it is not named with confidence;
+  or in its place, and it is not named with confidence, whatever the model;
 * where the best effect leaves more than the healthy rig does, another one that does nearly as well
   may be the right one: the model's own error may favour either.
 """
@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.data import NoiseFloor
-from rigwatch.workbench.explain.verdict import MUCH_WORSE, Verdict
+from rigwatch.workbench.explain.verdict import MUCH_WORSE, NEARLY, Verdict
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import Ranked
 
@@ -32,18 +32,36 @@ A rough model's own error grows with the motion, and a strong fault changes the 
 rightly named alone leaves up to 1.3 times the healthy error and 1.3 % on the rigs looked at, one
 of two hidden effects 2.0 times and 6 %.
 """
-NEARLY = 0.8
-"""Share of the best effect's gain from which another one may be right as well."""
+
+
+def much_left(base: Fitted, floor: NoiseFloor, fitted: Fitted) -> bool:
+    """Whether a fit leaves so much that what it holds cannot be all that is missing.
+
+    Samples at which an effect jumps do not count, see `discontinuities.py`.
+    """
+    left, before = (floor.ratio(fit, fitted.calm) for fit in (fitted.held_out, base.held_out))
+    return left > MUCH and left**2 - 1 > SHARE * (before**2 - 1)
 
 
 def leaves_much(base: Fitted, floor: NoiseFloor, found: Verdict) -> bool:
-    """Whether the effect that is named leaves so much that it cannot be all that is missing."""
+    """Whether the effect that is named alone leaves so much that another must hide beside it."""
     if found.word != "missing_effect" or found.second or found.best is None:
         return False
-    if found.best.fitted is None:
-        return False
-    left, before = floor.ratio(found.best.fitted.held_out), floor.ratio(base.held_out)
-    return left > MUCH and left**2 - 1 > SHARE * (before**2 - 1)
+    return found.best.fitted is not None and much_left(base, floor, found.best.fitted)
+
+
+def not_alone(base: Fitted, floor: NoiseFloor, found: Verdict) -> Verdict:
+    """The verdict, with no confidence in one effect that leaves much."""
+    if not leaves_much(base, floor, found):
+        return found
+    assert found.best is not None
+    assert found.best.fitted is not None
+    left = floor.ratio(found.best.fitted.held_out)
+    text = (
+        f"{found.best.label} explains most, but leaves {left:.2f} times the error on the"
+        f" healthy recording, expected at most {MUCH:g}: something else may hide beside it"
+    )
+    return replace(found, word="undetermined", text=text)
 
 
 def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdict) -> Verdict:
@@ -68,13 +86,7 @@ def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdi
         )
         return replace(found, word="undetermined", text=text)
     if leaves_much(base, floor, found):
-        assert found.best.fitted is not None
-        left = floor.ratio(found.best.fitted.held_out)
-        text = (
-            f"{found.best.label} explains most, but leaves {left:.2f} times the error on the"
-            f" healthy recording, expected at most {MUCH:g}: something else may hide beside it"
-        )
-        return replace(found, word="undetermined", text=text)
+        return not_alone(base, floor, found)
     rivals = _nearly_as_good(rows, floor, found)
     if not rivals:
         return found

@@ -15,12 +15,18 @@ from typing import Literal
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import Convergence
 from rigwatch.physics.engine.score import ALIKE
+from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.remainder import (
+    accepted_as_well,
+    explains,
+    explains_too_little,
+    what_stays,
+)
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, doubt
-from rigwatch.workbench.fit import Fitted, block_errors
-from rigwatch.workbench.ranking import EXPLAINED, SAME, SIMILAR, Ranked, left_over
+from rigwatch.workbench.fit import Fitted, block_differences
+from rigwatch.workbench.ranking import SAME, SIMILAR, Ranked
 
 Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
@@ -29,10 +35,14 @@ EQUAL = 2.0
 """Standard deviations of a paired difference below which two effects do equally well."""
 NO_DIFFERENCE = 1e-4
 """Relative difference of errors that only says where two fits happened to stop."""
+LITTLE_MORE = 0.01
+"""Relative difference of errors that is no reason for a further parameter, where more is left."""
 PERHAPS = 1.0
 """Standard deviations by which an effect with more parameters may be the better one."""
 MUCH_WORSE = 1.5
 """Ratio of held-out errors that no chance favour of what else is missing explains."""
+NEARLY = 0.8
+"""Share of the best effect's gain from which another one may be right as well."""
 MOST_OF_IT = 0.75
 """Share of a gain that an effect of lower order must have to go first."""
 
@@ -95,6 +105,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
     word, text = _word(base, best, rivals, floor)
+    text += what_stays(base, best, floor) + accepted_as_well(rows, (*members, *rivals))
     return Verdict(word, best, members, rivals, text, evidence=evidence)
 
 
@@ -102,7 +113,7 @@ def _word(
     base: Fitted, best: Ranked, rivals: tuple[str, ...], floor: NoiseFloor
 ) -> tuple[Word, str]:
     """The verdict where an effect lowers the error, and a sentence for people."""
-    if floor.method != "quiet band" and not _explains(base, best, floor):
+    if explains_too_little(base, best, floor):
         return "unknown_effect", (
             f"the best known effect, {best.label}, leaves much of the error above the noise floor"
         )
@@ -114,11 +125,6 @@ def _word(
         f"{best.label} is missing: the held-out error falls from {base.held_out_error:.3g} to"
         f" {best.held_out_error:.3g}"
     )
-
-
-def _explains(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
-    """Whether it explains the error above the floor, but for samples at which it jumps."""
-    return left_over(base, row, floor, tolerant=True) <= 1 - EXPLAINED
 
 
 def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> float:
@@ -159,7 +165,9 @@ def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
     if row.free > best.free:
         no_worse = row.held_out_error <= best.held_out_error * (1 + NO_DIFFERENCE)
         better = cosine > SIMILAR and _ahead(row, best) > PERHAPS
-        return trusted and ((cosine > ALIKE and no_worse) or better)
+        # At another place it is no refinement of the best, whatever its shape needs.
+        as_good = row.port != best.port and _equal(best, row, cosine)
+        return trusted and ((cosine > ALIKE and (no_worse or as_good)) or better)
     if cosine > ALIKE and not trusted and row.held_out_error < MUCH_WORSE * best.held_out_error:
         return True
     return cosine > SIMILAR and _equal(best, row, cosine)
@@ -178,6 +186,7 @@ def _elsewhere(best: Ranked, rows: Sequence[Ranked], known: tuple[str, ...]) -> 
         and row.kind != best.kind
         and best.cosines.get(row.label, 0.0) > SIMILAR
         and row.held_out_error < MUCH_WORSE * best.held_out_error
+        and (row.gain or 0.0) > NEARLY * (best.gain or 0.0)
     )
 
 
@@ -208,17 +217,34 @@ def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranke
     but noise, or explains what the other does not, it is what is missing.
     """
     top = min(accepted, key=lambda row: row.held_out_error)
-    equals = [row for row in accepted if row is top or _equal(top, row, 0.0)]
-    best = min(equals, key=lambda row: (row.free, row.held_out_error))
+    equals = [row for row in accepted if _as_good(top, row, floor)]
+    best = min(equals, key=_simplest)
     assert best.fitted is not None
     if floor.reached(best.fitted.held_out):
         return best
     lower = best.placement.effect.refines
     for row in accepted:
         if row.effect == lower and row.gain and best.gain and row.gain > MOST_OF_IT * best.gain:
-            alone = _explains(base, best, floor) and not _explains(base, row, floor)
+            alone = explains(base, best, floor) and not explains(base, row, floor)
             return best if alone else row
     return best
+
+
+def _simplest(row: Ranked) -> tuple[int, bool, float]:
+    """Order of equals: fewest parameters, what a computer does to samples last."""
+    return row.free, row.placement.effect.sampled, row.held_out_error
+
+
+def _as_good(top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
+    """Whether a row is as good as the one that leaves least.
+
+    Where more than noise is left, a little less of it is no reason for a further parameter.
+    """
+    assert top.fitted is not None
+    if row is top or _equal(top, row, 0.0):
+        return True
+    little = row.held_out_error <= top.held_out_error * (1 + LITTLE_MORE)
+    return row.free < top.free and little and not floor.reached(top.fitted.held_out)
 
 
 def _equal(one: Ranked, other: Ranked, cosine: float) -> bool:
@@ -236,6 +262,6 @@ def _ahead(one: Ranked, other: Ranked) -> float:
     """Standard deviations of the paired held-out difference by which one does better."""
     assert one.fitted is not None
     assert other.fitted is not None
-    difference = block_errors(other.fitted.held_out) - block_errors(one.fitted.held_out)
+    difference = block_differences(other.fitted.held_out, one.fitted.held_out)
     spread = difference.std(ddof=1) / np.sqrt(len(difference))
     return float(difference.mean() / max(spread, 1e-300))

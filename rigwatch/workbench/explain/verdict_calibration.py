@@ -8,8 +8,8 @@ the verdicts of each cell on simulated plants and those of them that were wrong;
 
 where K of N verdicts with the same word were wrong over all cells (P. S. Laplace's rule of
 succession, 1774) and count as much as s = 2 cases, so that a cell with few cases leans on the
-others. `benchmarks/hidden_effects` writes the file, and judges it on seeds that it was not made
-from.
+others. `benchmarks/explaining/hidden_effects` writes the file, and judges it on seeds that it was
+not made from.
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,8 @@
 
 from rigwatch.workbench.fit.fitted_model import (
     Fitted,
-    block_errors,
+    block_differences,
+    eigenvalues,
     fit_again,
     fit_base,
     fit_model,
@@ -12,20 +13,21 @@ from rigwatch.workbench.fit.fitted_model import (
     placements_of,
 )
 from rigwatch.workbench.fit.free_run import free_run
-from rigwatch.workbench.fit.healthy_parameters import commissioned, loosened
+from rigwatch.workbench.fit.healthy_parameters import commissioned, loosely_told, loosened
 from rigwatch.workbench.fit.healthy_reference import referenced
 from rigwatch.workbench.fit.healthy_remainder import learns_from_healthy, with_healthy_remainder
 from rigwatch.workbench.fit.input_hold import held_as, with_hold
-from rigwatch.workbench.fit.intervals import Value, as_written, covariance, values
+from rigwatch.workbench.fit.intervals import Value, as_written, covariance, shown, values
 from rigwatch.workbench.fit.profile import profile
 
 __all__ = [
     "Fitted",
     "Value",
     "as_written",
-    "block_errors",
+    "block_differences",
     "commissioned",
     "covariance",
+    "eigenvalues",
     "fit_again",
     "fit_base",
     "fit_model",
@@ -33,12 +35,14 @@ __all__ = [
     "free_run",
     "held_as",
     "learns_from_healthy",
+    "loosely_told",
     "loosened",
     "may_be_better",
     "nodes",
     "placements_of",
     "profile",
     "referenced",
+    "shown",
     "values",
     "with_healthy_remainder",
     "with_hold",

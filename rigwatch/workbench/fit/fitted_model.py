@@ -10,18 +10,22 @@ import numpy as np
 from rigwatch.physics.engine.compile import CompiledSystem, compile_system, even_substeps
 from rigwatch.physics.engine.equations import Placement, System, compose
 from rigwatch.physics.engine.fit import (
-    Convergence,
     Fit,
     Recording,
-    convergence,
     evaluate,
     fit,
-    fit_along_motion,
-    fit_from_afar,
     initial_states,
+    untied,
     windows,
 )
-from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.physics.engine.search import (
+    Convergence,
+    ShortHorizons,
+    WholeRuns,
+    convergence,
+    fit_from_afar,
+)
+from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, port_sizes, quiet_scale
 from rigwatch.workbench.fit.discontinuities import between_jumps
@@ -93,10 +97,17 @@ def overall(fitted: Fit) -> float:
 
 
 def block_errors(fitted: Fit) -> FloatArray:
-    """Mean squared error of each block, shape (blocks,): windows, or pieces of a long recording."""
+    """Mean squared error of each block, a window or a piece of one; NaN where nothing counts."""
     scale = fitted.scale if len(fitted.scale) > 1 else 1.0
     squared = (fitted.residuals / scale) ** 2
-    return np.array([np.nanmean(piece) for piece in blocks(squared) if np.isfinite(piece).any()])
+    means = [np.nanmean(p) if np.isfinite(p).any() else np.nan for p in blocks(squared)]
+    return np.array(means)
+
+
+def block_differences(one: Fit, other: Fit) -> FloatArray:
+    """By how much the error of `one` is above that of `other`, of blocks that count in both."""
+    found = block_errors(one) - block_errors(other)
+    return np.asarray(found[np.isfinite(found)])
 
 
 def blocks(windowed: FloatArray) -> list[FloatArray]:
@@ -220,23 +231,36 @@ def fit_model(
     begin, substeps = compiled.vector(start), study.file.substeps
     first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
+    search: ShortHorizons | WholeRuns | None = None
     if data.along_motion and len(compiled.system.free) >= FROM_AFAR and scale is not None:
-        found, ended = fit_along_motion(
-            compiled, data.train, start=begin, scale=scale, substeps=substeps
-        )
-        return _judged(study, data, placements, found, horizon, later, ended)
-    if from_afar and not data.along_motion:
-        found, ended = fit_from_afar(
-            compiled, data.train, horizon, start=begin, scale=scale,
-            noise=quiet_scale(data.train) if scale is None else scale, initial=first,
-            substeps=substeps,
-        )  # fmt: skip
+        search = WholeRuns(compiled, [data.train], scale, start=begin, substeps=substeps)
+    elif from_afar and not data.along_motion:
+        noise = quiet_scale(data.train) if scale is None else scale
+        search = ShortHorizons(compiled, data.train, horizon, begin, scale, noise, first, substeps)
+    if search:
+        found, ended = fit_from_afar(search)
+        found = _settled(study, data, found, horizon, substeps)
         return _judged(study, data, placements, found, horizon, later, ended)
     free_run = study.model.states and not data.along_motion
     if free_run and (horizon >= LONG or by_way_of_short):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
-    found = fit_over(horizon, start=begin, initial=first)
+    found = _settled(study, data, fit_over(horizon, start=begin, initial=first), horizon, substeps)
     return _judged(study, data, placements, found, horizon, later, None)
+
+
+def _settled(study: Study, data: Data, found: Fit, horizon: int, substeps: int) -> Fit:
+    """The fit with its ties settled, before anything is judged on it.
+
+    Along the motion priors settle them; what a rough model has learned is tied by nature.
+    """
+    if data.along_motion or study.model.rough:
+        return found
+    system = found.compiled.system
+    centre = {name: p.value for name, p in system.parameters.items()}
+    for placement in system.placements:
+        strength = placement.effect.strength
+        centre[placement.prefix + strength] = placement.effect.parameters[strength].neutral
+    return untied(found, data.train, horizon, centre, substeps)
 
 
 def _judged(  # noqa: PLR0917 -- they belong together
@@ -251,7 +275,9 @@ def _judged(  # noqa: PLR0917 -- they belong together
     """A fit with its error on the recordings held out."""
     beside = data.horizon if study.model.states else len(data.held_out)
     substeps = study.file.substeps
-    judged = evaluate(found, data.held_out, beside, substeps, initial)
+    # Along the motion what is hidden is led by it; a rough model is judged beside its reference.
+    judging = not (data.along_motion or study.model.rough)
+    judged = evaluate(found, data.held_out, beside, substeps, initial, judging=judging)
     calm = between_jumps(found, data.held_out, beside)
     return Fitted(tuple(placements), found, judged, substeps, horizon, calm, ended)
 
@@ -290,6 +316,11 @@ def nodes(fitted: Fitted, recording: Recording) -> int:
 
 def _fastest(fitted: Fitted, recording: Recording) -> float:
     """Largest eigenvalue of the model at the beginning of its windows [1/s]."""
+    return float(np.abs(eigenvalues(fitted, recording)).max(initial=0.0))
+
+
+def eigenvalues(fitted: Fitted, recording: Recording) -> ComplexArray:
+    """Eigenvalues of the model at the beginning of its windows [1/s], shape (windows, states)."""
     cut = windows(fitted.compiled.system, len(recording), fitted.horizon)
     run = fitted.compiled.linearise(
         recording.inputs, recording.dt, cut.starts[:LOOKED_AT], 2,
@@ -299,4 +330,4 @@ def _fastest(fitted: Fitted, recording: Recording) -> float:
     free, n = len(fitted.compiled.system.free), run.states.shape[2]
     slopes = run.rate_slopes[:, 0, :, free : free + n]
     finite = slopes[np.isfinite(slopes).all(axis=(1, 2))]
-    return float(np.abs(np.linalg.eigvals(finite)).max(initial=0.0))
+    return np.asarray(np.linalg.eigvals(finite), np.complex128)

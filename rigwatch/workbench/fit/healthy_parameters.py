@@ -6,18 +6,29 @@ to the healthy recording and fixed from then on. Without such a recording those 
 the model stay as they are, and the others are fitted to each recording.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
 from msgspec import structs
 
-from rigwatch.physics.engine.equations import Model
+from rigwatch.physics.engine.compile import compile_system
+from rigwatch.physics.engine.equations import Model, Parameter, compose
+from rigwatch.physics.engine.fit import evaluate
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit.fitted_model import fit_model
+from rigwatch.workbench.fit.fitted_model import Fitted, fit_model
 from rigwatch.workbench.fit.intervals import covariance
 from rigwatch.workbench.study import Kept, Study
+
+SAME = 1e-6
+"""Singular value over the largest below which a healthy recording knows a direction not at all."""
+LOOSE = 0.3
+"""Standard deviation of a kept parameter over its value from which it is said to be loose."""
+NEAR_ZERO = 0.01
+"""Share of its range that counts as a parameter's value at least."""
+LONGEST = 600.0
+"""Healthy recording that one may be asked for [s]."""
 
 
 def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> Study:
@@ -39,17 +50,87 @@ def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> S
     found = fit_model(loose, healthy, (), study.file.start, scale, from_afar=True)
     places = [found.compiled.system.free.index(name) for name in kept]
     uncertain = covariance(found.train)[0][np.ix_(places, places)]
+    told = Kept(tuple(kept), uncertain, found.convergence)
     return replace(
         study,
         model=_with_values(study.model, found.train.values()),
-        kept=Kept(tuple(kept), uncertain, found.convergence),
+        kept=with_known(told, healthy, found),
     )
 
 
-def loosened(model: Model) -> Model:
-    """The model with its kept parameters free, also where they have been fixed since."""
+def with_known(kept: Kept, healthy: Data, found: Fitted) -> Kept:
+    """The same with what is taken for known, of which the model tells a deviation.
+
+    With m off by d, the parameters beside it settle elsewhere on the healthy recording,
+
+        κ ← κ - H_κ⁺·H_m·d,   H: slopes of the residual there
+
+    Args:
+        kept: what the healthy recording told.
+        healthy: that recording.
+        found: the model's fit to it.
+    """
+    model, own = found.compiled.system.model, found.compiled.system.free
+    known = [n for n, p in model.parameters.items() if p.deviation and n not in own]
+    if not known:
+        return kept
+    compiled = compile_system(compose(loosened(model, known)))
+    parameters = compiled.vector(found.train.values())
+    loose = replace(found.train, compiled=compiled, parameters=parameters)
+    at = evaluate(loose, healthy.train, found.horizon, found.substeps, found.train.initial)
+    slopes = at.jacobian.reshape(-1, at.jacobian.shape[-1])
+    by_own, by_known = (
+        slopes[:, [compiled.system.free.index(n) for n in names]] for names in (own, known)
+    )
+    size = np.maximum(np.linalg.norm(by_own, axis=0), 1e-300)
+    turn = -np.linalg.lstsq(by_own / size, by_known, rcond=SAME)[0] / size[:, None]
+    moves = np.vstack([turn[[own.index(n) for n in kept.names]], np.eye(len(known))])
+    deviations = np.array([model.parameters[n].deviation for n in known])
+    whole = (moves * deviations**2) @ moves.T
+    count = len(kept.names)
+    whole[:count, :count] += kept.covariance
+    return replace(kept, names=(*kept.names, *known), covariance=whole)
+
+
+def loosely_told(kept: Kept, model: Model, seconds: float) -> tuple[str, ...]:
+    """Remarks on kept parameters that the healthy recording does not determine.
+
+    Args:
+        kept: what the healthy recording told.
+        model: with the values that it told.
+        seconds: how long it is, shortened by what hidden states need to settle.
+    """
+    deviations = np.sqrt(np.diag(kept.covariance))
+    shares = {
+        name: float(deviation) / _scale_of(model.parameters[name])
+        for name, deviation in zip(kept.names, deviations, strict=True)
+        if model.parameters[name].kept
+    }
+    loose = {name: share for name, share in shares.items() if share > LOOSE}
+    if not loose:
+        return ()
+    told = ", ".join(
+        f"{name} ({model.parameters[name].meaning or 'a parameter'}) to {share:.0%}"
+        for name, share in loose.items()
+    )
+    needed = seconds * (max(loose.values()) / LOOSE) ** 2
+    longer = f"{needed:.2g} s of such a motion" if needed < LONGEST else "another motion"
+    return (
+        f"the healthy recording of {seconds:.3g} s tells {told} of its value only; {longer} would"
+        f" tell them to {LOOSE:.0%}",
+    )
+
+
+def _scale_of(p: Parameter) -> float:
+    """What a deviation is held against: the value, or a hundredth of the range for one near 0."""
+    span = p.high - p.low
+    return max(abs(p.value), NEAR_ZERO * span if np.isfinite(span) else 0.0, 1e-300)
+
+
+def loosened(model: Model, names: Collection[str] = ()) -> Model:
+    """The model with its kept parameters and those named free, also where they have been fixed."""
     free = {
-        name: structs.replace(p, fixed=p.fixed and not p.kept)
+        name: structs.replace(p, fixed=p.fixed and not p.kept and name not in names)
         for name, p in model.parameters.items()
     }
     return structs.replace(model, parameters=free)

@@ -22,6 +22,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, along_motion, port_sizes
 from rigwatch.workbench.fit.fitted_model import Fitted, fit_model
+from rigwatch.workbench.fit.healthy_parameters import with_known
 from rigwatch.workbench.fit.intervals import covariance
 from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_products
 from rigwatch.workbench.study import Kept, Study
@@ -100,6 +101,8 @@ def with_healthy_remainder(study: Study, data: Data) -> tuple[Study, Data]:
     found = learn(study, healthy, driven.horizon)
     kept = tuple(found.fitted.compiled.system.free)
     told = Kept(kept, covariance(found.fitted.train)[0])
+    alone = replace(driven, train=healthy, held_out=healthy, healthy=None)
+    told = with_known(told, alone, found.fitted)
     # What the file says to start from has been used, and must not move what was learned.
     file = structs.replace(study.file, start={})
     study = replace(study, file=file, model=_fixed(found.model, found.fitted), kept=told)

@@ -22,7 +22,13 @@ from rigwatch.physics.engine.equations import Hold, Model, Placement
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, quiet_scale
-from rigwatch.workbench.fit.fitted_model import Fitted, block_errors, fit_model, placements_of
+from rigwatch.workbench.fit.fitted_model import (
+    Fitted,
+    block_differences,
+    block_errors,
+    fit_model,
+    placements_of,
+)
 from rigwatch.workbench.study import Held, Study
 
 BEYOND_CHANCE = 3.0
@@ -67,7 +73,7 @@ def with_hold(study: Study, data: Data, scale: FloatArray | None = None) -> Stud
     placements = () if data.healthy is not None else placements_of(study, data.train)
     source = "the healthy recording" if data.healthy is not None else "the recordings"
     best, line = _chosen(study, told, placements, scale)
-    before, after = (float(np.mean(_blocks(each.fitted))) for each in (line, best))
+    before, after = (float(np.nanmean(_blocks(each.fitted))) for each in (line, best))
     held = Held(best.hold, best.late, told.train.dt * best.late, source, (after / before) ** 0.5)
     return replace(
         study,
@@ -98,7 +104,9 @@ def _chosen(
 ) -> tuple[_Tried, _Tried]:
     """The best hold, and a line."""
     try_one = partial(_tried, study, data, placements, scale)
-    line = try_one("linear", 0.0, parameters_of(study.file), None)
+    # The healthy recording is described without the effects that were accepted since.
+    start = parameters_of(study.file) if placements else dict(study.file.start)
+    line = try_one("linear", 0.0, start, None)
     kept = try_one("zero", 0.0, line.fitted.train.values(), line.fitted)
     best = kept if _better(kept, line) else line
     if data.along_motion or _at_noise(best, data, scale):
@@ -135,26 +143,26 @@ def _refined(try_late: "partial[_Tried]", kept: _Tried) -> _Tried | None:
             found[late] = try_late(late, start, kept.fitted)
         except ModelError:
             return float("inf")
-        return float(np.mean(block_errors(found[late].fitted.train)))
+        return float(np.nanmean(block_errors(found[late].fitted.train)))
 
     sizes = [size(late) for late in LATENESSES]
     if not found:
         return None
     # Where the coarse steps show nothing, no fine one does.
-    if min(sizes) < float(np.mean(block_errors(kept.fitted.train))):
+    if min(sizes) < float(np.nanmean(block_errors(kept.fitted.train))):
         near = LATENESSES[int(np.argmin(sizes))]
         ends = (max(near - 0.25, 1e-3), min(near + 0.25, 1.0))
         minimize_scalar(size, bounds=ends, method="bounded", options={"xatol": FINE})
-    return min(found.values(), key=lambda each: float(np.mean(block_errors(each.fitted.train))))
+    return min(found.values(), key=lambda each: float(np.nanmean(block_errors(each.fitted.train))))
 
 
 def _better(one: _Tried, other: _Tried) -> bool:
     """Whether the error falls beyond chance from the other to the one."""
-    before, after = _blocks(other.fitted), _blocks(one.fitted)
-    fall = before - after
+    before = _blocks(other.fitted)
+    fall = block_differences(other.fitted.held_out, one.fitted.held_out)
     spread = float(np.std(fall, ddof=1) / np.sqrt(len(fall))) if len(fall) > 1 else 0.0
     mean = float(np.mean(fall))
-    return mean > BEYOND_CHANCE * spread and mean > MATERIAL * float(np.mean(before))
+    return mean > BEYOND_CHANCE * spread and mean > MATERIAL * float(np.nanmean(before))
 
 
 def _blocks(fitted: Fitted) -> FloatArray:

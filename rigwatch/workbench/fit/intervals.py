@@ -53,6 +53,14 @@ class Value:
         return replace(self, value=unit.from_si(self.value), unit=text, interval=ends)
 
 
+def shown(value: Value) -> str:
+    """A value with its unit and interval, for people."""
+    if value.interval is None:
+        return f"{value.value:.3g} {value.unit}"
+    low, high = value.interval
+    return f"{value.value:.3g} {value.unit} ({low:.3g} … {high:.3g})"
+
+
 def as_written(found: Mapping[str, Value], system: System) -> dict[str, Value]:
     """Every value of a system's parameters, from SI to the unit that people wrote."""
     units = {name: system.parameters[name].shown for name in found}

@@ -108,4 +108,8 @@ def _entering(model: Model, port: str, terms: str, sign: str = "+") -> Model:
         name: replace(output, expression=word.sub(added, output.expression))
         for name, output in model.outputs.items()
     }
-    return replace(model, states=states, outputs=outputs)
+    quantities = {
+        name: replace(quantity, expression=word.sub(added, quantity.expression))
+        for name, quantity in model.quantities.items()
+    }
+    return replace(model, states=states, outputs=outputs, quantities=quantities)

@@ -1,13 +1,12 @@
 """Whether an effect counts: the recordings held out decide.
 
-Their error must fall, block by block, by more than chance would do, and by enough to be worth it.
+Their error must fall by more than chance would do, and by enough to be worth it; and the recordings
+that are fitted must tell that the effect is there at all.
 """
 
-import numpy as np
-from scipy.stats import t as student
-
 from rigwatch.workbench.data import NoiseFloor
-from rigwatch.workbench.fit import Fitted, block_errors
+from rigwatch.workbench.fit import Fitted, Value, values
+from rigwatch.workbench.ranking.paired_test import Difference, difference
 from rigwatch.workbench.ranking.ranked import Ranked
 
 MATERIAL = 0.03
@@ -17,32 +16,47 @@ STEP = 0.025
 EXPLAINED = 0.95
 """Share of the energy above the floor that an effect must explain for the error to be known."""
 
+NEAR = 2.0
+"""Error over the floor beyond which something is left to explain, however much there was."""
+
 
 def judge_fit(base: Fitted, row: Ranked) -> None:
-    """Say whether the held-out error falls by more than chance."""
+    """Say whether the held-out error falls by more than chance, with a strength that is told."""
     assert row.fitted is not None
-    row.gain, row.gain_deviation = gain(base, row.fitted)
-    count = len(block_errors(base.held_out))
-    needed = student.ppf(1 - STEP, count - 1) * row.gain_deviation
-    fall = 1 - row.held_out_error / base.held_out_error
-    row.accepted = bool(row.gain > max(needed, 0.0) and fall > MATERIAL)
-    row.reason = _said(row.gain, needed, row.accepted)
+    found = difference(base.held_out, row.fitted.held_out)
+    row.gain, row.reason = found.mean, _refused(found)
+    if not row.reason and (vague := _vague(row)) is not None:
+        row.reason = vague
+    row.accepted = not row.reason
+    row.reason = row.reason or "held-out error falls"
 
 
-def _said(gained: float, needed: float, accepted: bool) -> str:
-    if accepted:
-        return "held-out error falls"
-    if gained <= 0:
-        return "held-out error rises"
-    if gained <= needed:
+def _refused(found: Difference) -> str:
+    """Why the recordings held out do not speak for an effect, empty where they do."""
+    if found.mean <= 0:
+        more = "" if found.p_rises < STEP else ", no more than by chance"
+        return f"held-out error rises{more}"
+    if found.p_falls >= STEP:
         return "held-out error falls no more than by chance"
-    return f"held-out error falls by less than {MATERIAL:.0%}"
+    return "" if found.relative > MATERIAL else f"held-out error falls by less than {MATERIAL:.0%}"
 
 
-def gain(base: Fitted, other: Fitted) -> tuple[float, float]:
-    """Fall of the held-out mean squared error from `base` to `other`, and its deviation."""
-    difference = block_errors(base.held_out) - block_errors(other.held_out)
-    return float(difference.mean()), float(difference.std(ddof=1) / np.sqrt(len(difference)))
+def _vague(row: Ranked) -> str | None:
+    """What says that the effect may as well be absent, None where its strength is told."""
+    assert row.fitted is not None
+    name = row.placement.effect.strength
+    p, value = row.placement.effect.parameters[name], _strength(row)
+    if p.role == "switch" or value is None or value.interval is None:
+        return None
+    low, high = value.interval
+    if not low <= p.neutral <= high:
+        return None
+    return f"the training does not tell its strength: {name} = {low:.3g} … {high:.3g}"
+
+
+def _strength(row: Ranked) -> Value | None:
+    assert row.fitted is not None
+    return values(row.fitted.train).get(row.placement.prefix + row.placement.effect.strength)
 
 
 def left_over(base: Fitted, row: Ranked, floor: NoiseFloor, *, tolerant: bool = False) -> float:
@@ -54,4 +68,6 @@ def left_over(base: Fitted, row: Ranked, floor: NoiseFloor, *, tolerant: bool = 
 
 def leaves_nothing(row: Ranked, base: Fitted, floor: NoiseFloor) -> bool:
     """Whether it explains so much of the error above the floor that only its like could as well."""
-    return left_over(base, row, floor) < 1 - EXPLAINED
+    assert row.fitted is not None
+    near = floor.ratio(row.fitted.held_out, row.fitted.calm) < NEAR
+    return near and left_over(base, row, floor) < 1 - EXPLAINED

@@ -12,6 +12,9 @@ from rigwatch.workbench.study import Study
 def candidates(study: Study, recording: Recording) -> list[Candidate]:
     """Every effect at every port where it makes sense and does not stand yet.
 
+    Elective effects are ranked where the study asks for the whole library: verdicts are calibrated
+    without them, and more candidates make larger classes.
+
     Args:
         study: its model, its effects and those already accepted.
         recording: shows how large the signals at the ports are.
@@ -25,4 +28,9 @@ def candidates(study: Study, recording: Recording) -> list[Candidate]:
             return None
         return study.effect_at(name, port).scaled(sizes[port])
 
-    return every_candidate(ports, study.effects, effect_at)
+    ranked = {
+        name: effect
+        for name, effect in study.effects.items()
+        if study.file.whole_library or not effect.elective
+    }
+    return every_candidate(ports, ranked, effect_at)

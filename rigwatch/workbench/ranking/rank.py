@@ -45,10 +45,20 @@ def rank(
         least = AGAIN * floor.above(base.train)
         likely = [row for row in chosen if row.explained > least]
         try_again(study, data, base, likely, progress)
+    while spare := _in_place_of_troubled(rows):
+        progress(f"fitting {spare.label}, as what it looks like cannot be fitted")
+        refit(study, data, base, spare, fit_model if enough else fit_twice)
     while double := _unfitted_double(rows, floor):
         progress(f"fitting {double.label}, which looks like the best")
         refit(study, data, base, double, fit_model if enough else fit_twice)
     return in_order(rows)
+
+
+def _in_place_of_troubled(rows: Sequence[Ranked]) -> Ranked | None:
+    """What was left aside for another that then could not be fitted; None where nothing was."""
+    troubled = {row.label for row in rows if row.trouble}
+    waiting = (row for row in rows if row.fitted is None and not row.trouble)
+    return next((row for row in waiting if row.told_by in troubled), None)
 
 
 def _unfitted_double(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:

@@ -31,10 +31,10 @@ class Ranked:
         turned: the same with a sign: negative where both explain the residual in opposite ways.
         fitted: with it in the model; None where it was not worth a fit or the fit failed.
         gain: fall of the held-out mean squared error, None without a fit.
-        gain_deviation: standard deviation of `gain`.
         accepted: whether the held-out error falls by more than chance.
         reason: in words.
         trouble: why it cannot be fitted, empty where it can.
+        told_by: what is fitted in its place, as it looks the same; empty where nothing is.
     """
 
     placement: Placement
@@ -47,10 +47,10 @@ class Ranked:
     turned: dict[str, float]
     fitted: Fitted | None = None
     gain: float | None = None
-    gain_deviation: float | None = None
     accepted: bool = False
     reason: str = "not like the residual"
     trouble: str = ""
+    told_by: str = ""
 
     @property
     def effect(self) -> str:
@@ -87,18 +87,23 @@ class Ranked:
 
 def row_of(candidate: Candidate, found: Standing, kind: str) -> Ranked:
     """The row of an effect that is scored and not yet fitted; `kind` is its port's."""
-    effect = candidate.effect
-    start = _within(effect.parameters[effect.strength], found.strength)
     return Ranked(
-        Placement(candidate.name, effect, candidate.port),
+        Placement(candidate.name, candidate.effect, candidate.port),
         kind,
         found.p_value,
         found.explained,
-        {**candidate.shape, effect.strength: start},
+        start_of(candidate, found.strength),
         found.alike,
         found.cosines,
         found.turned,
     )
+
+
+def start_of(candidate: Candidate, strength: float) -> dict[str, float]:
+    """Values that a fit of an effect of this strength begins with, by the effect's own names."""
+    effect = candidate.effect
+    begin = _within(effect.parameters[effect.strength], strength)
+    return {**candidate.shape, effect.strength: begin}
 
 
 def _within(p: EffectParameter, strength: float) -> float:

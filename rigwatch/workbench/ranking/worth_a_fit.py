@@ -19,7 +19,7 @@ def worth_a_fit(rows: Sequence[Ranked], kind: str) -> list[Ranked]:
             told[row.label] = row
             row.reason = "explains less than others; not fitted"
         else:
-            row.reason = f"looks like {double}; not fitted"
+            row.told_by, row.reason = double, f"looks like {double}; not fitted"
     chosen = list(told.values())[: MOST_FITS[kind]]
     for port_kind in ("force", "actuator", "sensor"):
         first = next((row for row in told.values() if row.kind == port_kind), None)

@@ -2,8 +2,11 @@
 
 from rigwatch.workbench.report.html_report import write_report
 from rigwatch.workbench.report.text_report import (
+    VERDICTS,
+    base_lines,
     change_lines,
     comparison_lines,
+    doubt_of,
     explanation_lines,
     number,
     region_data,
@@ -12,8 +15,11 @@ from rigwatch.workbench.report.text_report import (
 )
 
 __all__ = [
+    "VERDICTS",
+    "base_lines",
     "change_lines",
     "comparison_lines",
+    "doubt_of",
     "explanation_lines",
     "number",
     "region_data",

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rigwatch.workbench.compare import Comparison, Region
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.fit import Value
-from rigwatch.workbench.steps import Change
+from rigwatch.workbench.steps import Bases, Change
 from rigwatch.workbench.study import GIVEN, Held
 
 VERDICTS = {
@@ -120,7 +120,7 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
     lines += table(head, [_ranked(row) for row in found.ranking[:most]])
     if found.next_experiment:
         lines += ["", f"next experiment: {found.next_experiment.text}"]
-    return lines
+    return lines + [f"note: {remark}" for remark in base.remarks]
 
 
 def doubt_of(found: Explanation) -> str:
@@ -162,6 +162,28 @@ def change_lines(found: Change) -> list[str]:
             ["name", "value", "interval", "unit", ""], _parameters(found.after.parameters)
         )
     return lines
+
+
+def base_lines(found: Bases, most: int = 12) -> list[str]:
+    """What `rigwatch study base` prints."""
+    head = ["variants", "training", "held out", "over noise", "parameters"]
+    rows = [
+        [
+            ", ".join(base.variants) or "as written",
+            *map(number, (base.train_error, base.held_out_error, base.over_noise)),
+            str(base.parameters),
+        ]
+        for base in found.ranking[:most]
+    ]
+    enough = found.enough
+    lines = [f"healthy recordings, error in deviations of noise ({len(found.ranking)} bases)"]
+    lines += [*table(head, rows), ""]
+    lines += [
+        f"enough: {', '.join(enough.variants) or 'the model as it was written'}, which leaves"
+        f" {enough.over_noise:.3g} times the noise of what is held out"
+    ]
+    lines += [f"  {enough.reason}"] if enough.variants else []
+    return lines + [f"note: {remark}" for remark in found.remarks]
 
 
 def region_lines(found: Sequence[Region], most: int) -> list[str]:

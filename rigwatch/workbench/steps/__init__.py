@@ -1,21 +1,47 @@
-"""Steps on a study: add and undo effects, replay the ledger, promote a model to a monitor."""
+"""Steps on a study: its base, effects added and undone, the ledger again, a model for a monitor."""
 
 from rigwatch.workbench.steps import change
-from rigwatch.workbench.steps.change import Change, add, learn, undo
+from rigwatch.workbench.steps.base import Base, Bases, find_base, take_base
+from rigwatch.workbench.steps.change import add, learn, undo
+from rigwatch.workbench.steps.from_logs import Logs, study_from_logs
+from rigwatch.workbench.steps.handing_over import (
+    HandedOver,
+    Rehearsal,
+    hand_over,
+    model_path,
+    rehearse,
+)
 from rigwatch.workbench.steps.ledger_replay import replay
 from rigwatch.workbench.steps.model_steps import Signals, Stage, signals, stages
 from rigwatch.workbench.steps.promotion import promotion
+from rigwatch.workbench.steps.trial import Change, Trial, try_add, try_effect, try_undo, whole
 
 __all__ = [
+    "Base",
+    "Bases",
     "Change",
+    "HandedOver",
+    "Logs",
+    "Rehearsal",
     "Signals",
     "Stage",
+    "Trial",
     "add",
     "change",
+    "find_base",
+    "hand_over",
     "learn",
+    "model_path",
     "promotion",
+    "rehearse",
     "replay",
     "signals",
     "stages",
+    "study_from_logs",
+    "take_base",
+    "try_add",
+    "try_effect",
+    "try_undo",
     "undo",
+    "whole",
 ]

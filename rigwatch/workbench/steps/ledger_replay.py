@@ -7,7 +7,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from rigwatch.workbench.compare import comparison, open_bench
-from rigwatch.workbench.study import Accepted, Study, lines
+from rigwatch.workbench.study import Accepted, Study, lines, varied
 
 SAME = 1e-6
 """Share by which errors may differ between machines."""
@@ -29,7 +29,12 @@ def replay(study: Study, progress: Callable[[str], None] = lambda _: None) -> li
     """Fit the models of all steps that changed the effects; the file itself is left alone."""
     checks = []
     accepted: dict[str, Accepted] = {}
+    # The variants that the first step stood on: what the first change of them took away.
+    first = next((line for line in lines(study) if line["step"] == "base"), None)
+    study = varied(study, first["before"] if first else study.file.variants)
     for line in lines(study):
+        if line["step"] == "base":
+            study = varied(study, line["variants"])
         if line["step"] == "add":
             accepted[f"{line['effect']}@{line['port']}"] = Accepted(
                 effect=line["effect"],

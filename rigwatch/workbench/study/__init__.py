@@ -1,7 +1,15 @@
 """A study on disk: its TOML file, its recordings, and the ledger of every step with hashes."""
 
 from rigwatch.workbench.study import ledger
-from rigwatch.workbench.study.ledger import append, check_data, lines, model_hash
+from rigwatch.workbench.study.edits import (
+    append_effect,
+    drop_effect,
+    keep_holds,
+    use_effect_file,
+    use_variants,
+)
+from rigwatch.workbench.study.folder import FILE, digest
+from rigwatch.workbench.study.ledger import append, check_data, commit, lines, model_hash, stands_on
 from rigwatch.workbench.study.study import (
     GIVEN,
     Accepted,
@@ -12,16 +20,14 @@ from rigwatch.workbench.study.study import (
     Span,
     Study,
     StudyFile,
-    append_effect,
     create,
-    drop_effect,
-    keep_holds,
-    nearest,
     open_study,
-    use_effect_file,
+    study_of,
+    varied,
 )
 
 __all__ = [
+    "FILE",
     "GIVEN",
     "Accepted",
     "Derive",
@@ -34,13 +40,18 @@ __all__ = [
     "append",
     "append_effect",
     "check_data",
+    "commit",
     "create",
+    "digest",
     "drop_effect",
     "keep_holds",
     "ledger",
     "lines",
     "model_hash",
-    "nearest",
     "open_study",
+    "stands_on",
+    "study_of",
     "use_effect_file",
+    "use_variants",
+    "varied",
 ]

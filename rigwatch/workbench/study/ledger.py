@@ -5,8 +5,10 @@ Data that have changed since are refused, so that errors before and after an eff
 """
 
 import hashlib
+import os
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,11 @@ import msgspec
 
 from rigwatch.version import __version__
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.typed_files import read_text
+from rigwatch.workbench.study.folder import FILE, digest, locked, write_step
 from rigwatch.workbench.study.study import Study
+
+_PART = 1 << 22
 
 
 def data_hashes(study: Study) -> dict[str, str]:
@@ -28,15 +34,28 @@ def data_hashes(study: Study) -> dict[str, str]:
 
 def _hash(path: Path) -> str:
     files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
-    digest = hashlib.sha256()
-    for file in files:
-        try:
-            digest.update(file.read_bytes())
-        except OSError as error:
-            raise ModelError(
-                f"{file}: {error.strerror}, expected a session of the study"
-            ) from error
-    return digest.hexdigest()
+    try:
+        return _of_files(tuple((file, _state(file.stat())) for file in files))
+    except OSError as error:
+        raise ModelError(
+            f"{error.filename}: {error.strerror}, expected a session of the study"
+        ) from error
+
+
+def _state(found: os.stat_result) -> tuple[int, ...]:
+    """What tells that a file is still the one that was read."""
+    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+
+
+@lru_cache(maxsize=64)
+def _of_files(files: tuple[tuple[Path, tuple[int, ...]], ...]) -> str:
+    """SHA-256 of files, read once for as long as nobody writes them."""
+    found = hashlib.sha256()
+    for path, _ in files:
+        with path.open("rb") as file:
+            while part := file.read(_PART):
+                found.update(part)
+    return found.hexdigest()
 
 
 def model_hash(study: Study) -> str:
@@ -46,19 +65,58 @@ def model_hash(study: Study) -> str:
     return hashlib.sha256(text).hexdigest()
 
 
-def append(study: Study, step: str, **content: Any) -> dict[str, Any]:
-    """Write one line; what was written."""
+def stands_on(study: Study) -> str:
+    """SHA-256 of all that an error of the study depends on: file, model, effects and data.
+
+    Raises:
+        ModelError: a recording is not there.
+    """
+    whole = (study.file, study.model, dict(study.effects), data_hashes(study), __version__)
+    return hashlib.sha256(msgspec.json.encode(whole, order="deterministic")).hexdigest()
+
+
+def append(study: Study, step: str, /, **content: Any) -> dict[str, Any]:
+    """Write one line about the study as it is; what was written.
+
+    Raises:
+        ModelError: the study has been changed since it was opened.
+    """
+    return commit(study, study, step, **content)
+
+
+def commit(before: Study, after: Study, step: str, /, **content: Any) -> dict[str, Any]:
+    """Write the study's file as `after` has it and the line that tells it: both, or neither.
+
+    Args:
+        before: the study as it was opened.
+        after: as it is to be.
+        step: what was done.
+        content: what else the line says.
+
+    Returns:
+        The line.
+
+    Raises:
+        ModelError: the study has been changed since it was opened.
+    """
     line = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "rigwatch": __version__,
         "step": step,
-        "data": data_hashes(study),
-        "model": model_hash(study),
-        "effects": [f"{a.effect}@{a.port}" for a in study.file.effects],
+        "data": data_hashes(after),
+        "model": model_hash(after),
+        "study": digest(after.text),
+        "effects": [f"{a.effect}@{a.port}" for a in after.file.effects],
         **content,
     }
-    with study.ledger.open("ab") as file:
-        file.write(msgspec.json.encode(line) + b"\n")
+    text = after.text if after.text != before.text else None
+    with locked(before.folder) as ledger:
+        if read_text(before.folder / FILE) != before.text:
+            raise ModelError(
+                f"{before.folder}: the study has been changed by somebody else since this step"
+                " began, which was tried on another model; nothing was written"
+            )
+        write_step(before.folder, ledger, msgspec.json.encode(line) + b"\n", text)
     return line
 
 
@@ -82,8 +140,8 @@ def check_data(study: Study) -> None:
     known: dict[str, str] = {}
     for line in lines(study):
         known |= line.get("data", {})
-    for name, digest in data_hashes(study).items():
-        if known.get(name, digest) != digest:
+    for name, found in data_hashes(study).items():
+        if known.get(name, found) != found:
             raise ModelError(
                 f"{study.folder}: {name} has changed since the last step: errors before and after"
                 " would not be comparable; `rigwatch study accept-data` takes it as it is now"

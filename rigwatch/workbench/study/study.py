@@ -5,10 +5,7 @@ been accepted, one `[[effects]]` table each at its end. Adding an effect writes 
 undoing takes the last one away; the rest of the file, with its comments, stays as it was written.
 """
 
-import difflib
 import os
-import shutil
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
@@ -27,25 +24,21 @@ from rigwatch.physics.engine.equations import (
     Parameter,
     check_model,
     library,
-    load_effects,
     load_model,
     offered,
     shipped_models,
     units_at,
+    with_variants,
 )
-from rigwatch.physics.engine.fit import Convergence
-from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError
-from rigwatch.wire.typed_files import Section, load
+from rigwatch.physics.engine.search import Convergence
+from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError, nearest
+from rigwatch.wire.typed_files import Section, load, parse, read_text
 from rigwatch.wire.units import Unit, unit_of
+from rigwatch.workbench.study.folder import FILE, LEDGER, settle
+from rigwatch.workbench.study.recording_parameters import known_as_inputs, known_in_si
 
-FILE = "study.toml"
-LEDGER = "ledger.jsonl"
-_TABLE = "\n[[effects]]\n"
 GIVEN = ("the study", "the model file")
 """Sources of holds that nothing was chosen for."""
-CHOSEN = "  # chosen from the data, with the first effect"
-"""Behind holds that were written with the first effect, and go with it."""
-
 
 Lateness = Annotated[float, Meta(ge=0, le=1)]
 
@@ -56,6 +49,10 @@ class Span(Section, frozen=True, kw_only=True):
     session: Annotated[str, Meta(description="session file, from the study's folder")]
     start: Annotated[float, Meta(ge=0, description="seconds into it where the part begins")] = 0.0
     end: Annotated[float, Meta(description="seconds into it where the part ends")] = float("inf")
+    parameters: Annotated[
+        dict[str, float],
+        Meta(description="the model's parameters that are known of this recording, in their units"),
+    ] = field(default_factory=dict)
 
 
 class Derived(Section, frozen=True, kw_only=True):
@@ -97,12 +94,21 @@ class StudyFile(Section, frozen=True, kw_only=True):
     """The file `study.toml`."""
 
     model: Annotated[str, Meta(description="a shipped model's name, or a model file")]
+    variants: Annotated[
+        tuple[str, ...], Meta(description="variants of the model, see `rigwatch study base`")
+    ] = ()
     train: Annotated[tuple[Span, ...], Meta(min_length=1, description="what is fitted to")]
     held_out: Annotated[tuple[Span, ...], Meta(min_length=1, description="what decides")]
     healthy: Annotated[
         tuple[Span, ...], Meta(description="recordings with nothing wrong, for the noise floor")
     ] = ()
-    horizon: Annotated[float, Meta(gt=0, description="time between re-initialisations [s]")] = 0.5
+    horizon: Annotated[
+        Annotated[float, Meta(gt=0)] | None,
+        Meta(
+            description="time between re-initialisations [s]; chosen from the data and the model's"
+            " time constants if not given"
+        ),
+    ] = None
     prediction: Annotated[
         Literal["auto", "measured motion", "free"],
         Meta(
@@ -136,6 +142,9 @@ class StudyFile(Section, frozen=True, kw_only=True):
     effect_files: Annotated[
         tuple[str, ...], Meta(description="own effects, TOML files from the study's folder")
     ] = ()
+    whole_library: Annotated[
+        bool, Meta(description="rank the elective effects of the library as well")
+    ] = False
     effects: Annotated[tuple[Accepted, ...], Meta(description="accepted so far, in order")] = ()
 
 
@@ -185,6 +194,8 @@ class Study:
         own: names of those that are not shipped.
         kept: what the healthy recording told, None before it was asked.
         holds: what inputs do between samples, by name, where that is known.
+        text: what its file said when it was opened.
+        horizon_from: what the horizon was chosen from, in words; empty where it is given.
     """
 
     folder: Path
@@ -194,6 +205,8 @@ class Study:
     own: frozenset[str]
     kept: Kept | None = None
     holds: Mapping[str, Held] = dataclass_field(default_factory=dict)
+    text: str = ""
+    horizon_from: str = ""
 
     @property
     def ledger(self) -> Path:
@@ -231,12 +244,6 @@ class Study:
         return effect.at(units_at(self.model, port), f"effect {name} at {port}")
 
 
-def nearest(name: str, known: Mapping[str, object]) -> str:
-    """The end of a sentence that found `name`: what may have been meant, or what there is."""
-    close = " or ".join(map(repr, difflib.get_close_matches(name, known, 3, 0.5)))
-    return f"; did you mean {close}?" if close else f", expected one of {', '.join(sorted(known))}"
-
-
 def open_study(folder: Path | str) -> Study:
     """The study in `folder`.
 
@@ -246,13 +253,25 @@ def open_study(folder: Path | str) -> Study:
     """
     folder = Path(folder)
     path = folder / FILE
+    settle(folder)
     if not path.is_file():
         raise ConfigError(path, "", "no such file", "a study; make one with `rigwatch study new`")
-    file = load(path, StudyFile)
+    return study_of(folder, read_text(path))
+
+
+def study_of(folder: Path, text: str) -> Study:
+    """The study that `folder` would hold if its file said `text`; nothing is written.
+
+    Raises:
+        ConfigError: the text does not fit.
+        ModelError: its model or one of its effects is unknown.
+    """
+    file = parse(text, StudyFile, folder / FILE)
     given = offered(folder / name for name in file.effect_files)
     effects = {**library(), **given}
-    model, holds = _held(_model(folder, file.model), file)
-    study = Study(folder, file, model, effects, frozenset(given), holds=holds)
+    file = known_in_si(_written(folder, file), file, folder / FILE)
+    model, holds = _base(folder, file)
+    study = Study(folder, file, model, effects, frozenset(given), holds=holds, text=text)
     for accepted in file.effects:
         study.effect(accepted.effect)
     return _in_si(study)
@@ -264,11 +283,11 @@ def _in_si(study: Study) -> Study:
         name: _unit(study.model.parameters.get(name)).to_si(value)
         for name, value in study.file.start.items()
     }
-    effects = [_converted(study, a, "to_si") for a in study.file.effects]
+    effects = [converted(study, a, "to_si") for a in study.file.effects]
     return replace(study, file=structs.replace(study.file, start=start, effects=tuple(effects)))
 
 
-def _converted(study: Study, accepted: Accepted, way: Literal["to_si", "from_si"]) -> Accepted:
+def converted(study: Study, accepted: Accepted, way: Literal["to_si", "from_si"]) -> Accepted:
     """The values of an accepted effect, from the units that people write to SI or back."""
     known = study.effect_at(accepted.effect, accepted.port).parameters
     values = {
@@ -307,6 +326,27 @@ def _model(folder: Path, name: str) -> Model:
     if name not in models:
         raise ModelError(f"{folder / FILE}: found model {name!r}{nearest(name, models)}")
     return models[name]
+
+
+def _base(folder: Path, file: StudyFile) -> tuple[Model, dict[str, Held]]:
+    """The study's model with its variants and its holds, and the holds."""
+    return _held(known_as_inputs(_written(folder, file), file), file)
+
+
+def _written(folder: Path, file: StudyFile) -> Model:
+    """The study's model with its variants, as its file describes it."""
+    return with_variants(_model(folder, file.model), file.variants)
+
+
+def varied(study: Study, variants: Sequence[str]) -> Study:
+    """The study with these variants of its model, in memory alone.
+
+    Raises:
+        ModelError: a variant is unknown, or two of them exclude each other.
+    """
+    file = structs.replace(study.file, variants=tuple(variants))
+    model, holds = _base(study.folder, file)
+    return replace(study, file=file, model=model, kept=None, holds=holds)
 
 
 def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
@@ -367,76 +407,3 @@ def create(folder: Path | str, template: Path | str, sessions: Path | str | None
     except RigwatchError:
         (folder / FILE).unlink()
         raise
-
-
-def append_effect(study: Study, accepted: Accepted) -> Study:
-    """The study with one more effect in its file, its values in the units of its parameters."""
-    written = _converted(study, accepted, "from_si")
-    table = f'effect = "{accepted.effect}"\nport = "{accepted.port}"\n'
-    table += f"parameters = {_inline(written.parameters)}\n"
-    if written.model:
-        table += f"model = {_inline(written.model)}\n"
-    text = _text(study).rstrip() + "\n" + _TABLE + table
-    return _rewritten(study, text)
-
-
-def _inline(values: Mapping[str, float]) -> str:
-    """Numbers by name as an inline table."""
-    return f"{{ {', '.join(f'{name} = {value!r}' for name, value in values.items())} }}"
-
-
-def drop_effect(study: Study) -> Study:
-    """The study without the effect that its file lists last.
-
-    Raises:
-        ModelError: there is none, or the table does not stand at the end of the file.
-    """
-    text = _text(study)
-    at = text.rfind(_TABLE)
-    if not study.file.effects or at < 0:
-        raise ModelError(f"{study.folder}: found no effect to undo")
-    text = text[:at].rstrip() + "\n"
-    if len(study.file.effects) == 1:
-        text = "".join(line for line in text.splitlines(True) if CHOSEN not in line)
-    return _rewritten(study, text)
-
-
-def use_effect_file(study: Study, path: Path) -> Study:
-    """The study with a copy of the user's effect file, whose effects join the others.
-
-    Raises:
-        ConfigError: the file does not fit.
-    """
-    load_effects(path)
-    target = study.folder / path.name
-    if path.resolve() != target.resolve():
-        shutil.copyfile(path, target)
-    names = [*dict.fromkeys([*study.file.effect_files, path.name])]
-    line = f"effect_files = [{', '.join(repr(n).replace(chr(39), chr(34)) for n in names)}]\n"
-    kept = [x for x in _text(study).splitlines(True) if not x.startswith("effect_files")]
-    return _rewritten(study, line + "".join(kept))
-
-
-def keep_holds(study: Study) -> Study:
-    """The study with the holds that the data have chosen in its file, so that they stay."""
-    chosen = {n: h for n, h in study.holds.items() if h.source not in GIVEN}
-    if not chosen or study.file.hold:
-        return study
-    holds = ", ".join(f'{name} = "{held.hold}"' for name, held in chosen.items())
-    late = ", ".join(f"{name} = {held.late!r}" for name, held in chosen.items() if held.late)
-    lines = f"hold = {{ {holds} }}{CHOSEN}\n" + (f"late = {{ {late} }}{CHOSEN}\n" if late else "")
-    return _rewritten(study, lines + _text(study))
-
-
-def _text(study: Study) -> str:
-    return (study.folder / FILE).read_text(encoding="utf-8")
-
-
-def _rewritten(study: Study, text: str) -> Study:
-    """Write the file whole or not at all, after a look at whether it can be read back."""
-    tomllib.loads(text)
-    path = study.folder / FILE
-    beside = path.with_suffix(".new")
-    beside.write_text(text, encoding="utf-8")
-    beside.replace(path)
-    return open_study(study.folder)

@@ -1,0 +1,51 @@
+"""The workbench in a browser beside the demonstration, where its extra is installed."""
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+
+STOP_TIMEOUT = 10.0
+
+
+@contextmanager
+def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iterator[None]:
+    """Serve the studies of `folder` with the page of a rig for as long as this lasts.
+
+    Args:
+        folder: of the demonstration; the studies are below it.
+        rig: its configuration.
+        say: told the address.
+    """
+    if find_spec("starlette") is None or find_spec("uvicorn") is None:
+        yield
+        return
+    studies = folder / "studies"
+    studies.mkdir(exist_ok=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rigwatch", "workbench", str(studies), "--rig", str(rig), "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        process_group=0,
+    )
+    threading.Thread(target=_tell, args=(process, say), name="pages", daemon=True).start()
+    try:
+        yield
+    finally:
+        process.terminate()
+        try:
+            process.wait(STOP_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            process.kill()
+
+
+def _tell(process: "subprocess.Popen[str]", say: Callable[[str], None]) -> None:
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    if line:
+        say(f"workbench: {json.loads(line)['address']}")

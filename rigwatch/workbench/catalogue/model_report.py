@@ -1,0 +1,157 @@
+"""Whether a model's file can work: units, names that nothing uses, states that no output shows.
+
+Observability is read from a run of the model with its exact sensitivities: the outputs' slopes by
+the initial states, over as long as the slowest state takes to settle. A state whose column vanishes
+is shown by nothing, and states whose columns add up to nothing cannot be told apart (R. Hermann,
+A. J. Krener, IEEE TAC 22(5), 1977; here numerically, along one run).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigwatch.physics.engine.compile import compile_system
+from rigwatch.physics.engine.equations import (
+    Model,
+    System,
+    check_model,
+    measured_states,
+    names_in,
+)
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.catalogue.effect_curves import Curve
+
+STEPS = (1.0, 0.1, 0.01, 0.0)
+"""What inputs step to, the first with which the run stays finite."""
+MOST, FINEST, SETTLED = 4000, 20.0, 5.0
+"""Samples of a run at most, samples within the fastest time constant, slowest ones to run for."""
+SHOWN = 1e-9
+"""Slope by a state below which nothing shows it, over the largest."""
+APART = 1e-7
+"""Smallest singular value of the slopes, over the largest, from which states are told apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelReport:
+    """What is found.
+
+    Attributes:
+        unused: parameters, quantities and inputs that no equation needs, by name.
+        unseen: states that no output shows.
+        tied: states that the outputs cannot tell from each other.
+        start: states that no channel shows and that therefore start where the file says.
+        step: what the inputs step to that are not given.
+        run: the outputs from the file's start with such inputs; none without states.
+        trouble: why there is no run.
+    """
+
+    unused: tuple[str, ...]
+    unseen: tuple[str, ...]
+    tied: tuple[str, ...]
+    start: tuple[str, ...]
+    step: float
+    run: tuple[Curve, ...]
+    trouble: str = ""
+
+    @property
+    def fine(self) -> bool:
+        """Whether nothing is in a fit's way."""
+        return not (self.unused or self.tied or self.trouble)
+
+
+def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> ModelReport:
+    """Check a model.
+
+    Args:
+        model: as it was read.
+        inputs: values of some inputs during the run, by name.
+        where: its file, for errors.
+
+    Raises:
+        ModelError: the model cannot be used, or an input is unknown.
+    """
+    system = check_model(model, where)
+    if unknown := set(inputs) - set(model.inputs):
+        known = ", ".join(model.inputs)
+        raise ModelError(f"{where}: found input {min(unknown)!r}, expected one of {known}")
+    shown = {state.name for state in measured_states(model)}
+    start = tuple(name for name in model.states if name not in shown)
+    unused = _unused(model, system)
+    if not model.states:
+        return ModelReport(unused, (), (), start, 0.0, ())
+    for step in STEPS:
+        given = dict.fromkeys(model.inputs, step) | dict(inputs)
+        time, outputs, slopes = _run(system, given)
+        if np.isfinite(outputs).all() and np.isfinite(slopes).all():
+            break
+    else:
+        trouble = "the run does not stay finite, expected other starts, parameters or inputs"
+        return ModelReport(unused, (), (), start, 0.0, (), trouble)
+    curves = tuple(
+        Curve("time [s]", f"{name} [{own.shown or own.unit}]", time, outputs[:, column])
+        for column, (name, own) in enumerate(model.outputs.items())
+    )
+    return ModelReport(unused, *_observed(list(model.states), slopes), start, step, curves)
+
+
+def _unused(model: Model, system: System) -> tuple[str, ...]:
+    """What stands in no equation, nor at a port where an effect may ask for it."""
+    equations = (*system.derivatives.values(), *system.outputs.values())
+    symbols = {s.name for equation in equations for s in equation.free_symbols}
+    texts = [
+        *(state.derivative for state in model.states.values()),
+        *(output.expression for output in model.outputs.values()),
+        *(v.expression for port in model.ports.values() for v in port.variables.values()),
+        *(quantity.expression for quantity in model.quantities.values()),
+    ]
+    named = frozenset().union(*(names_in(text, "model") for text in texts))
+    spelt = (v.expression for port in system.model.ports.values() for v in port.variables.values())
+    symbols |= frozenset().union(*(names_in(text, "model") for text in spelt))
+    leaves = [n for n in (*model.parameters, *model.inputs) if n not in symbols]
+    return (*leaves, *(n for n in model.quantities if n not in named))
+
+
+def _run(system: System, inputs: Mapping[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Time (n,), outputs (n, outputs), and their slopes by initial states (n·outputs, states)."""
+    compiled = compile_system(system)
+    first = np.array([[state.start for state in system.states.values()]])
+    values = np.array([[inputs[name] for name in system.model.inputs]])
+    parameters, at = compiled.parameters, np.zeros(1, np.int64)
+    there = compiled.linearise(
+        np.repeat(values, 2, 0), 1e-9, at, 2, initial=first, parameters=parameters, substeps=1
+    )
+    free, states = len(system.free), len(system.states)
+    rates = np.linalg.eigvals(np.nan_to_num(there.rate_slopes[0, 0, :, free : free + states]))
+    dt, count = _grid(np.abs(rates))
+    made = compiled.simulate(
+        np.repeat(values, count, 0), dt, at, count, initial=first, parameters=parameters
+    )
+    slopes = made.slopes[0, :, :, free : free + states].reshape(-1, states)
+    return np.arange(count, dtype=np.float64) * dt, made.outputs[0], slopes
+
+
+def _grid(rates: FloatArray) -> tuple[float, int]:
+    """Time between samples [s] and their number: the slowest state settles if it can."""
+    moving = rates[rates > 1e-9 * max(float(rates.max()), 1e-300)]
+    if not moving.size:
+        return 0.01, 500
+    fastest, slowest = float(moving.max()), float(moving.min())
+    dt = min(max(1 / (FINEST * fastest), SETTLED / slowest / MOST), 1 / fastest)
+    return dt, max(min(round(SETTLED / slowest / dt), MOST), 200)
+
+
+def _observed(names: list[str], slopes: FloatArray) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """States that no output shows, and those that cannot be told apart."""
+    size = np.linalg.norm(slopes, axis=0)
+    seen = size > SHOWN * max(float(size.max()), 1e-300)
+    kept = [name for name, one in zip(names, seen.tolist(), strict=True) if one]
+    unit = slopes[:, seen] / size[seen]
+    _, singular, axes = np.linalg.svd(unit, full_matrices=False)
+    tied: set[str] = set()
+    for value, axis in zip(singular.tolist(), axes, strict=True):
+        if value < APART * singular[0]:
+            tied |= {n for n, part in zip(kept, np.abs(axis).tolist(), strict=True) if part > 0.1}
+    unseen = tuple(name for name in names if name not in kept)
+    return unseen, tuple(name for name in kept if name in tied)

@@ -1,0 +1,115 @@
+"""How long a window is: long enough for the model's dynamics, short enough for many of them.
+
+Over a horizon much shorter than its time constants a model hardly moves from where each window
+begins, and whatever is missing hides in that; over a long one errors add up, and few windows are
+left to judge on. So the horizon spans the slowest of the model's own motions that a recording
+shows: three time constants, or two periods where it oscillates. The model is fitted once over a
+horizon that the outputs suggest, to know them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from msgspec import structs
+
+from rigwatch.physics.engine.fit import Recording, filled
+from rigwatch.wire.arrays import ComplexArray, FloatArray
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.data import goes_along_motion, prepare, quiet_scale
+from rigwatch.workbench.fit import Fitted, eigenvalues, fit_base, with_hold
+from rigwatch.workbench.study import Study
+
+SPANS = 3.0
+"""Horizon over the slowest time constant."""
+PERIODS = 2.0
+"""Periods in a horizon, where the slowest motion oscillates."""
+WINDOWS = 10
+"""Windows at least of the shortest recording."""
+FEWEST = 20
+"""Samples at least of a window."""
+GONE = float(np.exp(-1))
+"""Autocorrelation at which an output has forgotten itself."""
+
+
+def with_horizon(study: Study) -> Study:
+    """The study with a horizon, chosen where its file gives none.
+
+    Raises:
+        ModelError: data do not suit the model.
+    """
+    given = study.file.horizon is not None or not study.model.states
+    if given or study.model.rough or goes_along_motion(study):
+        return study
+    data = prepare(_with(study, ""))
+    shortest = (
+        min(length for r in (data.train, data.held_out) for length in r.parts) * data.train.dt
+    )
+    longest, least = shortest / WINDOWS, FEWEST * data.train.dt
+    begin = float(np.clip(_memory(data.train), least, max(longest, least)))
+    study = _with(study, "how fast the outputs change", begin)
+    try:
+        fitted = _once(study)
+    except ModelError:
+        return study
+    slowest = _slowest(eigenvalues(fitted, data.train), shortest)
+    if slowest is None:
+        return study
+    constant, name = slowest
+    chosen = float(np.clip(constant, least, max(longest, least)))
+    bound = ", as far as the shortest recording has ten of it" if chosen < constant else ""
+    return _with(study, f"{name}{bound}", chosen)
+
+
+def with_horizon_of(study: Study, other: Study) -> Study:
+    """The study with the horizon that was chosen for another opening of it."""
+    if not other.horizon_from:
+        return study
+    file = structs.replace(study.file, horizon=other.file.horizon)
+    return replace(study, file=file, horizon_from=other.horizon_from)
+
+
+def _with(study: Study, source: str, horizon: float | None = None) -> Study:
+    rounded = None if horizon is None else float(f"{horizon:.2g}")
+    file = structs.replace(study.file, horizon=rounded)
+    return replace(study, file=file, horizon_from=source)
+
+
+def _once(study: Study) -> Fitted:
+    """The model fitted to the training recordings."""
+    data = prepare(study)
+    scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
+    return fit_base(with_hold(study, data, scale), data, scale)
+
+
+def _slowest(found: ComplexArray, longest: float) -> tuple[float, str] | None:
+    """Horizon that the slowest motion asks for [s], and what it is; None where nothing moves.
+
+    What takes longer than the recording lasts, as an integrator does, is no motion that it shows.
+    """
+    rate = np.sort_complex(found.ravel())
+    seen = rate[np.abs(rate) * longest > 1]
+    if not len(seen):
+        return None
+    turning = np.abs(seen.imag) > np.abs(seen.real)
+    asked = np.where(turning, 2 * np.pi * PERIODS / np.abs(seen), SPANS / np.abs(seen))
+    # Modes of all windows together: the slowest that is no exception.
+    wanted = float(np.quantile(asked, 1 - 0.5 / found.shape[1]))
+    at = int(np.argmin(np.abs(asked - wanted)))
+    if turning[at]:
+        return wanted, f"the model's period of {wanted / PERIODS:.2g} s"
+    return wanted, f"the model's time constant of {wanted / SPANS:.2g} s"
+
+
+def _memory(recording: Recording) -> float:
+    """Three times how long the slowest output is like itself [s]."""
+    spans = [_like_itself(filled(column)) for column in recording.outputs.T]
+    return SPANS * max(spans) * recording.dt
+
+
+def _like_itself(signal: FloatArray) -> int:
+    """Samples until the autocorrelation has fallen to 1/e."""
+    left = signal - signal.mean()
+    spectrum = np.abs(np.fft.rfft(left, 2 * len(left))) ** 2
+    together = np.fft.irfft(spectrum)[: len(left)]
+    below = np.nonzero(together < GONE * max(float(together[0]), 1e-300))[0]
+    return int(below[0]) if len(below) else len(left)

@@ -1,0 +1,52 @@
+"""What was fitted stays for the next step, found by the hashes of what it stood on."""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from rigwatch.workbench.compare.compare import Comparison, comparison
+from rigwatch.workbench.compare.preparation import Bench, open_bench
+from rigwatch.workbench.study import Study, check_data, stands_on
+
+T = TypeVar("T")
+FEW = 6
+
+
+class Warm:
+    """Fits of a study that its next steps begin with; a study that has changed finds none.
+
+    Args:
+        most: results that are kept, the latest used.
+    """
+
+    def __init__(self, most: int = FEW) -> None:
+        self._most = most
+        self._kept: OrderedDict[tuple[str, ...], Any] = OrderedDict()
+
+    def get(self, key: tuple[str, ...], make: Callable[[], T]) -> T:
+        """What is kept under `key`, made where it is not."""
+        if key not in self._kept:
+            self._kept[key] = make()
+            while len(self._kept) > self._most:
+                self._kept.popitem(last=False)
+        self._kept.move_to_end(key)
+        found: T = self._kept[key]
+        return found
+
+    def bench(self, study: Study) -> Bench:
+        """The study's bench.
+
+        Raises:
+            ModelError: data have changed, or do not suit the model.
+        """
+        check_data(study)
+        return self.get(("bench", stands_on(study)), lambda: open_bench(study))
+
+    def comparison(self, study: Study) -> Comparison:
+        """The study's errors.
+
+        Raises:
+            ModelError: data have changed, or do not suit the model.
+        """
+        key = ("comparison", stands_on(study))
+        return self.get(key, lambda: comparison(self.bench(study)))

@@ -1,0 +1,114 @@
+"""Whether the training recordings excite the model: what they do not tell, and a split that does.
+
+A part in which nothing moves, or steps each without its transient, leave parameters of the model
+open. What is then held against other recordings is an accident, and no effect can be judged by it.
+So before anything is ranked every parameter is asked for; where one is open, other splits of the
+same recordings are tried, and one that tells it is proposed.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from msgspec import structs
+
+from rigwatch.physics.engine.fit import Recording
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.data import Data, prepare
+from rigwatch.workbench.explain.verdict import Verdict
+from rigwatch.workbench.fit import Value, fit_base, shown, values
+from rigwatch.workbench.study import Span, Study
+
+OPEN, TOLD = 1.0, 0.25
+"""Half of an interval over its value from which a parameter is open, and up to which it is told."""
+SHARES = (0.5, 2 / 3)
+"""Shares of each recording that are tried as training."""
+
+
+def unexcited(bench: Bench) -> Verdict | None:
+    """The verdict where the training leaves parameters open that another split would tell."""
+    left_open = {n: v for n, v in _own(bench).items() if _width(v) > OPEN}
+    in_memory = len(bench.data.train.parts) != len(bench.study.file.train)
+    if not left_open or in_memory or bench.data.along_motion or bench.study.model.rough:
+        return None
+    for study in _splits(bench.study, bench.data):
+        found, judged = _values(study, bench)
+        told = all(_width(found[name]) < TOLD for name in left_open) if found else False
+        if told and all(_width(judged[name]) < OPEN for name in left_open):
+            said = ", ".join(f"{name} = {shown(value)}" for name, value in left_open.items())
+            then = ", ".join(f"{name} = {shown(found[name])}" for name in left_open)
+            text = (
+                f"the training does not excite the model: it leaves {said}; train on"
+                f" {_said(study.file.train)} and hold out {_said(study.file.held_out)}, which gives"
+                f" {then}"
+            )
+            return Verdict("model_inadequate", None, (), (), text)
+    return None
+
+
+def _own(bench: Bench) -> dict[str, Value]:
+    """The model's free parameters with their intervals, as its training tells them."""
+    known = bench.study.model.parameters
+    return {n: v for n, v in values(bench.base.train).items() if n in known and v.interval}
+
+
+def _width(value: Value) -> float:
+    """Half of the interval over the value."""
+    assert value.interval is not None
+    low, high = value.interval
+    return (high - low) / 2 / max(abs(value.value), 1e-300)
+
+
+def _values(study: Study, bench: Bench) -> tuple[dict[str, Value], dict[str, Value]]:
+    """What both sides of another split tell of the model's parameters; nothing without a fit."""
+    try:
+        data = prepare(study)
+        fitted = fit_base(study, data, bench.base.train.scale)
+    except RigwatchError:
+        return {}, {}
+    train, held_out = (
+        {name: value for name, value in values(side).items() if value.interval}
+        for side in (fitted.train, fitted.held_out)
+    )
+    return train, held_out
+
+
+def _splits(study: Study, data: Data) -> Iterator[Study]:
+    """The study with other parts of the same recordings to train on."""
+    train, held = study.file.train, study.file.held_out
+    whole = _whole(_ending(train, data.train) + _ending(held, data.held_out))
+    tries = [(list(held), list(train))]
+    for share in SHARES:
+        at = [round(span.start + share * (span.end - span.start), 2) for span in whole]
+        first = [structs.replace(s, end=end) for s, end in zip(whole, at, strict=True)]
+        last = [structs.replace(s, start=begin) for s, begin in zip(whole, at, strict=True)]
+        tries += [(first, last), (last, first)]
+    for fitted, judged in tries:
+        file = structs.replace(study.file, train=tuple(fitted), held_out=tuple(judged))
+        yield replace(study, file=file)
+
+
+def _ending(spans: Sequence[Span], recording: Recording) -> list[Span]:
+    """Spans with ends in seconds, as far as they are counted."""
+    lengths = zip(spans, recording.parts, strict=True)
+    return [
+        structs.replace(s, end=min(s.end, s.start + length * recording.dt)) for s, length in lengths
+    ]
+
+
+def _whole(spans: Sequence[Span]) -> list[Span]:
+    """One span a session, from where its first part begins to where its last one ends."""
+    names = dict.fromkeys(span.session for span in spans)
+    groups = [[span for span in spans if span.session == name] for name in names]
+    return [
+        structs.replace(group[0], start=min(s.start for s in group), end=max(s.end for s in group))
+        for group in groups
+    ]
+
+
+def _said(spans: Sequence[Span]) -> str:
+    def part(span: Span) -> str:
+        end = "its end" if span.end == float("inf") else f"{span.end:.4g} s"
+        return f"{span.session} from {span.start:.4g} s to {end}"
+
+    return ", ".join(part(span) for span in spans)

@@ -1,0 +1,182 @@
+"""A study from the logs of a machine and the name of a model.
+
+Logs become sessions in the study's folder, columns become the model's signals, and the file that is
+written says what was chosen: parts to fit to and parts that decide, rate, low-pass.
+"""
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from msgspec import structs
+
+from rigwatch.physics.engine.equations import Input, Model, Output, load_model, shipped_models
+from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError, nearest
+from rigwatch.wire.exchange import ImportMapping, import_file, read_table
+from rigwatch.workbench.data import (
+    RATES_ALIKE,
+    Part,
+    prepare,
+    proposed_low_pass,
+    proposed_split,
+    read_columns,
+)
+from rigwatch.workbench.steps.log_columns import Matched, matched
+from rigwatch.workbench.study import FILE, Span, Study, open_study
+
+
+@dataclass(frozen=True)
+class Logs:
+    """What a user has.
+
+    Attributes:
+        data: log files: CSV, MAT, Parquet, JSON; or sessions.
+        model: a shipped model's name, or a model file.
+        healthy: logs with nothing wrong.
+        mapping: how logs are read, where their headers do not tell.
+        start: values of the model's parameters that are known, in their units.
+    """
+
+    data: tuple[Path, ...]
+    model: str
+    healthy: tuple[Path, ...] = ()
+    mapping: ImportMapping = field(default_factory=ImportMapping)
+    start: Mapping[str, float] = field(default_factory=dict)
+
+
+def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
+    """A new study, and what was chosen or taken for granted.
+
+    Args:
+        folder: is made where there is none.
+        logs: recordings and model.
+
+    Raises:
+        ConfigError: the folder holds a study already.
+        ImportDataError: a log cannot be read.
+        ModelError: the model is unknown, or its signals are not told by the columns.
+    """
+    if (folder / FILE).exists():
+        raise ConfigError(folder / FILE, "", "a study", "a folder without one")
+    model, made_folder, written = _model(logs.model), not folder.exists(), list[Path]()
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        reading, remarks = _imported(folder, logs, model, written)
+        text, said = _file(folder, logs, model, reading)
+        written.append(folder / FILE)
+        (folder / FILE).write_text(text, encoding="utf-8")
+        study = open_study(folder)
+        return study, [*remarks, *said, *prepare(study).remarks]
+    except RigwatchError:
+        for path in written:
+            path.unlink(missing_ok=True)
+        if made_folder:
+            folder.rmdir()
+        raise
+
+
+def _model(name: str) -> Model:
+    if name.endswith(".toml"):
+        return load_model(Path(name))
+    models = shipped_models()
+    if name not in models:
+        raise ModelError(f"--model: found {name!r}{nearest(name, models)}")
+    return models[name]
+
+
+def _imported(
+    folder: Path, logs: Logs, model: Model, written: list[Path]
+) -> tuple[Matched, list[str]]:
+    """Logs as sessions of one name each beside the study's file."""
+    names = [path.stem for path in (*logs.data, *logs.healthy)]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise ModelError(f"--data: found {min(twice)} twice, expected files of different names")
+    reading, remarks = None, list[str]()
+    for path in (*logs.data, *logs.healthy):
+        target = folder / f"{path.stem}.mcap"
+        if path.suffix == ".mcap":
+            shutil.copyfile(path, target)
+            written.append(target)
+            continue
+        table = read_table(path, logs.mapping)
+        try:
+            found = matched(table.names, model, logs.mapping.channels)
+        except ModelError as error:
+            raise ModelError(f"{path}: {error}") from None
+        mapping = structs.replace(
+            logs.mapping, channels=found.channels, time=logs.mapping.time or found.time
+        )
+        made = import_file(path, target, mapping)
+        written.append(target)
+        remarks += [f"{path.name}: {remark}" for remark in (*found.remarks, *made.remarks[1:])]
+        reading = reading or found
+    return reading or Matched({}, "", {}, ()), remarks
+
+
+def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str, list[str]]:
+    """The study's file, and what was chosen for it in words."""
+    spans = [Span(session=f"{path.stem}.mcap") for path in logs.data]
+    tables = [read_columns(folder, span) for span in spans]
+    driving = [n for n in _channels(model.inputs) if n in tables[0].values]
+    outputs = [n for n in _channels(model.outputs) if n in tables[0].values]
+    train, held_out = proposed_split(tables, driving or outputs)
+    lines, said = [f'model = "{_named(folder, logs.model)}"'], list[str]()
+    rates = [1 / table.dt for table in tables]
+    if max(rates) / min(rates) > 1 + RATES_ALIKE:
+        lines.append(f"rate = {min(rates):.6g}  # the slowest log's")
+    if logs.start:
+        values = ", ".join(f"{name} = {value!r}" for name, value in logs.start.items())
+        lines.append(f"start = {{ {values} }}")
+    if reading.rates:
+        sources = sorted({channel for channel, _ in reading.rates.values()})
+        low_pass = max(proposed_low_pass(tables, name) for name in sources)
+        lines += ["", "[derive]", f"low_pass = {low_pass!r}"]
+        lines += [
+            f'signals.{name} = {{ channel = "{channel}", order = {order} }}'
+            for name, (channel, order) in reading.rates.items()
+        ]
+        said.append(f"{', '.join(reading.rates)} made from {', '.join(sources)}, low-passed at"
+                    f" {low_pass:g} Hz")  # fmt: skip
+    for use, parts in (("train", train), ("held_out", held_out)):
+        for part in parts:
+            lines += _span(use, logs.data[part.recording].stem, part)
+            said.append(f"{use.replace('_', ' ')}: {_in_words(logs, part)}")
+    for path in logs.healthy:
+        lines += _span("healthy", path.stem, Part(0))
+    known = [n for n, p in model.parameters.items() if p.fixed and n not in logs.start]
+    if known:
+        said.append(
+            f"{', '.join(known)}: not fitted, taken from the model file; say what you know with"
+            f" --set {known[0]}=VALUE"
+        )
+    return "\n".join(lines) + "\n", said
+
+
+def _channels(signals: Mapping[str, Input] | Mapping[str, Output]) -> list[str]:
+    return [signal.channel or name for name, signal in signals.items()]
+
+
+def _named(folder: Path, model: str) -> str:
+    """A model by its name, or its file copied into the study."""
+    if not model.endswith(".toml"):
+        return model
+    shutil.copyfile(model, folder / Path(model).name)
+    return Path(model).name
+
+
+def _span(use: str, session: str, part: Part) -> list[str]:
+    lines = ["", f"[[{use}]]", f'session = "{session}.mcap"']
+    if part.start:
+        lines.append(f"start = {part.start:.6g}")
+    if part.end != float("inf"):
+        lines.append(f"end = {part.end:.6g}")
+    return lines
+
+
+def _in_words(logs: Logs, part: Part) -> str:
+    name = logs.data[part.recording].name
+    if not part.start and part.end == float("inf"):
+        return name
+    until = f"to {part.end:.4g} s" if part.end != float("inf") else "on"
+    return f"{name} from {part.start:.4g} s {until}"

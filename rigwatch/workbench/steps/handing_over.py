@@ -1,0 +1,136 @@
+"""Hands a promoted model to the monitor of a rig: to the running one, else into its file.
+
+Before a model goes live it can be rehearsed on what the rig did last: the monitor with it and the
+one without run over the same samples.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from monitor.model import RigModel, load_model, model_versions
+from monitor.pipeline import RigMonitor
+from monitor.process import monitor_section
+from rigwatch.wire.bus import Granted, Wish, ask_for_model, connect, unique_process
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.messages import Alarm, SampleBlock
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.workbench.steps.promotion import Promotion, promotion
+from rigwatch.workbench.study import Study, ledger
+
+LINK_TIMEOUT = 3.0
+
+
+@dataclass(frozen=True)
+class HandedOver:
+    """What became of it.
+
+    Attributes:
+        granted: what the monitor says.
+        live: whether one runs.
+        found: what was handed over; None for a rollback.
+    """
+
+    granted: Granted
+    live: bool
+    found: Promotion | None
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """A model on what the rig did last.
+
+    Attributes:
+        seconds: length of it [s].
+        before, after: the monitor's residual with the model in force and with the new one, rms.
+        alarms: names that the new one raises there.
+    """
+
+    seconds: float
+    before: float
+    after: float
+    alarms: tuple[str, ...]
+
+
+def hand_over(
+    study: Study,
+    rig: Path,
+    user: str,
+    *,
+    rollback: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> HandedOver:
+    """Promote a study's model to a rig's monitor, or take the one before again.
+
+    Args:
+        study: whose accepted effects are promoted.
+        rig: the rig's configuration.
+        user: who asks.
+        rollback: the model before again.
+        say: takes remarks for people.
+
+    Raises:
+        ModelError: an effect has no place in the monitor's model, or the residual does not fall.
+        ConfigError: the rig's configuration or model cannot be read.
+    """
+    path = model_path(rig)
+    name, found = study.folder.resolve().name, None
+    if rollback:
+        wish = Wish("rollback", "", user, f"rolled back from study {name}")
+    else:
+        found = promotion(study, load_model(path))
+        effects = ", ".join(a.effect for a in study.file.effects)
+        wish = Wish("promote", found.text, user, f"study {name}: {effects}")
+    granted, live = _send(rig, path, wish, say)
+    if granted.done:
+        ledger.append(study, wish.action, rig=str(rig), live=live, text=granted.text)
+    return HandedOver(granted, live, found)
+
+
+def model_path(rig: Path) -> Path:
+    """The file of the model that a rig's monitor runs with."""
+    return Path(monitor_section(load_rig(rig), rig).model)
+
+
+def rehearse(new: RigModel, old: RigModel, blocks: Sequence[SampleBlock]) -> Rehearsal:
+    """Both models over the same samples; the first second, in which filters settle, not counted."""
+    seconds = (blocks[-1].t_ns[-1] - blocks[0].t_ns[0]) / 1e9 if blocks else 0.0
+    (before, _), (after, alarms) = (_run(model, blocks) for model in (old, new))
+    return Rehearsal(float(seconds), before, after, alarms)
+
+
+def _run(model: RigModel, blocks: Sequence[SampleBlock]) -> tuple[float, tuple[str, ...]]:
+    monitor, residuals, names = RigMonitor(model), [], dict[str, None]()
+    for block in blocks:
+        watched = monitor.update(block)
+        if watched is not None:
+            residuals.append(watched.estimates.column("residual").values)
+            raised = (a for a in watched.announcements if isinstance(a, Alarm))
+            names |= dict.fromkeys(a.name for a in raised if a.state == "unacknowledged")
+    whole = np.concatenate(residuals)[model.decision.settle :] if residuals else np.zeros(0)
+    return float(np.sqrt(np.nanmean(whole**2))) if whole.size else float("nan"), tuple(names)
+
+
+def _send(rig: Path, path: Path, wish: Wish, say: Callable[[str], None]) -> tuple[Granted, bool]:
+    """The monitor's answer; where none runs, the file is changed for its next start."""
+    try:
+        bus = connect(load_rig(rig), unique_process("promote"), LINK_TIMEOUT)
+        try:
+            return ask_for_model(bus, wish), True
+        finally:
+            bus.close()
+    except BusError as error:
+        say(f"{error}; the file is changed for its next start")
+        return _in_file(path, wish), False
+
+
+def _in_file(path: Path, wish: Wish) -> Granted:
+    now = time.time_ns()
+    if wish.action == "rollback":
+        model_versions.roll_back(path, now, wish.user, wish.text)
+    else:
+        model_versions.install(path, wish.model, now, wish.user, wish.text)
+    return Granted(True, "in force from the monitor's next start on")

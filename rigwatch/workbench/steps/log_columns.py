@@ -1,0 +1,120 @@
+"""Which columns of a log are a model's signals: by name, else by the only unit that fits."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rigwatch.physics.engine.equations import Input, Model, Output
+from rigwatch.wire.errors import ModelError
+from rigwatch.wire.exchange import Header, read_header
+from rigwatch.wire.units import unit_of
+
+TIMES = ("time", "t", "timestamp", "time_stamp", "seconds", "sec")
+"""Names of the column of the time."""
+
+
+@dataclass(frozen=True)
+class Matched:
+    """How a log is read.
+
+    Attributes:
+        channels: channel = "column[unit]".
+        time: "column[unit]", empty where the log has none.
+        rates: channels that are made from others: how often those are differentiated.
+        remarks: what was taken for granted, for people.
+    """
+
+    channels: dict[str, str]
+    time: str
+    rates: dict[str, tuple[str, int]]
+    remarks: tuple[str, ...]
+
+
+def matched(columns: Sequence[str], model: Model, given: Mapping[str, str]) -> Matched:
+    """The columns of a model's signals.
+
+    Args:
+        columns: of the log.
+        model: whose signals are looked for.
+        given: what the user said, channel = "column[unit]".
+
+    Raises:
+        ModelError: no column, or more than one, may be a signal; what to type is said.
+    """
+    headers = [read_header(column) for column in columns]
+    time = next((header for header in headers if header.name in TIMES), None)
+    free = [header for header in headers if header is not time]
+    signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
+    found, rates, remarks = dict(given), dict[str, tuple[str, int]](), list[str]()
+    for name, signal in signals.items():
+        channel = signal.channel or name
+        if channel in found or channel in rates:
+            continue
+        column = _column(name, channel, signal, free)
+        if column is not None:
+            unit = _unit(column, signal)
+            found[channel] = f"{column.column}[{unit}]"
+            free.remove(column)
+            if not column.units:
+                remarks.append(f"{column.column}: no unit in its header, taken for {unit}")
+        elif made := _rate(signal, signals):
+            rates[channel] = made
+        else:
+            raise ModelError(_unknown(name, channel, signal, columns))
+    if time is not None and not time.units:
+        remarks.append(f"{time.column}: no unit in its header, taken for s")
+    told = f"{time.column}[{_time_unit(time)}]" if time else ""
+    return Matched(found, told, rates, tuple(remarks))
+
+
+def _time_unit(time: Header) -> str:
+    return time.units[0] if time.units else "s"
+
+
+def _column(
+    name: str, channel: str, signal: Input | Output, headers: Sequence[Header]
+) -> Header | None:
+    """The column of a signal: of its name, else the only one whose unit fits."""
+    suiting = [header for header in headers if not header.units or _fits(header, signal)]
+    wanted = {name.lower(), channel.lower()}
+    named = [header for header in suiting if header.name in wanted]
+    alike = [h for h in suiting if any(_within(word, h.name) for word in wanted)]
+    measured = [header for header in suiting if header.units]
+    for chosen in (named, alike, measured):
+        if len(chosen) == 1:
+            return chosen[0]
+    return None
+
+
+def _within(word: str, name: str) -> bool:
+    return word in name or (len(name) > 1 and word.startswith(name))
+
+
+def _fits(header: Header, signal: Input | Output) -> bool:
+    wanted = unit_of(signal.shown or signal.unit).dimension
+    return any(unit_of(unit).dimension == wanted for unit in header.units)
+
+
+def _unit(header: Header, signal: Input | Output) -> str:
+    """The unit that a header means: of those that it may, the one that suits the signal."""
+    wanted = unit_of(signal.shown or signal.unit).dimension
+    fitting = (unit for unit in header.units if unit_of(unit).dimension == wanted)
+    return next(fitting, signal.shown or signal.unit)
+
+
+def _rate(signal: Input | Output, signals: Mapping[str, Input | Output]) -> tuple[str, int] | None:
+    """The channel that a signal is the rate of, and how often that is differentiated."""
+    own = unit_of(signal.shown or signal.unit).dimension
+    for order in (1, 2):
+        for name, other in signals.items():
+            unit = f"({other.shown or other.unit})/s^{order}"
+            if other is not signal and unit_of(unit).dimension == own:
+                return other.channel or name, order
+    return None
+
+
+def _unknown(name: str, channel: str, signal: Input | Output, columns: Sequence[str]) -> str:
+    unit = signal.shown or signal.unit
+    return (
+        f"found no column that must be {name} [{unit}] among {', '.join(columns)};"
+        f" say which: --map {channel}=COLUMN[{unit}]"
+    )

@@ -1,0 +1,254 @@
+"""Tries a step on a study: an effect put into its model, or the last one taken away.
+
+A trial fits and writes nothing, so that it may be ended at any time; its commit writes the study's
+file and the ledger's line, both or neither.
+
+An effect under which the held-out error does not fall is refused: that the training error falls is
+no evidence, as every further parameter lets it.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from msgspec import structs
+
+from rigwatch.physics.engine.score import suits
+from rigwatch.wire.errors import ModelError, nearest
+from rigwatch.workbench.compare import Bench, Comparison, Warm, with_horizon_of
+from rigwatch.workbench.fit import held_as
+from rigwatch.workbench.ranking import (
+    Progress,
+    Ranked,
+    accepted_from,
+    candidates,
+    rank_only,
+    refit,
+    unheard,
+)
+from rigwatch.workbench.study import (
+    Accepted,
+    Study,
+    append_effect,
+    commit,
+    drop_effect,
+    keep_holds,
+    stands_on,
+    use_variants,
+)
+
+WORSE = 1.01
+"""Held-out error over that of the accepted fit up to which a fit once more has led back to it."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What a step did.
+
+    Attributes:
+        step: "add", "refused" or "undo".
+        effect, port: which one.
+        before, after: the model without and with the step; the same where it was refused.
+        tried: errors that a refused effect would have led to: training, held out.
+        text: in a sentence.
+    """
+
+    step: str
+    effect: str
+    port: str
+    before: Comparison
+    after: Comparison
+    tried: tuple[float, float] | None
+    text: str
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A step that has been tried, and not yet written.
+
+    Attributes:
+        before: the study as it was opened.
+        after: as it would be; as it was where the step is refused.
+        change: what the step does.
+        line: what the ledger would say.
+        step: what the ledger would call it, where it is not as the change does.
+    """
+
+    before: Study
+    after: Study
+    change: Change
+    line: dict[str, Any]
+    step: str = ""
+
+    def commit(self) -> Change:
+        """Write study and ledger, both or neither; what was done.
+
+        Raises:
+            ModelError: the study has been changed since it was opened.
+        """
+        commit(self.before, self.after, self.step or self.change.step, **self.line)
+        return self.change
+
+
+def try_add(
+    study: Study,
+    effect: str,
+    port: str | None = None,
+    *,
+    anyway: bool = False,
+    progress: Progress = unheard,
+    warm: Warm | None = None,
+) -> Trial:
+    """What `add` would do; nothing is written, so that it may be ended at any time.
+
+    Args:
+        study, effect, port, anyway: as for `add`.
+        progress: told what begins.
+        warm: fits that are there already; those that are made stay in it.
+
+    Raises:
+        ModelError: effect or port is unknown or already there, or the fit fails.
+    """
+    warm = warm or Warm()
+    where = _port(study, effect, port)
+    progress("fitting the model as it is")
+    bench, before = warm.bench(study), warm.comparison(study)
+    row = try_effect(study, effect, where, progress, warm)
+    assert row.fitted is not None
+    errors = (row.fitted.train_error, row.fitted.held_out_error)
+    words = (
+        f"{row.label}: held-out error {before.held_out_error:.4g} → {errors[1]:.4g} {before.unit}"
+    )
+    if not row.accepted and not anyway:
+        return _refused(study, row, before, f"{words}: {row.reason}")
+    accepted = whole(row)
+    # What is chosen now stays, so that errors before and after are of the same inputs.
+    held = with_horizon_of(held_as(study, bench.study.holds), bench.study)
+    changed = append_effect(keep_holds(held), accepted)
+    progress(f"fitting once more with {row.label}")
+    after = warm.comparison(changed)
+    if after.held_out_error > WORSE * errors[1] and not anyway:
+        reason = f"fitted once more it leaves {after.held_out_error:.4g} {after.unit}"
+        row = replace(row, reason=reason)
+        return _refused(study, row, before, f"{words}, but {row.reason}")
+    line = {"parameters": accepted.parameters, "model_parameters": accepted.model}
+    change = Change("add", effect, where, before, after, errors, words)
+    return Trial(study, changed, change, _which(change) | line | _numbers(after))
+
+
+def try_undo(study: Study, progress: Progress = unheard, warm: Warm | None = None) -> Trial:
+    """What `undo` would do; nothing is written.
+
+    Raises:
+        ModelError: there is nothing to take away.
+    """
+    warm = warm or Warm()
+    if not study.file.effects and study.file.variants:
+        return _as_written(study, progress, warm)
+    if not study.file.effects:
+        raise ModelError(f"{study.folder}: found no effect to undo")
+    last = study.file.effects[-1]
+    label = f"{last.effect}@{last.port}"
+    progress("fitting the model as it is")
+    before = warm.comparison(study)
+    changed = drop_effect(study)
+    progress(f"fitting without {label}")
+    after = warm.comparison(changed)
+    text = f"{label} taken away: held-out error {before.held_out_error:.4g} →"
+    text = f"{text} {after.held_out_error:.4g} {after.unit}"
+    change = Change("undo", last.effect, last.port, before, after, None, text)
+    return Trial(study, changed, change, _which(change) | _numbers(after))
+
+
+def _as_written(study: Study, progress: Progress, warm: Warm) -> Trial:
+    """The study with its model as it was written."""
+    named = ", ".join(study.file.variants)
+    progress("fitting the model as it is")
+    before, changed = warm.comparison(study), use_variants(study, ())
+    progress(f"fitting without {named}")
+    after = warm.comparison(changed)
+    text = f"{named} taken away: held-out error {before.held_out_error:.4g} →"
+    text = f"{text} {after.held_out_error:.4g} {after.unit}"
+    change = Change("undo", named, "", before, after, None, text)
+    line = {"variants": [], "before": list(study.file.variants), **_numbers(after)}
+    return Trial(study, changed, change, line, step="base")
+
+
+def _which(change: Change) -> dict[str, Any]:
+    return {"effect": change.effect, "port": change.port}
+
+
+def try_effect(
+    study: Study, effect: str, port: str, progress: Progress = unheard, warm: Warm | None = None
+) -> Ranked:
+    """An effect fitted at a port, and judged on the recordings held out.
+
+    Raises:
+        ModelError: effect or port is unknown or already there, or the fit fails.
+    """
+    warm = warm or Warm()
+    where, bench = _port(study, effect, port), warm.bench(study)
+    progress(f"fitting {effect}@{where}")
+    return warm.get((effect, where, stands_on(study)), lambda: _tried(bench, effect, where))
+
+
+def whole(row: Ranked) -> Accepted:
+    """The effect as a study's file lists it, with the values of the whole fit beside its own."""
+    assert row.fitted is not None
+    own, fit = accepted_from(row), row.fitted.train
+    free = set(fit.compiled.system.free)
+    rest = {
+        name: value
+        for name, value in fit.values().items()
+        if name in free and not name.startswith(row.placement.prefix)
+    }
+    return structs.replace(own, model=rest)
+
+
+def _refused(study: Study, row: Ranked, before: Comparison, words: str) -> Trial:
+    assert row.fitted is not None
+    errors = (row.fitted.train_error, row.fitted.held_out_error)
+    tried: dict[str, Any] = {"tried_train_error": errors[0], "tried_held_out_error": errors[1]}
+    words = f"{words}; not added"
+    change = Change("refused", row.effect, row.port, before, before, errors, words)
+    told = _which(change) | tried
+    return Trial(study, study, change, {"reason": row.reason} | _numbers(before) | told)
+
+
+def _numbers(found: Comparison) -> dict[str, object]:
+    return {
+        "train_error": found.train_error,
+        "held_out_error": found.held_out_error,
+        "noise_floor": found.noise_floor,
+        "unit": found.unit,
+    }
+
+
+def _port(study: Study, name: str, port: str | None) -> str:
+    effect, ports = study.effect(name), study.model.ports
+    fitting = [n for n, place in ports.items() if suits(effect, place, study.model)]
+    if port is None:
+        if len(fitting) == 1:
+            return fitting[0]
+        found = "none" if not fitting else "several: " + ", ".join(fitting)
+        raise ModelError(
+            f"{name}: found {found} of the model's ports for it, expected one (--port)"
+        )
+    if port not in ports:
+        raise ModelError(f"{name}: found no port {port!r}{nearest(port, ports)}")
+    if port not in fitting:
+        expected = ", ".join(fitting) or "another model"
+        raise ModelError(f"{name}: cannot stand at port {port!r}, expected {expected}")
+    if any(a.effect == name and a.port == port for a in study.file.effects):
+        raise ModelError(f"{name}@{port}: found in the model already")
+    return port
+
+
+def _tried(bench: Bench, effect: str, port: str) -> Ranked:
+    found = [
+        c for c in candidates(bench.study, bench.data.train) if (c.name, c.port) == (effect, port)
+    ]
+    row = rank_only(bench.study, bench.data, bench.base, found)
+    refit(bench.study, bench.data, bench.base, row)
+    if row.fitted is None:
+        raise ModelError(f"{row.label}: cannot be fitted: {row.trouble}")
+    return row

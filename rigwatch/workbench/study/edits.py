@@ -1,0 +1,90 @@
+"""Edits of a study's file: each gives the study as it would be, and writes nothing.
+
+`commit` writes the outcome, with the ledger's line that tells it.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rigwatch.physics.engine.equations import load_effects
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.study.folder import replace_file
+from rigwatch.workbench.study.study import GIVEN, Accepted, Study, converted, study_of
+
+_TABLE = "\n[[effects]]\n"
+CHOSEN = "  # chosen from the data, with the first effect"
+"""Behind holds that were written with the first effect, and go with it."""
+
+
+def append_effect(study: Study, accepted: Accepted) -> Study:
+    """The study with one more effect in its file, its values in the units of its parameters."""
+    written = converted(study, accepted, "from_si")
+    table = f'effect = "{accepted.effect}"\nport = "{accepted.port}"\n'
+    table += f"parameters = {_inline(written.parameters)}\n"
+    if written.model:
+        table += f"model = {_inline(written.model)}\n"
+    text = study.text.rstrip() + "\n" + _TABLE + table
+    return study_of(study.folder, text)
+
+
+def _inline(values: Mapping[str, float]) -> str:
+    """Numbers by name as an inline table."""
+    return f"{{ {', '.join(f'{name} = {value!r}' for name, value in values.items())} }}"
+
+
+def drop_effect(study: Study) -> Study:
+    """The study without the effect that its file lists last.
+
+    Raises:
+        ModelError: there is none, or the table does not stand at the end of the file.
+    """
+    text = study.text
+    at = text.rfind(_TABLE)
+    if not study.file.effects or at < 0:
+        raise ModelError(f"{study.folder}: found no effect to undo")
+    text = text[:at].rstrip() + "\n"
+    if len(study.file.effects) == 1:
+        text = "".join(line for line in text.splitlines(True) if CHOSEN not in line)
+    return study_of(study.folder, text)
+
+
+def use_effect_file(study: Study, path: Path) -> Study:
+    """The study with a copy of the user's effect file, whose effects join the others.
+
+    Raises:
+        ConfigError: the file does not fit.
+    """
+    load_effects(path)
+    target = study.folder / path.name
+    if path.resolve() != target.resolve():
+        replace_file(target, path.read_text(encoding="utf-8"))
+    names = dict.fromkeys([*study.file.effect_files, path.name])
+    return study_of(study.folder, _with_list(study, "effect_files", tuple(names)))
+
+
+def use_variants(study: Study, variants: Sequence[str]) -> Study:
+    """The study with these variants of its model in its file."""
+    return study_of(study.folder, _with_list(study, "variants", variants))
+
+
+def _with_list(study: Study, key: str, names: Sequence[str]) -> str:
+    """The file's text with a list of names at its head; without the key where there are none."""
+    quoted = ", ".join(f'"{name}"' for name in names)
+    kept = [x for x in study.text.splitlines(True) if not re.match(rf"{key}\s*=", x)]
+    return "".join([f"{key} = [{quoted}]\n" if names else "", *kept])
+
+
+def keep_holds(study: Study) -> Study:
+    """The study with the holds that the data have chosen in its file, so that they stay."""
+    chosen = {n: h for n, h in study.holds.items() if h.source not in GIVEN}
+    if study.horizon_from and study_of(study.folder, study.text).file.horizon is None:
+        text = f"horizon = {study.file.horizon!r}{CHOSEN}\n" + study.text
+        study = replace(study_of(study.folder, text), holds=study.holds)
+    if not chosen or study.file.hold:
+        return study
+    holds = ", ".join(f'{name} = "{held.hold}"' for name, held in chosen.items())
+    late = ", ".join(f"{name} = {held.late!r}" for name, held in chosen.items() if held.late)
+    lines = f"hold = {{ {holds} }}{CHOSEN}\n" + (f"late = {{ {late} }}{CHOSEN}\n" if late else "")
+    return study_of(study.folder, lines + study.text)
