@@ -1,4 +1,4 @@
-"""The command line: one thin module a command, found through the table below.
+"""The command line: one thin module per command, listed in the table below.
 
 A command module has
 
@@ -7,14 +7,12 @@ A command module has
     def add_arguments(parser: argparse.ArgumentParser) -> None
     def run(arguments: argparse.Namespace) -> int      the exit code, 0 for success
 
-and imports what it needs inside `run` where the import is slow. A command that has sub-commands has
-in place of both functions
+and does slow imports inside `run`. A command with sub-commands has, in place of both functions,
 
     ACTIONS: dict[str, str]      name of each: its module below rigwatch.commands
 
 and each of these is a command module again. Results go to stdout, progress and remarks to stderr.
-Every command has `--json`, added here: `arguments.json` is then true and stdout carries JSON and
-nothing else.
+Every command has `--json`, added here: `arguments.json` is then true and stdout carries only JSON.
 """
 
 import argparse
@@ -38,9 +36,11 @@ COMMANDS: dict[str, str] = {
     "daq": "processes.daq",
     "monitor": "processes.monitor",
     "record": "processes.record",
+    "witness": "processes.witness",
     "commission": "processes.commission",
     "alarms": "alarms.alarms",
     "ack": "alarms.ack",
+    "keys": "keys.keys",
     "doctor": "processes.doctor",
     "dashboard": "processes.dashboard",
     "view": "sessions.view",
@@ -50,6 +50,9 @@ COMMANDS: dict[str, str] = {
     "recover": "sessions.recover",
     "replay": "sessions.replay",
     "verify": "sessions.verify",
+    "model": "catalogue.model",
+    "effects": "catalogue.effects",
+    "workbench": "workbench.workbench",
     "study": "workbench.study",
     "compare": "workbench.compare",
     "locate": "workbench.locate",
@@ -59,7 +62,7 @@ COMMANDS: dict[str, str] = {
     "import": "sessions.import_",
     "export": "sessions.export",
 }
-"""One row a command; keep the rows sorted by what a newcomer needs first."""
+"""One row per command; keep the rows sorted by what a newcomer needs first."""
 
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130
@@ -68,7 +71,7 @@ _OUTPUT_LOST = (errno.ENOSPC, errno.EIO, errno.EDQUOT, errno.EFBIG)
 
 def main(argv: list[str] | None = None) -> int:
     """Entry point of `rigwatch`; returns the exit code."""
-    # Our matrices are small: a second thread of the linear algebra would spin, and take the time
+    # The matrices are small: a second thread of the linear algebra would spin, and take the time
     # of the rig's other processes. NumPy reads this when a command first imports it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     arguments = _parser(sys.argv[1:] if argv is None else argv).parse_args(argv)
@@ -95,7 +98,7 @@ def main(argv: list[str] | None = None) -> int:
 def every_command(
     table: Mapping[str, str] = COMMANDS, above: str = "rigwatch"
 ) -> Iterator[tuple[str, ModuleType]]:
-    """What is typed, such as "rigwatch study new", and the module of each command."""
+    """Each command as typed, such as "rigwatch study new", and its module."""
     for name, module_name in table.items():
         module = _module(module_name)
         yield f"{above} {name}", module
@@ -105,7 +108,7 @@ def every_command(
 def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rigwatch",
-        description="Watches a test rig against a model of it and tells what the model is missing.",
+        description="Monitors a test rig against a model of it and says what the model is missing.",
     )
     parser.add_argument("--version", action="version", version=f"rigwatch {__version__}")
     parser.set_defaults(json=False)
@@ -126,14 +129,14 @@ def _add_commands(
             epilog=f"example:\n{module.EXAMPLE}",
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-        # Only the command that was asked for is loaded whole, so that the others cost it nothing.
+        # Only the requested command is loaded completely, so that the others cost nothing.
         if name in argv:
             _fill(command, module, argv)
 
 
 def _fill(parser: argparse.ArgumentParser, module: ModuleType, argv: Sequence[str]) -> None:
-    """Arguments of a command, or its sub-commands."""
-    # Before a sub-command or after it: what is not given at one place must not undo the other.
+    """Add the arguments of a command, or its sub-commands."""
+    # Valid before or after a sub-command: absence at one place must not undo the other.
     parser.add_argument(
         "--json", action="store_true", default=argparse.SUPPRESS, help="print results as JSON"
     )
@@ -149,6 +152,6 @@ def _module(name: str) -> ModuleType:
 
 
 def _actions(module: ModuleType) -> Mapping[str, str]:
-    """Modules of a command's sub-commands by their names; empty where it has none."""
+    """Modules of a command's sub-commands, by name; empty if it has none."""
     found: Mapping[str, str] = getattr(module, "ACTIONS", {})
     return found

@@ -1,4 +1,4 @@
-"""`rigwatch ack`: say that an alarm has been seen, or reset one whose cause is gone."""
+"""`rigwatch ack`: acknowledges alarms, or resets those whose cause is gone."""
 
 import argparse
 import getpass
@@ -9,15 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rigwatch.wire.bus import Bus, Subscription
-    from rigwatch.wire.messages import Alarm, AlarmCommand
+    from rigwatch.wire.messages import AlarmCommand
 
 HELP = "acknowledge or reset alarms of a rig"
 EXAMPLE = """  rigwatch ack configs/demo.toml --user ann
   rigwatch ack configs/demo.toml dry_friction --user ann --reset"""
 TIMEOUT = 3.0
-SETTLE = 0.2
-"""After the first answer, time for more of them [s]."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,17 +27,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Send the command and print what it changed; 1 where it changed nothing."""
+    """Send the command and print the changes; 1 if there are none."""
     from rigwatch.commands.alarms.alarms import as_dict, as_line
-    from rigwatch.wire.bus import ask_alarm_list, connect, unique_process
-    from rigwatch.wire.messages import ALARMS, EVENTS
+    from rigwatch.wire.bus import command_alarms, connect, unique_process
     from rigwatch.wire.rig_config import load_rig
 
     bus = connect(load_rig(arguments.config), unique_process("ack"), TIMEOUT)
     try:
-        changes, events = bus.subscribe(ALARMS), bus.subscribe(EVENTS)
-        ask_alarm_list(bus, TIMEOUT)
-        changed, refusal = _send(bus, command_of(arguments), changes, events)
+        changed, refusal = command_alarms(bus, command_of(arguments))
     finally:
         bus.close()
     if arguments.json:
@@ -53,29 +47,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def command_of(arguments: argparse.Namespace) -> "AlarmCommand":
-    """What the operator asks for."""
+    """The command of the operator."""
     from rigwatch.wire.messages import AlarmCommand
 
     action = "reset" if arguments.reset else "acknowledge"
     user = arguments.user or getpass.getuser()
     return AlarmCommand(arguments.name, action, user, time.time_ns(), arguments.text)  # type: ignore[arg-type]
-
-
-def _send(
-    bus: "Bus", command: "AlarmCommand", changes: "Subscription", events: "Subscription"
-) -> "tuple[list[Alarm], str]":
-    """The transitions that the monitor answers with, and why it refuses, if it does."""
-    from rigwatch.wire.messages import COMMANDS
-
-    bus.publish(COMMANDS, command)
-    done: list[Alarm] = []
-    refusal = ""
-    deadline = time.monotonic() + TIMEOUT / 2
-    while time.monotonic() < deadline and not refusal:
-        alarm = changes.get(timeout=0.05)
-        if alarm is not None and alarm.user == command.user:
-            done.append(alarm)
-            deadline = min(deadline, time.monotonic() + SETTLE)
-        said = [event for event in events.drain() if event.code == "alarm_command_refused"]
-        refusal = said[0].text if said else refusal
-    return done, refusal

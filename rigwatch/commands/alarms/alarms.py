@@ -1,4 +1,4 @@
-"""`rigwatch alarms`: what is wrong with a rig now, or as it happens."""
+"""`rigwatch alarms`: lists the active alarms of a rig, or follows changes."""
 
 import argparse
 import json
@@ -20,13 +20,11 @@ TIMEOUT = 3.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
-    parser.add_argument(
-        "--follow", action="store_true", help="go on with every change, as it comes"
-    )
+    parser.add_argument("--follow", action="store_true", help="continue with every change")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print the alarms; 0 however many there are."""
+    """Print the alarms; 0 whatever their number."""
     from rigwatch.wire.bus import ask_alarm_list, connect, unique_process
     from rigwatch.wire.messages import ALARMS
     from rigwatch.wire.rig_config import load_rig
@@ -61,7 +59,7 @@ def _print_line(alarm: "Alarm", as_json: bool) -> None:
 
 
 def as_dict(alarm: "Alarm") -> dict[str, Any]:
-    """The alarm as JSON can say it: null where a figure is none."""
+    """The alarm as JSON: null for a figure that does not exist."""
     from dataclasses import asdict
 
     plain = asdict(alarm)
@@ -72,7 +70,7 @@ def as_dict(alarm: "Alarm") -> dict[str, Any]:
 
 
 def as_line(alarm: "Alarm") -> str:
-    """One line: when, how bad, what, its state."""
+    """One line: time, severity, name, state."""
     from datetime import datetime
 
     when = datetime.fromtimestamp(alarm.t_ns / 1e9).astimezone()
@@ -83,5 +81,5 @@ def as_line(alarm: "Alarm") -> str:
 
 
 def as_text(alarm: "Alarm") -> str:
-    """The alarm with its cause and what to do."""
+    """The alarm with its cause and guidance."""
     return f"{as_line(alarm)}\n    {alarm.cause}\n    {alarm.guidance}"

@@ -1,4 +1,4 @@
-"""What several commands share: opening sessions, drawing, progress."""
+"""Shared parts of commands: opening sessions, drawing, progress."""
 
 from rigwatch.commands.common import watched
 from rigwatch.commands.common.drawing import ready_to_draw, show_until_closed
@@ -6,6 +6,7 @@ from rigwatch.commands.common.marks import marks_of
 from rigwatch.commands.common.session_files import (
     add_session_and_target,
     add_span,
+    check_folder,
     damage_lines,
     print_json,
     report_written,
@@ -18,6 +19,7 @@ from rigwatch.commands.common.shipped_argument import file_or_name
 __all__ = [
     "add_session_and_target",
     "add_span",
+    "check_folder",
     "damage_lines",
     "file_or_name",
     "marks_of",

@@ -1,4 +1,4 @@
-"""What commands that draw share: what they need, and a viewer that stays until it is closed."""
+"""Shared parts of commands that draw: requirements, and a viewer that stays until closed."""
 
 import os
 import threading
@@ -15,7 +15,7 @@ _LOOK_AGAIN = 0.3
 
 
 def ready_to_draw(*files: Path | None) -> None:
-    """Say early what would hinder drawing, also into these files.
+    """Check early that drawing is possible, also into these files.
 
     Raises:
         MissingExtraError: Rerun is not installed.
@@ -36,8 +36,8 @@ def show_until_closed(
 
     Args:
         choice: which viewer.
-        draw: draws into it, and tells what is shown.
-        say: takes remarks for people.
+        draw: draws into it, and returns what is shown.
+        say: called with messages for people.
     """
     from rigwatch.dashboard.viewer import RECORDING_MEMORY, open_viewer
     from rigwatch.wire.rig_config import DashboardSection
@@ -46,7 +46,7 @@ def show_until_closed(
     viewer = open_viewer(
         choice, DashboardSection(), stop, say, lambda: None, memory=RECORDING_MEMORY
     )
-    assert viewer is not None  # only a wait for a foreign viewer can be given up
+    assert viewer is not None  # only the wait for an external viewer can be interrupted
     try:
         say(f"{draw(viewer)}; Ctrl-C ends")
         while viewer.exit_code() is None:

@@ -1,11 +1,11 @@
-"""What the screen takes from a model file: the signature and the limits that do not change."""
+"""The constant figures of a model file for the screen: signature and limits."""
 
 import math
 from pathlib import Path
 
 
 def marks_of(path: Path | str) -> dict[str, float]:
-    """Figures by name, in the units of the plots in which they are drawn.
+    """Figures by name, in the units of their plots.
 
     Raises:
         ConfigError: the model cannot be read.
@@ -16,7 +16,7 @@ def marks_of(path: Path | str) -> dict[str, float]:
     model = load_model(path)
     rules = rules_for(model)
     theta1, theta2 = model.signature
-    # The energy over 8 samples is what is judged; this is the steady change that would reach it.
+    # The energy over 8 samples is judged; this is the steady change that reaches its limit.
     change = model.noise.residual * math.sqrt(rules.limit_8 / 8)
     return {
         "theta1_signature": theta1,

@@ -1,4 +1,4 @@
-"""What the commands on session files share: times, JSON, words for damage."""
+"""Shared parts of commands on session files: times, JSON, descriptions of damage."""
 
 import argparse
 import sys
@@ -33,7 +33,7 @@ def say(text: str) -> None:
 
 
 def check_folder(target: Path | None) -> None:
-    """Refuse a file to write whose folder is missing, before long work is begun for it.
+    """Refuse an output file in a missing folder, before long work begins.
 
     Raises:
         SessionError: there is no such folder.
@@ -43,23 +43,23 @@ def check_folder(target: Path | None) -> None:
 
 
 def add_session_and_target(parser: argparse.ArgumentParser) -> None:
-    """Arguments of commands that make one session file of another."""
+    """Arguments of commands that write one session file from another."""
     parser.add_argument("session", type=Path, help="session file or folder of segments")
     parser.add_argument("target", type=Path, help="the new session file (.mcap)")
 
 
 def add_span(parser: argparse.ArgumentParser) -> None:
     """Options `--start` and `--end`."""
-    kind = "seconds from the first sample, or ISO time (UTC where it names no zone)"
-    parser.add_argument("--start", metavar="TIME", help=f"first time that is kept: {kind}")
+    kind = "seconds from the first sample, or ISO time (UTC without a zone)"
+    parser.add_argument("--start", metavar="TIME", help=f"start time: {kind}")
     parser.add_argument("--end", metavar="TIME", help="end time (exclusive)")
 
 
 def span_of(arguments: argparse.Namespace, session: "Session") -> tuple[int | None, int | None]:
-    """What `--start` and `--end` say [ns], None where they are not given.
+    """The times of `--start` and `--end` [ns], None if not given.
 
     Raises:
-        SessionError: one of them is no time.
+        SessionError: one of them is not a time.
     """
     start, end = arguments.start, arguments.end
     return (
@@ -84,10 +84,10 @@ def point_in_time(text: str, session: "Session", option: str) -> int:
 
 
 def unix_time(text: str, option: str, alternative: str = "") -> int:
-    """Unix time [ns] of an ISO time; UTC where it names no zone.
+    """Unix time [ns] of an ISO time; UTC without a zone.
 
     Raises:
-        SessionError: it is none; `alternative` is what would have been right, too.
+        SessionError: it is not one; `alternative` names the other valid form.
     """
     try:
         moment = datetime.fromisoformat(text)
@@ -99,7 +99,7 @@ def unix_time(text: str, option: str, alternative: str = "") -> int:
 
 
 def damage_lines(lost: "Iterable[LostSpan]") -> list[str]:
-    """One line a lost span, for people."""
+    """One line per lost span."""
     return [
         f"lost: {span.size} bytes at {span.offset} of {span.file.name}, "
         f"{_between(span.after_ns, span.before_ns)}: {span.reason}"
@@ -116,7 +116,7 @@ def _between(after_ns: int | None, before_ns: int | None) -> str:
 
 
 def report_written(written: "Written", as_json: bool) -> None:
-    """What came into a new file, and what of the old one did not."""
+    """The content of a new file, and the lost parts of the old one."""
     if as_json:
         print_json(written)
         return

@@ -1,4 +1,4 @@
-"""An argument that is a file of one's own or the name of one that comes with rigwatch."""
+"""An argument that is a file, or the name of one shipped with rigwatch."""
 
 import argparse
 from collections.abc import Callable
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def file_or_name(kind: str) -> Callable[[str], Path]:
-    """What argparse turns such an argument into; `kind` is a folder of `configs`."""
+    """The argparse type of such an argument; `kind` is a folder of `configs`."""
 
     def found(given: str) -> Path:
         from rigwatch.wire.errors import ConfigError

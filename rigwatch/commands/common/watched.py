@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 Span = tuple[int | None, int | None]
 _OTHERS = ["run", "gaps", "health", "events"]
 _BLOCK = 64
-"""Short blocks, so that words and drawings stand side by side at the right times [samples]."""
+"""Short blocks, so that text and plots match in time [samples]."""
 
 
 def messages_of(session: "Session", span: Span, model: Path | None) -> "Iterator[Message]":
-    """What the screen shows of a session.
+    """The messages of a session for the screen.
 
     Args:
         session: the recording.
         span: the part of it [ns].
-        model: compute estimates and alarms with it; None takes what was recorded.
+        model: compute estimates and alarms with it; None takes the recorded ones.
 
     Raises:
         ConfigError: the model cannot be read.
@@ -38,10 +38,9 @@ def messages_of(session: "Session", span: Span, model: Path | None) -> "Iterator
 
 
 def model_for(session: "Session", span: Span, given: Path | None) -> tuple[Path | None, bool]:
-    """The model that explains a session, and whether estimates have to be computed with it.
+    """The model of a session, and whether estimates must be computed with it.
 
-    It is the one that was given, else the one that the recorded configuration names, where that is
-    still there.
+    It is the given one, else the one in the recorded configuration, if it still exists.
     """
     if given is not None:
         return given, True

@@ -1,1 +1,1 @@
-"""Commands that start or prepare the processes of a rig."""
+"""Commands that prepare or run the processes of a rig."""

@@ -1,4 +1,4 @@
-"""`rigwatch commission`: recordings in, one model file out."""
+"""`rigwatch commission`: makes a model file from recordings."""
 
 import argparse
 from pathlib import Path
@@ -53,14 +53,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--band", type=float, nargs=2, default=(1.0, 14.0), metavar=("LOW", "HIGH"),
-        help="frequencies the transfer function is fitted to [Hz]",
+        help="frequency range of the transfer function's fit [Hz]",
     )  # fmt: skip
     parser.add_argument("--window", type=int, help="window of the estimates [samples]")
     parser.add_argument("--hop", type=int, default=1, help="samples between estimates")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the model file is written."""
+    """0 if the model file is written."""
     from monitor.commissioning import CommissionSettings, commission_best
     from monitor.model import model_text
     from monitor.signals import commission_inertia

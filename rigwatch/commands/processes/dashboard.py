@@ -1,4 +1,4 @@
-"""`rigwatch dashboard`: the live view of a rig."""
+"""`rigwatch dashboard`: shows a rig live."""
 
 import argparse
 import json
@@ -23,18 +23,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--viewer",
         choices=("auto", "native", "web", "connect", "headless"),
-        help="how it is shown; default: dashboard.viewer of the configuration",
+        help="kind of viewer; default: dashboard.viewer of the configuration",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when stopped or when the window was closed."""
+    """0 if stopped or the window is closed."""
     from rigwatch.dashboard import require_rerun
     from rigwatch.wire.rig_config import DashboardSection, load_rig
 
     config = load_rig(arguments.config)
     require_rerun()
-    # Rerun's own lines about a viewer that went are said here in plain words instead.
+    # Plain messages replace Rerun's own lines about a lost viewer.
     os.environ.setdefault("RUST_LOG", "off")
     from rigwatch.dashboard.process import LiveDashboard
     from rigwatch.wire.bus import connect
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _know_model(facts: "Facts", path: str) -> None:
-    """Take signature and limits from the model; a screen without them is better than none."""
+    """Read signature and limits from the model; a screen without them is better than none."""
     from rigwatch.commands.common import marks_of
 
     facts.model = Path(path).name

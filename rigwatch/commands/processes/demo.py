@@ -1,16 +1,17 @@
-"""`rigwatch demo`: a simulated rig from commissioning to an alarm that names friction."""
+"""`rigwatch demo`: runs a simulated rig from commissioning to an alarm that names friction."""
 
 import argparse
 import json
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
-HELP = "watch a simulated rig: friction appears, an alarm names it, a recording is left"
+HELP = "run a simulated rig: friction appears, an alarm names it, a recording remains"
 EXAMPLE = """  rigwatch demo
   rigwatch demo --headless --seconds 35
   rigwatch demo --commission-only"""
 LONGEST, AFTER_NAMED = 150.0, 8.0
-"""A headless run ends so long after friction was named, and at the latest after one cycle [s]."""
+"""Time from the naming of friction to the end of a headless run, at most one cycle [s]."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,20 +19,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--headless",
         action="store_true",
-        help="no window; ends once friction was named, with 0 only if it was",
+        help="no window; ends once friction is named, with exit code 0 only if it is",
     )
-    parser.add_argument("--seconds", type=float, metavar="N", help="end after this long [s]")
-    parser.add_argument(
-        "--folder", type=Path, default=Path("demo-session"), help="where everything is written"
-    )
+    parser.add_argument("--seconds", type=float, metavar="N", help="longest run time [s]")
+    parser.add_argument("--folder", type=Path, default=Path("demo-session"), help="output folder")
     parser.add_argument(
         "--commission-only", action="store_true", help="make the model of the simulated rig and end"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the demonstration did what it is for."""
-    from rigwatch.demo import Show, ensure_model, forget_alarms, write_rig_file
+    """0 if the demonstration succeeded."""
+    from rigwatch.demo import (
+        Show,
+        ensure_model,
+        forget_alarms,
+        workbench_pages,
+        write_rig_file,
+    )
     from rigwatch.wire.typed_files import find_config
 
     folder: Path = arguments.folder
@@ -47,7 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
         seconds, after_named = LONGEST, AFTER_NAMED
     if arguments.seconds is not None:
         seconds, after_named = arguments.seconds, float("inf")
-    outcome = Show(rig, folder, _remark).play(seconds, after_named)
+    beside = nullcontext() if arguments.headless else workbench_pages(folder, rig, _remark)
+    with beside:
+        outcome = Show(rig, folder, _remark).play(seconds, after_named)
     if arguments.json:
         print(json.dumps(outcome.as_dict(), indent=1))
     return 1 if arguments.headless and outcome.complaints else 0

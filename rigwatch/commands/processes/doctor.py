@@ -26,12 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--alive",
         choices=PROCESSES,
         metavar="PROCESS",
-        help=f"only ask this running process how it is: {', '.join(PROCESSES)}",
+        help=f"only check the health of this running process: {', '.join(PROCESSES)}",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print every finding; 1 where one of them keeps rigwatch from running."""
+    """Print every finding; 1 if one of them prevents rigwatch from running."""
     findings = []
     for finding in _asked(arguments):
         findings.append(finding)
@@ -61,7 +61,7 @@ def _findings(config: Path | None) -> Iterator[Finding]:
 
 
 def _recordings(config: Path | None) -> Path:
-    """Where recordings go; a configuration that is wrong is told of by its own check."""
+    """The folder for recordings; a wrong configuration is reported by its own check."""
     try:
         recorder = load_rig(config).recorder if config is not None else None
     except RigwatchError:

@@ -1,11 +1,11 @@
-"""`rigwatch init`: copies the example files that come with rigwatch into a folder."""
+"""`rigwatch init`: copies the shipped example files into a folder."""
 
 import argparse
 from pathlib import Path
 
 from rigwatch.commands.common import print_json
 
-HELP = "copy the example configurations, scenarios, studies, mappings and structures out"
+HELP = "copy the example configurations, scenarios, studies, mappings and structures"
 EXAMPLE = """\
   rigwatch init
   rigwatch init my-rig"""
@@ -14,12 +14,16 @@ EXAMPLE = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument(
-        "folder", type=Path, nargs="?", default=Path(), help="where `configs` is made; here if none"
+        "folder",
+        type=Path,
+        nargs="?",
+        default=Path(),
+        help="parent of the new folder `configs`; default: the working folder",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when they were copied; files that are there already stay as they are."""
+    """0 if they are copied; existing files are kept."""
     from rigwatch.wire.typed_files import copy_out
 
     copied, kept = copy_out(arguments.folder)

@@ -1,9 +1,9 @@
-"""`rigwatch monitor`: judge a rig's samples, publish estimates and alarms."""
+"""`rigwatch monitor`: judges a rig's samples and publishes estimates and alarms."""
 
 import argparse
 from pathlib import Path
 
-HELP = "watch a rig: samples in, friction estimates and alarms out"
+HELP = "monitor a rig: samples in, friction estimates and alarms out"
 EXAMPLE = "  rigwatch monitor configs/demo.toml"
 
 

@@ -1,10 +1,12 @@
-"""`rigwatch plant`: serves the simulated rig, talks to a running one, or records a scenario."""
+"""`rigwatch plant`: serves the simulated rig, controls a running one, or records a scenario."""
 
 import argparse
 import json
 from pathlib import Path
 
-HELP = "serve the simulated rig, change it while it runs, or record it faster than real time"
+HELP = (
+    "serve the simulated rig, change it while it runs, or record a scenario faster than real time"
+)
 EXAMPLE = """  rigwatch plant configs/demo.toml
   rigwatch plant configs/demo.toml --set friction=0.4 --over 5
   rigwatch plant configs/demo.toml --line-fault flip=20
@@ -16,12 +18,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "file", type=Path, metavar="FILE", help="configuration of the rig; a scenario to record"
     )
-    talk = parser.add_argument_group("talk to the simulated rig that runs")
+    talk = parser.add_argument_group("control the running simulated rig")
     talk.add_argument(
         "--set", action="append", default=[], metavar="EFFECT=VALUE", help="set an effect"
     )
     talk.add_argument("--over", type=float, default=0.0, metavar="S", help="as a ramp over S")
-    talk.add_argument("--clear", action="store_true", help="take all effects away")
+    talk.add_argument("--clear", action="store_true", help="remove all effects")
     talk.add_argument("--effects", action="store_true", help="list the effects and their values")
     talk.add_argument(
         "--line-fault", metavar="NAME[=FRAMES]", help="disturb the serial line for some frames"
@@ -29,12 +31,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     talk.add_argument("--tell", metavar="LINE", help="any other line, such as 'restart'")
     record = parser.add_argument_group("record faster than real time")
     record.add_argument("--session", type=Path, metavar="OUT.mcap", help="write a session here")
-    record.add_argument("--seconds", type=float, metavar="S", help="length, else the scenario's")
+    record.add_argument(
+        "--seconds", type=float, metavar="S", help="length; default: the scenario's"
+    )
     record.add_argument("--seed", type=int, default=1, metavar="N", help="of the sensors' noise")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve until a signal ends it, or do what was asked and return."""
+    """Serve until a signal ends it, or execute the request and return."""
     lines = _lines(arguments)
     if arguments.session:
         return _record(arguments)

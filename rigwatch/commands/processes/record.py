@@ -1,11 +1,11 @@
-"""`rigwatch record`: keeps everything that a rig says in session files."""
+"""`rigwatch record`: records all messages of a rig in session files."""
 
 import argparse
 from pathlib import Path
 
 from rigwatch.commands.common import print_json
 
-HELP = "record what a rig says: samples, estimates, alarms, events"
+HELP = "record samples, estimates, alarms and events of a rig"
 EXAMPLE = """  rigwatch record configs/demo.toml
   rigwatch record configs/demo.toml --notes 'bearing at 300 kPa'"""
 
@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Record until a signal ends it, then say where."""
+    """Record until a signal ends it, then print the session's path."""
     from rigwatch.recorder import run as record
     from rigwatch.wire.host import set_at_signal
 

@@ -1,4 +1,4 @@
-"""`rigwatch router`: the bus that the processes of a rig meet on."""
+"""`rigwatch router`: runs the router of a rig's bus."""
 
 import argparse
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 HELP = "run the router of a rig's bus"
 EXAMPLE = "  rigwatch router configs/demo.toml"
 TURN = 0.25
-"""Time between two words to the supervisor [s]."""
+"""Time between two notifications to the supervisor [s]."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     raise_priority(ROUTER)
     close = open_router(config)
     heartbeat.ready(f"listens at {config.bus.listen}")
-    # Samples do not go through this loop: it only says that it turns.
+    # Samples do not pass through this loop: it only reports that it runs.
     while not stop.wait(TURN):
         heartbeat.advance(0)
     heartbeat.stopping()

@@ -25,15 +25,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         choices=PROCESSES,
         metavar="PROCESS",
-        help=f"leave out one of {', '.join(PROCESSES)}; may be given more than once",
+        help=f"omit one of {', '.join(PROCESSES)}; may be given more than once",
     )
     parser.add_argument(
-        "--seconds", type=float, default=float("inf"), metavar="N", help="stop after this long"
+        "--seconds", type=float, default=float("inf"), metavar="N", help="stop after this time"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run until a signal or for the time asked; 0 after an orderly stop."""
+    """Run until a signal or for the given time; 0 after an orderly stop."""
     config = load_rig(arguments.config)
     _refuse_second_start(config, arguments.without)
     console = Console(config.rig.id, arguments.json)
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
         if not is_ready and all(w.was_ready for w in supervisor.processes.values()):
             is_ready = True
             heartbeat.ready("all processes run")
-        # Whoever watches this supervisor is told what it watches for: samples advance.
+        # The parent of this supervisor gets the same notification: samples advance.
         heartbeat.advance(flow.totals.get("daq", 0))
         if time.monotonic() >= stop_at:
             supervisor.stop()
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _refuse_second_start(config: RigConfig, without: list[str]) -> None:
-    """A second `up` on one bus would give two sources of one rig's samples."""
+    """Refuse a second `up` on one bus: the rig would have two sources of samples."""
     address = endpoint_address(config.bus.listen)
     if "router" not in without and address is not None and not is_free(*address):
         raise BusError(

@@ -16,12 +16,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("session", type=Path, help="session file or folder of segments")
     parser.add_argument("target", type=Path, help="the new file, .csv, .mat or .parquet")
     parser.add_argument("--estimates", action="store_true", help="estimates in place of samples")
-    parser.add_argument("--device", help="whose, where the session has several devices")
+    parser.add_argument("--device", help="device, if the session has several")
     add_span(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the file was written, also where damage in the session left holes in it."""
+    """0 if the file is written, even if damage in the session leaves gaps."""
     from rigwatch.wire.exchange import export_session
     from rigwatch.wire.session import open_session
 

@@ -1,4 +1,4 @@
-"""`rigwatch import`: makes a session of a CSV, MAT, Parquet or JSON file."""
+"""`rigwatch import`: makes a session from a CSV, MAT, Parquet or JSON file."""
 
 import argparse
 from pathlib import Path
@@ -9,7 +9,7 @@ from rigwatch.commands.common import file_or_name, print_json, say
 if TYPE_CHECKING:
     from rigwatch.wire.exchange import ImportMapping
 
-HELP = "make a session of a CSV, MAT, Parquet or JSON file"
+HELP = "make a session from a CSV, MAT, Parquet or JSON file"
 EXAMPLE = """\
   rigwatch import DATA_EMPS.mat emps.mcap --mapping emps
   rigwatch import run.csv run.mcap --time 't[ms]' --map 'position=qm[mm]' --map 'force=u*35.15[N]'
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--mapping",
         type=file_or_name("imports"),
         metavar="TOML",
-        help="column mapping, or the name of one that comes with rigwatch",
+        help="column mapping, or the name of a shipped one",
     )
     parser.add_argument(
         "--map",
@@ -33,25 +33,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CHANNEL=COLUMN[UNIT]",
         help="a channel, its column and the column's unit; also COLUMN*FACTOR+OFFSET[UNIT]",
     )
-    parser.add_argument("--time", metavar="COLUMN[UNIT]", help="the column of the time")
+    parser.add_argument("--time", metavar="COLUMN[UNIT]", help="time column")
     parser.add_argument("--rate", type=float, metavar="HZ", help="sample rate, without a time")
     parser.add_argument("--device", help="the device's name in the session")
     parser.add_argument("--rig", help="the rig's id in the session")
-    parser.add_argument("--skip-rows", type=int, metavar="N", help="rows left out at the start")
     parser.add_argument(
-        "--delimiter", help="between the cells of CSV: auto, whitespace, or a character"
+        "--skip-rows", type=int, metavar="N", help="number of rows to skip at the start"
     )
     parser.add_argument(
-        "--columns", metavar="A,B,…", help="names of columns, without a header line"
+        "--delimiter", help="separator of CSV cells: auto, whitespace, or a character"
     )
-    parser.add_argument("--start", metavar="TIME", help="ISO time that the file's time counts from")
     parser.add_argument(
-        "--flag-missing", action="store_true", default=None, help="take NaN as invalid samples"
+        "--columns", metavar="A,B,…", help="column names, if there is no header line"
+    )
+    parser.add_argument("--start", metavar="TIME", help="ISO time of zero in the time column")
+    parser.add_argument(
+        "--flag-missing", action="store_true", default=None, help="accept NaN as invalid samples"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the session was made."""
+    """0 if the session is written."""
     from rigwatch.commands.common import unix_time
     from rigwatch.wire.exchange import import_file
 
@@ -68,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _mapping(arguments: argparse.Namespace) -> "ImportMapping":
-    """The mapping file's content, with what the options say in its place."""
+    """The mapping file's content, overridden by the options."""
     import msgspec
 
     from rigwatch.wire.errors import ImportDataError

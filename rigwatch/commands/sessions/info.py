@@ -1,4 +1,4 @@
-"""`rigwatch info`: what is in a session."""
+"""`rigwatch info`: summarises a session."""
 
 import argparse
 from pathlib import Path
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from rigwatch.wire.messages import RunInfo
     from rigwatch.wire.session import ChannelSummary, DeviceSummary, Summary
 
-HELP = "show what is in a session: rates, gaps, quality, topics, alarms, damage"
+HELP = "summarise a session: rates, gaps, quality, topics, alarms, damage"
 EXAMPLE = "  rigwatch info sessions/bench1-20260501T120000Z"
 
 
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the session could be read, damaged or not."""
+    """0 if the session is readable, damaged or not."""
     from rigwatch.wire.session import open_session, summarise
 
     summary = summarise(open_session(arguments.session))
@@ -50,8 +50,9 @@ def _lines(summary: "Summary") -> list[str]:
         f"alarm: {iso_time(alarm.t_ns)} {alarm.name} {alarm.state}: {alarm.cause}"
         for alarm in summary.alarms
     ]
-    if summary.reported_lost:
-        lines.append(f"reported lost while recording: {summary.reported_lost} samples")
+    if summary.unknown_ends:
+        lines.append(f"the end of {summary.unknown_ends} start(s) is missing, length unknown")
+    lines += [f"{n} {topic} are missing" for topic, n in summary.lost_messages.items() if n]
     lines += damage_lines(summary.lost)
     lines += [f"not closed (still recording, or killed): {name}" for name in summary.unclosed]
     return lines

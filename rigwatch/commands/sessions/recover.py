@@ -1,10 +1,10 @@
-"""`rigwatch recover`: saves what is intact of a killed, truncated or damaged session."""
+"""`rigwatch recover`: saves the intact parts of a killed, truncated or damaged session."""
 
 import argparse
 
 from rigwatch.commands.common import add_session_and_target, report_written
 
-HELP = "save what is intact of a damaged session in a new file"
+HELP = "save the intact parts of a damaged session in a new file"
 EXAMPLE = "  rigwatch recover broken.mcap saved.mcap"
 
 
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 whether or not there was damage: what was lost is in the report."""
+    """0 with or without damage: the report lists what is lost."""
     from rigwatch.wire.session import open_session, recover
 
     report_written(recover(open_session(arguments.session), arguments.target), arguments.json)

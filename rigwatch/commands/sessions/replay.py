@@ -1,4 +1,4 @@
-"""`rigwatch replay`: the monitor over a recording."""
+"""`rigwatch replay`: runs the monitor over a recording."""
 
 import argparse
 import math
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rigwatch.replay import Replay
     from rigwatch.wire.messages import Alarm
 
-HELP = "run the monitor over a recording, as fast as it goes or at a given speed"
+HELP = "run the monitor over a recording, as fast as possible or at a given speed"
 EXAMPLE = """\
   rigwatch replay run.mcap --model model.toml
   rigwatch replay sessions/bench1-20260501T120000Z --speed 1 --start 60
@@ -25,7 +25,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config", type=Path, help="configuration of the rig; default: the one recorded with it"
     )
-    parser.add_argument("--speed", type=_speed, default=0.0, metavar="X", help="times real time")
+    parser.add_argument(
+        "--speed", type=_speed, default=0.0, metavar="X", help="multiple of real time"
+    )
     parser.add_argument(
         "--out", type=Path, metavar="SESSION", help="new session of samples, estimates and alarms"
     )
@@ -40,7 +42,7 @@ def _speed(text: str) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the whole recording was judged, alarms or not."""
+    """0 if the whole recording is judged, with or without alarms."""
     from rigwatch.replay import monitor_for, replay
     from rigwatch.wire.session import open_session
 
@@ -59,11 +61,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _ignore(_: "Alarm") -> None:
-    """Nothing: with --json everything is told at the end."""
+    """Print nothing: with --json all results come at the end."""
 
 
 class _Announcer:
-    """Prints each alarm as it comes."""
+    """Prints each alarm as it occurs."""
 
     def __call__(self, alarm: "Alarm") -> None:
         from rigwatch.wire.session import iso_time

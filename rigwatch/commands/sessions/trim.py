@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the part was written."""
+    """0 if the part is written."""
     from rigwatch.wire.session import open_session, trim
 
     session = open_session(arguments.session)

@@ -1,4 +1,4 @@
-"""`rigwatch verify`: recorded sessions through the monitor, compared with stored references."""
+"""`rigwatch verify`: replays recorded sessions and compares with stored references."""
 
 import argparse
 from pathlib import Path
@@ -19,12 +19,12 @@ EXIT_DIFFERS = 1
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("cases", type=Path, metavar="CASES", help="file of cases (TOML)")
-    parser.add_argument("--update", action="store_true", help="renew references that differ")
-    parser.add_argument("--only", metavar="NAME", help="this case alone")
+    parser.add_argument("--update", action="store_true", help="rewrite references that differ")
+    parser.add_argument("--only", metavar="NAME", help="only this case")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 where every field is as in the references or was renewed, 1 where one differs."""
+    """0 if every field agrees with the references or they are rewritten, 1 if one differs."""
     from rigwatch.replay import load_cases, verify
     from rigwatch.wire.errors import ConfigError
 

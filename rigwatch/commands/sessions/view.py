@@ -1,4 +1,4 @@
-"""`rigwatch view`: a recording on the screen of a live rig."""
+"""`rigwatch view`: shows a recording on the screen of a live rig."""
 
 import argparse
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from rigwatch.commands.common import add_span
 if TYPE_CHECKING:
     from rigwatch.dashboard.recording import Drawn
 
-HELP = "show a recording: signals, residual, friction estimates, alarms and what to do"
+HELP = "show a recording: signals, residual, friction estimates, alarms and guidance"
 EXAMPLE = """  rigwatch view sessions/bench1-20260501T120000Z
   rigwatch view sessions/bench1-20260501T120000Z --start 60 --end 120 --save minute.rrd"""
 
@@ -21,18 +21,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         type=Path,
-        help="compute estimates and alarms with this model; default: what was recorded",
+        help="compute estimates and alarms with this model; default: show the recorded ones",
     )
     add_span(parser)
     parser.add_argument("--save", type=Path, metavar="FILE", help="write a file for Rerun (.rrd)")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="write a picture (.png)")
     parser.add_argument(
-        "--viewer", choices=("auto", "native", "web"), default="auto", help="how it is shown"
+        "--viewer", choices=("auto", "native", "web"), default="auto", help="kind of viewer"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when it was drawn, and when a window was shown, once that is closed."""
+    """0 if it is drawn; returns once a window is closed."""
     from rigwatch.commands.common import print_json, ready_to_draw, say
 
     ready_to_draw(arguments.save, arguments.picture)
@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _silent(text: str) -> None:
-    """Nothing but JSON is wanted."""
+    """Print nothing but JSON."""
 
 
 def _shown(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn | None":
@@ -64,7 +64,7 @@ def _shown(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn 
 
 
 def _in_a_viewer(arguments: argparse.Namespace, say: Callable[[str], None]) -> "Drawn | None":
-    """Show it until the window is closed; None where it was interrupted while it was drawn."""
+    """Show it until the window is closed; None if interrupted while drawing."""
     from rigwatch.commands.common import show_until_closed
     from rigwatch.dashboard import recording
     from rigwatch.dashboard.viewer import ForeignViewer, Viewer
@@ -83,7 +83,7 @@ def _in_a_viewer(arguments: argparse.Namespace, say: Callable[[str], None]) -> "
 
 
 def _draw(arguments: argparse.Namespace, say: Callable[[str], None], url: str) -> "Drawn":
-    """Draw the session into the viewer at `url`, or into the file asked for."""
+    """Draw the session into the viewer at `url`, or into the given file."""
     from rigwatch.commands.common import marks_of, span_of
     from rigwatch.commands.common import watched as _watched
     from rigwatch.dashboard import recording

@@ -1,4 +1,4 @@
-"""`rigwatch structure`: structures of masses and springs, identified from their motion."""
+"""`rigwatch structure`: identification and damage of structures from their motion."""
 
 HELP = "identify structures from their motion, and find damage in them"
 EXAMPLE = """\

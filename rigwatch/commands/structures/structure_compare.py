@@ -1,4 +1,4 @@
-"""`rigwatch structure compare`: every method of identification on the same record."""
+"""`rigwatch structure compare`: runs every identification method on the same record."""
 
 import argparse
 
@@ -15,7 +15,7 @@ from rigwatch.commands.structures.structure_files import (
 )
 from rigwatch.commands.structures.structure_view import add_views, draw_methods, wanted
 
-HELP = "run every method of identification on the same record"
+HELP = "run every identification method on the same record"
 EXAMPLE = """\
   rigwatch structure compare configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure compare antenna.toml antenna.csv --report methods.html
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when at least one method converged, 1 when none did."""
+    """0 if at least one method converged, else 1."""
     from rigwatch.structures.identification import METHODS, Identification, solved
     from rigwatch.wire.errors import ModelError
 

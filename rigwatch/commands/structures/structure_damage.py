@@ -1,4 +1,4 @@
-"""`rigwatch structure damage`: whether, when and where a structure was damaged, and how much."""
+"""`rigwatch structure damage`: finds whether, when, where and how much a structure is damaged."""
 
 import argparse
 from collections.abc import Mapping
@@ -34,20 +34,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_record(parser)
     parser.add_argument(
-        "--undamaged", type=float, metavar="SECONDS", help="start that is sure to be undamaged"
+        "--undamaged", type=float, metavar="SECONDS", help="length of the undamaged start"
     )
     parser.add_argument("--limit", type=float, help="fixed limit of the residual instead of a test")
     add_test(
         parser,
         "in a whole record",
-        "data from which a damage is identified at first and least between two, default 2",
+        "data for the first identification, and shortest time between damages, default 2",
     )
     add_report(parser)
     add_views(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the record was examined, damaged or not."""
+    """0 if the record is examined, damaged or not."""
     from rigwatch.structures.damage import Settings, examine
     from rigwatch.structures.model import load_structure
     from rigwatch.structures.records import read_any

@@ -1,4 +1,4 @@
-"""What the actions of `rigwatch structure` share: files, unknowns, figures for people."""
+"""Shared parts of `rigwatch structure`: files, unknowns, formatted figures."""
 
 import argparse
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def add_problem(parser: argparse.ArgumentParser) -> None:
-    """Arguments that say what is identified from what."""
+    """Arguments for structure, record and unknowns."""
     parser.add_argument(
         "structure", type=file_or_name("structures"), help="structure or model file (.toml)"
     )
@@ -25,35 +25,35 @@ def add_problem(parser: argparse.ArgumentParser) -> None:
         "--unknown",
         action="append",
         metavar="NAME[=GUESS]",
-        help="an unknown with its guess, such as k1_6=1300, m4 or v6(0); instead of the file's",
+        help="an unknown with its guess, such as k1_6=1300, m4 or v6(0); replaces the file's",
     )
     parser.add_argument(
         "--weighting", default="uniform", help="uniform, exponential:SECONDS or jacobi:A,B"
     )
-    parser.add_argument(
-        "--first", type=int, default=0, metavar="SAMPLE", help="first sample that counts"
-    )
+    parser.add_argument("--first", type=int, default=0, metavar="SAMPLE", help="first sample used")
 
 
 def add_test(parser: argparse.ArgumentParser, within: str, settle: str) -> None:
-    """How damage is looked for: `within` is what a false alarm is counted in."""
+    """Arguments of the damage test: `within` names the period of the false-alarm rate."""
     parser.add_argument(
         "--false-alarms", type=float, default=0.01, metavar="P",
         help=f"probability of any false alarm {within}, default 0.01",
     )  # fmt: skip
     parser.add_argument("--settle", type=float, default=2.0, metavar="SECONDS", help=settle)
     parser.add_argument(
-        "--known", action="store_true", help="take the file's values as true, even unknown ones"
+        "--known",
+        action="store_true",
+        help="take the file's values as true, even those marked unknown",
     )
 
 
 def add_report(parser: argparse.ArgumentParser) -> None:
-    """Where a web page is written."""
+    """The argument for a web page."""
     parser.add_argument("--report", type=Path, metavar="FILE.html", help="write a web page")
 
 
 def write_page(path: Path, text: str) -> None:
-    """Write a web page and say so.
+    """Write a web page and report it.
 
     Raises:
         ModelError: it cannot be written.
@@ -66,7 +66,7 @@ def write_page(path: Path, text: str) -> None:
 
 
 def add_record(parser: argparse.ArgumentParser) -> None:
-    """The record: a table or a session."""
+    """The argument for a record: a table or a session."""
     parser.add_argument(
         "record",
         type=Path,
@@ -75,10 +75,10 @@ def add_record(parser: argparse.ArgumentParser) -> None:
 
 
 def problem_asked(arguments: argparse.Namespace) -> "Problem":
-    """The identification that the arguments of `add_problem` ask for.
+    """The identification problem from the arguments of `add_problem`.
 
     Raises:
-        ModelError: of `problem_of`, or a guess is no number.
+        ModelError: as in `problem_of`, or a guess is not a number.
     """
     from rigwatch.structures.identification import problem_of
     from rigwatch.structures.records import read_any
@@ -95,10 +95,10 @@ def problem_asked(arguments: argparse.Namespace) -> "Problem":
 
 
 def unknowns_of(arguments: argparse.Namespace) -> tuple[list[str] | None, dict[str, float]]:
-    """Names and guesses of `--unknown`; None where the file's are taken.
+    """Names and guesses of `--unknown`; None to take the file's.
 
     Raises:
-        ModelError: a guess is no number.
+        ModelError: a guess is not a number.
     """
     if not arguments.unknown:
         return None, {}
@@ -115,7 +115,7 @@ def unknowns_of(arguments: argparse.Namespace) -> tuple[list[str] | None, dict[s
 
 
 def subject_of(path: Path) -> "Structure | Model":
-    """The structure in the file, or the model where it has equations of its own.
+    """The structure in the file, or the model if it has equations of its own.
 
     Raises:
         ConfigError: it is neither.
@@ -132,7 +132,7 @@ def subject_of(path: Path) -> "Structure | Model":
 
 
 def units_of(problem: "Problem") -> dict[str, str]:
-    """The unit that each unknown is written in, by name; x(0) has that of the state x."""
+    """The unit of each unknown in the file, by name; x(0) has that of the state x."""
     system = problem.sweeper.compiled.system
     units = {name: p.shown or p.unit for name, p in system.parameters.items()}
     units |= {f"{name}(0)": state.shown or state.unit for name, state in system.states.items()}
@@ -140,7 +140,7 @@ def units_of(problem: "Problem") -> dict[str, str]:
 
 
 def as_written(found: "Identification", units: Mapping[str, str]) -> "Identification":
-    """What was identified, from SI to the units that the model's file is written in."""
+    """The result, converted from SI to the units of the model's file."""
     from rigwatch.wire.units import unit_of
 
     given = {name: unit_of(units[name]) for name in found.names}
@@ -161,7 +161,7 @@ def as_written(found: "Identification", units: Mapping[str, str]) -> "Identifica
 
 
 def figures(found: "Identification", units: Mapping[str, str] | None = None) -> list[str]:
-    """One line an unknown: estimate and 95 % interval, and its unit where `units` are given."""
+    """One line per unknown: estimate and 95 % interval, with its unit if `units` are given."""
     width = max(len(name) for name in found.names)
     lines = []
     for name in found.names:
@@ -200,7 +200,7 @@ def plain(found: "Identification", units: Mapping[str, str]) -> dict[str, object
 def write_report(
     arguments: argparse.Namespace, problem: "Problem", results: "Mapping[str, Identification | str]"
 ) -> None:
-    """The page of `--report`; a result is a method's, or the message of why there is none.
+    """The page of `--report`; a result is that of a method, or its error message.
 
     Raises:
         ModelError: it cannot be written.

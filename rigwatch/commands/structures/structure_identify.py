@@ -1,4 +1,4 @@
-"""`rigwatch structure identify`: unknown masses, springs and dampers from a record of motion."""
+"""`rigwatch structure identify`: identifies masses, springs and dampers from a record."""
 
 import argparse
 
@@ -15,7 +15,7 @@ from rigwatch.commands.structures.structure_files import (
 )
 from rigwatch.commands.structures.structure_view import add_views, draw_methods, wanted
 
-HELP = "identify what is unknown of a structure from a record"
+HELP = "identify the unknowns of a structure from a record"
 EXAMPLE = """\
   rigwatch structure identify configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure identify antenna.toml antenna.csv --method direct --report antenna.html
@@ -33,14 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--integrator",
         choices=("dormand-prince", "runge-kutta"),
-        help="of quasilinearization: dormand-prince (the thesis's) or runge-kutta",
+        help="integrator of quasilinearization: dormand-prince (the thesis's) or runge-kutta",
     )
     add_report(parser)
     add_views(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the method converged, 1 when it did not."""
+    """0 if the method converged, else 1."""
     from rigwatch.structures.identification import solved
 
     drawn = wanted(arguments)

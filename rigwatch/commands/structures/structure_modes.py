@@ -1,4 +1,4 @@
-"""`rigwatch structure modes`: natural modes, and which springs carry their strain energy."""
+"""`rigwatch structure modes`: natural modes, and the strain energy of each spring."""
 
 import argparse
 from pathlib import Path
@@ -21,14 +21,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--families", action="store_true", help="count k1_6, k1_7, ... together as k1"
     )
     parser.add_argument(
-        "--only", metavar="PREFIX", help="only springs whose name starts so, such as k1"
+        "--only", metavar="PREFIX", help="only springs with this prefix, such as k1"
     )
-    parser.add_argument("--svg", type=Path, metavar="FILE", help="also draw the shares there")
+    parser.add_argument(
+        "--svg", type=Path, metavar="FILE", help="also draw the shares into this file"
+    )
     add_report(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the modes were found."""
+    """0 if the modes are found."""
     from rigwatch.structures.model import by_family, load_structure, strain_energy
     from rigwatch.structures.report import modes_html, shares_svg
 

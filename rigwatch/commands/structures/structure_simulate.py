@@ -1,4 +1,4 @@
-"""`rigwatch structure simulate`: a record of a structure that does not exist."""
+"""`rigwatch structure simulate`: simulates a record of a structure."""
 
 import argparse
 from pathlib import Path
@@ -10,7 +10,7 @@ from rigwatch.wire.errors import ModelError
 if TYPE_CHECKING:
     from sim_plant.structure import Damage
 
-HELP = "make a record by simulation, to try the other actions on"
+HELP = "simulate a record, to try the other actions"
 EXAMPLE = """\
   rigwatch structure simulate configs/structures/kabe_antenna.toml antenna.csv
   rigwatch structure simulate kabe.toml damaged.csv --damage 5 springs.k4_46.stiffness=50
@@ -23,16 +23,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("record", type=Path, help="the new record (.csv or .npz)")
     parser.add_argument("--dt", type=float, default=0.01, help="time between samples [s]")
     parser.add_argument("--duration", type=float, default=10.0, help="length [s]")
-    parser.add_argument("--noise", type=float, default=0.0, help="share of each signal's peak")
-    parser.add_argument("--seed", type=int, default=0, help="of noise and earthquake")
+    parser.add_argument(
+        "--noise",
+        type=float,
+        default=0.0,
+        help="standard deviation as a share of each signal's peak",
+    )
+    parser.add_argument("--seed", type=int, default=0, help="seed of noise and earthquake")
     parser.add_argument(
         "--damage", nargs=2, action="append", metavar=("SECONDS", "PLACE=VALUE"),
-        help="from then on a number of the file is another",
+        help="change a number of the file from that time on",
     )  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the record was written."""
+    """0 if the record is written."""
     from rigwatch.structures.model import load_structure
     from rigwatch.structures.records import record_of, write_record
     from sim_plant.earthquake import accelerogram

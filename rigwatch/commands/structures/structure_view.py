@@ -1,4 +1,4 @@
-"""`--save` and `--picture` of `rigwatch structure`: what was measured, modelled and concluded."""
+"""`--save` and `--picture` of `rigwatch structure`: measurement, model and conclusions."""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from rigwatch.structures.identification import Identification, Problem
 
 SHOWN = 5
-"""Places of a damage that are told."""
+"""Number of candidate places listed."""
 SIGHT = 5.0
-"""Multiples of the largest measured value up to which a modelled one is drawn."""
+"""Largest modelled value drawn, in multiples of the largest measured one."""
 
 
 def add_views(parser: argparse.ArgumentParser) -> None:
@@ -29,7 +29,7 @@ def add_views(parser: argparse.ArgumentParser) -> None:
 
 
 def wanted(arguments: argparse.Namespace) -> bool:
-    """Whether something is to be drawn; says early what would hinder it.
+    """Whether to draw; checks early that it is possible.
 
     Raises:
         MissingExtraError: Rerun is not installed.
@@ -73,7 +73,7 @@ def draw_damage(arguments: argparse.Namespace, found: "Examination") -> None:
 
 
 def told(damage: "Damage") -> list[str]:
-    """A damage in lines for people."""
+    """The description of a damage."""
     at = damage.instant
     vague = "" if damage.explained else ", not explained by one change or two"
     both = ", two changes at once" if damage.ranking.second else ""
@@ -92,9 +92,9 @@ def told(damage: "Damage") -> list[str]:
 def draw_methods(
     arguments: argparse.Namespace, problem: "Problem", results: "Mapping[str, Identification | str]"
 ) -> None:
-    """What one method or several found: signals, what is left of them, unknowns.
+    """The results of methods: signals, residuals, unknowns.
 
-    A result is a method's, or the message of why there is none.
+    A result is that of a method, or its error message.
     """
     import numpy as np
 
@@ -124,7 +124,7 @@ def _method(model: str, method: str, result: "Identification | str") -> str:
 
 
 def _kept(values: "NDArray[np.float64]", measured: "NDArray[np.float64]") -> "NDArray[np.float64]":
-    """A signal where it is within sight of the measured one; a method may run away."""
+    """A signal, clipped near the measured range; a method may diverge."""
     import numpy as np
 
     near = np.abs(values) <= SIGHT * np.nanmax(np.abs(measured))
@@ -132,7 +132,7 @@ def _kept(values: "NDArray[np.float64]", measured: "NDArray[np.float64]") -> "ND
 
 
 def _story(title: str, lines: Sequence[str]) -> str:
-    """Markdown: a title, and lines that stand as they are."""
+    """Markdown: a title, and verbatim lines."""
     stripped = [line.rstrip() for line in lines]
     return "\n".join([f"# {title}", "", *(["```", *stripped, "```"] if lines else [])])
 

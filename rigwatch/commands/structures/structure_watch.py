@@ -1,4 +1,4 @@
-"""`rigwatch structure watch`: a structure watched for damage, on line or over a session."""
+"""`rigwatch structure watch`: monitors a structure for damage, online or over a session."""
 
 import argparse
 from pathlib import Path
@@ -10,7 +10,7 @@ from rigwatch.commands.structures.structure_files import add_test
 if TYPE_CHECKING:
     from rigwatch.structures.live import LiveDamage
 
-HELP = "watch a structure for damage: samples in, residuals, an alarm and the damage's place out"
+HELP = "monitor a structure for damage: samples in; residuals, alarm and place of the damage out"
 EXAMPLE = """\
   rigwatch structure watch configs/structures/kabe_antenna.toml rig.toml
   rigwatch structure watch configs/structures/kabe_antenna.toml sessions/antenna.mcap"""
@@ -28,16 +28,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--undamaged", type=float, default=2.0, metavar="SECONDS",
-        help="start that is sure to be undamaged, default 2",
+        help="length of the undamaged start, default 2",
     )  # fmt: skip
     parser.add_argument("--span", type=float, default=60.0, metavar="SECONDS", help="default 60")
     add_test(
-        parser, "within --span", "data after an alarm from which the place is found, default 2"
+        parser, "within --span", "length of data after an alarm used to find the place, default 2"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when a signal ended it, or the session was gone through."""
+    """0 after a signal, or at the end of the session."""
     if arguments.source.suffix == ".toml":
         return _on_line(arguments)
     return _over_session(arguments)
@@ -75,7 +75,7 @@ def _over_session(arguments: argparse.Namespace) -> int:
 
 
 def _watched(arguments: argparse.Namespace, rate: float) -> "LiveDamage":
-    """The structure as asked for, at a sample rate [Hz]."""
+    """The requested monitor at a sample rate [Hz]."""
     from rigwatch.structures.live import LiveDamage, LiveSettings
     from rigwatch.structures.model import load_structure
 

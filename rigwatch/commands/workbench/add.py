@@ -1,11 +1,11 @@
-"""`rigwatch add`: puts an effect into a study's model, if the held-out recordings speak for it."""
+"""`rigwatch add`: adds an effect to a study's model, if the held-out recordings support it."""
 
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import print_json, say
 
-HELP = "add an effect to the model of a study, refit, compare; refused where held-out error rises"
+HELP = "add an effect to the model of a study, refit, compare; refused if the held-out error rises"
 EXAMPLE = """\
   rigwatch add emps coulomb
   rigwatch add emps offset --port force_sensor
@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("study", type=Path, help="the study's folder")
     parser.add_argument("effect", nargs="?", help="name of the effect")
-    parser.add_argument("--port", help="where it enters, if several places are possible")
+    parser.add_argument("--port", help="where it acts, if several places are possible")
     parser.add_argument(
         "--anyway", action="store_true", help="add it even though the held-out error does not fall"
     )
@@ -24,12 +24,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--effect-file",
         type=Path,
         metavar="TOML",
-        help="own effects: they are copied into the study and ranked beside the others",
+        help="file of own effects: copied into the study and ranked with the others",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 where the effect was added, 1 where it was refused."""
+    """0 if the effect is added, 1 if refused."""
     from rigwatch.wire.errors import ModelError
     from rigwatch.workbench.report import change_lines
     from rigwatch.workbench.steps import add, learn
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
             return 0
     if arguments.effect is None:
         raise ModelError("add: found no effect, expected its name, or --effect-file")
-    change = add(study, arguments.effect, arguments.port, anyway=arguments.anyway)
+    change = add(study, arguments.effect, arguments.port, anyway=arguments.anyway, progress=say)
     if arguments.json:
         print_json(change)
     else:

@@ -15,7 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("study", type=Path, help="the study's folder")
     parser.add_argument(
-        "--profile", action="store_true", help="intervals from the profile likelihood: many fits"
+        "--profile",
+        action="store_true",
+        help="compute intervals from the profile likelihood, which takes many fits",
     )
 
 

@@ -1,11 +1,11 @@
-"""`rigwatch explain`: rank what the model may be missing and give a verdict."""
+"""`rigwatch explain`: ranks the effects that the model may lack and gives a verdict."""
 
 import argparse
 from pathlib import Path
 
 from rigwatch.commands.common import print_json, say
 
-HELP = "rank what the model may be missing and give a verdict"
+HELP = "rank the effects that the model may lack and give a verdict"
 EXAMPLE = "  rigwatch explain emps"
 
 

@@ -13,7 +13,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("study", type=Path, help="the study's folder")
     parser.add_argument("--view", help="only one view, such as motion")
-    parser.add_argument("--most", type=int, default=3, help="regions shown of each view")
+    parser.add_argument("--most", type=int, default=3, help="number of regions shown per view")
 
 
 def run(arguments: argparse.Namespace) -> int:

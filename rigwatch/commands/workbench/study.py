@@ -1,8 +1,9 @@
-"""`rigwatch study`: a model beside recordings, and every step taken with them."""
+"""`rigwatch study`: a model, recordings, and every step taken with them."""
 
-HELP = "make a study of a model and recordings, show what was done in it, hand on what it learnt"
+HELP = "make a study of a model and recordings, show its steps, promote its result"
 EXAMPLE = """\
   rigwatch study new emps --template configs/studies/emps.toml --sessions recordings/
+  rigwatch study base rubbing
   rigwatch study show emps
   rigwatch study report emps --output emps.html
   rigwatch study view emps --save emps.rrd
@@ -11,6 +12,7 @@ EXAMPLE = """\
 
 ACTIONS = {
     "new": "workbench.study_new",
+    "base": "workbench.study_base",
     "show": "workbench.study_show",
     "report": "workbench.study_report",
     "view": "workbench.study_view",

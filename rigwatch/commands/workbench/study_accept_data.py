@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rigwatch.commands.common import print_json
 
-HELP = "continue a study with recordings that have changed; until then they are refused"
+HELP = "accept changed recordings, which a study refuses otherwise"
 EXAMPLE = "  rigwatch study accept-data emps"
 
 

@@ -1,38 +1,118 @@
-"""`rigwatch study new`: makes a study after a template."""
+"""`rigwatch study new`: makes a study of logs and a model, or from a template."""
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import file_or_name, print_json
+from rigwatch.commands.common import file_or_name, print_json, say
 
-HELP = "make a study of a model and recordings, after a template"
-EXAMPLE = "  rigwatch study new emps --template emps --sessions recordings/"
+if TYPE_CHECKING:
+    from rigwatch.workbench.steps import Logs
+
+HELP = "make a study of logs and a model, or from a template"
+EXAMPLE = """\
+  rigwatch study new drive --data run1.csv run2.csv --model motor --set R=2.0 --set K=0.06
+  rigwatch study new drive --data log.csv --model motor --map 'speed=n[rpm]' --time 't[ms]'
+  rigwatch study new emps --template emps --sessions recordings/"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
     parser.add_argument("study", type=Path, help="the study's folder")
-    parser.add_argument(
+    given = parser.add_mutually_exclusive_group(required=True)
+    given.add_argument(
+        "--data", type=Path, nargs="+", metavar="LOG", help="logs of the machine: CSV, MAT, …"
+    )
+    given.add_argument(
         "--template",
         type=file_or_name("studies"),
-        required=True,
         metavar="TOML",
-        help="study file to start from, or the name of one that comes with rigwatch",
+        help="study file to start from, or the name of a shipped one",
     )
     parser.add_argument(
-        "--sessions", type=Path, metavar="FOLDER", help="where the template's sessions are"
+        "--sessions", type=Path, metavar="FOLDER", help="folder of the template's sessions"
+    )
+    parser.add_argument("--model", help="a shipped model's name, or a model file, for --data")
+    parser.add_argument(
+        "--healthy", type=Path, nargs="+", default=[], metavar="LOG", help="logs with nothing wrong"
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a parameter of the model that you know, in its unit",
+    )
+    parser.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        metavar="CHANNEL=COLUMN[UNIT]",
+        help="a channel, its column and unit, where headers do not tell",
+    )
+    parser.add_argument("--time", metavar="COLUMN[UNIT]", help="the column of the time")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="sample rate, without a time")
+    parser.add_argument(
+        "--columns", metavar="A,B,…", help="names of columns, without a header line"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when it was made."""
+    """0 if it is written."""
+    from rigwatch.workbench.steps import study_from_logs
     from rigwatch.workbench.study import create, ledger
 
-    study = create(arguments.study, arguments.template, arguments.sessions)
+    remarks: list[str] = []
+    if arguments.data:
+        study, remarks = study_from_logs(arguments.study, _logs(arguments))
+    else:
+        study = create(arguments.study, arguments.template, arguments.sessions)
     line = ledger.append(study, "new")
     if arguments.json:
-        print_json(line)
+        print_json(line | {"remarks": remarks})
         return 0
     print(f"{study.folder}: model {study.model.name}: {study.model.summary}")
+    for remark in remarks:
+        say(remark)
     print(f"  {len(study.effects)} effects may be tried; next: rigwatch explain {study.folder}")
     return 0
+
+
+def _logs(arguments: argparse.Namespace) -> "Logs":
+    """What the options say about the logs."""
+    from rigwatch.wire.errors import ModelError
+    from rigwatch.wire.exchange import ImportMapping, parse_map_option
+    from rigwatch.workbench.steps import Logs
+
+    if not arguments.model:
+        raise ModelError("--data: found no --model, expected a model's name or file")
+    columns = tuple(arguments.columns.split(",")) if arguments.columns else ()
+    mapping = ImportMapping(
+        channels=dict(map(parse_map_option, arguments.map)),
+        time=arguments.time or "",
+        rate=arguments.rate,
+        columns=columns,
+        flag_missing=True,
+    )
+    return Logs(
+        tuple(arguments.data),
+        arguments.model,
+        tuple(arguments.healthy),
+        mapping,
+        dict(map(_value, arguments.set)),
+    )
+
+
+def _value(text: str) -> tuple[str, float]:
+    """A parameter and its value.
+
+    Raises:
+        ModelError: the text is not NAME=VALUE.
+    """
+    from rigwatch.wire.errors import ModelError
+
+    name, _, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise ModelError(f"--set: found {text!r}, expected NAME=VALUE such as R=2.0") from None

@@ -1,11 +1,11 @@
-"""`rigwatch study replay`: fits every step of the ledger again and compares."""
+"""`rigwatch study replay`: refits every step of the ledger and compares."""
 
 import argparse
 from pathlib import Path
 
 from rigwatch.commands.common import print_json, say
 
-HELP = "fit every step of a study again and compare with its ledger"
+HELP = "refit every step of a study and compare with its ledger"
 EXAMPLE = "  rigwatch study replay emps"
 
 
@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 where every step gives the same; 1 where one gives other errors than the ledger."""
+    """0 if every step reproduces the ledger; 1 if an error differs."""
     from rigwatch.workbench.steps import replay
     from rigwatch.workbench.study import open_study
 

@@ -13,12 +13,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the action."""
     parser.add_argument("study", type=Path, help="the study's folder")
     parser.add_argument(
-        "--output", type=Path, metavar="HTML", help="else report.html in the study's folder"
+        "--output", type=Path, metavar="HTML", help="default: report.html in the study's folder"
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when the page was written."""
+    """0 if the page is written."""
     from rigwatch.workbench.report import write_report
     from rigwatch.workbench.study import open_study
 

@@ -25,6 +25,8 @@ def run(arguments: argparse.Namespace) -> int:
         print_json({"model": study.model.name, "effects": study.file.effects, "ledger": steps})
         return 0
     print(f"{study.folder}: model {study.model.name}: {study.model.summary}")
+    for name in study.file.variants:
+        print(f"  with {name}: {study.model.variants[name].physics}")
     for accepted in study.file.effects:
         print(f"  + {accepted.effect}@{accepted.port}: {study.effects[accepted.effect].physics}")
     rows = [

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when it was drawn, and when a window was shown, once that is closed."""
+    """0 if it is drawn; returns once a window is closed."""
     ready_to_draw(arguments.save, arguments.picture)
     from rigwatch.workbench.steps import signals, stages
     from rigwatch.workbench.study import open_study
@@ -46,12 +46,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def write_views(draw: Callable[..., None], end: float, picture: Path | None) -> None:
-    """Draw into a headless viewer for a picture, or else into a file.
+    """Draw into a headless viewer for a picture, else into a file.
 
     Args:
         draw: takes the viewer's address, "" for the file.
-        end: of the data [s].
-        picture: file to write.
+        end: end of the data [s].
+        picture: picture file to write.
     """
     from rigwatch.dashboard import recording, study_view
 

@@ -1,9 +1,9 @@
-"""`rigwatch undo`: takes the last effect of a study away again."""
+"""`rigwatch undo`: removes the last effect of a study."""
 
 import argparse
 from pathlib import Path
 
-from rigwatch.commands.common import print_json
+from rigwatch.commands.common import print_json, say
 
 HELP = "remove the last effect from the model of a study"
 EXAMPLE = "  rigwatch undo emps"
@@ -15,12 +15,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 where an effect was taken away."""
+    """0 if an effect is removed."""
     from rigwatch.workbench.report import change_lines
     from rigwatch.workbench.steps import undo
     from rigwatch.workbench.study import open_study
 
-    change = undo(open_study(arguments.study))
+    change = undo(open_study(arguments.study), say)
     if arguments.json:
         print_json(change)
     else:

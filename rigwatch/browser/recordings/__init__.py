@@ -1,0 +1,20 @@
+"""From files to a new study: looked at, imported, put beside a model."""
+
+from rigwatch.browser.recordings.looking import Look, look_at
+from rigwatch.browser.recordings.new_study import make_study, template_data, template_names
+from rigwatch.browser.recordings.recorded import channels_of, recordings_in, write_channels
+from rigwatch.browser.recordings.stories import Story, begin_story, stories
+
+__all__ = [
+    "Look",
+    "Story",
+    "begin_story",
+    "channels_of",
+    "look_at",
+    "make_study",
+    "recordings_in",
+    "stories",
+    "template_data",
+    "template_names",
+    "write_channels",
+]

@@ -1,0 +1,90 @@
+"""A look at a foreign file before it is imported: its columns, and which mapping would fit."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from rigwatch.wire.errors import ImportDataError, RigwatchError
+from rigwatch.wire.exchange import ImportMapping, columns_of, parse_source
+from rigwatch.wire.typed_files import find_file, load, shipped_names
+
+SHOWN = 5
+"""Values of a column that are shown."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a file holds.
+
+    Attributes:
+        columns: name, first values and range of each.
+        scalars: single numbers beside them.
+        mapping: name of the shipped mapping that fits best, empty where none does.
+        suggested: the mapping itself, or a beginning of one.
+        rows: of the longest column.
+    """
+
+    columns: list[dict[str, Any]]
+    scalars: dict[str, float]
+    mapping: str
+    suggested: dict[str, Any]
+    rows: int
+
+
+def look_at(path: Path) -> Look:
+    """What a CSV, MAT, Parquet or JSON file holds.
+
+    Raises:
+        ImportDataError: it cannot be read.
+    """
+    cells, scalars = columns_of(path)
+    name, mapping = _fitting(path, list(cells))
+    columns = [_column(name, values) for name, values in cells.items()]
+    rows = max((len(values) for values in cells.values()), default=0)
+    return Look(columns, scalars, name, msgspec.to_builtins(mapping), rows)
+
+
+def _column(name: str, values: Any) -> dict[str, Any]:
+    shown = [str(value) for value in values[:SHOWN]]
+    try:
+        numbers = np.asarray(values).astype(np.float64)
+        ends = [float(np.nanmin(numbers)), float(np.nanmax(numbers))]
+    except (ValueError, TypeError):
+        return {"name": name, "shown": shown, "low": None, "high": None}
+    return {"name": name, "shown": shown, "low": ends[0], "high": ends[1]}
+
+
+def _fitting(path: Path, columns: list[str]) -> tuple[str, ImportMapping]:
+    """The shipped mapping that takes most columns of the file, all of which are there."""
+    found: list[tuple[int, str, ImportMapping]] = []
+    for name in shipped_names("imports"):
+        mapping = load(find_file(name, "imports"), ImportMapping)
+        try:
+            taken = _taken(mapping, tuple(columns))
+        except RigwatchError:
+            continue
+        wrong = mapping.format not in ("auto", path.suffix.lower().removeprefix("."))
+        if taken and not wrong:
+            found.append((taken, name, mapping))
+    if not found:
+        return "", _beginning(columns)
+    _, name, mapping = max(found, key=lambda entry: entry[0])
+    return name, mapping
+
+
+def _taken(mapping: ImportMapping, columns: tuple[str, ...]) -> int:
+    if mapping.time and mapping.time.partition("[")[0].strip() not in columns:
+        raise ImportDataError("another file")
+    sources = [parse_source(n, text, columns) for n, text in mapping.channels.items()]
+    return len({source.column for source in sources})
+
+
+def _beginning(columns: list[str]) -> ImportMapping:
+    """The first column for the time, every other as a channel of its own without a unit."""
+    names = {c: "".join(ch if ch.isalnum() or ch in "_-" else "_" for ch in c) for c in columns}
+    channels = {names[c]: f"{c}[1]" for c in columns[1:] if names[c]}
+    time = f"{columns[0]}[s]" if columns else ""
+    return ImportMapping(time=time, channels=channels)

@@ -1,0 +1,112 @@
+"""A new study's file: a template's settings with recordings of one's own."""
+
+import os
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import structs
+
+from rigwatch.physics.engine.equations import shipped_models
+from rigwatch.wire.errors import ConfigError, RigwatchError
+from rigwatch.wire.typed_files import as_toml, find_file, load, shipped_names
+from rigwatch.workbench.study import FILE, Span, Study, StudyFile, ledger, open_study
+
+USES = ("train", "held_out", "healthy")
+
+
+def template_names() -> dict[str, list[str]]:
+    """Templates and models that a study may begin with, by name."""
+    usable = [n for n in shipped_names("studies") if not _template(n).model.endswith(".toml")]
+    return {"templates": usable, "models": list(shipped_models())}
+
+
+def template_data(name: str) -> dict[str, Any]:
+    """What a template says of its recordings: file, use and span of each."""
+    file = _template(name)
+    spans = [
+        {
+            "use": use,
+            "session": span.session,
+            "start": span.start,
+            "end": span.end if isfinite(span.end) else None,
+        }
+        for use in USES
+        for span in getattr(file, use)
+    ]
+    signals = list(shipped_models()[file.model].inputs) + list(shipped_models()[file.model].outputs)
+    return {"model": file.model, "spans": spans, "signals": signals}
+
+
+def _template(name: str) -> StudyFile:
+    """A template that ships with rigwatch: no file that somebody else names."""
+    if name not in (known := shipped_names("studies")):
+        raise RigwatchError(f"found template {name!r}, expected one of {', '.join(known)}")
+    return load(find_file(name, "studies"), StudyFile)
+
+
+def make_study(
+    folder: Path, begin: str, spans: Sequence[tuple[str, Path, float, float | None]]
+) -> Study:
+    """Make a study in `folder`.
+
+    Args:
+        folder: holds none yet.
+        begin: name of a template, or "model:" and that of a model.
+        spans: use, recording, begin and end [s] of each part.
+
+    Raises:
+        RigwatchError: there is one already, or the parts do not fit.
+    """
+    if (folder / FILE).exists():
+        raise ConfigError(folder / FILE, "", "a study", "another name")
+    parts: dict[str, list[Span]] = {use: [] for use in USES}
+    for use, path, start, end in spans:
+        if use not in parts:
+            raise RigwatchError(f"found use {use!r}, expected one of {', '.join(USES)}")
+        name = Path(os.path.relpath(path, folder)).as_posix()
+        parts[use].append(Span(session=name, start=start, end=float("inf") if end is None else end))
+    if not (parts["train"] and parts["held_out"]):
+        raise RigwatchError("found no training or no held-out recording, expected one of each")
+    train, held_out, healthy = (tuple(parts[use]) for use in USES)
+    kind, _, model = begin.partition(":")
+    if model:
+        if model not in (known := shipped_models()):
+            raise RigwatchError(f"found model {model!r}, expected one of {', '.join(known)}")
+        file = StudyFile(model=model, train=train, held_out=held_out, healthy=healthy)
+    else:
+        file = structs.replace(_template(kind), train=train, held_out=held_out, healthy=healthy)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / FILE).write_text(as_toml(_said(file)), encoding="utf-8")
+    try:
+        study = open_study(folder)
+        ledger.append(study, "new")
+    except RigwatchError:
+        (folder / FILE).unlink()
+        raise
+    return study
+
+
+def _said(section: msgspec.Struct) -> dict[str, Any]:
+    """What differs from what a section says where it is silent."""
+    found = {}
+    for field in structs.fields(section):
+        value = getattr(section, field.name)
+        default = field.default
+        if default is msgspec.NODEFAULT and field.default_factory is not msgspec.NODEFAULT:
+            default = field.default_factory()
+        if value != default:
+            found[field.encode_name] = _plain(value)
+    return found
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, msgspec.Struct):
+        return _said(value)
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    return value

@@ -1,0 +1,59 @@
+"""The recordings of a folder, and their channels for a chart."""
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigwatch.browser.signals import write_trace
+from rigwatch.browser.work import RESULTS, Results
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.session import SUFFIX, open_session
+
+DEEP = 4
+MOST = 500
+
+
+def recordings_in(root: Path) -> list[str]:
+    """Every session below a folder, by its name from there; links that lead out are left out."""
+    return sorted(path.relative_to(root).as_posix() for path in _sessions(root))[:MOST]
+
+
+def _sessions(root: Path) -> Iterator[Path]:
+    for depth in range(DEEP):
+        for path in root.glob("/".join(["*"] * depth + [f"*{SUFFIX}"])):
+            if path.resolve().is_relative_to(root) and path.is_file():
+                yield path
+
+
+def channels_of(root: Path, path: Path) -> tuple[Results, dict[str, Any]]:
+    """Where a recording's channels are for charts, and what they are; written where they are not.
+
+    Raises:
+        RigwatchError: the session cannot be read.
+    """
+    stat = path.stat()
+    key = f"{path}:{stat.st_ino}:{stat.st_size}:{stat.st_mtime_ns}"
+    kept = Results(root / RESULTS / hashlib.sha256(key.encode()).hexdigest()[:32])
+    if not kept.has("recording.json"):
+        kept.write("recording", write_channels(kept, path))
+    found: dict[str, Any] = kept.read("recording")
+    return kept, found
+
+
+def write_channels(kept: Results, path: Path) -> dict[str, Any]:
+    """Write every channel as a line; names with units, seconds and samples."""
+    blocks = list(open_session(path).samples())
+    if not blocks:
+        raise RigwatchError(f"{path.name}: found no samples")
+    t_ns = np.concatenate([block.t_ns for block in blocks])
+    times = (t_ns - t_ns[0]) / 1e9
+    columns = [column for column in blocks[0].channels if column.values.dtype.kind == "f"]
+    with kept.whole("signals") as folder:
+        for column in columns:
+            values = [block.channel(column.name).values for block in blocks]
+            write_trace(folder, column.name, np.concatenate(values), times)
+    channels = {column.name: column.unit for column in columns}
+    return {"channels": channels, "seconds": float(times[-1]), "samples": len(times)}

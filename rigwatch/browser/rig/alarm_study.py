@@ -1,0 +1,67 @@
+"""An alarm as a study: a healthy stretch before its onset, and what came after it."""
+
+from pathlib import Path
+
+from rigwatch.browser.recordings import make_study
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.messages import Alarm
+from rigwatch.wire.rig_config import RigConfig
+from rigwatch.wire.session import newest, open_session, trim
+from rigwatch.workbench.study import Study
+
+HEALTHY = 5.0
+"""Length of the healthy stretch [s]."""
+FAULTY = 10.0
+"""Longest stretch with the fault [s]."""
+LEAST = 4.0
+"""Shortest that is worth a study [s]."""
+AROUND = 0.5
+"""Time left out on both sides of the onset, and between training and held out [s]."""
+TEMPLATE = "rig"
+
+
+def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm) -> Study:
+    """Cut the recording around an alarm's onset and make a study of it.
+
+    Args:
+        root: folder of the studies.
+        config: the rig's.
+        alarm: whose onset it is.
+
+    Raises:
+        SessionError: too little was recorded before or after the onset.
+        ConfigError: there is such a study already.
+    """
+    if config.recorder is None:
+        raise SessionError("found no [recorder] of the rig, expected one that has what it did")
+    session = open_session(newest(Path(config.recorder.folder)))
+    times = [block.t_ns for block in session.samples()]
+    if not times:
+        raise SessionError(f"{session.path}: found no samples, expected those around the alarm")
+    held = (alarm.seq - alarm.onset_seq) / config.rig.sample_rate if alarm.onset_seq >= 0 else 0.0
+    onset = alarm.t_ns - round(held * 1e9)
+    first, last = int(times[0][0]), int(times[-1][-1])
+    before, after = (onset - first) / 1e9 - AROUND, (last - onset) / 1e9 - AROUND
+    for seconds, where in ((before, "before"), (after, "after")):
+        if seconds < LEAST:
+            raise SessionError(
+                f"{alarm.name}: found {max(seconds, 0):.1f} s recorded {where} its onset, expected"
+                f" at least {LEAST:g} s"
+            )
+    name = f"{alarm.name}-{alarm.t_ns // 1_000_000_000}"
+    folder = root / "recordings"
+    folder.mkdir(exist_ok=True)
+    healthy, faulty = (folder / f"{name}-{part}.mcap" for part in ("healthy", "fault"))
+    around = round(AROUND * 1e9)
+    if not healthy.exists():
+        trim(session, healthy, onset - around - round(min(before, HEALTHY) * 1e9), onset - around)
+    length = min(after, FAULTY)
+    if not faulty.exists():
+        trim(session, faulty, onset + around, onset + around + round(length * 1e9))
+    half = (length - AROUND) / 2
+    parts = [
+        ("train", faulty, 0.0, half),
+        ("held_out", faulty, half + AROUND, None),
+        ("healthy", healthy, 0.0, None),
+    ]
+    return make_study(root / name, TEMPLATE, parts)

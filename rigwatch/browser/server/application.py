@@ -1,0 +1,85 @@
+"""The application: routes behind the guard."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.resources import files
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from rigwatch.browser.server import (
+    import_routes,
+    job_routes,
+    rig_routes,
+    signal_routes,
+    study_routes,
+)
+from rigwatch.browser.server.access import Access, Guard
+from rigwatch.browser.server.context import Context
+from rigwatch.browser.work import warm_up
+from rigwatch.page import STYLE
+from rigwatch.workbench.study import FILE
+
+STATIC = Path(str(files("rigwatch.browser.server").joinpath("static")))
+LEDGER = "ledger.jsonl"
+
+
+def application(context: Context, access: Access) -> Starlette:
+    """The pages of a folder, for those whom `access` lets in."""
+    routes = [
+        Route("/static/page.css", _style),
+        Mount("/static", StaticFiles(directory=STATIC)),
+        *import_routes.ROUTES,
+        *rig_routes.ROUTES,
+        *signal_routes.ROUTES,
+        *job_routes.ROUTES,
+        *study_routes.ROUTES,
+    ]
+    app = Starlette(
+        routes=routes,
+        middleware=[
+            Middleware(Guard, access=access),
+            Middleware(GZipMiddleware, minimum_size=2000, compresslevel=5),
+        ],
+        lifespan=_lifespan,
+    )
+    app.state.context = context
+    return app
+
+
+async def _style(_: Request) -> Response:
+    return Response(STYLE, media_type="text/css")
+
+
+@asynccontextmanager
+async def _lifespan(app: Starlette) -> AsyncIterator[None]:
+    context: Context = app.state.context
+    warm_up()
+    watching = asyncio.create_task(context.desks.watch(_state))
+    try:
+        yield
+    finally:
+        watching.cancel()
+        context.desks.close()
+        if hasattr(app.state, "link"):
+            app.state.link.close()
+
+
+def _state(folder: Path) -> object:
+    """What tells that a study was changed."""
+    found = []
+    for name in (FILE, LEDGER):
+        try:
+            stat = (folder / name).stat()
+        except OSError:
+            found.append((0, 0, 0))
+        else:
+            found.append((stat.st_ino, stat.st_size, stat.st_mtime_ns))
+    return tuple(found)

@@ -1,0 +1,104 @@
+"""What the routes share: places, desks, and answers of one form."""
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+
+from rigwatch.browser.server.places import PlaceError, Places
+from rigwatch.browser.work import Desk, Desks, as_plain
+from rigwatch.wire.errors import RigwatchError
+
+MOST_BODY = 1 << 20
+"""Bytes of a request that is no upload."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a server serves.
+
+    Attributes:
+        places: the folder.
+        desks: the studies' processes.
+        rig: configuration of a rig, None without one.
+        most_upload: bytes of a recording that may be brought.
+    """
+
+    places: Places
+    desks: Desks = field(default_factory=Desks)
+    rig: Path | None = None
+    most_upload: int = 1 << 30
+
+    def desk(self, request: Request) -> Desk:
+        """The desk of the study that a request names.
+
+        Raises:
+            RigwatchError: there is none, or its files lie elsewhere.
+        """
+        return self.desks.of(self.places.study(request.path_params["name"]))
+
+
+def context_of(request: Request) -> Context:
+    """The server's context."""
+    found: Context = request.app.state.context
+    return found
+
+
+def answer(value: Any, status: int = 200) -> Response:
+    """A value as JSON; what is not finite is null."""
+    body = msgspec.json.encode(as_plain(value))
+    headers = {"cache-control": "no-store"}
+    return Response(body, status, headers, media_type="application/json")
+
+
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+def told(handler: Handler) -> Handler:
+    """A handler whose errors for users become an answer of one line."""
+
+    @wraps(handler)
+    async def guarded(request: Request) -> Response:
+        try:
+            return await handler(request)
+        except PlaceError as error:
+            return answer({"error": str(error)}, 404)
+        except RigwatchError as error:
+            return answer({"error": str(error)}, 409)
+
+    return guarded
+
+
+async def body_of(request: Request) -> dict[str, Any]:
+    """A request's JSON.
+
+    Raises:
+        RigwatchError: it is none, or too long.
+    """
+    whole = bytearray()
+    async for part in request.stream():
+        whole += part
+        if len(whole) > MOST_BODY:
+            raise RigwatchError(f"found more than {MOST_BODY} bytes, expected a short request")
+    try:
+        return msgspec.json.decode(whole or b"{}", type=dict[str, Any])
+    except msgspec.DecodeError as error:
+        raise RigwatchError(f"found no JSON: {error}") from None
+
+
+def number_of(request: Request, name: str) -> float | None:
+    """A number of the address, None where it is missing or none."""
+    try:
+        return float(request.query_params[name])
+    except (KeyError, ValueError):
+        return None
+
+
+def refused(text: str, status: int) -> Response:
+    """A refusal in plain words."""
+    return PlainTextResponse(f"rigwatch: {text}\n", status)

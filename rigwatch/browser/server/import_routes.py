@@ -1,0 +1,208 @@
+"""Recordings brought, looked at and imported; new studies and stories."""
+
+import contextlib
+import secrets
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route
+
+from rigwatch.browser.recordings import (
+    begin_story,
+    channels_of,
+    look_at,
+    make_study,
+    recordings_in,
+    template_data,
+    template_names,
+)
+from rigwatch.browser.server.context import (
+    answer,
+    body_of,
+    context_of,
+    number_of,
+    refused,
+    told,
+)
+from rigwatch.browser.server.places import RECORDINGS, UPLOADS, PlaceError
+from rigwatch.browser.server.signal_routes import packed, span_of
+from rigwatch.browser.signals import open_trace
+from rigwatch.browser.views import render
+from rigwatch.wire.errors import ImportDataError, RigwatchError
+from rigwatch.wire.exchange import ImportMapping, import_file
+from rigwatch.wire.session import SUFFIX, open_session
+
+
+async def new_page(request: Request) -> Response:
+    """The page on which a study is made."""
+    context = context_of(request)
+    return HTMLResponse(
+        render(
+            "new.html", place="new", has_rig=context.rig is not None, begin=template_names(),
+            most=context.most_upload >> 20,
+        )
+    )  # fmt: skip
+
+
+async def bring(request: Request) -> Response:
+    """Take a file, bounded; what it holds."""
+    context = context_of(request)
+    name, most = request.path_params["file"], context.most_upload
+    context.places.new(name)
+    length = request.headers.get("content-length", "")
+    if length.isdigit() and int(length) > most:
+        return refused(f"found {int(length) >> 20} MB, expected at most {most >> 20} MB", 413)
+    folder = context.places.inside(UPLOADS)
+    folder.mkdir(exist_ok=True)
+    path = folder / f"{secrets.token_hex(6)}-{name}"
+    if not await _written(request, path, most):
+        return refused(f"found more than {most >> 20} MB, expected less", 413)
+    try:
+        return answer({"upload": path.name, "look": await _looked(path)})
+    except RigwatchError as error:
+        path.unlink()
+        raise ImportDataError(str(error).replace(f"{path}", name)) from None
+
+
+async def _looked(path: Path) -> Any:
+    """What a brought file holds; None of a session, which is taken as it is."""
+    if path.suffix == SUFFIX:
+        await run_in_threadpool(lambda: open_session(path).check_content())
+        return None
+    return await run_in_threadpool(look_at, path)
+
+
+async def _written(request: Request, path: Path, most: int) -> bool:
+    """Write a request's body; whether it was no longer than allowed."""
+    size, whole = 0, False
+    try:
+        with path.open("wb") as file:
+            async for part in request.stream():
+                size += len(part)
+                if size > most:
+                    return False
+                file.write(part)
+        whole = True
+    finally:
+        if not whole:
+            path.unlink(missing_ok=True)
+    return True
+
+
+async def take_in(request: Request) -> Response:
+    """Make a session of a file that was brought."""
+    context, wanted = context_of(request), await body_of(request)
+    source = context.places.inside(f"{UPLOADS}/{Path(str(wanted.get('upload'))).name}")
+    if not source.is_file():
+        raise PlaceError("found no file that was brought, expected one")
+    target = context.places.new(f"{wanted.get('name', '')}{SUFFIX}", RECORDINGS)
+    target.parent.mkdir(exist_ok=True)
+    if target.exists():
+        raise ImportDataError(f"{target.name}: there is one already, expected another name")
+    if source.suffix == SUFFIX:
+        source.rename(target)
+        return answer({"recording": context.places.relative(target), "remarks": []})
+    mapping = _mapping(wanted.get("mapping"))
+    try:
+        made = await run_in_threadpool(import_file, source, target, mapping)
+    except RigwatchError as error:
+        target.unlink(missing_ok=True)
+        raise ImportDataError(str(error).replace(str(source), source.name[13:])) from None
+    with contextlib.suppress(OSError):
+        source.unlink()
+    return answer(
+        {
+            "recording": context.places.relative(target),
+            "samples": made.samples,
+            "rate": made.rate_hz,
+            "remarks": made.remarks,
+        }
+    )
+
+
+def _mapping(given: object) -> ImportMapping:
+    try:
+        return msgspec.convert(given, ImportMapping)
+    except msgspec.ValidationError as error:
+        raise ImportDataError(f"mapping: {error}") from None
+
+
+async def recordings(request: Request) -> Response:
+    """The recordings of the folder."""
+    root = context_of(request).places.root
+    return answer(await run_in_threadpool(recordings_in, root))
+
+
+async def recording(request: Request) -> Response:
+    """Channels and length of a recording."""
+    return answer((await _channels(request))[1])
+
+
+async def recording_signals(request: Request) -> Response:
+    """A channel of a recording, for its chart."""
+    kept, found = await _channels(request)
+    channel = request.query_params.get("channel", "")
+    if channel not in found["channels"]:
+        raise PlaceError(f"{channel!r}: no channel of this recording")
+    lines = {channel: open_trace(kept.folder / "signals", channel)}
+    return packed(lines, span_of(request, lines), int(number_of(request, "width") or 1000))
+
+
+async def _channels(request: Request) -> Any:
+    places = context_of(request).places
+    path = places.inside(request.path_params["file"])
+    if path.suffix != SUFFIX or not path.is_file():
+        raise PlaceError(f"{path.name}: no recording")
+    return await run_in_threadpool(channels_of, places.root, path)
+
+
+async def template(request: Request) -> Response:
+    """What a template says of its recordings."""
+    return answer(template_data(request.path_params["template"]))
+
+
+async def make(request: Request) -> Response:
+    """Make a study."""
+    places, wanted = context_of(request).places, await body_of(request)
+    folder = places.new(str(wanted.get("name", "")))
+    spans = []
+    for part in wanted.get("spans", []):
+        path = places.inside(str(part.get("session", "")))
+        if not path.is_file():
+            raise PlaceError(f"{part.get('session')}: no such recording")
+        spans.append(
+            (str(part.get("use")), path, _seconds(part, "start") or 0.0, _seconds(part, "end"))
+        )
+    study = await run_in_threadpool(make_study, folder, str(wanted.get("begin", "")), spans)
+    return answer({"study": places.relative(study.folder)})
+
+
+def _seconds(part: dict[str, Any], name: str) -> float | None:
+    value = part.get(name)
+    if value is not None and not isinstance(value, int | float):
+        raise RigwatchError(f"{name}: found {value!r}, expected seconds")
+    return value
+
+
+async def story(request: Request) -> Response:
+    """Begin a story."""
+    root = context_of(request).places.root
+    made = await run_in_threadpool(begin_story, root, request.path_params["story"])
+    return answer({"study": made})
+
+
+ROUTES = [
+    Route("/new", new_page),
+    Route("/api/upload/{file}", told(bring), methods=["PUT"]),
+    Route("/api/import", told(take_in), methods=["POST"]),
+    Route("/api/recordings", told(recordings)),
+    Route("/api/recording/{file:path}", told(recording)),
+    Route("/api/recording-signals/{file:path}", told(recording_signals)),
+    Route("/api/template/{template}", told(template)),
+    Route("/api/new", told(make), methods=["POST"]),
+    Route("/api/story/{story}", told(story), methods=["POST"]),
+]

@@ -1,0 +1,102 @@
+"""Long work: begun, watched by server-sent events, cancelled."""
+
+import asyncio
+from collections.abc import AsyncIterator
+
+import msgspec
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.routing import Route
+
+from rigwatch.browser.server.context import answer, body_of, context_of, told
+from rigwatch.browser.server.study_routes import job_data
+from rigwatch.browser.work import Desk
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.workbench.study import digest, open_study
+
+ARGUMENTS: dict[str, dict[str, type]] = {
+    "show": {"step": int},
+    "explain": {},
+    "preview": {"effect": str, "port": str},
+    "add": {"effect": str, "port": str, "anyway": bool},
+    "undo": {},
+    "report": {},
+    "rehearse": {},
+    "promote": {},
+    "rollback": {},
+}
+"""What a page may have done, with what."""
+CHANGES = frozenset({"add", "undo"})
+AT_THE_RIG = frozenset({"rehearse", "promote", "rollback"})
+HEARTBEAT = 15.0
+"""Longest that a page hears nothing [s]."""
+
+
+async def begin(request: Request) -> Response:
+    """Have something done; one thing at a time a study."""
+    wanted = await body_of(request)
+    task = str(wanted.get("task", ""))
+    if task not in ARGUMENTS:
+        raise RigwatchError(f"found task {task!r}, expected one of {', '.join(ARGUMENTS)}")
+    arguments = _arguments(task, wanted.get("arguments", {}))
+    context, name = context_of(request), request.path_params["name"]
+    folder = await run_in_threadpool(context.places.checked, name)
+    if task in CHANGES:
+        seen = wanted.get("study")
+        if seen is not None and digest(open_study(folder).text) != seen:
+            raise RigwatchError(
+                f"{name}: the study has been changed elsewhere since this page showed it; it is"
+                " shown anew, look again"
+            )
+    if task in AT_THE_RIG:
+        if context.rig is None:
+            raise RigwatchError(f"{task}: found no rig, expected `rigwatch workbench --rig CONFIG`")
+        arguments["rig"] = str(context.rig.resolve())
+    return answer(job_data(context.desk(request).ask(task, arguments)), 202)
+
+
+def _arguments(task: str, given: object) -> dict[str, object]:
+    kinds = ARGUMENTS[task]
+    found = dict(given) if isinstance(given, dict) else {}
+    for name, value in found.items():
+        if name not in kinds or not isinstance(value, kinds[name]):
+            raise RigwatchError(f"{task}: found {name!r}, expected {', '.join(kinds) or 'nothing'}")
+    missing = [n for n in kinds if n not in found and n not in ("anyway", "step")]
+    if missing:
+        raise RigwatchError(f"{task}: found no {', '.join(missing)}")
+    return found
+
+
+async def cancel(request: Request) -> Response:
+    """End what runs; the study is as it was."""
+    return answer({"cancelled": context_of(request).desk(request).cancel()})
+
+
+async def events(request: Request) -> Response:
+    """What happens to a study, as it happens."""
+    desk = context_of(request).desk(request)
+    headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
+    return StreamingResponse(_events(desk), media_type="text/event-stream", headers=headers)
+
+
+async def _events(desk: Desk) -> AsyncIterator[bytes]:
+    queue = desk.listen()
+    try:
+        what, job = "job", desk.job
+        while True:
+            body = msgspec.json.encode(job_data(job)).decode() if what == "job" else "{}"
+            yield f"event: {what}\ndata: {body}\n\n".encode()
+            try:
+                what, job = await asyncio.wait_for(queue.get(), HEARTBEAT)
+            except TimeoutError:
+                what = "still"
+    finally:
+        desk.leave(queue)
+
+
+ROUTES = [
+    Route("/api/begin/{name:path}", told(begin), methods=["POST"]),
+    Route("/api/cancel/{name:path}", told(cancel), methods=["POST"]),
+    Route("/api/events/{name:path}", told(events)),
+]

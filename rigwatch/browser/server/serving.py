@@ -1,0 +1,101 @@
+"""Runs the server: on this machine alone, unless it is told otherwise and the way is safe."""
+
+import contextlib
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import uvicorn
+
+from rigwatch.browser.server.access import Access, hosts_of
+from rigwatch.browser.server.application import application
+from rigwatch.browser.server.context import Context
+from rigwatch.browser.server.places import Places
+from rigwatch.wire.errors import RigwatchError
+
+LOCAL = ("127.0.0.1", "localhost", "::1")
+STOP_WITHIN = 2
+
+
+@dataclass(frozen=True)
+class Options:
+    """How the pages are served.
+
+    Attributes:
+        folder: what is served.
+        address, port: where it listens; port 0 takes a free one.
+        certificate, key: of TLS.
+        behind_proxy: names by which people reach a proxy in front of it, which does TLS.
+        rig: configuration of a rig to show.
+        most_upload: bytes of a recording that may be brought.
+    """
+
+    folder: Path
+    address: str = "127.0.0.1"
+    port: int = 0
+    certificate: Path | None = None
+    key: Path | None = None
+    behind_proxy: tuple[str, ...] = ()
+    rig: Path | None = None
+    most_upload: int = 1 << 30
+
+
+def serve(options: Options, ready: Callable[[str], None]) -> None:
+    """Serve until interrupted; `ready` is told the address to open.
+
+    Raises:
+        RigwatchError: another address than this machine's without TLS, or it is taken.
+    """
+    _check(options)
+    listening = _listen(options)
+    port = int(listening.getsockname()[1])
+    secure = bool(options.certificate or options.behind_proxy)
+    names = [*LOCAL, options.address, *([socket.gethostname()] if secure else [])]
+    hosts = hosts_of(names, port) | frozenset(name.lower() for name in options.behind_proxy)
+    access = Access(hosts, secure)
+    context = Context(
+        Places(options.folder.resolve()), rig=options.rig, most_upload=options.most_upload
+    )
+    config = uvicorn.Config(
+        application(context, access), log_level="warning", access_log=False, lifespan="on",
+        ssl_certfile=options.certificate, ssl_keyfile=options.key, proxy_headers=False,
+        server_header=False, timeout_graceful_shutdown=STOP_WITHIN, limit_concurrency=400,
+        h11_max_incomplete_event_size=1 << 16,
+    )  # fmt: skip
+    where = options.behind_proxy[0] if options.behind_proxy else f"{_shown(options)}:{port}"
+    ready(f"{'https' if secure else 'http'}://{where}/?token={access.token}")
+    with contextlib.suppress(KeyboardInterrupt):
+        uvicorn.Server(config).run(sockets=[listening])
+
+
+def _check(options: Options) -> None:
+    if bool(options.certificate) != bool(options.key):
+        raise RigwatchError("--certificate: found one of certificate and key, expected both")
+    if options.address not in LOCAL and not (options.certificate or options.behind_proxy):
+        raise RigwatchError(
+            f"--address: found {options.address}, which others can reach; expected 127.0.0.1, or"
+            " --certificate and --key, or --behind-proxy NAME"
+        )
+    if not options.folder.is_dir():
+        raise RigwatchError(f"{options.folder}: no such folder, expected one for studies")
+
+
+def _listen(options: Options) -> socket.socket:
+    family = socket.AF_INET6 if ":" in options.address else socket.AF_INET
+    found = socket.socket(family, socket.SOCK_STREAM)
+    found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        found.bind((options.address, options.port))
+        # Who is told the address may come before the server does.
+        found.listen(128)
+    except OSError as error:
+        found.close()
+        raise RigwatchError(
+            f"{options.address}:{options.port}: {error.strerror}, expected a free port"
+        ) from error
+    return found
+
+
+def _shown(options: Options) -> str:
+    return f"[{options.address}]" if ":" in options.address else options.address

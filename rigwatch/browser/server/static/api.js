@@ -1,0 +1,53 @@
+// Talks to the server: JSON, signals, and what it tells by itself.
+
+export class Refused extends Error {}
+
+async function checked(response) {
+  if (response.ok) return response;
+  let text = await response.text();
+  try { text = JSON.parse(text).error ?? text; } catch { /* plain words */ }
+  throw new Refused(text);
+}
+
+export async function get(path, signal) {
+  return (await checked(await fetch(path, { signal }))).json();
+}
+
+export async function post(path, body = {}) {
+  const headers = { "content-type": "application/json" };
+  return (await checked(await fetch(path, { method: "POST", headers, body: JSON.stringify(body) }))).json();
+}
+
+/** Lines of a chart: { ends, lines: [{ name, x, y }] }; NaN becomes null, a gap. */
+export async function signals(path, signal) {
+  const buffer = await (await checked(await fetch(path, { signal }))).arrayBuffer();
+  const length = new DataView(buffer).getUint32(0, true);
+  const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  let at = 4 + length;
+  const lines = head.lines.map(([name, count]) => {
+    const x = new Float64Array(buffer, at, count);
+    at += 8 * count;
+    return { name, count, x };
+  });
+  for (const line of lines) {
+    line.y = Array.from(new Float32Array(buffer, at, line.count), (v) => (Number.isNaN(v) ? null : v));
+    at += 4 * line.count;
+  }
+  return { ends: head.ends, lines };
+}
+
+/** Server-sent events for as long as the page is looked at: a browser has few connections. */
+export function listen(path, heard) {
+  let source = null;
+  const open = () => {
+    if (source || document.hidden) return;
+    source = new EventSource(path);
+    for (const kind of ["job", "study"]) source.addEventListener(kind, (event) => heard(kind, JSON.parse(event.data)));
+  };
+  const close = () => { source?.close(); source = null; };
+  document.addEventListener("visibilitychange", () => {
+    if (document.hidden) close(); else { open(); heard("study", {}); }
+  });
+  addEventListener("pagehide", close);
+  open();
+}

@@ -1,0 +1,203 @@
+// Two charts over one span of time: signals, and the residual with the floor as a band.
+import { signals } from "./api.js";
+
+const MARGIN = 62;
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const STYLES = {
+  measured: { stroke: "measured", width: 2.6 },
+  modelled: { stroke: "model", width: 1.2 },
+  residual: { stroke: "rest", width: 1.1 },
+  preview: { stroke: "held", width: 1.5, dash: [6, 3] },
+};
+
+function label(value) {
+  if (value === null || value === undefined) return "–";
+  const size = Math.abs(value);
+  return size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(2) : String(Number(value.toPrecision(4)));
+}
+
+export class Charts {
+  constructor(places, told) {
+    this.told = told;
+    this.span = null;
+    this.ends = [0, 1];
+    this.marks = [];
+    this.band = null;
+    this.names = {};
+    this.plots = {};
+    this.places = places;
+    this.asked = {};
+    this.width = 1000;
+    new ResizeObserver(() => this.fit()).observe(places.signals);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.rebuild());
+  }
+
+  /** Shows another recording, channel or step; the span stays where it still is one. */
+  async show(query, { keep = true, unit = "", floor = null } = {}) {
+    this.query = query;
+    this.unit = unit;
+    this.band = floor;
+    if (!keep) this.span = null;
+    await this.load();
+  }
+
+  async preview(query) { this.previewed = query; await this.load(["residual"]); }
+
+  async load(charts = ["signals", "residual"]) {
+    if (!this.query) return;
+    await Promise.all(charts.map((chart) => this.loadOne(chart)));
+  }
+
+  async loadOne(chart) {
+    this.asked[chart]?.abort();
+    const asked = (this.asked[chart] = new AbortController());
+    const query = new URLSearchParams(this.query);
+    query.set("chart", chart);
+    query.set("width", Math.max(200, Math.round(this.places[chart].clientWidth - MARGIN)));
+    if (this.span) { query.set("from", this.span[0]); query.set("to", this.span[1]); }
+    if (chart === "residual" && this.previewed) for (const [k, v] of Object.entries(this.previewed)) query.set(k, v);
+    const path = this.query.get("path");
+    query.delete("path");
+    try { this.draw(chart, await signals(`${path}?${query}`, asked.signal)); } catch (error) {
+      if (error.name !== "AbortError") throw error;
+    }
+  }
+
+  draw(chart, found) {
+    const [first, ...rest] = found.lines;
+    const same = rest.every((line) => line.count === first.count && line.x[0] === first.x[0] && line.x[line.count - 1] === first.x[first.count - 1]);
+    const data = same ? [first.x, ...found.lines.map((line) => line.y)] : uPlot.join(found.lines.map((line) => [line.x, line.y]));
+    if (chart === "signals") this.ends = found.ends;
+    const names = found.lines.map((line) => line.name).join();
+    if (!this.plots[chart] || this.names[chart] !== names) {
+      this.plots[chart]?.destroy();
+      this.names[chart] = names;
+      this.plots[chart] = this.make(chart, found.lines.map((line) => line.name), data);
+    } else {
+      this.plots[chart].setData(data, false);
+    }
+    this.place(chart);
+    this.told("drawn", chart);
+  }
+
+  place(chart) {
+    const [from, to] = this.span ?? this.ends;
+    this.plots[chart].batch(() => {
+      this.plots[chart].setScale("x", { min: from, max: to });
+    });
+  }
+
+  make(chart, names, data) {
+    const box = this.places[chart];
+    const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line"), width: 1 }, font: "11px system-ui" };
+    const last = chart === "residual";
+    return new uPlot({
+      width: box.clientWidth, height: box.clientHeight,
+      legend: { show: false },
+      cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
+      scales: { x: { time: false, auto: false }, y: { auto: true } },
+      axes: [
+        { ...axis, show: true, size: last ? 26 : 8, label: last ? "time [s]" : undefined, labelSize: 13, labelFont: "11px system-ui", values: last ? undefined : (_, ticks) => ticks.map(() => "") },
+        { ...axis, size: MARGIN, space: 26, label: `${last ? "residual" : this.query.get("channel")} [${this.unit}]`, labelSize: 16, labelFont: "11px system-ui", values: (_, ticks) => ticks.map(label) },
+      ],
+      series: [{}, ...names.map((name) => ({
+        label: name, spanGaps: false, points: { show: false }, width: STYLES[name].width,
+        stroke: colour(STYLES[name].stroke), dash: STYLES[name].dash,
+      }))],
+      hooks: {
+        drawClear: [(plot) => { this.drawMarks(plot); if (last) this.drawBand(plot); }],
+        setSelect: [(plot) => this.selected(plot)],
+        setCursor: [(plot) => this.point(plot, names)],
+        ready: [(plot) => this.wheel(plot)],
+      },
+    }, data, box);
+  }
+
+  drawBand(plot) {
+    if (!this.band) return;
+    const [high, low] = [plot.valToPos(this.band, "y", true), plot.valToPos(-this.band, "y", true)];
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
+    ctx.fillStyle = colour("band");
+    ctx.fillRect(bbox.left, high, bbox.width, low - high);
+    ctx.restore();
+  }
+
+  drawMarks(plot) {
+    const { ctx, bbox } = plot;
+    ctx.save();
+    ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
+    ctx.fillStyle = colour("mark");
+    for (const [from, to] of this.marks) {
+      const left = plot.valToPos(from, "x", true);
+      ctx.fillRect(left, bbox.top, Math.max(plot.valToPos(to, "x", true) - left, 1.5), bbox.height);
+    }
+    ctx.restore();
+  }
+
+  mark(spans) { this.marks = spans; for (const plot of Object.values(this.plots)) plot.redraw(false); }
+
+  selected(plot) {
+    if (plot.select.width < 4) return;
+    const span = [plot.posToVal(plot.select.left, "x"), plot.posToVal(plot.select.left + plot.select.width, "x")];
+    plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    this.look(span);
+  }
+
+  point(plot, names) {
+    const at = plot.cursor.idx;
+    if (at === null || at === undefined) return;
+    this.told("point", [`t ${label(plot.data[0][at])} s`, ...names.map((name, k) => `${name} ${label(plot.data[k + 1][at])}`)].join("   "));
+  }
+
+  wheel(plot) {
+    plot.over.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const centre = plot.posToVal(event.offsetX, "x");
+      this.zoom(event.deltaY > 0 ? 1.25 : 0.8, centre);
+    }, { passive: false });
+    plot.over.addEventListener("dblclick", () => this.look(null));
+  }
+
+  look(span) {
+    const [first, last] = this.ends;
+    if (span) {
+      const width = Math.min(span[1] - span[0], last - first);
+      const from = Math.min(Math.max(span[0], first), last - width);
+      span = width >= last - first || width <= 0 ? null : [from, from + width];
+    }
+    this.span = span;
+    for (const chart of Object.keys(this.plots)) this.place(chart);
+    this.told("span", span);
+    clearTimeout(this.later);
+    this.later = setTimeout(() => this.load(), 40);
+  }
+
+  zoom(factor, centre) {
+    const [from, to] = this.span ?? this.ends;
+    const at = centre ?? (from + to) / 2;
+    this.look([at - (at - from) * factor, at + (to - at) * factor]);
+  }
+
+  pan(share) {
+    const [from, to] = this.span ?? this.ends;
+    const by = (to - from) * share;
+    this.look([from + by, to + by]);
+  }
+
+  fit() {
+    for (const [chart, plot] of Object.entries(this.plots)) {
+      const box = this.places[chart];
+      plot.setSize({ width: box.clientWidth, height: box.clientHeight });
+    }
+    clearTimeout(this.later);
+    this.later = setTimeout(() => this.load(), 120);
+  }
+
+  rebuild() {
+    for (const plot of Object.values(this.plots)) plot.destroy();
+    this.plots = {};
+    this.load();
+  }
+}

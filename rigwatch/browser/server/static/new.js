@@ -1,0 +1,237 @@
+// Brings recordings, maps their columns, and makes a study of parts of them.
+import { get, post, signals, Refused } from "./api.js";
+import { $, attempt, remark, say } from "./common.js";
+
+const USES = [["train", "training"], ["held_out", "held out"], ["healthy", "healthy"]];
+let upload = null;
+let recordings = [];
+let chosen = null;
+let chart = null;
+
+function field(value, label, width = 24) {
+  const input = document.createElement("input");
+  input.value = value ?? "";
+  input.size = width;
+  input.setAttribute("aria-label", label);
+  return input;
+}
+
+function cell(row, ...content) {
+  const td = row.insertCell();
+  td.append(...content);
+  return td;
+}
+
+function remover(row, done = () => {}) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = "×";
+  button.setAttribute("aria-label", "remove this row");
+  button.addEventListener("click", () => { row.remove(); done(); });
+  return button;
+}
+
+async function bring(file) {
+  $("bringing").textContent = `reading ${file.name}…`;
+  const response = await fetch(`/api/upload/${encodeURIComponent(file.name)}`, { method: "PUT", body: file });
+  $("bringing").textContent = "";
+  if (!response.ok) {
+    const text = await response.text();
+    let told = text;
+    try { told = JSON.parse(text).error; } catch { /* plain words */ }
+    throw new Refused(told);
+  }
+  const found = await response.json();
+  upload = found.upload;
+  const name = file.name.replace(/\.[^.]*$/, "").replace(/[^A-Za-z0-9._-]/g, "_");
+  if (!found.look) { await take(name, null); return; }
+  look(file.name, found.look, found.look.mapping || name.toLowerCase());
+}
+
+function look(file, found, name) {
+  $("mapping").hidden = false;
+  $("mapping").dataset.rest = JSON.stringify(found.suggested);
+  const told = found.mapping ? `, read as ${found.mapping}` : "";
+  $("mapping-title").textContent = `${file}: ${found.rows} rows${told}`;
+  const body = $("columns").tBodies[0];
+  body.replaceChildren();
+  for (const one of found.columns) {
+    const row = body.insertRow();
+    const head = document.createElement("th");
+    head.scope = "row";
+    head.textContent = one.name;
+    row.append(head);
+    cell(row, one.shown.map((v) => v.slice(0, 12)).join("  "));
+    for (const end of [one.low, one.high]) cell(row, end === null ? "–" : Number(end.toPrecision(5)).toString()).className = "num";
+  }
+  for (const [constant, value] of Object.entries(found.scalars)) {
+    const row = body.insertRow();
+    cell(row, constant);
+    cell(row, `${value} (one number)`).colSpan = 3;
+  }
+  $("recording-name").value = name;
+  $("time").value = found.suggested.time;
+  $("rate").value = found.suggested.rate ?? "";
+  $("channels").tBodies[0].replaceChildren();
+  for (const [channel, source] of Object.entries(found.suggested.channels)) channelRow(channel, source);
+  $("recording-name").focus();
+  say(`${file} has ${found.columns.length} columns`);
+}
+
+function channelRow(channel = "", source = "") {
+  const row = $("channels").tBodies[0].insertRow();
+  cell(row, field(channel, "channel", 16));
+  cell(row, field(source, `source of ${channel || "the channel"}`, 30));
+  cell(row, remover(row));
+}
+
+function mapping() {
+  const channels = {};
+  for (const row of $("channels").tBodies[0].rows) {
+    const [channel, source] = [...row.querySelectorAll("input")].map((one) => one.value.trim());
+    if (channel) channels[channel] = source;
+  }
+  const rate = $("rate").value.trim();
+  return { ...JSON.parse($("mapping").dataset.rest), time: $("time").value.trim(), rate: rate ? Number(rate) : null, channels };
+}
+
+async function take(name, given) {
+  const made = await post("/api/import", { upload, name, mapping: given });
+  $("mapping").hidden = true;
+  $("file").value = "";
+  await list();
+  remark([`${made.recording} is here`, ...(made.remarks ?? [])].join("; "), true);
+  document.body.dataset.imported = made.recording;
+  fill();
+}
+
+async function list() {
+  recordings = await get("/api/recordings");
+  for (const select of document.querySelectorAll("#parts select.recording")) options(select, select.value);
+}
+
+function options(select, value) {
+  select.replaceChildren(...recordings.map((one) => new Option(one, one)));
+  if (recordings.includes(value)) select.value = value;
+}
+
+function partRow({ use = "train", session = "", start = 0, end = null } = {}) {
+  const row = $("parts").tBodies[0].insertRow();
+  const uses = document.createElement("select");
+  uses.setAttribute("aria-label", "use");
+  uses.append(...USES.map(([value, words]) => new Option(words, value)));
+  uses.value = use;
+  const which = document.createElement("select");
+  which.className = "recording";
+  which.setAttribute("aria-label", "recording");
+  options(which, session);
+  cell(row, uses);
+  cell(row, which);
+  cell(row, field(start || "", "from, seconds", 8));
+  cell(row, field(end ?? "", "to, seconds", 8));
+  cell(row, remover(row, () => choose($("parts").tBodies[0].rows[0] ?? null)));
+  row.addEventListener("focusin", () => choose(row));
+  which.addEventListener("change", () => show());
+  return row;
+}
+
+/** The template's parts, with recordings of the same name where there are such. */
+async function fill() {
+  const begin = $("begin").value;
+  const body = $("parts").tBodies[0];
+  let parts = [{ use: "train" }, { use: "held_out" }];
+  $("needs").textContent = "";
+  if (!begin.startsWith("model:")) {
+    const found = await get(`/api/template/${begin}`);
+    parts = found.spans;
+    if (begin !== $("begin").value) return;
+    $("needs").textContent = `model ${found.model}`;
+  }
+  body.replaceChildren();
+  for (const part of parts) {
+    const same = recordings.find((one) => one.split("/").pop() === part.session);
+    partRow({ ...part, session: same ?? recordings[0] });
+  }
+  if (!$("study-name").value && !begin.startsWith("model:")) $("study-name").value = begin;
+  choose(body.rows[0]);
+}
+
+function choose(row) {
+  if (chosen === row && chart) return;
+  chosen = row;
+  for (const one of $("parts").tBodies[0].rows) one.classList.toggle("chosen", one === row);
+  show();
+}
+
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+
+async function show() {
+  const session = chosen?.querySelector("select.recording")?.value;
+  if (!session) return;
+  const path = session.split("/").map(encodeURIComponent).join("/");
+  const found = await attempt(() => get(`/api/recording/${path}`));
+  if (!found) return;
+  const select = $("brush-channel");
+  const before = select.value;
+  select.replaceChildren(...Object.entries(found.channels).map(([name, unit]) => new Option(`${name} [${unit}]`, name)));
+  if (before in found.channels) select.value = before;
+  const query = new URLSearchParams({ channel: select.value, width: $("brush").clientWidth });
+  const lines = await attempt(() => signals(`/api/recording-signals/${path}?${query}`));
+  if (lines) draw(lines, found.channels[select.value]);
+}
+
+function draw(found, unit) {
+  chart?.destroy();
+  const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, font: "11px system-ui" };
+  chart = new uPlot({
+    width: $("brush").clientWidth, height: 170, legend: { show: false },
+    cursor: { drag: { x: true, y: false, setScale: false } },
+    scales: { x: { time: false } },
+    axes: [{ ...axis, label: "time [s]", labelSize: 14, labelFont: "11px system-ui" }, { ...axis, size: 62, label: `[${unit}]`, labelSize: 14, labelFont: "11px system-ui" }],
+    series: [{}, { stroke: colour("measured"), width: 1.3, points: { show: false } }],
+    hooks: { setSelect: [brushed], drawClear: [marked] },
+  }, [found.lines[0].x, found.lines[0].y], $("brush"));
+}
+
+function brushed(plot) {
+  if (plot.select.width < 4 || !chosen) return;
+  const ends = [plot.select.left, plot.select.left + plot.select.width].map((at) => plot.posToVal(at, "x").toFixed(3));
+  const [from, to] = chosen.querySelectorAll("input");
+  from.value = ends[0];
+  to.value = ends[1];
+  plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+  plot.redraw(false);
+}
+
+function marked(plot) {
+  const [from, to] = chosen?.querySelectorAll("input") ?? [];
+  if (!from) return;
+  const left = plot.valToPos(Number(from.value || plot.scales.x.min), "x", true);
+  const right = plot.valToPos(Number(to.value || plot.scales.x.max), "x", true);
+  plot.ctx.save();
+  plot.ctx.fillStyle = colour("mark");
+  plot.ctx.fillRect(left, plot.bbox.top, right - left, plot.bbox.height);
+  plot.ctx.restore();
+}
+
+function parts() {
+  return [...$("parts").tBodies[0].rows].map((row) => {
+    const [use, session] = [...row.querySelectorAll("select")].map((one) => one.value);
+    const [start, end] = [...row.querySelectorAll("input")].map((one) => one.value.trim());
+    return { use, session, start: start ? Number(start) : 0, end: end ? Number(end) : null };
+  });
+}
+
+$("file").addEventListener("change", (event) => { if (event.target.files[0]) attempt(() => bring(event.target.files[0])); });
+$("more-channels").addEventListener("click", () => channelRow());
+$("more-parts").addEventListener("click", () => { choose(partRow()); });
+$("mapping").addEventListener("submit", (event) => { event.preventDefault(); attempt(() => take($("recording-name").value.trim(), mapping())); });
+$("begin").addEventListener("change", () => attempt(fill));
+$("brush-channel").addEventListener("change", () => show());
+$("study").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const made = await attempt(() => post("/api/new", { name: $("study-name").value.trim(), begin: $("begin").value, spans: parts() }));
+  if (made) location.href = `/study/${made.study}`;
+});
+addEventListener("keydown", (event) => { if (event.key === "?" && !event.target.closest("input, select")) $("help").showModal(); });
+addEventListener("load", () => attempt(async () => { await list(); await fill(); }));

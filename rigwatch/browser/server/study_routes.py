@@ -1,0 +1,114 @@
+"""Pages of studies and their parts."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from markupsafe import Markup
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, HTMLResponse, Response
+from starlette.routing import Route
+
+from rigwatch.browser.recordings import stories
+from rigwatch.browser.server.context import answer, context_of, number_of, told
+from rigwatch.browser.server.places import PlaceError
+from rigwatch.browser.views import candidate_html, listed, parts_of, render, state_of
+from rigwatch.browser.work import Job, as_plain
+from rigwatch.wire.errors import RigwatchError
+
+
+def _step(request: Request) -> int | None:
+    step = number_of(request, "step")
+    return None if step is None else int(step)
+
+
+async def studies_page(request: Request) -> Response:
+    """The list of studies."""
+    context = context_of(request)
+    found = await run_in_threadpool(listed, context.places.root)
+    return HTMLResponse(
+        render(
+            "studies.html", studies=found, folder=context.places.root.name, place="studies",
+            has_rig=context.rig is not None, stories=stories(context.places.root),
+        )
+    )  # fmt: skip
+
+
+async def study_page(request: Request) -> Response:
+    """One study; its model is fitted where that was not done yet."""
+    context, name = context_of(request), request.path_params["name"]
+    values: dict[str, Any] = {
+        "name": name, "model": "", "trouble": "", "parts": {}, "state": "",
+        "place": "study", "has_rig": context.rig is not None,
+    }  # fmt: skip
+    try:
+        folder = await run_in_threadpool(context.places.checked, name)
+        state, parts = await run_in_threadpool(
+            _drawn, folder, name, _step(request), context.rig is not None
+        )
+    except RigwatchError as error:
+        return HTMLResponse(render("study.html", **(values | {"trouble": str(error)})), 404)
+    shown = {name: Markup(html) for name, html in parts.items()}
+    values |= {"model": state["model"], "parts": shown, "state": _script(state)}
+    return HTMLResponse(render("study.html", **values), headers={"cache-control": "no-store"})
+
+
+async def study_parts(request: Request) -> Response:
+    """The parts of a study's page and what its code needs to know."""
+    context, name = context_of(request), request.path_params["name"]
+    folder = await run_in_threadpool(context.places.checked, name)
+    state, parts = await run_in_threadpool(
+        _drawn, folder, name, _step(request), context.rig is not None
+    )
+    return answer({"parts": parts, "state": state, "job": job_data(context.desk(request).job)})
+
+
+async def study_candidate(request: Request) -> Response:
+    """One candidate of the ranking, with the evidence for it."""
+    context, name = context_of(request), request.path_params["name"]
+    folder, label = context.places.study(name), request.query_params.get("label", "")
+    state = await run_in_threadpool(state_of, folder, name, _step(request))
+    return answer({"html": candidate_html(state, label)})
+
+
+async def study_file(request: Request) -> Response:
+    """A file that was made of a study: its report, or the excitation of the next experiment."""
+    context, name = context_of(request), request.path_params["name"]
+    kind = request.url.path.split("/")[3]
+    folder = await run_in_threadpool(context.places.checked, name)
+    state = await run_in_threadpool(state_of, folder, name)
+    path = state.results.folder / FILES[kind]
+    if not path.is_file():
+        raise PlaceError(f"{name}: found no {kind}, expected it to be made first")
+    return FileResponse(path, filename=f"{folder.name}-{FILES[kind]}")
+
+
+def _drawn(
+    folder: Path, name: str, step: int | None, rig: bool
+) -> tuple[dict[str, Any], dict[str, str]]:
+    state = state_of(folder, name, step)
+    return state.plain(), parts_of(state, rig=rig)
+
+
+def _script(state: dict[str, Any]) -> Any:
+    return Markup(msgspec.json.encode(as_plain(state)).decode().replace("<", "\\u003c"))
+
+
+def job_data(job: Job | None) -> dict[str, Any] | None:
+    """A job as the pages know it."""
+    if job is None:
+        return None
+    plain: dict[str, Any] = as_plain(job)
+    return plain | {"active": job.active}
+
+
+FILES = {"report": "report.html", "experiment": "experiment.csv"}
+ROUTES = [
+    Route("/api/file/report/{name:path}", told(study_file)),
+    Route("/api/file/experiment/{name:path}", told(study_file)),
+    Route("/", studies_page),
+    Route("/study/{name:path}", study_page),
+    Route("/api/parts/{name:path}", told(study_parts)),
+    Route("/api/candidate/{name:path}", told(study_candidate)),
+]

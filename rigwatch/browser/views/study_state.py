@@ -1,0 +1,122 @@
+"""What is known of one step of a study: read from its folder, nothing is fitted."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from rigwatch.browser.work import Results, results_of
+from rigwatch.workbench.compare import Comparison
+from rigwatch.workbench.explain import Explanation
+from rigwatch.workbench.study import Study, digest, lines, open_study
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One of the models that a study's effects make, one after another.
+
+    Attributes:
+        number: of effects in it.
+        added: the last of them, as "effect@port"; empty for the model alone.
+        comparison: its errors, None where it is not fitted yet.
+    """
+
+    number: int
+    added: str
+    comparison: Comparison | None
+
+    @property
+    def label(self) -> str:
+        """What people call it."""
+        return f"+ {self.added.split('@')[0].replace('_', ' ')}" if self.added else "model alone"
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A study at one step.
+
+    Attributes:
+        study: with the step's effects alone.
+        name: of the study, as the page's address has it.
+        whole: with all of its effects.
+        step: how many effects are shown.
+        steps: all that there are, the model alone first.
+        results: of the step that is shown.
+        explanation: of it, None where it was not asked.
+        evidence: of each candidate, by label.
+        ledger: its lines, the oldest first.
+    """
+
+    study: Study
+    name: str
+    whole: Study
+    step: int
+    steps: list[Step]
+    results: Results
+    explanation: Explanation | None
+    evidence: dict[str, Any]
+    ledger: list[dict[str, Any]]
+
+    @property
+    def comparison(self) -> Comparison | None:
+        """Errors of the step that is shown."""
+        return self.steps[self.step].comparison
+
+    @property
+    def latest(self) -> bool:
+        """Whether the study is shown as it is."""
+        return self.step == len(self.whole.file.effects)
+
+    def plain(self) -> dict[str, Any]:
+        """What the page's code needs to know."""
+        found = self.comparison
+        channels = [
+            {
+                "name": name,
+                "unit": output.unit,
+                "floor": found.channels[name].noise_floor if found else None,
+            }
+            for name, output in self.study.model.outputs.items()
+        ]
+        return {
+            "study": digest(self.whole.text),
+            "model": self.study.model.name,
+            "key": self.results.folder.name,
+            "step": self.step,
+            "steps": len(self.steps),
+            "latest": self.latest,
+            "channels": channels,
+            "fitted": found is not None and self.results.has("signals"),
+            "explained": self.explanation is not None,
+        }
+
+
+def state_of(folder: Path, name: str, step: int | None = None) -> State:
+    """The study in a folder at a step, as it is where the step is None or there is no such.
+
+    Raises:
+        RigwatchError: the study cannot be opened.
+    """
+    whole = open_study(folder)
+    effects = whole.file.effects
+    count = len(effects)
+    shown = count if step is None or not 0 <= step <= count else step
+    models = [whole.with_effects(effects[:k]) if k < count else whole for k in range(count + 1)]
+    kept = [results_of(model) for model in models]
+    steps = [
+        Step(k, f"{effects[k - 1].effect}@{effects[k - 1].port}" if k else "", _comparison(one))
+        for k, one in enumerate(kept)
+    ]
+    results = kept[shown]
+    told = results.read("explanation")
+    return State(
+        models[shown], name, whole, shown, steps, results,
+        None if told is None else msgspec.convert(told, Explanation, strict=False),
+        results.read("evidence") or {}, list(lines(whole)),
+    )  # fmt: skip
+
+
+def _comparison(results: Results) -> Comparison | None:
+    told = results.read("comparison")
+    return None if told is None else msgspec.convert(told, Comparison, strict=False)

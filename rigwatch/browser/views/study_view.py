@@ -1,0 +1,177 @@
+"""The parts of a study's page, each a piece of HTML that replaces the one before."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from rigwatch.browser.views.motion_map import motion_map
+from rigwatch.browser.views.pages import render
+from rigwatch.browser.views.study_state import State
+from rigwatch.workbench.explain import Explanation, Row
+from rigwatch.workbench.report import VERDICTS, doubt_of
+
+PARTS = ("verdict", "ledger", "missing", "where", "parameters", "data")
+VIEWS = {
+    "direction": "Direction of motion",
+    "amplitude": "Distance from the mean position",
+    "input": "Size of the drive",
+    "time": "Time",
+    "frequency": "Frequency",
+    "lines": "Lines of the excitation",
+}
+
+
+@dataclass
+class Candidate:
+    """A row of the ranking, with those that cannot be told from it.
+
+    Attributes:
+        row: what `explain` says.
+        told: what speaks for it.
+        physics: of the effect, in a sentence.
+        alike: rows of its class that are not shown by themselves.
+    """
+
+    row: Row
+    told: dict[str, Any]
+    physics: str
+    alike: "list[Candidate]" = field(default_factory=list)
+
+    @property
+    def label(self) -> str:
+        """ "effect@port"."""
+        return f"{self.row.effect}@{self.row.port}"
+
+    @property
+    def held_out(self) -> float | None:
+        """Held-out error of its fit, a later one first."""
+        found = self.told.get("held_out_error", self.row.held_out_error)
+        return None if found is None else float(found)
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the recordings held out speak for it."""
+        return bool(self.told.get("accepted", self.row.accepted))
+
+    @property
+    def reason(self) -> str:
+        """The same in words."""
+        return str(self.told.get("reason", self.row.reason))
+
+
+def parts_of(state: State, *, rig: bool = False) -> dict[str, str]:
+    """Every part by its name; `rig` says whether there is one to promote to."""
+    values = {
+        "s": state,
+        "headline": headline(state),
+        "doubt": doubt(state),
+        "candidates": candidates(state),
+        "regions": regions(state),
+        "views": VIEWS,
+        "maps": motion_map(state),
+        "command": command,
+        "rig": rig,
+        "rehearsal": state.results.read("rehearsal") if rig else None,
+    }
+    return {name: render(f"{name}.html", **values) for name in PARTS}
+
+
+def headline(state: State) -> str:
+    """The verdict in a sentence."""
+    found = state.explanation
+    if found is None:
+        return "Compared, not explained yet" if state.comparison else "Not fitted yet"
+    text = VERDICTS[found.verdict]
+    if found.verdict in ("missing_effect", "undetermined"):
+        text = _in_words(found)
+    return text[0].upper() + text[1:]
+
+
+def _in_words(found: Explanation) -> str:
+    """The verdict's sentence with effects as people call them."""
+    text = found.text
+    for row in found.ranking:
+        text = text.replace(
+            f"{row.effect}@{row.port}", f"{row.effect.replace('_', ' ')} at {row.port}"
+        )
+    return text
+
+
+def doubt(state: State) -> str:
+    """How often a verdict like this one was wrong."""
+    found = state.explanation
+    if found is None:
+        return ""
+    cases, wrong = found.like_this
+    if found.wrong_probability is not None and cases:
+        were = "was" if wrong == 1 else "were"
+        return (
+            f"{wrong} of {cases} simulated cases like this {were} wrong"
+            f" (probability {found.wrong_probability:.1%})"
+        )
+    return doubt_of(found)
+
+
+def candidates(state: State) -> list[Candidate]:
+    """The ranking, effects that cannot be told apart below the best of them."""
+    if state.explanation is None:
+        return []
+    shown: list[Candidate] = []
+    for row in state.explanation.ranking:
+        physics = (
+            state.study.effects[row.effect].physics if row.effect in state.study.effects else ""
+        )
+        label = f"{row.effect}@{row.port}"
+        one = Candidate(row, state.evidence.get(label, {}), physics)
+        like = next((c for c in shown if label in c.row.class_ and not _fitted(one)), None)
+        (like.alike if like else shown).append(one)
+    return shown
+
+
+def _fitted(one: Candidate) -> bool:
+    return one.held_out is not None
+
+
+def regions(state: State) -> dict[str, dict[str, list[dict[str, Any]]]]:
+    """Where the model fails: by channel and view, each region with its number."""
+    found: dict[str, dict[str, list[dict[str, Any]]]] = {}
+    for number, region in enumerate(state.results.read("regions") or []):
+        views = found.setdefault(region["channel"], {})
+        views.setdefault(region["view"], []).append(region | {"number": number})
+    for views in found.values():
+        for name in ("time", "frequency", "amplitude", "input"):
+            views.get(name, []).sort(key=lambda region: _first_number(region["name"]))
+    return found
+
+
+def _first_number(name: str) -> float:
+    words = [word for word in name.split() if word[0].isdigit() or word[0] == "-"]
+    try:
+        return float(words[0])
+    except (IndexError, ValueError):
+        return 0.0
+
+
+def command(state: State, step: str, effect: str = "", port: str = "") -> tuple[str, str]:
+    """What one would type, and what one would call, to do the same."""
+    name = state.study.folder.name
+    if not effect:
+        return f"rigwatch {step} {name}", f'rigwatch.{step}("{name}")'
+    return (
+        f"rigwatch {step} {name} {effect} --port {port}",
+        f'rigwatch.{step}("{name}", "{effect}", port="{port}")',
+    )
+
+
+def candidate_html(state: State, label: str) -> str:
+    """One candidate with the evidence for it; empty where there is none of that name."""
+    every = [one for c in candidates(state) for one in (c, *c.alike)]
+    found = next((c for c in every if c.label == label), None)
+    if found is None:
+        return ""
+    gains = found.told.get("blocks", [])
+    most = max((abs(g) for g in gains), default=1.0) or 1.0
+    return render(
+        "detail.html", c=found, now=state.comparison, latest=state.latest,
+        blocks=[g / most for g in gains], better=sum(g > 0 for g in gains),
+        command=command(state, "add", found.row.effect, found.row.port),
+    )  # fmt: skip

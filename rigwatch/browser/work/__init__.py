@@ -1,0 +1,19 @@
+"""Long work on studies: one process each, its results on disk, an end at any time."""
+
+from rigwatch.browser.work.desk import Desk, Desks, Job, warm_up
+from rigwatch.browser.work.directions import Directions
+from rigwatch.browser.work.results import FOLDER as RESULTS
+from rigwatch.browser.work.results import Results, as_plain, results_of, signal_key
+
+__all__ = [
+    "RESULTS",
+    "Desk",
+    "Desks",
+    "Directions",
+    "Job",
+    "Results",
+    "as_plain",
+    "results_of",
+    "signal_key",
+    "warm_up",
+]

@@ -1,0 +1,33 @@
+"""A study's model at the monitor, over what the rig's recorder has of the last minutes."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from monitor.model import load_model
+from rigwatch.wire.errors import SessionError
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.session import newest, open_session
+from rigwatch.workbench.steps import Rehearsal, model_path, promotion, rehearse
+from rigwatch.workbench.study import Study
+
+MINUTES = 3.0
+"""Length of what is rehearsed on, at most [min]."""
+
+
+def rehearsal(study: Study, rig: Path, progress: Callable[[str], None]) -> Rehearsal:
+    """Rehearse the study's model.
+
+    Raises:
+        ModelError: the study has nothing that the monitor has a place for.
+        SessionError: the rig has recorded nothing.
+    """
+    recorder = load_rig(rig).recorder
+    if recorder is None:
+        raise SessionError(f"{rig}: found no [recorder], expected one that has what the rig did")
+    session = open_session(newest(Path(recorder.folder)))
+    old = load_model(model_path(rig))
+    new = promotion(study, old).model
+    progress("rehearsing on what the rig did last")
+    last = max((int(block.t_ns[-1]) for block in session.samples()), default=0)
+    blocks = list(session.samples(None, last - round(MINUTES * 60e9), None))
+    return rehearse(new, old, blocks)

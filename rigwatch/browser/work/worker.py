@@ -1,0 +1,39 @@
+"""A study's process: takes tasks from a pipe, tells progress and outcome, ends with its parent."""
+
+import os
+import threading
+from multiprocessing import parent_process
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+
+from rigwatch.browser.work.tasks import TASKS, Worker
+from rigwatch.wire.errors import RigwatchError
+
+
+def work(pipe: Connection, folder: str) -> None:
+    """Do what comes through the pipe, one task after another, until it is closed."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    worker = Worker(Path(folder), lambda text: pipe.send(("progress", text)))
+    while True:
+        try:
+            task, arguments = pipe.recv()
+        except EOFError:
+            return
+        pipe.send(_outcome(worker, task, arguments))
+
+
+def _outcome(worker: Worker, task: str, arguments: dict[str, object]) -> tuple[str, object]:
+    try:
+        return "done", TASKS[task](worker, **arguments)
+    except RigwatchError as error:
+        return "failed", str(error)
+    except Exception as error:
+        return "failed", f"{task}: {type(error).__name__}: {error}"
+
+
+def _end_with_parent() -> None:
+    """A process whose server was killed must not go on."""
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

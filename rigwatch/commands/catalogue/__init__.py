@@ -1,0 +1,1 @@
+"""Commands on what there is to choose from: effects and models."""

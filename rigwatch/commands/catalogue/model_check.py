@@ -1,0 +1,80 @@
+"""`rigwatch model check`: whether a model's file can work."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.commands.common import check_folder, print_json, say
+
+if TYPE_CHECKING:
+    from rigwatch.workbench.catalogue import ModelReport
+
+HELP = "check a model's units, names, ports and what its outputs show of its states; draw a run"
+EXAMPLE = """\
+  rigwatch model check my_rig.toml
+  rigwatch model check heated-block --input ambient=293 --save run.svg"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    parser.add_argument("model", help="a file, or the name of a model that ships")
+    parser.add_argument(
+        "--input", action="append", default=[], metavar="NAME=VALUE",
+        help="value of an input during the run, in SI; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--save", type=Path, metavar="FILE", help="draw the run into FILE.svg, one file an output"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 if nothing is in a fit's way, 1 otherwise."""
+    from rigwatch.physics.engine.equations import model_named
+    from rigwatch.workbench.catalogue import model_report, plotted, text_plot
+
+    check_folder(arguments.save)
+    inputs = dict(map(_value, arguments.input))
+    report = model_report(model_named(arguments.model), inputs, arguments.model)
+    if arguments.json:
+        print_json(_plain(report))
+    else:
+        print("\n".join(_lines(arguments.model, report)))
+        for curve in report.run:
+            print("\n" + "\n".join(text_plot(curve)))
+    if arguments.save:
+        for number, curve in enumerate(report.run):
+            file = arguments.save.with_suffix("")
+            file = file.with_name(f"{file.name}{f'_{number + 1}' if number else ''}.svg")
+            file.write_text(plotted(curve, f"{arguments.model}: {curve.up}"), "utf-8")
+            say(f"drawn: {file}")
+    return 0 if report.fine else 1
+
+
+def _value(text: str) -> tuple[str, float]:
+    from rigwatch.wire.errors import ModelError
+
+    name, _, number = text.partition("=")
+    try:
+        return name, float(number)
+    except ValueError:
+        raise ModelError(f"--input: found {text!r}, expected a NAME=VALUE such as u=2.5") from None
+
+
+def _lines(name: str, report: "ModelReport") -> list[str]:
+    lines = [f"{name}: equations and units fit, every port stands in an equation"]
+    said = (
+        (report.unused, "stands in no equation and at no port"),
+        (report.unseen, "no output depends on it, so that no recording can tell it"),
+        (report.tied, "the outputs cannot tell it from another of these"),
+        (
+            report.start,
+            "no channel shows it: a fit finds its start from the outputs",
+        ),
+    )
+    lines += [f"  {one}: {what}" for names, what in said for one in names]
+    return [*lines, *([f"  {report.trouble}"] if report.trouble else [])]
+
+
+def _plain(report: "ModelReport") -> dict[str, object]:
+    run = [{"output": c.up, "time": c.x.tolist(), "value": c.y.tolist()} for c in report.run]
+    return {**vars(report), "run": run, "fine": report.fine}

@@ -1,0 +1,26 @@
+"""`rigwatch model list`: the models that ship."""
+
+import argparse
+
+from rigwatch.commands.common import print_json
+
+HELP = "list the models that ship with rigwatch"
+EXAMPLE = "  rigwatch model list"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action: none."""
+    del parser
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 on success."""
+    from rigwatch.physics.engine.equations import shipped_models
+
+    found = shipped_models()
+    if arguments.json:
+        print_json({name: model.summary for name, model in found.items()})
+        return 0
+    for name, model in sorted(found.items()):
+        print(f"{name:20} {model.summary}")
+    return 0

@@ -1,0 +1,37 @@
+"""`rigwatch model new`: a file of one's own, begun from a model that ships."""
+
+import argparse
+from pathlib import Path
+
+from rigwatch.commands.common import check_folder, print_json
+
+HELP = "begin a model of your own as a copy of one that ships"
+EXAMPLE = "  rigwatch model new my_rig.toml --like mass-spring-damper"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the action."""
+    parser.add_argument("file", type=Path, help="the new file (.toml)")
+    parser.add_argument(
+        "--like", default="mass-spring-damper", metavar="MODEL",
+        help="model to begin from (default: %(default)s)",
+    )  # fmt: skip
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 on success."""
+    from rigwatch.physics.engine.equations import model_named, model_text
+    from rigwatch.wire.errors import ModelError
+
+    file, like = arguments.file, arguments.like
+    if file.exists():
+        raise ModelError(f"{file}: found a file, expected a name that is free")
+    check_folder(file)
+    name = model_named(like).name
+    text = model_text(like).replace(f'name = "{name}"', f'name = "{file.stem}"', 1)
+    file.write_text(text, "utf-8")
+    if arguments.json:
+        print_json({"file": file, "like": like})
+    else:
+        print(f"{file}: begun from {like}; next: rigwatch model check {file}")
+    return 0

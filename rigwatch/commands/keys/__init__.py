@@ -1,0 +1,1 @@
+"""Commands for a rig's authority and certificates."""

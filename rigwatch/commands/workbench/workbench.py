@@ -1,0 +1,72 @@
+"""`rigwatch workbench`: the studies of a folder in a browser."""
+
+import argparse
+import json
+import webbrowser
+from pathlib import Path
+
+from rigwatch.commands.common import say
+
+HELP = "open the studies of a folder in a browser: see, add what is missing, watch the error fall"
+EXAMPLE = """\
+  rigwatch workbench studies/
+  rigwatch workbench studies/ --rig configs/story.toml
+  rigwatch workbench studies/ --address 0.0.0.0 --certificate rig.pem --key rig.key"""
+OWN_FOLDER = Path("workbench")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "folder", type=Path, nargs="?", help="folder of studies and recordings, else ./workbench"
+    )
+    parser.add_argument("--rig", type=Path, metavar="CONFIG", help="configuration of a rig to show")
+    parser.add_argument("--port", type=int, default=0, help="else a free one")
+    parser.add_argument("--address", default="127.0.0.1", help="where it listens")
+    parser.add_argument("--certificate", type=Path, metavar="PEM", help="certificate for TLS")
+    parser.add_argument("--key", type=Path, metavar="PEM", help="its key")
+    parser.add_argument(
+        "--behind-proxy",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="name by which people reach a proxy in front of it that does TLS",
+    )
+    parser.add_argument(
+        "--most-upload", type=int, default=1024, metavar="MB", help="largest file that is taken"
+    )
+    parser.add_argument("--open", action="store_true", help="open it in the browser here")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when it was ended."""
+    from rigwatch.wire.errors import MissingExtraError
+
+    try:
+        from rigwatch.browser.server import Options, serve
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(
+            error.name or "starlette", "workbench", "the workbench in a browser"
+        ) from None
+
+    folder = arguments.folder or OWN_FOLDER
+    if arguments.folder is None:
+        folder.mkdir(exist_ok=True)
+
+    def ready(address: str) -> None:
+        if arguments.json:
+            print(json.dumps({"address": address}), flush=True)
+        else:
+            print(f"workbench: {address}", flush=True)
+            say("Ctrl-C ends")
+        if arguments.open:
+            webbrowser.open(address)
+
+    serve(
+        Options(
+            folder, arguments.address, arguments.port, arguments.certificate, arguments.key,
+            tuple(arguments.behind_proxy), arguments.rig, arguments.most_upload << 20,
+        ),
+        ready,
+    )  # fmt: skip
+    return 0
