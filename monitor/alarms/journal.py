@@ -21,6 +21,8 @@ from rigwatch.wire.messages import Alarm
 
 _ALARM_TYPES = get_type_hints(Alarm)
 _RECORD_TYPES = get_type_hints(AlarmRecord)
+LARGEST, KEPT = 16 << 20, 8
+"""Size at which a journal is rotated [bytes], and how many older ones are kept."""
 LONGEST_LINE = 1 << 16
 """No line of ours comes near this [bytes]."""
 
@@ -30,6 +32,8 @@ class AlarmJournal:
 
     Args:
         path: the file; it and its folder are made where they are missing.
+        largest: size at which it is rotated: set aside as `<path>.1`, older ones as `.2` and so on,
+            and continued with the newest record of each alarm [bytes].
 
     Attributes:
         failure: why the last write failed, "" where it did not; the lines wait in memory for the
@@ -39,15 +43,17 @@ class AlarmJournal:
         SessionError: the file cannot be opened.
     """
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, largest: int = LARGEST) -> None:
         self.path = Path(path)
         self.failure = ""
+        self._largest = largest
         self._waiting: list[bytes] = []
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
             self._end_torn_line()
             _sync_folder(self.path.parent)
+            self._newest = _newest(self.path)
         except OSError as error:
             raise SessionError(
                 f"{path}: alarm journal cannot be opened: {error.strerror}"
@@ -55,16 +61,49 @@ class AlarmJournal:
 
     def write(self, records: Iterable[AlarmRecord]) -> None:
         """Append records and force them to disk; a full disk shows in `failure` only."""
-        self._waiting += [_line(record) for record in records]
+        for record in records:
+            self._waiting.append(_line(record))
+            self._newest[record.alarm.name] = record
         if not self._waiting:
             return
         try:
             _write_all(self._file, self._waiting)
             os.fsync(self._file)
+            if os.fstat(self._file).st_size > self._largest:
+                self._rotate()
         except OSError as error:
             self.failure = f"{self.path}: alarm journal cannot be written: {error.strerror}"
             return
         self.failure = ""
+
+    def newest(self) -> list[AlarmRecord]:
+        """The newest record of each alarm: the state in which a restarted monitor starts."""
+        return list(self._newest.values())
+
+    def _rotate(self) -> None:
+        """Set the file aside and begin one that holds the newest record of each alarm.
+
+        At every moment a whole journal stands at the path: a kill or power cut loses nothing.
+        """
+        beside = self.path.with_name(f"{self.path.name}.new")
+        beside.write_bytes(b"".join(map(_line, self._newest.values())))
+        file = os.open(beside, os.O_RDWR | os.O_APPEND)
+        try:
+            os.fsync(file)
+            for number in range(KEPT - 1, 0, -1):
+                if (older := self._set_aside(number)).exists():
+                    older.replace(self._set_aside(number + 1))
+            self._set_aside(1).hardlink_to(self.path)
+            beside.replace(self.path)
+        except OSError:
+            os.close(file)
+            raise
+        os.close(self._file)
+        self._file = file
+        _sync_folder(self.path.parent)
+
+    def _set_aside(self, number: int) -> Path:
+        return self.path.with_name(f"{self.path.name}.{number}")
 
     def close(self) -> None:
         """Close the file; what could not be written is lost."""
@@ -75,6 +114,15 @@ class AlarmJournal:
         size = os.fstat(self._file).st_size
         if size and os.pread(self._file, 1, size - 1) != b"\n":
             self._waiting.append(b"\n")
+
+
+def _newest(path: Path) -> dict[str, AlarmRecord]:
+    """The newest record of each alarm; memory is that of these, however long the journal is."""
+    if not path.is_file():  # a device may be endless
+        return {}
+    with path.open("rb") as file:
+        parsed = (_parse(line) for line in _lines(file) if line.strip())
+        return {record.alarm.name: record for record in parsed if record is not None}
 
 
 def read_journal(path: Path | str) -> tuple[list[AlarmRecord], int]:

@@ -45,6 +45,7 @@ class AlarmKind:
         cause: what is probably wrong.
         guidance: what to do now.
         defaults: settings where the configuration says nothing.
+        safety: it calls for the rig to be stopped: a flood never groups it.
         refines: the alarm that this one takes the place of, "" for none.
     """
 
@@ -54,6 +55,12 @@ class AlarmKind:
     guidance: str
     defaults: AlarmSettings
     refines: str = ""
+    safety: bool = False
+
+    @property
+    def always_shown(self) -> bool:
+        """Whether no flood may group it."""
+        return self.safety or self.severity == "critical"
 
 
 _LASTING = AlarmSettings(persistence=2, clear_after=256, latch=True)
@@ -105,6 +112,28 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         _PASSING,
     ),
     AlarmKind(
+        "line_noise",
+        "error",
+        "more than 1 % of the bytes from the device belong to no frame",
+        "Check the baud rate, the cable's shield and its length; see crc_errors and skipped_bytes "
+        "in the health message.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "slow_device",
+        "warning",
+        "the device delivers less than 90 % of its samples' nominal rate",
+        "Check the device's load and the line's speed; compare rate_hz with rig.sample_rate.",
+        _PASSING,
+    ),
+    AlarmKind(
+        "estimates_missing",
+        "critical",
+        "samples arrive and nothing is estimated from them",
+        "See the monitor's health message for the reason. The rig is not being watched.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
         "clock_drift",
         "warning",
         "the device's clock runs at another rate than this machine's",
@@ -117,6 +146,21 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "error",
         "the disk is full or nearly so; recording or journal may stop",
         "Free space or mount another disk. Monitoring continues; what is not recorded is counted.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "disk_almost_full",
+        "critical",
+        "less than 2 % of the recording's disk is free; recording is about to stop",
+        "Free space now: remove old sessions, or set recorder.keep_days or keep_gigabytes.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "recording_stopped",
+        "critical",
+        "nothing is being recorded",
+        "Check the disk and the recorder's process. Monitoring continues; the recorder fetches "
+        "what the rings still hold when it returns.",
         _AT_ONCE,
     ),
     AlarmKind(
@@ -150,6 +194,14 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "the {channel} signal is cut off at one value inside the sensor's range",
         "Check the sensor's amplifier, its supply and its range. What lies beyond the "
         "cut is lost, so do not trust estimates that need this channel.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "sensor_jumped",
+        "error",
+        "the {channel} signal has jumped as no motion of the rig can",
+        "Check the sensor's mounting, wiring and zero, and whether somebody has touched it. Dry "
+        "friction is not named from the samples after a jump.",
         _AT_ONCE,
     ),
     AlarmKind(
@@ -195,6 +247,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "Stop soon. Check the air bearing's supply, then alignment, seals and guides.",
         _LASTING,
         refines="departure",
+        safety=True,
     ),
     AlarmKind(
         "stiction",
@@ -203,6 +256,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "Stop now. The bearing touches or a part is jammed; turn on the air before moving again.",
         _LASTING,
         refines="departure",
+        safety=True,
     ),
     AlarmKind(
         "other_fault",

@@ -12,7 +12,8 @@ name it has.
 
 The first alarm raised while no other waits to be seen is the first-out. In a flood (`flood.py`)
 further alarms stand and are journalled, but are announced only as events, until the flood ends;
-critical alarms always show.
+critical alarms and those that ask for the rig to be stopped always show. An alarm that comes and
+goes again and again is one alarm with a count (`flapping.py`).
 """
 
 from collections.abc import Iterable, Mapping
@@ -183,10 +184,23 @@ class AlarmManager:
         alarm.active = active
         if not alarm.settings.enabled or alarm.shelved_until_ns:
             alarm.occasion = at
+        elif alarm.may_flap and self._flapped(alarm, at):
+            return
         elif active:
             self._raise(alarm, at)
         else:
             self._clear(alarm, at)
+
+    def _flapped(self, alarm: AlarmInstance, at: Occasion) -> bool:
+        """Whether the condition came or went within a series that stands as one alarm."""
+        if not alarm.active:
+            return alarm.flaps.went(at.t_ns)
+        if not alarm.flaps.came(at.t_ns) or alarm.state == "normal":
+            return False
+        alarm.occasion = at
+        if alarm.flaps.is_news():
+            self._publish(alarm, at.t_ns)
+        return True
 
     def _raise(self, alarm: AlarmInstance, at: Occasion) -> None:
         if any(other.active and other.settings.enabled for other in self._refinements(alarm)):
@@ -247,7 +261,7 @@ class AlarmManager:
             return
         t_ns = alarm.occasion.t_ns
         begins = is_new and self._flood.add(t_ns)
-        alarm.grouped = self._flood.active and alarm.kind.severity != "critical"
+        alarm.grouped = self._flood.active and not alarm.kind.always_shown
         if begins:
             at = replace(
                 alarm.occasion,
@@ -264,6 +278,8 @@ class AlarmManager:
             t_ns, name = min(due)
             if name == ALARM_FLOOD:
                 self._end_flood(t_ns)
+            elif self._alarms[name].flaps.ends_ns == t_ns:
+                self._end_series(self._alarms[name], t_ns)
             else:
                 self._unshelve(self._alarms[name], t_ns, "", "its time on the shelf is over")
 
@@ -273,8 +289,20 @@ class AlarmManager:
             for alarm in self._alarms.values()
             if alarm.shelved_until_ns
         ]
+        flapping = [
+            (alarm.flaps.ends_ns, alarm.name)
+            for alarm in self._alarms.values()
+            if alarm.flaps.ends_ns is not None
+        ]
         ends_ns = self._flood.ends_ns
-        return shelved if ends_ns is None else [(ends_ns, ALARM_FLOOD), *shelved]
+        flood = [] if ends_ns is None else [(ends_ns, ALARM_FLOOD)]
+        return [*flood, *shelved, *flapping]
+
+    def _end_series(self, alarm: AlarmInstance, t_ns: int) -> None:
+        """The condition has neither come nor gone for a while: the alarm follows it again."""
+        if not alarm.active and alarm.clear():
+            self._publish(alarm, t_ns)
+        alarm.flaps.end()
 
     def _end_flood(self, t_ns: int) -> None:
         self._flood.end()

@@ -20,7 +20,8 @@ latches. Shelving keeps an alarm in normal, whatever its condition does, for a l
 
 from dataclasses import dataclass, field
 
-from monitor.alarms.kinds import AlarmKind, AlarmSettings, kind_of, split
+from monitor.alarms.flapping import FlapWatch
+from monitor.alarms.kinds import REFINED, AlarmKind, AlarmSettings, kind_of, split
 from rigwatch.wire.messages import Alarm, AlarmState
 
 UNSEEN: tuple[AlarmState, ...] = ("unacknowledged", "cleared_unacknowledged")
@@ -63,6 +64,7 @@ class AlarmInstance:
         first_out: it was raised while no other alarm waited to be seen.
         grouped: it stands hidden in a flood.
         occasion: what raised it.
+        flaps: how often it has come lately.
     """
 
     name: str
@@ -76,6 +78,7 @@ class AlarmInstance:
     first_out: bool = False
     grouped: bool = False
     occasion: Occasion = field(default_factory=Occasion)
+    flaps: FlapWatch = field(default_factory=FlapWatch)
 
     def __post_init__(self) -> None:
         self.kind = kind_of(self.name)
@@ -84,6 +87,11 @@ class AlarmInstance:
     def is_remark(self) -> bool:
         """Whether nobody has to acknowledge it."""
         return self.kind.severity == "info"
+
+    @property
+    def may_flap(self) -> bool:
+        """Whether its comings are counted; names of one fault replace each other instead."""
+        return not self.kind.refines and self.kind.name not in REFINED
 
     @property
     def stands_for_fault(self) -> bool:
@@ -133,11 +141,13 @@ class AlarmInstance:
         """The alarm as published; decided at `t_ns` [ns] by `user`, else by its occasion."""
         at = self.occasion
         cause = self.kind.cause.format(channel=split(self.name)[1])
+        counted = f"came {self.flaps.count} times" if self.flaps.holding else ""
+        text = "; ".join(filter(None, (at.text, counted)))
         return Alarm(
             name=self.name,
             state=self.state,
             severity=self.kind.severity,
-            cause=f"{cause}: {at.text}" if at.text else cause,
+            cause=f"{cause}: {text}" if text else cause,
             guidance=self.kind.guidance,
             device=at.device,
             boot=at.boot,

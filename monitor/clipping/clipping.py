@@ -1,4 +1,4 @@
-"""Clipping of each channel as conditions: `flat_top.py` with the model's figures."""
+"""Clipping of each channel as conditions: runs `flat_top.py` with the model's figures."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from monitor.signals import SENSOR_CLIPPED, Admitted, Condition
 
 
 class Clipping:
-    """Carries the evidence of every channel from block to block.
+    """Accumulates the evidence of every channel from block to block.
 
     Args:
-        model: says how often a healthy reading repeats; where it does not, nothing is judged.
+        model: how often a healthy reading repeats; a channel without this figure is not judged.
     """
 
     def __init__(self, model: RigModel) -> None:
@@ -27,7 +27,7 @@ class Clipping:
         self._state = new_flat_tops(len(model.channels))
 
     def update(self, admitted: Admitted) -> tuple[Condition, ...]:
-        """Conditions of the block's samples, those that were put in for missing ones left out."""
+        """Conditions of the block's samples, without the padding for missing ones."""
         if not self._names:
             return ()
         if admitted.missing < 0:

@@ -1,18 +1,17 @@
 """Clipping inside the range: a channel whose peaks are cut off at one and the same value.
 
-A live reading carries noise, so it seldom repeats to the last digit; a clipped one repeats for as
-long as the signal would go further. Every reading that stands at the extreme of the last one to two
-spans is a trial: does the next one repeat it? With p the largest chance that the noise allows and
-q = (1 + p)/2, Page's cumulative sum, one for each end of each channel,
+A real reading carries noise, so it seldom repeats to the last digit; a clipped one repeats as long
+as the signal would exceed it. Every reading at the extreme of the last one to two spans is a trial:
+does the next one repeat it? With p the largest probability that noise allows and q = (1 + p)/2,
+Page's cumulative sum, one for each end of each channel,
 
     S ← max(0, S + ln(q/p))            repeated
     S ← max(0, S + ln((1-q)/(1-p)))    not repeated
 
-leaves h in a healthy channel after e^h trials on average, at the earliest (Lorden, Annals of
-Mathematical Statistics 42, 1971). The h is that of every other threshold: e^-h is the chance that
-is allowed at one look. It needs no amplitude, range, period or model. Where the converter's step
-hides the noise p is near 1, and nothing is said; a channel that does not move at all is not clipped
-but stuck.
+exceeds h in a healthy channel after at least e^h trials on average (Lorden, Annals of Mathematical
+Statistics 42, 1971). The h is that of every other threshold: e^-h is the probability allowed per
+test. It needs no amplitude, range, period or model. If the converter's step hides the noise, p is
+near 1 and nothing is reported; a channel that does not move at all is stuck, not clipped.
 """
 
 # Compiled functions are untyped to mypy.
@@ -31,9 +30,9 @@ SPAN = 256
 before the fault is forgotten, and motion down to a hertz comes to its own extremes.
 """
 NEVER = 1.0
-"""Chance of a repeat with which a channel is not judged."""
+"""Probability of a repeat above which a channel is not judged."""
 _CEILING = 2.0
-"""S stops at this many h, so that it comes back soon after the clipping has gone."""
+"""Upper bound of S in units of h, so that it falls soon after the clipping ends."""
 
 
 class FlatTops(NamedTuple):
@@ -56,7 +55,7 @@ class FlatTops(NamedTuple):
 
 
 def new_flat_tops(channels: int) -> FlatTops:
-    """A state that has seen nothing."""
+    """The initial state."""
     state = FlatTops(
         np.zeros((channels, 2)),
         np.zeros((2, channels, 2)),
@@ -71,7 +70,7 @@ def new_flat_tops(channels: int) -> FlatTops:
 
 @njit(cache=True)
 def forget_flat_tops(state: FlatTops) -> None:
-    """Back to nothing seen; the counts stay."""
+    """Reset to the initial state; the counts stay."""
     state.score[:, :] = 0.0
     state.extreme[:, :, :] = -np.inf
     state.last[:] = np.nan
@@ -87,12 +86,12 @@ def judge_flat_tops(  # noqa: PLR0917
     state: FlatTops,
     score: FloatArray,
 ) -> None:
-    """Take samples in; `score` gets the larger S of the two ends, after each sample.
+    """Process samples; `score` gets the larger S of the two ends, after each sample.
 
     Args:
-        values: readings, shape (n, c); those that are not good may be anything.
+        values: readings, shape (n, c); arbitrary where not good.
         good: shape (n, c).
-        chance: p of each channel, shape (c,); NEVER where it is not to be judged.
+        chance: p of each channel, shape (c,); NEVER if it is not judged.
         limit: h.
         state: carried on.
         score: shape (n, c).

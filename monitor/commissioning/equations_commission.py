@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import savgol_coeffs
 
-from monitor.commissioning.healthy_fit import Stretch, fit_healthy
+from monitor.commissioning.healthy_fit import fit_healthy
 from monitor.commissioning.healthy_limits import HealthyPart, healthy_limits
 from monitor.commissioning.sensor_chain import fit_sensor
-from monitor.commissioning.unhealthy import check_healthy
+from monitor.commissioning.unhealthy import check_healthy, check_moves, white_noise
 from monitor.model import (
     EquationsPlant,
     FrictionSection,
@@ -35,7 +35,9 @@ from monitor.observer import (
     Observed,
     ObserverSignals,
     SpectralWidth,
+    Spectrum,
     base_model,
+    bends_of,
     drive_energy,
     fit_remainder,
     force_port,
@@ -48,12 +50,13 @@ from monitor.observer import (
     remainder_signals,
 )
 from monitor.signals import GOOD, NEW_BOOT, Codes, Recording
+from rigwatch.physics.engine.equations import measured_states
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 EQUATIONS = "servo-pneumatic"
 """Shipped model that is fitted where none is named."""
-FITTED, CHIRP = 6.0, 14.0
+FITTED, CHIRP = 6.5, 14.5
 """Beginning of a recording, and of one that sweeps through frequencies, that is fitted [s]."""
 TRAINED = 2.0 / 3.0
 """Share of each recording from which the remainder is learnt before it is judged on the rest."""
@@ -78,8 +81,8 @@ def commission_equations(
         corner: of the high-pass of all that is judged [Hz].
 
     Raises:
-        ModelError: there is no healthy recording, rates differ, the equations do not describe the
-            rig, or a healthy recording is not healthy.
+        ModelError: there is no healthy recording, rates differ, a recording is short or at rest,
+            the equations do not describe the rig, or a healthy recording is not healthy.
     """
     used = [one for one in recordings if one.role != "friction"]
     if not any(one.role == "healthy" for one in used):
@@ -88,6 +91,7 @@ def commission_equations(
     if len(rates) != 1:
         raise ModelError(f"commissioning: found sample rates {sorted(rates)} Hz, expected one")
     rate = rates.pop()
+    check_moves(used, [state.channel for state in measured_states(base_model(name))])
     plant = _fitted(used, name, corner, rate)
     parts, remainder, scheme = _remainder(used, plant, rate)
     return _model(used, plant, remainder, scheme, parts, rate)
@@ -103,11 +107,11 @@ def _fitted(used: Sequence[Recording], name: str, corner: float, rate: float) ->
     n = layout.inputs
     known = fit_sensor(model, [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved], rate)
     stretches = [
-        Stretch(*_cut(m, layout, round((CHIRP if one.role == "chirp" else FITTED) * rate)))
+        _cut(m, layout, round((CHIRP if one.role == "chirp" else FITTED) * rate))
         for one, m in zip(used, moved, strict=True)
     ]
     turn = TURNS * _speed_noise(used, layout, lag, rate)
-    noise = min(_noise(one.channel(layout.channels[-1])) for one in used)
+    noise = min(white_noise(one.channel(layout.channels[-1])) for one in used)
     found = fit_healthy(
         name, port, stretches, turn=turn, corner=corner, rate=rate, noise=noise, known=known
     )
@@ -131,19 +135,14 @@ def _admitted(one: Recording, layout: Layout) -> tuple[FloatArray, Codes]:
 
 def _cut(moved: FloatArray, layout: Layout, n: int) -> tuple[FloatArray, FloatArray]:
     inputs = layout.inputs
-    return np.ascontiguousarray(moved[:n, :inputs]), np.ascontiguousarray(moved[:n, inputs])
-
-
-def _noise(signal: FloatArray) -> float:
-    """White noise of a signal, from its third differences, rms."""
-    return max(float(np.std(np.diff(signal, 3)) / np.sqrt(20.0)), 1e-12)
+    return np.ascontiguousarray(moved[:n, :inputs]), np.ascontiguousarray(moved[:n, [inputs]])
 
 
 def _speed_noise(used: Sequence[Recording], layout: Layout, lag: int, rate: float) -> float:
     column = layout.columns[layout.speed]
     channel = layout.channels[column.channel]
     kernel = savgol_coeffs(2 * lag + 1, 3, deriv=column.order, delta=1.0 / rate)
-    noises = [_noise(one.channel(channel)) for one in used]
+    noises = [white_noise(one.channel(channel)) for one in used]
     return max(min(noises) * float(np.linalg.norm(kernel)), 1e-9)
 
 
@@ -200,11 +199,11 @@ def _rms(signal: FloatArray) -> float:
     return float(np.sqrt(np.mean(signal**2)))
 
 
-def _narrow(seen: Observed, layout: Layout, slow: float, rate: float) -> float:
-    """Least narrowness of a recording's spectrum, once it has begun."""
+def _spectrum(seen: Observed, layout: Layout, slow: float, rate: float) -> Spectrum:
+    """Of a recording's motion, once it has begun."""
     speed = np.ascontiguousarray(seen.rows[:, layout.speed])
-    found = SpectralWidth(slow, rate).update(speed, seen.state)[round(STARTED * rate) :]
-    return float(np.clip(found.min(initial=1.0), 0.0, 1.0))
+    found = SpectralWidth(slow, rate).update(speed, seen.state)
+    return Spectrum(*(figure[round(STARTED * rate) :] for figure in found))
 
 
 def _model(  # noqa: PLR0917 -- all that was found
@@ -219,7 +218,8 @@ def _model(  # noqa: PLR0917 -- all that was found
     speeds = np.concatenate([o.rows[:, layout.speed] for o in parts])
     slow = max(SLOW * _rms(speeds), plant.turn)
     signals = [range_signals(o)[o.state != EMPTY] for o in parts]
-    seen = range_of(layout.signals, signals, min(_narrow(o, layout, slow, rate) for o in parts))
+    motions = [_spectrum(o, layout, slow, rate) for o in parts]
+    seen = range_of(layout.signals, signals, motions, bends_of(used, base_model(plant.model)))
     healthy = [
         HealthyPart(
             o.judged,

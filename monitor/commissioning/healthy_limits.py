@@ -124,10 +124,12 @@ def _largest(signal: FloatArray, length: int, allowed: FloatArray, skip: int) ->
 def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
     """The decision's columns, whatever it would say."""
     out = np.zeros((len(OUTPUTS), len(part.state)))
-    inside = np.ones(len(part.state), np.bool_)
+    inside, jumped = np.ones((2, len(part.state)), np.bool_)
+    jumped[:] = False
     kept = new_state(part.levels.shape[1])
     decide(
-        part.judged, part.speed, part.levels, part.drive, inside, part.state, rules, kept, out
+        part.judged, part.speed, part.levels, part.drive, inside, jumped, part.state, rules,
+        kept, out,
     )  # fmt: skip
     out[SPREAD] = np.maximum(out[SPREAD], rules.noise)
     return out

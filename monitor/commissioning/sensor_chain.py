@@ -16,12 +16,13 @@ from scipy.signal import lfilter
 from monitor.observer import high_pass
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import (
-    FUNCTIONS,
     Input,
     Model,
     along_measured_motion,
     balanced_states,
     compose,
+    names_in,
+    spelt_out,
 )
 from rigwatch.wire.arrays import FloatArray
 
@@ -36,12 +37,13 @@ TRIES = 5
 
 def sensor_parameters(model: Model) -> frozenset[str]:
     """Parameters that stand only in the equations of states which no other state needs."""
+    model = spelt_out(model)
     needed = [(name, _named(state.derivative)) for name, state in model.states.items()]
     sinks = {n for n, _ in needed if not any(n in used for other, used in needed if other != n)}
     sinks -= {state.name for state in balanced_states(model)}
     elsewhere = set().union(*(used for name, used in needed if name not in sinks))
     elsewhere |= set().union(*(_named(output.expression) for output in model.outputs.values()))
-    own = set().union(*(used for name, used in needed if name in sinks)) if sinks else set()
+    own = set().union(*(used for name, used in needed if name in sinks))
     return frozenset((own & set(model.parameters)) - elsewhere)
 
 
@@ -88,6 +90,7 @@ def fit_sensor(
 
 def _behind_the_balance(model: Model, free: frozenset[str]) -> Model | None:
     """The states behind the sensor, driven by the rate of the motion; None without any."""
+    model = spelt_out(model)
     along = along_measured_motion(model)
     balance = model.states[balanced_states(model)[0].name]
     names = [n for n, state in along.states.items() if free & _named(state.derivative)]
@@ -120,7 +123,7 @@ def _sum_of_known(text: str, known: set[str]) -> str:
     kept = [
         f"{sign}({ast.unparse(term)})"
         for sign, term in _terms(ast.parse(text.strip(), mode="eval").body, "+")
-        if {n.id for n in ast.walk(term) if isinstance(n, ast.Name)} - set(FUNCTIONS) <= known
+        if _named(ast.unparse(term)) <= known
     ]
     return " ".join(kept).lstrip("+") or "0"
 
@@ -132,6 +135,5 @@ def _terms(node: ast.expr, sign: str) -> list[tuple[str, ast.expr]]:
     return [(sign, node)]
 
 
-def _named(text: str) -> set[str]:
-    tree = ast.walk(ast.parse(text.strip(), mode="eval"))
-    return {node.id for node in tree if isinstance(node, ast.Name)} - set(FUNCTIONS)
+def _named(text: str) -> frozenset[str]:
+    return names_in(text, "model")

@@ -1,4 +1,5 @@
-"""Healthy recordings that are not: friction that sets in, or one that rubs while the others do not.
+"""Healthy recordings that tell nothing, being short or at rest, and those that are not healthy:
+friction that sets in, or one that rubs while the others do not.
 
 Dry friction is estimated block by block,
 
@@ -15,15 +16,49 @@ from collections.abc import Sequence
 import numpy as np
 
 from monitor.observer import DRY_UNIT, E
+from monitor.signals import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
+SECONDS, MOVES = 5.0, 5.0
+"""Least length of a recording [s], and of its motion in deviations of the channel's noise."""
 BLOCK, SETTLED = 128, 512
 """Samples of one estimate, and of a beginning that is not counted."""
 LEAST = 3
 """Blocks that either side of a step must have, and recordings of which one is told apart."""
 STEP = 2.5
 """Step of the friction over the residual beside it, from which a recording is refused."""
+
+
+def check_moves(recordings: Sequence[Recording], shown: Sequence[str]) -> None:
+    """Refuse recordings in which too little moves for too short a time.
+
+    Args:
+        recordings: chirps and healthy ones.
+        shown: channels that show the motion.
+
+    Raises:
+        ModelError: a recording is short, or a channel holds nothing but its noise.
+    """
+    for one in recordings:
+        seconds = len(one.channel(shown[0])) / one.sample_rate
+        if seconds < SECONDS:
+            raise ModelError(
+                f"{one.name}: found {seconds:.1f} s of samples without a gap, expected at least"
+                f" {SECONDS:g} s with the excitation running: record longer"
+            )
+        for name in shown:
+            signal = one.channel(name)
+            if np.std(signal) <= MOVES * white_noise(signal):
+                raise ModelError(
+                    f"{one.name}: found no motion in {name} beyond its noise, expected the"
+                    " excitation to run: record with it, or check the channel"
+                )
+
+
+def white_noise(signal: FloatArray) -> float:
+    """Root mean square of the white noise of a signal, from its third differences."""
+    return max(float(np.std(np.diff(signal, 3)) / np.sqrt(20.0)), 1e-12)
 
 
 def check_healthy(names: Sequence[str], judged: Sequence[FloatArray], rate: float) -> None:

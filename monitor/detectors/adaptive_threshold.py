@@ -1,7 +1,7 @@
-"""A threshold that grows with what the input asks of an imperfect model (Höfling and Deibert 1994).
+"""A threshold that grows with the activity of the input (Höfling and Deibert 1994).
 
-A model that is off by some share leaves a residual in proportion to its input, larger while the
-input changes. A fixed limit is then either left by every manoeuvre or blind at rest. The limit here
+A model with a relative error leaves a residual in proportion to its input, larger while the input
+changes. A fixed limit is then either exceeded by every manoeuvre or blind at rest. The limit here
 is
 
     J(t) = c + e(t),   e(t) = max( |w(t)|, e(t-1)·exp(-T/T2) ),   w = K·(1 + T1·s)/(1 + T2·s)·u
@@ -12,7 +12,7 @@ is
 
 The lead-lag filter is discretised exactly for a held input: z += (1 - exp(-T/T2))·(u - z), w = K·(z
 + T1/T2·(u - z)). The envelope e keeps the limit from vanishing at each zero crossing of the input;
-it forgets as the filter does, so four figures (c, K, T1, T2) say it all, as in the paper.
+it decays as the filter does, so four figures (c, K, T1, T2) suffice, as in the paper.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 NOISE_FACTOR = 4.0
-"""The floor stands at least this many deviations of the residual's noise away [1]."""
+"""Smallest floor, in standard deviations of the residual's noise [1]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class AdaptiveThreshold:
             raise ModelError(f"adaptive threshold: found {figures}, expected figures above 0")
 
     def coefficients(self, sample_rate: float) -> FloatArray:
-        """(floor, gain, lead/lag, exp(-T/T2)) as the kernel wants them."""
+        """(floor, gain, lead/lag, exp(-T/T2)), the kernel's coefficients."""
         decay = np.exp(-1.0 / (sample_rate * self.lag))
         return np.array([self.floor, self.gain, self.lead / self.lag, decay])
 
@@ -92,11 +92,11 @@ def threshold_block(coefficients: FloatArray, state: ThresholdState, u: FloatArr
 def fit_threshold(
     residual: FloatArray, u: FloatArray, sample_rate: float, slowest: float, margin: float
 ) -> AdaptiveThreshold:
-    """The tightest threshold that a healthy residual keeps away from by `margin`.
+    """The tightest threshold that leaves a `margin` above a healthy residual.
 
     Lag and lead are scanned; for each pair the gain is scanned and the floor follows. The lowest
-    mean limit wins; where several are as good (a steady input cannot tell floor from gain) the
-    largest gain does, since a model's error grows with its input.
+    mean limit wins; of several equals (a steady input cannot separate floor from gain) the largest
+    gain wins, since a model's error grows with its input.
 
     Args:
         residual: healthy, NaN where not judged, shape (n,).

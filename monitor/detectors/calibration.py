@@ -1,9 +1,8 @@
 """Settings of the detectors from a healthy recording, as plain figures for the model file.
 
 Every detector has two functions here or in the registry: one that turns a healthy recording into a
-table of figures, and one that builds the detector from the table. The recording should hold the
-excitation that will be watched: what the model gets wrong there is what the thresholds must leave
-room for.
+table of figures, and one that builds the detector from the table. The recording should contain the
+excitation to be monitored: the thresholds must leave room for the model's error there.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,20 +24,20 @@ from rigwatch.wire.errors import ModelError
 
 Figures = Mapping[str, float]
 MARGIN = 1.5
-"""Limits stand this much above the largest healthy residual [1]."""
+"""Ratio of the limits to the largest healthy residual [1]."""
 CORNER = 0.3
 """High-pass that follows the operating point [Hz]: below the excitation, above drift."""
 SETTLED = 8.0
-"""Time constants after which a start is forgotten [1]."""
+"""Settling time in time constants [1]."""
 NIS_WINDOW = 64
 FALSE_ALARM = 1e-9
-"""Chance of a false alarm in one window of a right model [1]."""
+"""Probability of a false alarm in one window with a correct model [1]."""
 DRIVE_SHARE, STATE_SHARE = 1e-8, 1e-8
-"""W as shares of the variances of input and model error: it only keeps the filters awake [1]."""
+"""W as shares of the variances of input and model error: it only keeps the gains above 0 [1]."""
 
 
 def time_constant(function: TransferFunction, sample_rate: float) -> float:
-    """Slowest time constant that lasts [s]: slower ones are taken away by the high-pass."""
+    """Slowest time constant [s]: the high-pass removes slower ones."""
     high_passed = 1.0 / (2.0 * np.pi * CORNER)
     radii = np.clip(np.abs(function.poles), 1e-3, 1.0 - 1e-9)
     constants = -1.0 / (sample_rate * np.log(radii))
@@ -84,7 +83,7 @@ def make_parity(
     *,
     moving_average: bool,
 ) -> ParityDetector:
-    """The detector that `calibrate_parity` has prepared."""
+    """The detector calibrated by `calibrate_parity`."""
     threshold = AdaptiveThreshold(*(figures[name] for name in ("floor", "gain", "lead", "lag")))
     point = OperatingPoint(figures["corner"], figures["u0"], figures["y0"], int(figures["settle"]))
     return ParityDetector(
@@ -99,8 +98,8 @@ def calibrate_unknown_input(
     acceleration.
 
     The limit is the chi-square one. A linear model of a nonlinear plant leaves innovations that are
-    neither white nor normal, so the measurements' variances, in proportion to what the model gets
-    wrong in each, are scaled until the largest healthy sum stands `MARGIN` below that limit.
+    neither white nor normal, so the measurements' variances, in proportion to the model's error in
+    each, are scaled until the largest healthy sum is `MARGIN` below that limit.
 
     Raises:
         ModelError: a recording is too short to settle.
@@ -132,7 +131,7 @@ def calibrate_unknown_input(
 def make_unknown_input(
     function: TransferFunction, figures: Figures, channels: Channels, sample_rate: float
 ) -> UnknownInputDetector:
-    """The detector that `calibrate_unknown_input` has prepared."""
+    """The detector calibrated by `calibrate_unknown_input`."""
     plain = {name: figures[name] for name in ("input", "state", "position", "acceleration")}
     noise = NoiseModel(
         **plain,
@@ -151,7 +150,7 @@ def _codes(n: int) -> NDArray[np.int64]:
 
 
 def _settling(sample_rate: float) -> int:
-    """Samples after a start that are not judged."""
+    """Number of samples after a start that are not judged."""
     return int(SETTLED / (2.0 * np.pi * CORNER) * sample_rate)
 
 

@@ -1,10 +1,9 @@
 """What every detector is: blocks of samples in, columns and one condition out, state carried
 between.
 
-A detector says what it sees at each sample and nothing else: persistence, latching and naming are
-the alarms' business. Samples that are missing or invalid never reach it: short runs are predicted
-through with the last good value and judged by nobody, after a long one it starts afresh
-(`monitor.signals.admission`).
+A detector only judges each sample: persistence, latching and naming belong to the alarms. Missing
+or invalid samples never reach it: short runs are bridged with the last good value and not judged;
+after a long one it restarts (`monitor.signals.admission`).
 """
 
 from abc import ABC, abstractmethod
@@ -20,11 +19,11 @@ from rigwatch.wire.messages import Column, SampleBlock
 
 Findings = tuple[tuple[Column, ...], tuple[Condition, ...]]
 LONGEST_HOLD = 8
-"""Missing or invalid samples that are predicted through at most [1]."""
+"""Longest run of missing or invalid samples that is bridged [1]."""
 
 
 class Detector(Protocol):
-    """Anything that can be run beside the friction scheme."""
+    """The protocol of a detector beside the friction scheme."""
 
     def update(self, block: SampleBlock) -> Findings:
         """Columns to publish and conditions, each as long as the block."""
@@ -33,12 +32,12 @@ class Detector(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Channels:
-    """Which channels a detector looks at.
+    """The channels of a detector.
 
     Attributes:
-        input: what drives the plant, such as "voltage".
-        output: what the model gives, such as "position".
-        acceleration: second derivative of the output; "" where the rig has none.
+        input: drive of the plant, such as "voltage".
+        output: output of the model, such as "position".
+        acceleration: second derivative of the output; "" if the rig has none.
     """
 
     input: str = "voltage"
@@ -57,7 +56,7 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What a detector's kernel found over n samples.
+    """The result of a detector's kernel over n samples.
 
     Attributes:
         series: columns to publish.
@@ -72,12 +71,12 @@ class Judgement:
 
     @property
     def active(self) -> NDArray[np.uint8]:
-        """1 where the value lies outside its limits; 0 where nothing was judged."""
+        """1 where the value is outside its limits; 0 where not judged."""
         return ((self.value < self.low) | (self.value > self.high)).astype(np.uint8)
 
 
 class SampleDetector(ABC):
-    """A detector that works sample by sample on a few channels.
+    """Base of detectors that work sample by sample on a few channels.
 
     Args:
         condition: name of the condition that it reports.

@@ -1,4 +1,4 @@
-"""The first-order high-pass that follows an operating point, and what it does to a model.
+"""The first-order high-pass that follows an operating point, and its effect on a model.
 
 v(t) = β·( v(t-1) + u(t) - u(t-1) ),   β = 1/(1 + 2π·fc/fs),   v = 0 at the start
 
@@ -18,15 +18,15 @@ def forgetting(corner: float, sample_rate: float) -> float:
 
 
 def high_passed(values: FloatArray, corner: float, sample_rate: float) -> FloatArray:
-    """A whole signal from rest, shape (n,)."""
+    """Filter a whole signal from rest, shape (n,)."""
     beta = forgetting(corner, sample_rate)
     return TransferFunction.of([beta, -beta], [1.0, -beta]).simulate(values - values[0])
 
 
 def leaky(function: TransferFunction, corner: float, sample_rate: float) -> TransferFunction:
-    """`function` with poles that remember longer than the high-pass moved to where it forgets.
+    """`function` with poles slower than the high-pass moved to its corner.
 
-    Above the corner nothing changes; an integrator becomes one that forgets its start.
+    Above the corner nothing changes; an integrator becomes a leaky one.
     """
     beta = forgetting(corner, sample_rate)
     poles = function.poles

@@ -41,9 +41,9 @@ def new_nis_window(length: int) -> NisWindow:
 
 @njit(cache=True)
 def push_nis(window: NisWindow, nis: float) -> float:
-    """Take one in; the sum over the window, NaN until it is full.
+    """Add one; the sum over the window, NaN until it is full.
 
-    The sum is formed anew at each turn of the ring, so that no rounding is carried for ever.
+    The sum is recomputed at each turn of the ring, so that rounding errors do not accumulate.
     """
     values, total, place = window
     total[0] += nis - values[place[0]]

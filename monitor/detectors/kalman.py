@@ -17,8 +17,7 @@ step gives them all:
 
 It exists where [E; C] has full column rank: every unknown shows in something that is measured.
 
-The steps take a prediction and its covariance, so that they serve linear and nonlinear models
-alike.
+The steps take a prediction and its covariance, so that they serve linear and nonlinear models.
 """
 
 import numpy as np
@@ -39,11 +38,10 @@ from rigwatch.wire.errors import ModelError
 def kalman_update(
     x: FloatArray, p: FloatArray, h: FloatArray, v: FloatArray, y: FloatArray
 ) -> float:
-    """Take a measurement into the predicted `x` and `p`, in place (thesis 2.40-2.42).
+    """Update the predicted `x` and `p` with a measurement, in place (thesis 2.40-2.42).
 
     Returns the normalised innovation squared νᵀ·S⁻¹·ν, ν = y - H·x, S = H·P·Hᵀ + V: chi-square with
-    m degrees of freedom where model and noise are right; NaN where S is singular, and nothing is
-    changed.
+    m degrees of freedom if model and noise are right; NaN if S is singular, and nothing changes.
     """
     innovation = y - times(h, x)
     ph = product_transposed(p, h)
@@ -73,7 +71,7 @@ def generalised_update(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     y: FloatArray,
     augmented: FloatArray,
 ) -> bool:
-    """Take a measurement into the predicted `x` and `p`, in place (thesis 2.60-2.61).
+    """Update the predicted `x` and `p` with a measurement, in place (thesis 2.60-2.61).
 
     Args:
         x: prediction f(x, u), shape (n,); becomes the new state.
@@ -112,7 +110,7 @@ def augmented_matrices(
         g: shape (m, p), p may be 0.
 
     Raises:
-        ModelError: the unknown inputs cannot be told from what is measured.
+        ModelError: the measurements do not determine the unknown inputs.
     """
     (m, n), q, unknown = h.shape, f.shape[1], g.shape[1]
     e = np.hstack([np.eye(n), np.zeros((n, unknown)), -f])

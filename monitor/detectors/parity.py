@@ -1,5 +1,4 @@
-"""Parity equations: what is left when a linear model is held against its plant (Höfling and Deibert
-1994).
+"""Parity equations: the residuals of a linear model (Höfling and Deibert 1994).
 
     r_ARMA = y - G(q⁻¹)·u                (thesis 2.45)      G = B/A
     r_MA   = A(q⁻¹)·y - B(q⁻¹)·u         (thesis 2.46)
@@ -10,13 +9,13 @@
 A constant fault Δy on the output and Δu on the input shows as Δy - G(1)·Δu in the first (2.50) and
 as A(1)·Δy - B(1)·Δu in the second (2.51), up to the sign convention of the fault. Here faults add
 to the readings (y → y + Δy, u → u + Δu), which gives these very signs. The ARMA residual runs a
-model beside the plant and remembers its past; the MA residual looks at the last samples only,
-reacts and forgets at once, and amplifies noise.
+model in parallel and depends on all past samples; the MA residual depends on the last samples only,
+reacts at once, and amplifies noise.
 
 The operating point is either given, or followed by a first-order high-pass of both signals; linear
-filters commute, so the high-pass leaves the residual's meaning and lets constant faults fade with
-its time constant. The residual is then high-passed once more: a plant that integrates, like the
-rig, has a model that never forgets where it started, and this makes the residual forget it. Each
+filters commute, so the high-pass keeps the residual's meaning and lets constant faults decay with
+its time constant. The residual is high-passed once more: the model of an integrating plant, such as
+the rig, never forgets its initial state; this removes it. Each
 residual is judged by an adaptive threshold.
 """
 
@@ -43,10 +42,10 @@ from rigwatch.wire.errors import ModelError
 
 @dataclass(frozen=True, slots=True)
 class OperatingPoint:
-    """What is taken off input and output.
+    """The operating point subtracted from input and output.
 
     Attributes:
-        corner: of the high-pass that follows the operating point [Hz]; 0 for a given one.
+        corner: corner of the high-pass that follows the operating point [Hz]; 0 for a given one.
         u0: input at the operating point [input unit], for corner 0.
         y0: output at the operating point [output unit], for corner 0.
         settle: samples after a start that are not judged [1].
@@ -66,7 +65,7 @@ class ParityState(NamedTuple):
         point: last (u, y), the same high-passed, last residual and the same high-passed,
             shape (6,).
         threshold: state of the adaptive threshold.
-        counts: samples since the start; samples since the last one that was held, shape (2,).
+        counts: samples since the start; samples since the last held one, shape (2,).
     """
 
     output: FloatArray
@@ -85,7 +84,7 @@ def _new_state(order: int) -> ParityState:
 def small_signal(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     forget: float, u0: float, y0: float, state: ParityState, u: float, y: float
 ) -> None:
-    """Take the operating point off; the results stand in `state.point[2:4]`."""
+    """Subtract the operating point; the results are in `state.point[2:4]`."""
     point = state.point
     if forget == 1.0:
         point[2], point[3] = u - u0, y - y0
@@ -99,7 +98,7 @@ def small_signal(  # noqa: PLR0917 -- a compiled kernel takes no keywords
 
 @njit(cache=True)
 def _forget_start(forget: float, state: ParityState, residual: float) -> float:
-    """The residual without what the model remembers of its start."""
+    """The residual without the effect of the model's initial state."""
     if forget == 1.0:
         return residual
     point = state.point
@@ -174,7 +173,7 @@ class ParityDetector(SampleDetector):
         moving_average: r_MA in place of r_ARMA.
 
     Raises:
-        ModelError: G is unstable, so that the model beside the plant would run away.
+        ModelError: G is unstable, so that the parallel model would diverge.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
 """Detectors beside the friction scheme: one row each, and every generic test picks the row up.
 
-A detector needs the model file's transfer function from input to output and a table of figures that
-`calibrate` makes of a healthy recording. `monitor.detectors` in the configuration says which ones
-run. Heavy imports wait until a detector is asked for.
+A detector needs the model file's transfer function from input to output and a table of figures from
+`calibrate` on a healthy recording. `monitor.detectors` in the configuration selects the detectors.
+Heavy imports wait until a detector is used.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,9 +22,9 @@ class DetectorKind:
     """One row.
 
     Attributes:
-        name: in the configuration.
-        condition: that it reports, with an alarm of the same name.
-        summary: what it is, for people.
+        name: name in the configuration.
+        condition: reported condition, with an alarm of the same name.
+        summary: description for people.
         calibrate: (function, healthy recordings, sample rate [Hz]) → figures; a recording has shape
             (n, 3): input, output, acceleration, or (n, 2) without the last.
         make: (function, figures, channels, sample rate [Hz]) → detector.

@@ -1,10 +1,8 @@
-"""The detectors that a configuration names, ready to run, from what the model file knows of the
-healthy rig.
+"""Builds the detectors that a configuration names from the model file's healthy reference.
 
-The model file keeps one averaged period of the healthy rig under each excitation, and how far
-single periods scatter about it. Repeated, with that scatter put back as noise from a fixed seed,
-they are the healthy recordings that the detectors are calibrated with: the same model file always
-gives the same detectors.
+The model file holds one averaged period of the healthy rig under each excitation, and the scatter
+of single periods. Repeated, with that scatter added as noise from a fixed seed, they are the
+healthy recordings for the calibration: the same model file always gives the same detectors.
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,13 +17,13 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ConfigError
 
 FRICTION = "friction"
-"""The friction scheme itself: always runs, and is no detector of this folder."""
+"""The friction scheme: always runs, and is not a detector of this folder."""
 HEALTHY_SECONDS = 40.0
 SEED = 1
 
 
 def detectors_of(names: Iterable[str], model: RigModel, file: Path | str) -> tuple[Detector, ...]:
-    """The detectors called `names`, but for the friction scheme.
+    """The detectors called `names`, without the friction scheme.
 
     Args:
         names: as in monitor.detectors.

@@ -1,7 +1,7 @@
 """Products and inverses of matrices of a few rows, in plain loops.
 
 A linear algebra library sums in an order that depends on the processor; these sum from left to
-right, so that a replay gives the same bits everywhere, and for five rows they are faster.
+right, so that a replay is identical to the bit everywhere, and for five rows they are faster.
 """
 
 import numpy as np
@@ -58,10 +58,10 @@ def times(a: FloatArray, x: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def inverse(matrix: FloatArray, out: FloatArray) -> bool:
-    """Inverse of a symmetric positive definite matrix into `out`; False where it is singular.
+    """Inverse of a symmetric positive definite matrix into `out`; False if it is singular.
 
     The matrix is scaled to a unit diagonal first, so that states in metres and in metres per square
-    second can stand beside each other. Nothing is raised: a filter must be able to reset and go on.
+    second are comparable. It raises nothing: a filter must be able to reset and continue.
     """
     n = matrix.shape[0]
     scale = np.empty(n)

@@ -1,20 +1,19 @@
-"""A bias on the position sensor, detected by a Kalman filter and estimated by one that allows for
-it.
+"""Detects a bias of the position sensor by a Kalman filter, and estimates it by a second one.
 
 Two filters run side by side on the same model (Nowakowski, Boutayeb and Darouach 1993, thesis
 2.54-2.61):
 
-* the plain one believes the position sensor. Its innovations are white and of known size while that
-is right; a sliding chi-square test of them detects the fault (`innovation_test.py`); * the
-generalised one takes the sensor's bias η as an unknown input of the measurement, y = H·x + G·η, and
-so gives the fault-free states and the bias whatever it is.
+* the plain one trusts the position sensor. Its innovations are white and of known size while that
+  is right; a sliding chi-square test of them detects the fault (`innovation_test.py`);
+* the generalised one takes the sensor's bias η as an unknown input of the measurement,
+  y = H·x + G·η, and so estimates the fault-free states and the bias.
 
 On the rig the model is the transfer function with W = q·B·Bᵀ + s·I: errors of a linear model of a
 nonlinear plant act partly like an unknown drive of variance q [input unit²]; s [output unit²] keeps
-W regular. Measured are the position and, where there is one, the acceleration one sample ago, which
-tells a moved sensor from a moved mass. All signals pass one high-pass (`high_pass.py`): neither a
-plant that integrates nor a piezo accelerometer says anything about a lasting offset. So a bias
-shows when it comes and then fades.
+W regular. The measurements are the position and, if available, the acceleration one sample ago,
+which distinguishes a moved sensor from a moved mass. All signals pass one high-pass
+(`high_pass.py`), as neither an integrating plant nor a piezo accelerometer shows a constant offset.
+So a bias shows when it appears and then decays.
 """
 
 from dataclasses import dataclass
@@ -122,7 +121,7 @@ def filter_model(
 
 
 def new_filter_state(model: FilterModel, window: int) -> FilterState:
-    """Filters that have seen nothing."""
+    """The initial filters."""
     n = model.b.size
     return FilterState(
         np.zeros(n),
@@ -140,7 +139,7 @@ def new_filter_state(model: FilterModel, window: int) -> FilterState:
 
 @njit(cache=True)
 def _start(model: FilterModel, state: FilterState, beta: float, signals: FloatArray) -> None:
-    """Begin at the position that is measured, not knowing how it moves."""
+    """Start at the measured position, with unknown motion."""
     state.raw[:] = signals
     state.high[:] = 0.0
     if beta == 1.0:
@@ -165,7 +164,7 @@ def _predict(model: FilterModel, x: FloatArray, p: FloatArray, u: float) -> None
 
 @njit(cache=True)
 def _step(model: FilterModel, state: FilterState, y: FloatArray) -> float:
-    """Update both filters; normalised innovation squared, NaN where a filter broke down."""
+    """Update both filters; normalised innovation squared, NaN if a filter failed."""
     nis = kalman_update(state.plain, state.plain_p, model.h, model.v, y)
     ok = generalised_update(
         state.general, state.general_p, model.e, model.c, model.v_inverse, y, state.augmented
@@ -237,7 +236,7 @@ class UnknownInputDetector(SampleDetector):
         sample_rate: [Hz].
 
     Raises:
-        ModelError: the model or the noise does not allow it.
+        ModelError: the model or the noise is unsuitable.
     """
 
     def __init__(
@@ -265,7 +264,7 @@ class UnknownInputDetector(SampleDetector):
 
     @property
     def resets(self) -> int:
-        """How often the filters broke down and were started again."""
+        """How often the filters failed and were restarted."""
         return int(self._state.counts[1])
 
     def judge(self, signals: FloatArray, code: NDArray[np.int64]) -> Judgement:

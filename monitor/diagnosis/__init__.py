@@ -1,4 +1,4 @@
-"""What is probably missing when an alarm stands: ranked in a process of its own."""
+"""Ranks the probable cause of an active alarm, in a separate process."""
 
 from monitor.diagnosis.background_ranking import Explainer
 

@@ -1,8 +1,7 @@
-"""What is probably missing when an alarm stands: asked in the background on recent samples.
+"""Ranks the probable cause of an alarm in the background, from recent samples.
 
-The ranking itself is in `fault_candidates.py` and runs in a process of its own; here is what of
-the samples
-is kept for it, when it is asked, and what becomes of the answer.
+The ranking itself is in `fault_candidates.py` and runs in a separate process; this module buffers
+the samples, requests the ranking and handles the answer.
 """
 
 import queue
@@ -21,22 +20,22 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event, SampleBlock
 
 NAMED = ("departure", "dry_friction", "other_fault")
-"""Alarms that ask for an explanation; a mass that sticks has its name."""
+"""Alarms that request an explanation; stiction already has its name."""
 WAIT = 2.0
-"""Samples since the onset that a ranking waits for [s]."""
+"""Time from the onset to the ranking [s]."""
 KEPT = 20.0
-"""Samples that are kept [s]."""
+"""Length of the buffered samples [s]."""
 MOST_TOLD = 64
-"""Answers that are kept for those who list alarms later."""
+"""Number of answers kept for later listings of alarms."""
 Judged = tuple[EstimateBlock, SampleBlock]
 
 
 class Explainer:
-    """Asks for one alarm at a time, and never makes samples wait.
+    """Requests one ranking at a time, and never delays samples.
 
     Args:
-        model: gives the model in force.
-        effect_files: own effects, ranked beside the library's.
+        model: returns the current model.
+        effect_files: own effects, ranked with the library's.
     """
 
     def __init__(self, model: Callable[[], RigModel], effect_files: Sequence[str] = ()) -> None:
@@ -66,7 +65,7 @@ class Explainer:
             self._thread.start()
 
     def hear(self, alarm: Alarm) -> None:
-        """Want an explanation where an alarm that needs one comes up, once an onset."""
+        """Request an explanation if an alarm needs one, once per onset."""
         if alarm.name == "stiction" and alarm.state == "unacknowledged":
             self._wanted = None
         key = (alarm.boot, alarm.onset_seq)
@@ -77,14 +76,14 @@ class Explainer:
                 self._told.pop(next(iter(self._told)))
 
     def results(self) -> list[Event]:
-        """What has been found since."""
+        """The answers since the last call."""
         found = [self._results.get() for _ in range(self._results.qsize())]
         for alarm, _, text in found:
             self._told[alarm.boot, alarm.onset_seq] = text
         return [event for _, event, _ in found]
 
     def with_causes(self, standing: Sequence[Alarm]) -> list[Alarm]:
-        """The alarms that stand, each with what is probably missing beside its cause."""
+        """The active alarms, each with the probably missing effect in its cause."""
         return [self._with_cause(alarm) for alarm in standing]
 
     def _with_cause(self, alarm: Alarm) -> Alarm:

@@ -1,9 +1,9 @@
-"""What is probably missing: every effect of the library put before the change since an alarm.
+"""Ranks every effect of the library by how well it explains the change since an alarm.
 
-The engine's score test, as in a study: what an effect at a port would do to the change, to first
-order along what was measured, is held against the change itself. p-values allow for residuals that
+The engine's score test, as in a study: the first-order change that an effect at a port would cause
+along the measured motion is compared with the observed change. p-values allow for residuals that
 are correlated and for the number of candidates; effects whose directions are nearly parallel form a
-class, but for those that the samples make clearly worse. Nothing is fitted: a study says more.
+class, except those that are clearly worse. Nothing is fitted: a study tells more.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,15 +35,15 @@ from rigwatch.physics.engine.score import (
 from rigwatch.wire.arrays import FloatArray
 
 LEVEL = 0.01
-"""Corrected p-value from which on nothing is named."""
+"""Corrected p-value above which nothing is named."""
 EXPLAINED = 0.5
-"""Share of the change's energy below which the best effect is not what is missing."""
+"""Share of the change's energy below which the best effect is rejected."""
 NEARLY = 0.02
-"""Difference in that share below which first order is too coarse to say which is better."""
+"""Difference in that share below which the first order cannot rank two effects."""
 BLOCKS, WORSE = 16, 3.0
 """Pieces of the samples over which two effects are compared, and standard errors that count."""
 FEWEST = 64
-"""Samples that a ranking needs at least."""
+"""Fewest samples for a ranking."""
 SETTLED = 0.25
 """Time from the onset until effects have built up [s]."""
 
@@ -68,11 +68,11 @@ class Suspect:
     """An effect at a port.
 
     Attributes:
-        effect, port: which one.
+        effect, port: their names.
         p_value: corrected for all candidates.
         explained: share of the change's energy.
         parameters: free ones.
-        alike: others that these samples cannot tell it from, as "effect@port".
+        alike: others that these samples cannot distinguish from it, as "effect@port".
     """
 
     effect: str
@@ -84,17 +84,18 @@ class Suspect:
 
     @property
     def label(self) -> str:
-        """Effect and port in one word."""
+        """Effect and port as one name."""
         return f"{self.effect}@{self.port}"
 
 
 def suspects(evidence: Evidence, model: RigModel, effects: Mapping[str, Effect]) -> list[Suspect]:
     """Every effect at every port with its best shape, the most likely first.
 
-    An effect whose strength would have the wrong sign is left out.
+    An effect whose strength has the wrong sign is excluded.
     """
     ports = rig_ports(model, _bridged(evidence.signals))
-    found = _candidates(ports, effects, model)
+    tried = {name: effect for name, effect in effects.items() if not effect.elective}
+    found = _candidates(ports, tried, model)
     pushes = _pushes(ports, found, evidence.onset, 1 / model.sample_rate)
     moved = np.empty_like(pushes)
     for index, candidate in enumerate(found):
@@ -150,7 +151,7 @@ def _candidates(ports: RigPorts, effects: Mapping[str, Effect], model: RigModel)
 
 
 def _sizes(port: Port, columns: Mapping[str, FloatArray], dt: float) -> dict[str, float]:
-    """Root mean squares of what effects at the port see; their values are shares of these."""
+    """Root mean squares of the port's variables; values of effects are relative to these."""
     variables = {name: columns[v.expression] for name, v in port.variables.items()}
     return sizes_at_port(variables, _signal(port, columns) if port.signal else None, dt)
 
@@ -177,7 +178,7 @@ def _pushes(ports: RigPorts, found: Sequence[Candidate], onset: int, dt: float) 
 def _allowed(
     ports: RigPorts, found: Sequence[Candidate], scores: Scores, pushes: FloatArray
 ) -> list[bool]:
-    """Whether each candidate's strength has the right sign and is not beyond all measure."""
+    """Whether each candidate's strength has the right sign and a plausible size."""
     allowed = []
     for index, candidate in enumerate(found):
         strength = float(scores.strength[index])

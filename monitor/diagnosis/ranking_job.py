@@ -1,9 +1,9 @@
-"""Ranks in a process of its own, started by the monitor.
+"""The ranking process, started by the monitor.
 
     python -m monitor.diagnosis FOLDER
 
-A thread would share the interpreter with the monitor's loop, and make samples wait while it imports
-and computes. The folder holds what is asked, and takes the answer.
+A thread would share the interpreter with the monitor's loop, and delay samples while it imports and
+computes. The folder holds the request, and receives the answer.
 """
 
 import json
@@ -20,7 +20,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
 
 LONGEST = 300
-"""A job that takes longer is given up [s]; the first on a machine compiles what effects need."""
+"""Time limit of a job [s]; the first on a machine compiles the effects."""
 NICENESS = 10
 MODULE = "monitor.diagnosis"
 _EVIDENCE, _MODEL, _EFFECTS, _ANSWER = "evidence.npz", "model.toml", "effects.json", "answer.txt"
@@ -34,13 +34,13 @@ def ask(  # noqa: PLR0917 -- what is put into the folder
     model: RigModel,
     effect_files: Sequence[str],
 ) -> str:
-    """What is probably missing, in words; empty where the job failed. Waits for it."""
+    """Wait for the ranking as text; empty if the job failed."""
     np.savez(folder / _EVIDENCE, signals=signals, change=change, onset=onset)
     (folder / _MODEL).write_text(model_text(model), encoding="utf-8")
     (folder / _EFFECTS).write_text(json.dumps(list(effect_files)), encoding="utf-8")
     child = os.posix_spawn(
         sys.executable, [sys.executable, "-m", MODULE, str(folder)], os.environ,
-        # The monitor's own real-time class would be handed on.
+        # A child would inherit the monitor's real-time class.
         scheduler=(os.SCHED_OTHER, os.sched_param(0)),
     )  # fmt: skip
     os.waitpid(child, 0)
@@ -49,10 +49,10 @@ def ask(  # noqa: PLR0917 -- what is put into the folder
 
 
 def answer(folder: Path) -> str:
-    """Do what is asked in `folder`.
+    """Process the request in `folder`.
 
     Raises:
-        RigwatchError: a file of effects does not fit.
+        RigwatchError: a file of effects is malformed.
     """
     from monitor.diagnosis.fault_candidates import Evidence, in_words, suspects
     from rigwatch.physics.engine.equations import library, offered
@@ -65,11 +65,11 @@ def answer(folder: Path) -> str:
 
 
 def main() -> int:
-    """0 where there is an answer."""
+    """0 if there is an answer."""
     os.nice(NICENESS)
     signal.alarm(LONGEST)
     folder = Path(sys.argv[1])
-    # Written beside and renamed, so that half an answer is none.
+    # Written to a temporary file and renamed, so that an answer is complete or absent.
     beside = folder / "answer.new"
     try:
         text = answer(folder)

@@ -1,7 +1,7 @@
-"""The rig as the engine sees it: where effects may enter, and how each place reaches the change.
+"""The rig as a model with ports: where effects may act, and how each place affects the change.
 
-A monitor's model has no equations of motion, so that its ports are read from measured signals, and
-what an effect pushes there is carried on by the model's own filters:
+A monitor's model has no equations of motion, so its ports are evaluated on measured signals, and
+the model's filters carry the effect to the residual:
 
     force at the mass    -Ge for a transfer function, as Ge takes friction against the motion to be
                          positive; 1/M for an inertia
@@ -35,23 +35,23 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 MOST = 2.0
-"""Rms of an effect over that of the signal it enters at."""
+"""Rms of an effect relative to that of the signal at its port."""
 MOST_FRICTION = 10.0
-"""Rms of a force in units of the known friction that Ge was made with."""
+"""Rms of a force in units of the known friction of commissioning."""
 Response = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
 class RigPorts:
-    """Places where an effect may be missing, over one stretch of samples.
+    """Places where an effect may be missing, over a stretch of samples.
 
     Attributes:
         model: a model without states: its inputs are measured, each of its ports has an output.
         inputs: shape (samples, inputs).
-        outputs: output that a port is read at, by port.
+        outputs: output of each port, by port.
         responses: from that output to the change of the residual [m/s^2], by port.
         known: the part of the change that is healthy [m/s^2], shape (samples,).
-        limits: rms that an effect may have at a port; more than that is no fault, by port.
+        limits: largest plausible rms of an effect at a port, by port.
     """
 
     model: Model
@@ -66,7 +66,7 @@ def rig_ports(model: RigModel, signals: FloatArray) -> RigPorts:
     """The ports of a rig.
 
     Args:
-        model: in force.
+        model: the current model.
         signals: its channels, finite, shape (samples, channels).
     """
     if isinstance(model.plant, InertiaPlant):

@@ -2,18 +2,11 @@
 
 The thesis takes mean ± 3·sd of the first 50 estimates. That is right for its few hundred
 estimates; at 256 a second a normal estimate leaves three standard deviations every second or two.
-`tail_factor` says how many it takes: for n independent looks and an allowed probability P of one
-false alarm among them,
-
-    k = Φ⁻¹(1 - P/(2·n))
-
-where n counts the windows that do not overlap, times the looks taken at each of them.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from rigwatch.wire.arrays import FloatArray
 
@@ -41,14 +34,3 @@ def thesis_thresholds(theta: FloatArray, factor: float = THESIS_FACTOR) -> Thres
     """mean ± factor·sd of healthy estimates, shape (n, 2), n at least 2."""
     mean, deviation = theta.mean(axis=0), theta.std(axis=0, ddof=1)
     return Thresholds(mean - factor * deviation, mean + factor * deviation)
-
-
-def tail_factor(false_alarm: float, looks: float) -> float:
-    """How many standard deviations keep the chance of one false alarm in `looks` looks below
-    `false_alarm`.
-
-    Args:
-        false_alarm: allowed probability, above 0 and below 1.
-        looks: independent, two-sided, normal looks, at least 1.
-    """
-    return float(-ndtri(false_alarm / (2.0 * max(looks, 1.0))))

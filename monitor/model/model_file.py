@@ -19,6 +19,7 @@ from monitor.model.observer_sections import (
 )
 from rigwatch.physics.transfer import TransferFunction
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.rig_config import FASTEST, SLOWEST
 from rigwatch.wire.typed_files import Section, load, parse
 
 Floats = tuple[float, ...]
@@ -164,7 +165,7 @@ class RecordingSection(Section, frozen=True, kw_only=True):
 class RigModel(Section, frozen=True, kw_only=True):
     """The whole model file."""
 
-    sample_rate: Annotated[float, Meta(gt=0, description="[Hz]")]
+    sample_rate: Annotated[float, Meta(ge=SLOWEST, le=FASTEST, description="[Hz]")]
     channels: Annotated[tuple[str, ...], Meta(min_length=2, description="input, position, …")]
     plant: Plant
     friction: FrictionSection

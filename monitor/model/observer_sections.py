@@ -51,6 +51,23 @@ class RangeSection(Section, frozen=True, kw_only=True):
             "broad noise",
         ),
     ] = 0.0
+    sizes: Annotated[
+        Floats, Meta(description="sizes of the motion, rms of the rate of its speed, ascending")
+    ] = ()
+    paces: Annotated[
+        Floats,
+        Meta(description="largest mean frequency of a motion of at least each size [Hz]"),
+    ] = ()
+    channels: Annotated[
+        tuple[str, ...], Meta(description="channels that show a state, which cannot jump")
+    ] = ()
+    bends: Annotated[
+        Floats,
+        Meta(
+            description="largest difference of neighbouring samples of each: of second order where "
+            "its rate is a state as well, else of first"
+        ),
+    ] = ()
 
 
 class HealthyLimits(Section, frozen=True, kw_only=True):

@@ -11,6 +11,7 @@ of a known fault. Its part of the model file is declared in `monitor.model`, and
 """
 
 from monitor.observer import decision_state
+from monitor.observer.channel_jumps import ChannelJumps, bends_of
 from monitor.observer.decision_state import (
     DEVIATIONS,
     MEDIUM,
@@ -50,7 +51,7 @@ from monitor.observer.prediction import (
 )
 from monitor.observer.range_seen import RangeSeen, drive_energy, range_of, range_signals
 from monitor.observer.remainder import fit_remainder, no_remainder
-from monitor.observer.spectral_width import SpectralWidth
+from monitor.observer.spectral_width import SpectralWidth, Spectrum
 
 __all__ = [
     "DEVIATIONS",
@@ -65,6 +66,7 @@ __all__ = [
     "SHORT",
     "SPREAD",
     "SUBSTEPS",
+    "ChannelJumps",
     "DecisionRules",
     "E",
     "FixedLag",
@@ -73,8 +75,10 @@ __all__ = [
     "ObserverSignals",
     "RangeSeen",
     "SpectralWidth",
+    "Spectrum",
     "balanced",
     "base_model",
+    "bends_of",
     "decide",
     "decision_state",
     "drive_energy",

@@ -10,7 +10,11 @@ from rigwatch.wire.arrays import FloatArray
 
 SHORT, MEDIUM, LONG = 8, 32, 128
 """Windows [samples]: a jump, one estimate, one name."""
-HISTORY = LONG
+RISING = 2
+"""Samples after a reversal in which real friction still turns."""
+HISTORY = LONG + RISING
+WAKE = 256
+"""Samples after a jump of a channel in which filters and hidden states still ring."""
 
 ARMING, JUDGING, BEYOND = 0.0, 1.0, 2.0
 """Modes: hidden states settle; everything is judged; the motion is beyond what was fitted."""
@@ -44,6 +48,8 @@ class Counts(NamedTuple):
     disagreed: int = 8
     since_change: int = 9
     above: int = 10
+    since_jump: int = 11
+    judging: int = 12
 
 
 AT = Counts()
@@ -71,6 +77,7 @@ def new_state(levels: int) -> DecisionState:
     """
     count = np.zeros(len(AT), np.int64)
     count[AT.since_onset] = -1
+    count[AT.since_jump] = WAKE
     return DecisionState(np.zeros((HISTORY, LEVELS + levels)), count, np.zeros(4))
 
 

@@ -8,6 +8,9 @@ Energies are in the healthy variance n² + κ·A, with A mean squares and fourth
 and of what is predicted, as what equations leave grows with the motion. A departure is friction
 where, since its onset, dry friction explains what is seen, a reversal is among it, and the sensors
 agree with each other.
+
+Only `decide` is kept compiled, with the fingerprint of what is compiled into it (as
+`monitor.decision.sample_kernel`).
 """
 
 # Compiled functions are untyped to mypy.
@@ -49,6 +52,7 @@ from monitor.observer.decision_state import (
     UNNAMED,
     VERDICT,
     VISCOUS,
+    WAKE,
     DecisionRules,
     DecisionState,
 )
@@ -65,9 +69,11 @@ from rigwatch.wire.arrays import FloatArray
 
 (
     HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
-    ABOVE,
-) = range(11)  # fmt: skip
+    ABOVE, JUMP_AGO, WAS_JUDGING,
+) = range(13)  # fmt: skip
 """Places of `decision_state.Counts`, as the kernel needs constants."""
+FINGERPRINT = "f242553ae176"
+"""Of every source file whose code is compiled into `decide`."""
 LOOKS = 3
 """Samples in a row that must agree on friction."""
 LEAST_LOOK = 12
@@ -82,7 +88,7 @@ OVER = 256
 """Samples without a departure after which an episode is over."""
 VIOLATED = 16
 """Samples in a row in which the sensors disagree."""
-SURE, LASTING = 1.4, 48
+SURE, LASTING = 2.0, 128
 """A deviation so far beyond the limit is a departure at once, a smaller one after so many samples:
 what a change of the drive stirs up is small or short.
 """
@@ -99,6 +105,7 @@ def decide(  # noqa: PLR0917 -- a kernel
     levels: FloatArray,
     drive: FloatArray,
     inside: NDArray[np.bool_],
+    jumped: NDArray[np.bool_],
     state: Codes,
     rules: DecisionRules,
     kept: DecisionState,
@@ -113,19 +120,21 @@ def decide(  # noqa: PLR0917 -- a kernel
         _follow_drive(drive[k], kept)
         if state[k] != TAINTED:
             _remember(kept, judged[k], speed[k], levels[k])
+        _follow_jumps(jumped[k], kept)
         _one(k, inside[k], rules, kept, out)
 
 
-@njit(cache=True)
+@njit()
 def _restart(kept: DecisionState) -> None:
     for place in range(kept.counts.size):
         kept.counts[place] = 0
     kept.counts[ONSET] = -1
+    kept.counts[JUMP_AGO] = WAKE
     kept.value[:] = 0.0
     kept.value[0] = UNNAMED
 
 
-@njit(cache=True)
+@njit()
 def _follow_drive(energy: float, kept: DecisionState) -> None:
     """Notice that the drive begins or grows suddenly."""
     late, before = kept.value[2], kept.value[3]
@@ -137,7 +146,22 @@ def _follow_drive(energy: float, kept: DecisionState) -> None:
     kept.value[2], kept.value[3] = late, before
 
 
-@njit(cache=True)
+@njit()
+def _follow_jumps(jumped: bool, kept: DecisionState) -> None:
+    """A jump where the motion is judged is another fault, elsewhere it has the rig settle anew."""
+    count = kept.counts
+    count[JUMP_AGO] = min(count[JUMP_AGO] + 1, WAKE)
+    if not jumped:
+        return
+    if count[WAS_JUDGING] == 0:
+        count[CHANGED] = 0
+        return
+    count[JUMP_AGO], count[DEPARTURE_AGO] = 0, 0
+    count[ONSET] = max(count[ONSET], 0)
+    kept.value[0] = OTHER
+
+
+@njit()
 def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray) -> None:
     """The first columns stand in the order of the residual's."""
     head = kept.counts[HEAD]
@@ -150,7 +174,7 @@ def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatA
     kept.counts[FILLED] = min(kept.counts[FILLED] + 1, HISTORY)
 
 
-@njit(cache=True)
+@njit()
 def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: FloatArray) -> None:
     count = kept.counts
     count[SINCE_START] += 1
@@ -174,8 +198,10 @@ def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: F
     count[ABOVE] = count[ABOVE] + 1 if away else 0
     if count[ONSET] < 0:
         away = out[DEVIATION, k] > SURE or count[ABOVE] >= LASTING
+    away = away or count[JUMP_AGO] == 0
     mode = _mode(kept, rules)
     out[MODE, k] = mode
+    count[WAS_JUDGING] = 1 if mode == JUDGING else 0
     if mode != JUDGING:
         count[ONSET] = -1
         kept.value[0] = UNNAMED
@@ -183,7 +209,7 @@ def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: F
     _follow(k, away, spread, rules, kept, out)
 
 
-@njit(cache=True)
+@njit()
 def _variance(kept: DecisionState, rules: DecisionRules) -> float:
     """What a healthy rig leaves under the motion of the medium window."""
     n = min(MEDIUM, kept.counts[FILLED])
@@ -196,13 +222,15 @@ def _variance(kept: DecisionState, rules: DecisionRules) -> float:
     return total
 
 
-@njit(cache=True)
+@njit()
 def _mode(kept: DecisionState, rules: DecisionRules) -> float:
     """Armed once everything has settled and is quiet, or has had time enough to be."""
     count = kept.counts
     if count[SINCE_START] < rules.settle:
         count[OUTSIDE] = min(count[SINCE_START], LONG)
         return ARMING
+    if count[JUMP_AGO] < WAKE:
+        return JUDGING
     if count[OUTSIDE] < LONG and count[OUTSIDE] < count[SINCE_START]:
         return BEYOND
     if count[CHANGED] < rules.settle and count[ONSET] < 0:
@@ -212,7 +240,7 @@ def _mode(kept: DecisionState, rules: DecisionRules) -> float:
     return ARMING
 
 
-@njit(cache=True)
+@njit()
 def _follow(  # noqa: PLR0917 -- a kernel
     k: int,
     away: bool,
@@ -241,7 +269,7 @@ def _follow(  # noqa: PLR0917 -- a kernel
     out[NAMED_FORCE, k] = kept.value[1]
 
 
-@njit(cache=True)
+@njit()
 def _verdict(
     k: int, spread: float, rules: DecisionRules, kept: DecisionState, out: FloatArray
 ) -> float:

@@ -31,6 +31,7 @@ from rigwatch.physics.engine.equations import (
     measured_states,
     predicted_outputs,
     shipped_models,
+    spelt_out,
 )
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -71,7 +72,7 @@ def force_port(model: Model) -> str:
 
 def speed_state(model: Model, port: str) -> str:
     """The measured state that is the speed at a port."""
-    return model.ports[port].variables["v"].expression
+    return spelt_out(model).ports[port].variables["v"].expression
 
 
 def rate_columns(model: Model) -> list[int]:

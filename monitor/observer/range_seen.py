@@ -1,6 +1,6 @@
 """The range of motion that a model was fitted to, and how far a sample lies beyond it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -8,13 +8,17 @@ from monitor.model import RangeSection, RigModel
 from monitor.observer.lagged_motion import EMPTY
 from monitor.observer.missing_force import PREDICTED
 from monitor.observer.model_signals import Observed
-from monitor.observer.spectral_width import SpectralWidth
+from monitor.observer.spectral_width import SpectralWidth, Spectrum
 from rigwatch.wire.arrays import FloatArray
 
 ALLOWED = 1.2
 """Half width of what is judged, in half the width of what was fitted."""
 WIDER = 0.25
 """Broadening that is always judged: what changes of the drive and faults do to a tone."""
+FASTER = 1.1
+"""Mean frequency that is judged, over the largest that was fitted of a motion of that size."""
+LEVELS, LEVEL_STEP = 24, 1.1
+"""Sizes of motion that are told apart, and the ratio of two of them."""
 PREDICTION = "predicted"
 """What the high-passed prediction is called among the signals of a range."""
 
@@ -36,15 +40,19 @@ class RangeSeen:
         low, high = np.array(model.motion_range.low), np.array(model.motion_range.high)
         self._middle = 0.5 * (low + high)
         self._half = ALLOWED * np.maximum(0.5 * (high - low), 1e-12)
+        self._sizes = np.array(model.motion_range.sizes)
+        self._paces = np.array([*model.motion_range.paces, np.inf])
 
     def distance(self, seen: Observed) -> FloatArray:
-        """Largest distance of any signal from the middle, or of the motion's width from a tone's:
-        1 at the limit, shape (n,).
+        """Largest of: distance of a signal from the middle, of the spectrum's width from a tone's,
+        mean frequency against what was seen of a motion of that size; 1 at the limit, shape (n,).
         """
         signals = range_signals(seen)
         far = (np.abs(signals - self._middle) / self._half).max(axis=1)
-        narrow = self._width.update(np.ascontiguousarray(seen.rows[:, self._speed]), seen.state)
-        far = np.maximum(far, (1.0 - narrow) / self._wider)
+        motion = self._width.update(np.ascontiguousarray(seen.rows[:, self._speed]), seen.state)
+        far = np.maximum(far, (1.0 - motion.narrow) / self._wider)
+        known = self._paces[np.searchsorted(self._sizes, motion.size / ALLOWED)]
+        far = np.maximum(far, motion.pace / (FASTER * known))
         return np.where(seen.state == EMPTY, 0.0, far)
 
 
@@ -61,12 +69,30 @@ def drive_energy(rows: FloatArray, seen: RangeSection, motions: Sequence[int]) -
     return np.asarray((scaled**2).sum(axis=1))
 
 
-def range_of(names: Sequence[str], parts: Sequence[FloatArray], narrow: float) -> RangeSection:
-    """The range of healthy signals, each part of shape (n, signals), and their least q."""
+def range_of(
+    names: Sequence[str],
+    parts: Sequence[FloatArray],
+    motions: Sequence[Spectrum],
+    bends: Mapping[str, float],
+) -> RangeSection:
+    """The range of healthy signals.
+
+    Args:
+        names: of the signals.
+        parts: of each recording, shape (n, signals).
+        motions: spectra of each recording once it has begun.
+        bends: largest differences of channels that show a state.
+    """
     every = np.concatenate(parts)
+    narrow, pace, size = (np.concatenate(part) for part in zip(*motions, strict=True))
+    sizes = size.max(initial=0.0) / LEVEL_STEP ** np.arange(LEVELS)[::-1]
     return RangeSection(
         names=(*names, PREDICTION),
         low=tuple(every.min(axis=0).tolist()),
         high=tuple(every.max(axis=0).tolist()),
-        narrow=narrow,
+        narrow=float(np.clip(narrow.min(initial=1.0), 0.0, 1.0)),
+        sizes=tuple(sizes.tolist()),
+        paces=tuple(float(pace[size >= least].max(initial=0.0)) for least in sizes),
+        channels=tuple(bends),
+        bends=tuple(bends.values()),
     )

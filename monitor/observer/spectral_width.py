@@ -7,7 +7,7 @@ Society A 237, 1956). What equations leave of tones says nothing about several a
 in whatever they lack.
 """
 
-from typing import cast
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,6 +22,20 @@ MEMORY = 0.5
 """Time over which the means reach back [s]."""
 
 
+class Spectrum(NamedTuple):
+    """Figures of the motion after each sample, each of shape (n,).
+
+    Attributes:
+        narrow: q; 1 at rest and without a whole kernel.
+        pace: mean frequency, √(⟨(Δv)²⟩/⟨v²⟩) as that of a tone [Hz]; 0 at rest.
+        size: root mean square of the rate of the speed [m/s^2]; 0 at rest.
+    """
+
+    narrow: FloatArray
+    pace: FloatArray
+    size: FloatArray
+
+
 class SpectralWidth:
     """Carries the means from block to block.
 
@@ -33,14 +47,16 @@ class SpectralWidth:
     def __init__(self, slow: float, rate: float) -> None:
         self._leak = float(np.exp(-2.0 * np.pi * SLOWEST / rate))
         self._share = 1.0 / (MEMORY * rate)
-        self._slow = slow
+        self._slow, self._rate = slow, rate
         self._kept = np.zeros(5)
 
-    def update(self, speed: FloatArray, state: Codes) -> FloatArray:
-        """q after each sample, shape (n,); 1 at rest and without a whole kernel."""
-        out = np.ones(len(speed))
+    def update(self, speed: FloatArray, state: Codes) -> Spectrum:
+        """The spectrum after each sample of a speed of shape (n,)."""
+        out = np.zeros((3, len(speed)))
+        out[0] = 1.0
         _advance(speed, state, self._leak, self._share, self._slow, self._kept, out)
-        return cast("FloatArray", out)
+        narrow, pace, size = out
+        return Spectrum(narrow, pace * self._rate / (2.0 * np.pi), size * self._rate)
 
 
 @njit(cache=True)
@@ -67,4 +83,6 @@ def _advance(  # noqa: PLR0917 -- a kernel
         kept[3] += share * (speed[k] * speed[k] - kept[3])
         kept[4] += share * (change * change - kept[4])
         if kept[3] > slow * slow:
-            out[k] = kept[3] / max(np.sqrt(kept[2] * kept[4]), 1e-300)
+            out[0, k] = kept[3] / max(np.sqrt(kept[2] * kept[4]), 1e-300)
+            out[1, k] = np.sqrt(kept[4] / kept[3])
+            out[2, k] = np.sqrt(kept[4])

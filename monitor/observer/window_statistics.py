@@ -6,7 +6,15 @@
 import numpy as np
 from numba import njit
 
-from monitor.observer.decision_state import DRY, ERROR, HISTORY, SPEED, WET, DecisionState
+from monitor.observer.decision_state import (
+    DRY,
+    ERROR,
+    HISTORY,
+    RISING,
+    SPEED,
+    WET,
+    DecisionState,
+)
 
 HEAD, FILLED = 0, 1
 """Places of `decision_state.Counts`, as the kernel needs constants."""
@@ -14,7 +22,7 @@ RIDGE = 1e-3
 """Of the viscous regressor against the dry one, where the two cannot be told apart."""
 
 
-@njit(cache=True)
+@njit()
 def mean_square(kept: DecisionState, column: int, length: int) -> float:
     """Of a column over the last samples."""
     n = min(length, kept.counts[FILLED])
@@ -24,7 +32,20 @@ def mean_square(kept: DecisionState, column: int, length: int) -> float:
     return total / max(n, 1)
 
 
-@njit(cache=True)
+@njit()
+def _slides(kept: DecisionState, ago: int) -> bool:
+    """Whether the motion has kept its direction for as long as real friction takes to turn its own:
+    contacts deform before they slide, and sensors are late.
+    """
+    head = kept.counts[HEAD]
+    speed = kept.rows[(head - ago) % HISTORY, SPEED]
+    for before in range(1, RISING + 1):
+        if speed * kept.rows[(head - ago - before) % HISTORY, SPEED] <= 0.0:
+            return False
+    return True
+
+
+@njit()
 def friction(
     kept: DecisionState, length: int, spread: float
 ) -> tuple[float, float, float, float, float]:
@@ -32,9 +53,13 @@ def friction(
     beyond its healthy spread, that both explain and that the dry part stands for.
     """
     n = min(length, kept.counts[FILLED])
+    used = 0
     a = b = c = p = q = yy = 0.0
     for ago in range(1, n + 1):
+        if not _slides(kept, ago):
+            continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        used += 1
         a += row[DRY] * row[DRY]
         b += row[DRY] * row[WET]
         c += row[WET] * row[WET]
@@ -50,12 +75,12 @@ def friction(
     deviations = force * np.sqrt(left) / spread
     explained = 2.0 * (force * p + viscous * q)
     explained -= force * force * a + 2.0 * force * viscous * b + viscous * viscous * c
-    beyond = max(yy - n * spread * spread, 0.2 * yy)
+    beyond = max(yy - used * spread * spread, 0.2 * yy)
     dry_alone = p * p / a if p > 0.0 else 0.0
     return force, viscous, deviations, explained / beyond, dry_alone / beyond
 
 
-@njit(cache=True)
+@njit()
 def dry_force(kept: DecisionState, length: int) -> float:
     """Force of dry friction alone [N]: viscous friction beside it is hardly told from it by a
     steady motion, and takes from it what smoothing and presliding round off.
@@ -63,13 +88,15 @@ def dry_force(kept: DecisionState, length: int) -> float:
     n = min(length, kept.counts[FILLED])
     a = p = 0.0
     for ago in range(1, n + 1):
+        if not _slides(kept, ago):
+            continue
         row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
         a += row[DRY] * row[DRY]
         p += row[DRY] * row[ERROR]
     return p / a if a > 0.0 else 0.0
 
 
-@njit(cache=True)
+@njit()
 def rest(kept: DecisionState, length: int, slow: float) -> float:
     """Share of the time at which the motion cannot be told from rest."""
     n = min(length, kept.counts[FILLED])
@@ -79,7 +106,7 @@ def rest(kept: DecisionState, length: int, slow: float) -> float:
     return still / max(n, 1)
 
 
-@njit(cache=True)
+@njit()
 def reversals(kept: DecisionState, length: int, slow: float) -> int:
     """How often the motion turns, beyond what noise does."""
     n = min(length, kept.counts[FILLED])

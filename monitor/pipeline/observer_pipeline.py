@@ -9,16 +9,19 @@ back, and is published with the sample that completes it.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from monitor.clipping import Clipping
 from monitor.model import EquationsPlant, RigModel
 from monitor.observer import (
     EMPTY,
     PREDICTED,
+    ChannelJumps,
     E,
     Observed,
     ObserverSignals,
     RangeSeen,
+    base_model,
     decide,
     drive_energy,
     levels,
@@ -50,6 +53,9 @@ class ObserverMonitor:
         self._admission = Admission(model.channels, model.channels, model.decision.longest_hold)
         self._signals = ObserverSignals(plant, remainder, model.sample_rate)
         self._range = RangeSeen(model, self._signals.layout.speed)
+        assert model.motion_range is not None
+        equations, channels = base_model(plant.model), self._signals.layout.channels
+        self._jumps = ChannelJumps(model.motion_range, equations, channels)
         self._state = d.new_state(1 + 2 * len(self._signals.layout.motions))
         self._since = 0
         self._follow(model)
@@ -76,6 +82,7 @@ class ObserverMonitor:
             return None
         seen = self._signals.update(admitted.signals, admitted.code)
         far = self._range.distance(seen)
+        jumped = self._jumps.update(admitted.signals, admitted.code)
         out = np.zeros((len(d.OUTPUTS), len(far)))
         layout, remainder = self._signals.layout, self.model.remainder
         assert remainder is not None
@@ -85,10 +92,23 @@ class ObserverMonitor:
         known = self.model.motion_range
         assert known is not None
         drive = drive_energy(seen.rows, known, layout.motions)
-        decide(seen.judged, speed, grown, drive, inside, seen.state, self.rules, self._state, out)
+        decide(
+            seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)), seen.state,
+            self.rules, self._state, out,
+        )  # fmt: skip
         conditions = self._conditions(admitted, seen, far, out)
-        clipping = self._clipping.update(admitted)
-        return Result(self._estimates(block, admitted, seen, out), (*conditions, *clipping))
+        sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))
+        return Result(self._estimates(block, admitted, seen, out), (*conditions, *sensors))
+
+    def _jump_conditions(
+        self, admitted: Admitted, jumped: NDArray[np.bool_], out: FloatArray
+    ) -> tuple[Condition, ...]:
+        at = admitted.padding
+        judged = (jumped & (out[d.MODE] == d.JUDGING)[:, None])[at:]
+        return tuple(
+            above(f"{kinds.SENSOR_JUMPED}.{name}", judged[:, place], judged[:, place] * 1.0, 0.0)
+            for place, name in enumerate(self._jumps.channels)
+        )
 
     def _estimates(
         self, block: SampleBlock, admitted: Admitted, seen: Observed, out: FloatArray

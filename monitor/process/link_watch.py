@@ -12,6 +12,12 @@ from rigwatch.wire.messages import Health
 
 LOSS_SHOWN_NS = 1_000_000_000
 """A loss stands for this long after its last gap [ns]."""
+DRIFT_PPM = 500.0
+"""A device's clock that runs faster or slower by more is worth an alarm [ppm]."""
+UNJUDGED_S = 1.0
+"""Samples without an estimate for longer are an alarm [s]."""
+ALMOST_FULL = 0.02
+"""Share of the disk below which recording ends soon."""
 CLOCK_STEP_NS = 500_000_000
 """A wall clock that moves by more against the monotonic one was set [ns]."""
 
@@ -75,13 +81,47 @@ class LinkWatch:
         return step if abs(step) > CLOCK_STEP_NS else 0
 
 
-def disk_report(seen: Seen, troubled: Health | None) -> tuple[str, Occasion, bool]:
-    """The same of the alarm `disk`: the recorder's last word, where that was trouble."""
-    if troubled is None:
-        return "disk", _occasion(seen), False
-    free = troubled.counters.get("free_share", float("nan"))
-    text = troubled.text or f"{free:.1%} of the disk is free"
-    return "disk", _occasion(seen, text=text), True
+def device_reports(
+    seen: Seen, daq: Health | None, unjudged_s: float, why: str
+) -> Iterator[tuple[str, Occasion, bool]]:
+    """The same for what is wrong with the device although samples arrive.
+
+    Args:
+        seen: what the process sees now.
+        daq: the last health message of data acquisition, None if there is none.
+        unjudged_s: time since the last estimate, while samples arrived [s].
+        why: why there are none, "" if that is not known.
+    """
+    state, text = (daq.state, daq.text) if daq else ("", "")
+    yield "line_noise", _occasion(seen, text=text), state == "garbage"
+    yield "slow_device", _occasion(seen, text=text), state == "slow"
+    drift = abs(daq.counters.get("drift_ppm", 0.0)) if daq else 0.0
+    at = _occasion(seen, drift, DRIFT_PPM, f"off by {drift:.0f} ppm")
+    yield "clock_drift", at, drift > DRIFT_PPM
+    yield "estimates_missing", _occasion(seen, text=why), unjudged_s > UNJUDGED_S
+
+
+def disk_reports(
+    seen: Seen, recorder: Health | None, alive: bool, journal_failure: str = ""
+) -> Iterator[tuple[str, Occasion, bool]]:
+    """The same for the alarms of disk and recording.
+
+    Args:
+        seen: what the process sees now.
+        recorder: the recorder's last health message, None if it has never sent one.
+        alive: whether the recorder's process is there.
+        journal_failure: why the alarm journal cannot be written, "" if it can.
+    """
+    free = recorder.counters.get("free_share", -1.0) if recorder else -1.0
+    short = bool(recorder and recorder.counters.get("disk_trouble", 0.0) > 0.0)
+    text = (recorder.text if recorder and short else "") or journal_failure
+    free_text = f"{free:.1%} of the disk is free"
+    yield "disk", _occasion(seen, text=text or free_text), short or bool(journal_failure)
+    yield "disk_almost_full", _occasion(seen, text=free_text), 0.0 <= free < ALMOST_FULL
+    gone = recorder is not None and not alive
+    stopped = recorder is not None and recorder.state == "not recording"
+    why = "the recorder process is not there" if gone else recorder.text if recorder else ""
+    yield "recording_stopped", _occasion(seen, text=why), gone or stopped
 
 
 def _occasion(

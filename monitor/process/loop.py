@@ -9,14 +9,14 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from monitor.alarms import AlarmJournal, Announcement, bounded, last_records, read_journal
+from monitor.alarms import AlarmJournal, Announcement, bounded
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
 from monitor.pipeline import RigMonitor, compile_kernels
 from monitor.process.cursor import Cursor
 from monitor.process.health import HealthBook
-from monitor.process.link_watch import LinkWatch, Seen, disk_report
+from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_reports
 from monitor.process.model_requests import ModelDesk, Place
 from monitor.process.startup_grace import Patience
 from rigwatch.wire.bus import Bus, connect, serve_alarm_list
@@ -82,17 +82,21 @@ class MonitorProcess:
         self._patience = Patience(time.monotonic())
         self._daq_alive = False
         self._daq_trouble = ""
-        self._disk_trouble: Health | None = None
+        self._daq: Health | None = None
+        self._delivered_s = self._estimated_s = 0.0
+        self._router_lost_at: float | None = None
+        self._recorder: Health | None = None
+        self._recorder_alive = False
         self._unsuitable = ""
         self._standing = self.rig.alarms.standing()
         self._commands = bus.subscribe(COMMANDS)
         self._healths = bus.subscribe(HEALTH)
         bus.watch_tokens(f"{ALIVE_KEY}/daq", self._daq_changed)
+        bus.watch_tokens(f"{ALIVE_KEY}/recorder", self._recorder_changed)
         self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
         serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
-        if section.journal:
-            records = last_records(read_journal(section.journal)[0])
-            self.say(self.rig.alarms.restore(records, time.time_ns()))
+        if self._journal:
+            self.say(self.rig.alarms.restore(self._journal.newest(), time.time_ns()))
         self._models = ModelDesk(bus, self.rig, Path(section.model))
         self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
@@ -121,10 +125,26 @@ class MonitorProcess:
         seen = self._seen()
         for name, occasion, holds in self._links.reports(seen):
             self.say(self.rig.alarms.report(name, occasion, active=holds))
-        name, occasion, holds = disk_report(seen, self._disk_trouble)
-        self.say(self.rig.alarms.report(name, occasion, active=holds))
+        unjudged = self._delivered_s - self._estimated_s
+        for name, occasion, holds in device_reports(seen, self._daq, unjudged, self._unsuitable):
+            self.say(self.rig.alarms.report(name, occasion, active=holds))
+        failure = self._journal.failure if self._journal else ""
+        for name, occasion, holds in disk_reports(
+            seen, self._recorder, self._recorder_alive, failure
+        ):
+            self.say(self.rig.alarms.report(name, occasion, active=holds))
+        self._announce_router(seen)
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen)
+
+    def _announce_router(self, seen: Seen) -> None:
+        """Tell those who only listen that the router was away: nobody could while it was."""
+        if not self.bus.connected():
+            self._router_lost_at = self._router_lost_at or time.monotonic()
+        elif self._router_lost_at is not None:
+            away, self._router_lost_at = time.monotonic() - self._router_lost_at, None
+            text = f"the router was away for {away:.1f} s; what was said meanwhile follows"
+            self.bus.publish(EVENTS, Event("monitor", seen.t_ns, "warning", "ROUTER BACK", text))
 
     def say(self, announcements: Iterable[Announcement]) -> None:
         """Journal what changed, then publish it."""
@@ -156,6 +176,7 @@ class MonitorProcess:
 
     def _judge(self, block: SampleBlock) -> None:
         self._judged_ns = int(block.t_ns[-1])
+        self._delivered_s += len(block) / self.rig.model.sample_rate
         known = self._known_of(block)
         try:
             if known:
@@ -165,9 +186,12 @@ class MonitorProcess:
         except KeyError as error:
             self._unsuitable = f"samples without the channel {error} that the model needs"
             return
-        if judged is None:
-            return
         self._unsuitable = ""
+        if judged is None:
+            if not len(fresh):
+                self._estimated_s = self._delivered_s
+            return
+        self._estimated_s = self._delivered_s
         self.bus.publish(ESTIMATES, judged[0])
         self._explainer.take(judged[0], fresh)
         self._health.judged(int(block.t_ns[-1]), time.time_ns())
@@ -182,13 +206,17 @@ class MonitorProcess:
     def _daq_changed(self, _key: str, alive: bool) -> None:
         self._daq_alive = alive
 
+    def _recorder_changed(self, _key: str, alive: bool) -> None:
+        self._recorder_alive = alive
+
     def _hear_of_others(self) -> None:
         for health in self._healths.drain():
             if health.source.startswith("daq"):
+                self._daq = health
                 self._daq_trouble = health.text if health.state == "reconnecting" else ""
             elif health.source.startswith("recorder"):
-                troubled = health.counters.get("disk_trouble", 0.0) > 0.0
-                self._disk_trouble = health if troubled else None
+                self._recorder = None if health.state == "stopped" else health
+                self._recorder_alive = True
 
     def _seen(self) -> Seen:
         self._hear_of_others()

@@ -1,4 +1,4 @@
-"""Samples before they are judged: admission, residual against the model, conditions."""
+"""Signal processing before the decision: admission, residual, conditions."""
 
 from monitor.signals import conditions
 from monitor.signals.admission import (
@@ -18,6 +18,7 @@ from monitor.signals.conditions import (
     OTHER_FAULT,
     SENSOR_CLIPPED,
     SENSOR_INVALID,
+    SENSOR_JUMPED,
     STICTION,
     Condition,
     above,
@@ -54,6 +55,7 @@ __all__ = [
     "RESTART",
     "SENSOR_CLIPPED",
     "SENSOR_INVALID",
+    "SENSOR_JUMPED",
     "STICTION",
     "VELOCITY",
     "VOLTAGE",

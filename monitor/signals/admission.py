@@ -1,9 +1,9 @@
-"""Which samples may enter: gaps, restarts and invalid readings become one code a sample.
+"""Admission of samples: gaps, restarts and invalid readings become one code per sample.
 
-A short run of missing or invalid samples is predicted through: the last good value is held for the
-filters, and the sample counts in no estimate. A longer run is not: nothing is fed until a good
-sample comes, and that one starts every filter afresh. Missing samples are put in as held ones, so
-that the count of samples stays the count of periods.
+A short run of missing or invalid samples is bridged: the last good value is held for the filters,
+and the sample is excluded from the estimates. After a longer run nothing is fed until a good sample
+arrives, which restarts every filter. Missing samples are inserted as held ones, so that sample
+counts and periods stay aligned.
 """
 
 from dataclasses import dataclass
@@ -24,14 +24,14 @@ Codes = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Admitted:
-    """Samples as the stages take them.
+    """Samples prepared for the stages.
 
     Args:
-        signals: one row a sample, one column a channel, held where not good, shape (n, c).
+        signals: one row per sample, one column per channel, held where not good, shape (n, c).
         code: shape (n,).
         position_valid: 1 where the second channel may be judged, shape (n,).
         seq: number of each sample, shape (n,).
-        padding: samples at the head that were put in for missing ones.
+        padding: number of inserted samples at the start.
         missing: samples known to be missing before the block, -1 for an unknown number.
         invalid_run: samples without a good reading up to and with this one, shape (n,).
         good: whether each reading is one, shape (n, c).
@@ -48,12 +48,12 @@ class Admitted:
 
 
 class Admission:
-    """Carries the last good sample and the count of bad ones from block to block.
+    """Keeps the last good sample and the count of bad ones from block to block.
 
     Args:
         channels: names of the channels in the order of the columns.
         needed: which of them the residual needs; the others may be invalid.
-        longest_hold: samples that are predicted through at most.
+        longest_hold: longest run of samples that is bridged.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Admission:
         self._fresh = False
 
     def admit(self, block: SampleBlock) -> Admitted | None:
-        """The block's samples with their codes; None where all of them have been seen before.
+        """The block's samples with their codes; None if all of them are repeats.
 
         Raises:
             KeyError: the block lacks a channel.
@@ -118,9 +118,7 @@ class Admission:
 
 
 def _usable(column: Column, stuck_counts: bool) -> NDArray[np.bool_]:
-    """Finite and of good quality; a position that stands still may be a mass that sticks, so it
-    counts.
-    """
+    """Finite and of good quality; a constant position may be stiction, so it counts as good."""
     finite = np.isfinite(column.values)
     if column.quality.size == 0:
         return finite
@@ -140,7 +138,7 @@ def _classify(  # noqa: PLR0917
     code: Codes,
     runs: Codes,
 ) -> None:
-    """Fill in held values and write the codes; `last` and `run` carry over."""
+    """Fill in held values and write the codes; updates `last` and `run`."""
     for k in range(code.size):
         was = run[0]
         run[0] = 0 if needed_good[k] else was + 1

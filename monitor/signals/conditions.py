@@ -1,7 +1,7 @@
-"""What the pipeline says about each sample, before alarms make something lasting of it.
+"""The judgement of each sample, before the alarms add persistence and latching.
 
-A condition is a column: one flag a sample, with the value that was judged and the limits it was
-judged by. Nothing is delayed, held or latched here; `monitor.alarms` does that.
+A condition is a column: one flag per sample, with the judged value and its limits. Nothing is
+delayed, held or latched here; `monitor.alarms` does that.
 """
 
 from dataclasses import dataclass
@@ -15,6 +15,8 @@ STICTION = "stiction"
 OTHER_FAULT = "other_fault"
 EXCITATION_CHANGED = "excitation_changed"
 REFERENCE_LEARNT = "reference_learnt"
+SENSOR_JUMPED = "sensor_jumped"
+"""One a channel that shows a state of the model, as `sensor_jumped.position`."""
 NOT_OBSERVABLE = "not_observable"
 ILL_CONDITIONED = "ill_conditioned"
 NOT_ARMED = "not_armed"
@@ -22,12 +24,12 @@ NOT_JUDGED = "not_judged"
 GAP = "gap"
 SENSOR_INVALID = "sensor_invalid"
 SENSOR_CLIPPED = "sensor_clipped"
-"""One a channel, as `sensor_clipped.position`; its value is the evidence S of `flat_top.py`."""
+"""One per channel, as `sensor_clipped.position`; its value is the evidence S of `flat_top.py`."""
 
 
 @dataclass(frozen=True)
 class ConditionKind:
-    """One kind of condition: its name, what `value` means, its unit and its meaning in words."""
+    """One kind of condition: its name, the meaning and unit of `value`, and its description."""
 
     name: str
     value: str
@@ -109,35 +111,17 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
     ),
 )
 
-OBSERVER_KINDS: tuple[ConditionKind, ...] = (
-    ConditionKind(
-        NOT_ARMED,
-        "time since the start",
-        "s",
-        "hidden states and filters have not settled yet, nothing is judged",
-        False,
-    ),
-    ConditionKind(
-        NOT_JUDGED,
-        "how far the motion is from the middle of what was fitted, in half its width",
-        "1",
-        "the motion is beyond what the model was fitted to, nothing is judged",
-        False,
-    ),
-)
-"""What only the observer says, beside all of `CONDITION_KINDS`."""
-
 
 @dataclass(frozen=True)
 class Condition:
     """One condition over a block of n samples.
 
     Args:
-        name: one of `CONDITION_KINDS`, or SENSOR_CLIPPED with its channel.
+        name: one of `CONDITION_KINDS`, or SENSOR_CLIPPED or SENSOR_JUMPED with its channel.
         active: 1 where the condition holds, shape (n,).
         value: the judged quantity, shape (n,), in the kind's unit; NaN where nothing was judged.
-        low: lower limit of `value`, shape (n,); -inf where there is none.
-        high: upper limit of `value`, shape (n,); +inf where there is none.
+        low: lower limit of `value`, shape (n,); -inf if there is none.
+        high: upper limit of `value`, shape (n,); +inf if there is none.
     """
 
     name: str
@@ -150,7 +134,7 @@ class Condition:
 def above(
     name: str, active: NDArray[np.bool_], value: NDArray[np.float64], high: float
 ) -> Condition:
-    """A condition whose value may not be above a limit."""
+    """A condition that holds above an upper limit."""
     n = active.size
     return Condition(
         name, active.astype(np.uint8), value.copy(), np.full(n, -np.inf), np.full(n, float(high))
@@ -160,7 +144,7 @@ def above(
 def below(
     name: str, active: NDArray[np.bool_], value: NDArray[np.float64], low: float
 ) -> Condition:
-    """A condition whose value may not be below a limit."""
+    """A condition that holds below a lower limit."""
     n = active.size
     return Condition(
         name, active.astype(np.uint8), value.copy(), np.full(n, low), np.full(n, np.inf)

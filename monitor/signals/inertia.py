@@ -1,17 +1,16 @@
-"""A plant that is a mass and nothing else: M·q̈ = force + offset - friction, with force and
-position measured.
+"""A plant that is a pure mass: M·q̈ = force + offset - friction, with measured force and position.
 
-The same pipeline watches it with this in place of the fourth-order model:
+The same pipeline monitors it with this in place of the fourth-order model:
 
     modelled   am = (F̃ + offset)/M,   measured  a = w̃''∗q
     regressors g1 = -sgn(v)/M,        g2 = -v/M         so that θ is friction itself [N], [N/(m/s)]
 
 Position is differentiated by one smooth kernel w (a Hann window to the fourth) and its
-derivatives, and the force is smoothed by the same w, so that the equation holds for the smoothed
-signals exactly. Everything is late by half the kernel.
+derivatives, and the force is smoothed by the same w, so that the equation holds exactly for the
+smoothed signals. All signals are delayed by half the kernel.
 
-Its healthy state has friction, so that its estimates have fixed limits from commissioning, in
-place of a healthy average.
+The healthy plant has friction, so its estimates have fixed limits from commissioning in place of a
+healthy average.
 """
 
 from collections.abc import Sequence
@@ -36,7 +35,7 @@ from rigwatch.wire.errors import ModelError
 
 CHANNELS = ("force", "position")
 _LEAST_SPEED = 0.02
-"""Share of the top speed below which a sample tells nothing about the sign."""
+"""Share of the top speed below which the sign of the velocity is uncertain."""
 
 
 def kernels(half_width: int, sample_rate: float) -> FloatArray:
@@ -59,7 +58,7 @@ def kernels(half_width: int, sample_rate: float) -> FloatArray:
 
 
 class InertiaResidual:
-    """The running stage: force and position in, the watch's columns out."""
+    """The stage: force and position in, the decision's columns out."""
 
     def __init__(self, model: RigModel) -> None:
         if not isinstance(model.plant, InertiaPlant):
@@ -70,7 +69,7 @@ class InertiaResidual:
         self._place = np.zeros(2, np.int64)
 
     def adopt(self, plant: InertiaPlant) -> None:
-        """Go on with another mass and offset; what has been smoothed stays."""
+        """Continue with another mass and offset; the smoothed signals stay."""
         self._mass, self._offset = plant.mass, plant.offset
 
     def update(self, signals: FloatArray, code: Codes) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Recordings as commissioning takes them: whole, in memory, one array a channel."""
+"""Recordings for commissioning: in memory, one array per channel."""
 
 import hashlib
 from collections.abc import Iterable, Mapping
@@ -23,7 +23,7 @@ class Recording:
         name: for messages and the model file.
         sample_rate: [Hz].
         channels: values by channel name, SI units, all of shape (n,).
-        sha256: of the samples.
+        sha256: hash of the samples.
     """
 
     role: Role
@@ -33,7 +33,7 @@ class Recording:
     sha256: str = ""
 
     def channel(self, name: str) -> FloatArray:
-        """The channel's values.
+        """The values of a channel.
 
         Raises:
             ModelError: there is no such channel.
@@ -48,7 +48,7 @@ class Recording:
 def recording_of(
     role: Role, name: str, sample_rate: float, channels: Mapping[str, FloatArray]
 ) -> Recording:
-    """A recording from arrays, hashed.
+    """A recording from arrays, with its hash.
 
     Raises:
         ModelError: a value is not finite or the lengths differ.

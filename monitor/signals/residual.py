@@ -25,7 +25,7 @@ VOLTAGE, POSITION, ACCELERATION, MODELLED, VELOCITY, G1, G2 = range(7)
 
 
 class _Filters(NamedTuple):
-    """Coefficients and states of the four filters, and the delay line of the measured signals."""
+    """Coefficients and states of the four filters, and the measured signals' delay line."""
 
     plant_b: FloatArray
     plant_a: FloatArray
@@ -41,8 +41,8 @@ class _Filters(NamedTuple):
 
 
 def modelled_acceleration(plant: TransferPlant, sample_rate: float) -> tuple[TransferFunction, int]:
-    """Voltage [V] to modelled acceleration [m/s^2], and the delay that the measured signals need
-    [samples].
+    """The filter from voltage [V] to modelled acceleration [m/s^2], and the delay of the measured
+    signals [samples].
     """
     function = plant.function()
     leading = int(np.argmax(function.b != 0.0))
@@ -52,7 +52,7 @@ def modelled_acceleration(plant: TransferPlant, sample_rate: float) -> tuple[Tra
 
 
 class TransferResidual:
-    """The running stage for a rig whose model is a transfer function."""
+    """The stage for a rig whose model is a transfer function."""
 
     def __init__(self, model: RigModel) -> None:
         if not isinstance(model.plant, TransferPlant):
