@@ -1,1 +1,1 @@
-"""Stands in for the rig: its own equations, hidden effects and faults behind real frames."""
+"""Simulates the rig: its own equations, hidden effects and faults behind real frames."""

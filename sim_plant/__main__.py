@@ -34,7 +34,7 @@ def serve(config: RigConfig, plant: PlantSection, stop: threading.Event) -> None
 
     Raises:
         ConfigError: the scenario is wrong, or does not suit the rig.
-        DeviceError: the line or port cannot be made, or this rig is simulated already.
+        DeviceError: the line or port cannot be created, or this rig is already simulated.
     """
     scenario = load_scenario(plant.scenario)
     rate = scenario.plant.sample_rate
@@ -72,7 +72,7 @@ def _modbus_rtu(
 
 
 def _modbus(device: Device, rate: float) -> "ModbusServer":
-    # pymodbus takes a third of a second to import, which the serial line need not wait for.
+    # pymodbus takes a third of a second to import; the serial line does not need it.
     from sim_plant.serve import ModbusServer, RegisterBank
 
     return ModbusServer(device, RegisterBank(len(CHANNELS)), rate, heartbeat=Heartbeat("plant"))

@@ -1,4 +1,4 @@
-"""A made-up earthquake: white noise through the soil filter of Kanai and Tajimi, under an envelope.
+"""A synthetic earthquake: noise through the soil filter of Kanai and Tajimi, with an envelope.
 
     ẍg = −(2·ζg·ωg·ż + ωg²·z),   z̈ + 2·ζg·ωg·ż + ωg²·z = −w(t)
 

@@ -1,7 +1,7 @@
 """Hidden effects and faults of the rig: one declaration each, read by the kernels by name.
 
-A declaration says what the effect does, where it acts, the value at which it is absent (`neutral`)
-and a strength that shows (`typical`). A new one is a line here and the line of physics for it.
+A declaration states what the effect does, where it acts, the value at which it is absent
+(`neutral`) and a visible strength (`typical`). A new one is a line here and its line of physics.
 """
 
 import difflib
@@ -23,8 +23,8 @@ LONGEST_DELAY = 0.45
 class Effect:
     """One effect that can be switched, ramped and scheduled.
 
-    `low` and `high` bound what has a meaning, `dry` marks forms of dry friction, and `needs` names
-    effects that must be on for this one to show.
+    `low` and `high` bound valid values, `dry` marks forms of dry friction, and `needs` names
+    effects that must be present for this one to show.
     """
 
     name: str
@@ -145,7 +145,7 @@ EFFECTS: dict[str, Effect] = {effect.name: effect for effect in DYNAMIC + SENSOR
 
 
 def complaint(name: str, value: float) -> tuple[str, str] | None:
-    """What was found and what was expected where an effect cannot have this value, else None."""
+    """The found and the expected value if an effect cannot have this value, else None."""
     if name not in EFFECTS:
         near = difflib.get_close_matches(name, EFFECTS, 1)
         return repr(name), f"{near[0]!r}?" if near else f"one of {', '.join(EFFECTS)}"

@@ -1,7 +1,8 @@
 """Drive voltages: one declaration each, listed in `Excitation`.
 
 An excitation is a section of a scenario file (`shape = "sine"` picks it) that turns sample numbers
-into volts. Numbers, not a running phase, so that a run does not depend on how it is cut into calls.
+into volts. It uses sample numbers, not a running phase, so that a run does not depend on its
+division into calls.
 """
 
 from collections.abc import Callable
@@ -35,7 +36,7 @@ class Shape(Section, frozen=True, kw_only=True, tag_field="shape"):
 
 
 class Periodic(Shape, frozen=True, kw_only=True):
-    """Base of those that repeat with one frequency."""
+    """Base of the periodic ones."""
 
     amplitude: Volts
     frequency: Hertz
@@ -80,9 +81,9 @@ class Triangle(Periodic, frozen=True, kw_only=True, tag="triangle"):
 
 
 class Chirp(Shape, frozen=True, kw_only=True, tag="chirp"):
-    """A sine whose frequency rises evenly, over and over.
+    """A repeated linear sweep of a sine.
 
-    It repeats without a jump where the sweep holds a whole number of cycles, which is
+    It repeats without a jump if the sweep holds a whole number of cycles, which is
     (start + stop) / 2 times its length.
     """
 
@@ -106,7 +107,7 @@ class Chirp(Shape, frozen=True, kw_only=True, tag="chirp"):
 
 
 class Multisine(Shape, frozen=True, kw_only=True, tag="multisine"):
-    """Lines of equal height and random phase, repeated every `period` samples.
+    """A multisine: lines of equal amplitude and random phase, repeated every `period` samples.
 
     `amplitude` is the largest voltage of a period. Of 32 sets of random phases, the one with the
     lowest peak is taken.
@@ -141,9 +142,9 @@ class Multisine(Shape, frozen=True, kw_only=True, tag="multisine"):
 
 
 class Recorded(Shape, frozen=True, kw_only=True, tag="recorded"):
-    """Samples of a file, one voltage a line, or given in place.
+    """Recorded samples: a file with one voltage per line, or a list.
 
-    Silent before t = 0 and, unless looped, after the last sample.
+    Zero before t = 0 and, unless looped, after the last sample.
     """
 
     file: Annotated[str, Meta(description="text file of one number a line")] = ""

@@ -1,11 +1,11 @@
-"""A mass between a spring and a damper with one or two hidden effects: a plant to be explained.
+"""A mass on a spring and damper with one or two hidden effects: a plant to be explained.
 
     m·dv/dt = F(u) − k·x − c·v + hidden(x, v, memory, t),    dx/dt = v
 
-Its equations and its integrator are its own: velocity first, then position (leapfrog: velocity is
-half a step behind, and forces that depend on it take it forward by that), with 64 steps a sample,
-and dry friction that truly sticks (D. Karnopp, 1985: below a speed that the
-friction could stop within a step, the mass is held as long as the other forces are too weak).
+It has its own equations and integrator: velocity first, then position (leapfrog: velocity is half a
+step behind, and forces that depend on it extrapolate it), with 64 steps per sample, and dry
+friction that truly sticks (D. Karnopp, 1985: below a speed that friction can stop within a step,
+the mass is held as long as the other forces are too weak).
 
 Symbols: x position [m], v velocity [m/s], u commanded force [N], F force that acts [N].
 """
@@ -22,11 +22,11 @@ from scipy.signal import lfilter
 from rigwatch.wire.arrays import FloatArray
 
 RATE = 256.0
-"""Samples a second."""
+"""Sample rate [Hz]."""
 LARGEST = 40.0
-"""Force that the drive gives before it saturates, divided by 1 + the strength [N]."""
+"""Force at which the drive saturates, divided by 1 + the strength [N]."""
 LIMIT = 1e6
-"""Share that stands for a plant that diverges (NaN or infinite)."""
+"""Share assigned to a plant that diverges (NaN or infinite)."""
 STEPS = 64
 """Integration steps between two samples."""
 MASS, DAMPING, STIFFNESS = 0.8, 1.5, 60.0
@@ -41,7 +41,7 @@ EFFECTS: tuple[str, ...] = (
     "acceleration_smoothing", "position_smoothing", "drive_smoothing",
     "acceleration_average", "position_average", "drive_average",
 )  # fmt: skip
-"""Names of the hidden effects; those in `UNKNOWN` are in no library."""
+"""Names of the hidden effects; those in `UNKNOWN` are not in any library."""
 DIGITAL = EFFECTS[-6:]
 """Done by a computer, sample by sample: y'(k) = s·y'(k-1) + (1-s)·y(k), or a mean of 1+s samples,
 rounded up. At the drive they make sense where the force is held from sample to sample."""
@@ -73,10 +73,10 @@ def oscillate(
 
     Args:
         force: commanded, shape (n,) [N].
-        hidden: what is hidden, nothing for a healthy plant.
+        hidden: hidden effects, none for a healthy plant.
         noise: standard deviations of the two sensors' white noise, shape (2,).
-        seed: of the noise.
-        held: whether the force stays from sample to sample, as a converter's; else a line.
+        seed: seed of the noise.
+        held: whether the force is held from sample to sample, as by a converter; else linear.
     """
     strengths = np.zeros(len(EFFECTS))
     for effect in hidden:
@@ -91,7 +91,7 @@ def oscillate(
 
 
 def _digital(signal: FloatArray, where: str, strengths: Mapping[str, float]) -> FloatArray:
-    """What a computer makes of a signal's samples."""
+    """The digital filtering of a signal's samples."""
     if share := min(strengths.get(f"{where}_smoothing", 0.0), 0.995):
         signal = lfilter([1 - share], [1, -share], signal, zi=[share * signal[0]])[0]
     if count := 1 + math.ceil(strengths.get(f"{where}_average", 0.0) - 1e-9):
@@ -103,13 +103,13 @@ def _digital(signal: FloatArray, where: str, strengths: Mapping[str, float]) -> 
 def strength_for(name: str, force: FloatArray, share: float, *, held: bool = False) -> float:
     """The strength at which an effect changes the outputs by `share` of their rms.
 
-    The larger of the shares of both channels counts.
+    The larger share of both channels counts.
 
     Args:
         name: one of `EFFECTS`.
         force: commanded, shape (n,) [N].
         share: such as 0.05.
-        held: whether the force stays from sample to sample.
+        held: whether the force is held from sample to sample.
     """
     silent = np.zeros(2)
     healthy = oscillate(force, (), silent, 0, held=held)

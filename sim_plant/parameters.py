@@ -1,8 +1,8 @@
-"""What the simulated rig is made of: dimensions, valve, pneumatics, sensors.
+"""Parameters of the simulated rig: dimensions, valve, pneumatics, sensors.
 
-Figures come from W. B. Dunbar's thesis (1999), Table 5.1 and section 5.4, where it prints them. The
-others are marked "chosen": they were set so that the frequency response, the amplitude dependence
-and the accelerations of the thesis come out, and they stay within what such parts have.
+Figures come from W. B. Dunbar's thesis (1999), Table 5.1 and section 5.4, if it prints them. The
+others are marked "chosen": they reproduce the frequency response, the amplitude dependence and the
+accelerations of the thesis, within the range of such parts.
 """
 
 from pathlib import Path
@@ -29,7 +29,7 @@ def _not_negative(description: str) -> Meta:
 
 
 class RigParameters(Section, frozen=True, kw_only=True):
-    """The rig; every key has a default, so that a file names only what differs."""
+    """The rig; every key has a default, so that a file names only deviations."""
 
     sample_rate: Annotated[float, _positive("samples a second [Hz]")] = 256.0
     substeps: Annotated[int, Meta(ge=4, le=256, description="integration steps a sample")] = 16
@@ -101,7 +101,7 @@ class RigParameters(Section, frozen=True, kw_only=True):
     adc_range_acceleration: Annotated[float, _positive("rails of the acceleration input [V]")] = (
         5.07
     )
-    clock_drift: Annotated[float, Meta(description="of the device's microseconds [ppm]")] = 0.0
+    clock_drift: Annotated[float, Meta(description="error of the device's clock [ppm]")] = 0.0
 
     @property
     def piston_area(self) -> float:

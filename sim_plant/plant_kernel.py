@@ -12,16 +12,16 @@ of area a, r laminar resistance to volume flow [Pa s/m^3], n ratio of heat capac
 [m^2], V volumes, Vd dead volume [m^3], L stroke [m], x from mid stroke [m], m mass [kg].
 
 The flow is that of (5.14), docs/theory.md 1.1, behind a laminar passage, solved in closed form: a
-fast flow follows (5.14), and near Pu = Pd it is linear, which takes away the infinite slope. Steps
-are semi-implicit (velocity, then position, then pressure, so that the air spring conserves energy).
-Dry friction is implicit: an impulse of at most level times step that cannot turn the velocity
-round, so the mass sticks exactly and no level is too large.
+fast flow follows (5.14), and near Pu = Pd it is linear, which removes the infinite slope. Steps are
+semi-implicit (velocity, then position, then pressure, so that the air spring conserves energy). Dry
+friction is implicit: an impulse of at most level times step that cannot reverse the velocity, so
+the mass sticks exactly at any level.
 """
 
 # Fields of a record are known to numba, not to mypy.
 # mypy: disable-error-code="no-any-return"
 
-# All that `advance_plant` calls stands in this file: numba's cache does not see changes in others.
+# Everything that `advance_plant` calls is in this file: numba's cache ignores changes in others.
 
 import math
 from typing import Any
@@ -43,7 +43,7 @@ STATE = (
 )  # fmt: skip
 STATE_TYPE = np.dtype([(name, np.float64) for name in STATE])
 DELAY_LINE = 128
-"""Samples of voltage that are kept for a late valve."""
+"""Voltage samples stored for a delayed valve."""
 
 _GAS = 287.05
 _GAP_STIFFNESS = 5.0e4
@@ -81,9 +81,9 @@ def dry_friction(  # noqa: PLR0917
 ) -> float:
     """Velocity after one step of dry friction [m/s].
 
-    `free_velocity` is what the step would give without it. A load at rest, or one that comes to
-    rest within the step, stays unless the other forces exceed the static level; a sliding one is
-    slowed by the kinetic level, which cannot turn it round.
+    `free_velocity` is the velocity after the step without friction. A load at rest, or one that
+    comes to rest within the step, stays unless the other forces exceed the static level; a sliding
+    one is slowed by the kinetic level, which cannot reverse it.
     """
     toward = 1.0 if free_velocity > 0.0 else -1.0
     kinetic = base + e.coulomb + e.binding * abs(x) + e.coulomb_direction * toward
@@ -129,7 +129,7 @@ def other_forces(x: float, time: float, e: Record) -> float:
 
 @njit(cache=True, error_model="numpy")
 def valve_voltage(line: Floats, sample: int, s: Record, e: Record, p: Record) -> float:
-    """What reaches the flapper of the drive voltage, after the actuator's faults [V]."""
+    """The drive voltage at the flapper, after the actuator's faults [V]."""
     late = min(e.actuator_delay * p.sample_rate, DELAY_LINE - 2.0)
     whole = int(late)
     part = late - whole
@@ -168,8 +168,8 @@ def advance_plant(  # noqa: PLR0915, PLR0917
 ) -> None:
     """Advances `state` by `len(command)` samples and writes one row of `TRUTH` for each.
 
-    A sample is read with its voltage just applied, which is then held to the next one. `first` is
-    the number of the first sample, `null` the pressure by which the valve's null is set apart [Pa].
+    A sample is read just after its voltage is applied, which is then held. `first` is
+    the number of the first sample, `null` the offset pressure of the valve's null [Pa].
     """
     p: Record = parameters[0]
     e: Record = effects[0]
@@ -217,7 +217,7 @@ def advance_plant(  # noqa: PLR0915, PLR0917
         truth[row, 3], truth[row, 4], truth[row, 5], truth[row, 6] = p1, p2, pu1, pu2
         truth[row, 7], truth[row, 8], truth[row, 9] = friction, drive, sensed
         for sub in range(int(p.substeps)):
-            # Means over the step, so that the valve neither leads nor lags the rest.
+            # Means over the step, so that the valve neither leads nor lags.
             former_1, former_2 = valve_1, valve_2
             valve_1 += share_1 * (volts - valve_1)
             valve_2 += share_2 * (0.5 * (former_1 + valve_1) - valve_2)
@@ -283,7 +283,7 @@ def balance(parameters: NDArray[np.void]) -> tuple[float, float, float]:
     """Pressures at which the piston rests at mid stroke, and the valve's null that gives them.
 
     Chamber 1 has more area than chamber 2, so with equal pressures the rod creeps out. As on a real
-    valve, the null is set (once, by its screw) so that 0 V holds the healthy piston still.
+    valve, a one-time null adjustment makes 0 V hold the healthy piston still.
 
     Returns:
         P1, P2 and the null pressure [Pa].

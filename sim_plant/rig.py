@@ -1,13 +1,13 @@
 """The simulated rig: voltage in, raw codes of three channels out, with the truth beside them.
 
-`Rig` carries all state between calls, so a run gives the same samples however it is cut into calls.
+`Rig` keeps all state between calls, so a run gives the same samples however it is divided.
 Effects of `sim_plant.effects` can be set or ramped at any sample.
 
-A cylinder integrates, and with a rod on one side only it creeps, so two things hold it at mid
-stroke for days. The valve's null is set once, as by its screw, so that 0 V balances the two areas
-(`plant_kernel.balance`). And a slow centring loop adds to the commanded voltage: a pick-off of its
-own, low-passed at 0.7 Hz, times -16 V/m, which gives a corner near 0.2 Hz and about 10 mV at 8 Hz.
-What it adds reaches the valve, so it is part of the measured voltage.
+A cylinder integrates, and with a rod on one side only it creeps, so two measures hold it at mid
+stroke for days. A one-time null adjustment of the valve makes 0 V balance the two areas
+(`plant_kernel.balance`). And a slow centring loop adds to the commanded voltage: its own pick-off,
+low-passed at 0.7 Hz, times -16 V/m, which gives a corner near 0.2 Hz and about 10 mV at 8 Hz. The
+addition reaches the valve, so it is part of the measured voltage.
 """
 
 from dataclasses import dataclass
@@ -29,12 +29,12 @@ from sim_plant.sensor_kernel import (
 CHANNELS = table.CHANNELS
 """Names of the three channels, in the order of their codes."""
 RAMP_GRID = 8
-"""A ramp takes its next value every so many samples."""
+"""Samples between updates of a ramp."""
 
 
 @dataclass(frozen=True, slots=True)
 class RawSamples:
-    """What the device hands over for n samples, and what really happened.
+    """The device's output for n samples, and the true values.
 
     Args:
         seq: number of each sample, int64 of shape (n,).
@@ -62,7 +62,7 @@ class _Ramp:
     def value(self, sample: int) -> float:
         if sample >= self.stop:
             return self.high
-        # On the grid, not where a call happens to begin.
+        # On the grid, not at the start of a call.
         sample = max(sample - sample % RAMP_GRID, self.start)
         return self.low + (self.high - self.low) * (sample - self.start) / (self.stop - self.start)
 
@@ -71,8 +71,8 @@ class Rig:
     """A servo-pneumatic rig with air-bearing mass, LVDT and accelerometer.
 
     Args:
-        parameters: what it is made of.
-        seed: of the sensors' noise; the same seed gives the same samples.
+        parameters: its parameters.
+        seed: seed of the sensors' noise; the same seed gives the same samples.
     """
 
     def __init__(self, parameters: RigParameters, seed: int) -> None:
@@ -93,20 +93,20 @@ class Rig:
 
     @property
     def effects(self) -> dict[str, float]:
-        """The present value of every effect by name."""
+        """The current value of every effect, by name."""
         return {name: self._get(name) for name in table.EFFECTS}
 
     @property
     def next_seq(self) -> int:
-        """Number of the sample that comes next."""
+        """Number of the next sample."""
         return self._sample - self._origin
 
     def restart_count(self) -> None:
-        """Calls the next sample number 0, device time 0; the motion continues."""
+        """Renumbers the next sample 0, device time 0; the motion continues."""
         self._origin = self._sample
 
     def set_effect(self, name: str, value: float, over_s: float = 0.0) -> None:
-        """Gives the effect `name` its `value` from the next sample on, or by a ramp over `over_s`.
+        """Sets the effect `name` to `value` from the next sample on, or ramps it over `over_s`.
 
         Raises:
             ModelError: there is no such effect, or it cannot have this value.
@@ -121,7 +121,7 @@ class Rig:
             self._put(name, value)
 
     def advance(self, voltage_command: NDArray[np.float64]) -> RawSamples:
-        """Runs one sample for each commanded voltage [V], held over the sample.
+        """Runs one sample per commanded voltage [V], held over the sample.
 
         Raises:
             ModelError: a voltage is not finite.
@@ -140,7 +140,7 @@ class Rig:
         return self._samples(first, truth, codes)
 
     def _stretch(self) -> int:
-        """Samples that can be run at once, ramps having been brought up to date."""
+        """Number of samples that can run at once after updating ramps."""
         if not self._ramps:
             return np.iinfo(np.int64).max
         for name, ramp in list(self._ramps.items()):

@@ -1,11 +1,11 @@
-"""A scenario: the plant, what drives it and what happens to it, as a TOML file, and its run.
+"""A scenario: plant, excitation, effects and events, as a TOML file, and its run.
 
 name, description, duration_s, lead_in_s
-[plant]       figures that differ from `RigParameters`
+[plant]       parameters that differ from `RigParameters`
 [excitation]  shape = "sine" and its keys
-[effects]     effects that are there from the start
+[effects]     effects present from the start
 [[events]]    at_s, effect, value, over_s: an effect set, or ramped over a time
-[experiment]  what was published about the experiment that it stands for
+[experiment]  published figures of the experiment that it reproduces
 """
 
 import math
@@ -46,24 +46,24 @@ class Scenario(Section, frozen=True, kw_only=True):
     """One scenario file."""
 
     name: Annotated[str, Meta(min_length=1, description="short name")]
-    description: Annotated[str, Meta(description="what it is and why")] = ""
+    description: Annotated[str, Meta(description="description and purpose")] = ""
     duration_s: Annotated[float, Meta(gt=0, description="length from t = 0, may be inf [s]")]
-    lead_in_s: Annotated[
-        float, Meta(ge=0, description="time the rig already runs before t = 0 [s]")
+    lead_in_s: Annotated[float, Meta(ge=0, description="run time before t = 0 [s]")] = 0.0
+    cycle_s: Annotated[
+        float, Meta(ge=0, description="period of the events, 0 for no repetition [s]")
     ] = 0.0
-    cycle_s: Annotated[float, Meta(ge=0, description="events repeat, 0 for never [s]")] = 0.0
-    plant: Annotated[RigParameters, Meta(description="figures of the rig")] = field(
+    plant: Annotated[RigParameters, Meta(description="parameters of the rig")] = field(
         default_factory=RigParameters
     )
-    excitation: Annotated[Excitation, Meta(description="what drives it")]
+    excitation: Annotated[Excitation, Meta(description="excitation")]
     effects: Annotated[dict[str, float], Meta(description="effects from the start")] = field(
         default_factory=dict
     )
     events: Annotated[tuple[Event, ...], Meta(description="what happens")] = ()
-    experiment: Annotated[Experiment | None, Meta(description="what was published")] = None
+    experiment: Annotated[Experiment | None, Meta(description="published figures")] = None
 
     def healthy(self, duration_s: float | None = None) -> "Scenario":
-        """The same rig and drive with no effect and no event, `duration_s` long where given."""
+        """The same rig and drive without effects and events, `duration_s` long if given."""
         return structs.replace(
             self,
             name=f"{self.name}-healthy",
@@ -78,7 +78,7 @@ class Scenario(Section, frozen=True, kw_only=True):
 def load_scenario(path: Path | str) -> Scenario:
     """The scenario at `path`, or the shipped one of that name.
 
-    A recorded drive's file is looked for beside it.
+    A recorded drive's file is relative to it.
 
     Raises:
         ConfigError: the file does not fit, names an unknown effect, or its events do not fit in.
@@ -110,10 +110,10 @@ def _beside(scenario: Scenario, folder: Path) -> Scenario:
 
 
 class ScenarioRun:
-    """A scenario while it runs.
+    """A running scenario.
 
     Args:
-        scenario: what is run.
+        scenario: the scenario.
         seed: of the sensors' noise.
     """
 
@@ -131,16 +131,16 @@ class ScenarioRun:
 
     @property
     def duration_s(self) -> float:
-        """Length of the scenario from t = 0 [s], infinite where it continues for ever."""
+        """Length of the scenario from t = 0 [s], infinite if it is endless."""
         return self.scenario.duration_s
 
     @property
     def samples(self) -> int | None:
-        """Samples in the whole scenario, None where it continues for ever."""
+        """Number of samples in the scenario, None if it is endless."""
         return None if math.isinf(self.duration_s) else round(self.duration_s * self._rate)
 
     def advance(self, n: int) -> RawSamples:
-        """The next `n` samples; a run may go on beyond its duration."""
+        """The next `n` samples; a run may continue beyond its duration."""
         parts = []
         end = self._next + n
         while self._next < end:
@@ -159,7 +159,7 @@ class ScenarioRun:
         return self.rig.advance(self._drive(numbers))
 
     def _event_sample(self, number: int) -> int:
-        """Sample at which the event `number` starts, counted on through all cycles."""
+        """Sample at which the event `number` starts, counted over all cycles."""
         cycle, index = divmod(number, len(self._events))
         return round((cycle * self.scenario.cycle_s + self._events[index].at_s) * self._rate)
 

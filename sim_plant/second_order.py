@@ -3,8 +3,8 @@
     m dv/dt = u - k x - c v - alpha sgn(v),   dx/dt = v,   u = 3 sin(2 pi 4 t)
 
 m = 1, k = 1, c = 2.2; from t = 10 s on a fault adds alpha and to c. Units are left out, as in the
-thesis. A step is split: half a step of dry friction (an impulse that cannot turn the velocity
-round), the exact solution of the linear part for an input held at its middle, half a step of dry
+thesis. A step is split: half a step of dry friction (an impulse that cannot reverse the
+velocity), the exact solution of the linear part for an input held at its middle, half a step of dry
 friction. It is of second order and sticks exactly.
 """
 
@@ -31,7 +31,7 @@ _SUBSTEPS = 20
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What is added from `FAULT_TIME` on: dry friction and viscous friction."""
+    """Added dry and viscous friction from `FAULT_TIME` on."""
 
     coulomb: float
     viscous: float
@@ -116,7 +116,7 @@ def _noisy(signal: Floats, time: Floats, random: np.random.Generator) -> Floats:
 
 @njit(cache=True)
 def _braked(velocity: float, impulse: float) -> tuple[float, float]:
-    """The velocity after dry friction that cannot turn it round, and what is left of `impulse`."""
+    """The velocity after dry friction, which cannot reverse it, and the rest of `impulse`."""
     used = min(abs(velocity), impulse)
     return velocity - math.copysign(used, velocity), impulse - used
 
@@ -131,7 +131,7 @@ def _run(  # noqa: PLR0917
     settings: Floats,
     out: Floats,
 ) -> None:
-    """Steps through one part of the record; `state` (x, v) is carried."""
+    """Steps through one part of the record and updates `state` (x, v)."""
     mass, stiffness, damping, coulomb, step = settings
     impulse = 0.5 * coulomb * step / mass
     fine = middles.size // inputs.size
@@ -146,7 +146,7 @@ def _run(  # noqa: PLR0917
             v, left = _braked(v, impulse)
             moved = matrix[0, 0] * x + matrix[0, 1] * v + gain[0] * u
             v = matrix[1, 0] * x + matrix[1, 1] * v + gain[1] * u
-            # A mass at rest has spent nothing in the first half: the whole impulse holds it.
+            # A mass at rest used no impulse in the first half: the whole impulse holds it.
             v, left = _braked(v, impulse + left)
             x = moved
     state[0], state[1] = x, v

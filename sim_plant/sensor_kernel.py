@@ -1,9 +1,9 @@
-"""From true values to raw codes: sensor dynamics, sensor faults, noise, ranges and converters.
+"""Turns true values into raw codes: sensor dynamics, faults, noise, ranges and converters.
 
     true value -> piezo high-pass (acceleration) -> lag -> delay -> gain, bias, drift, noise, spikes
                -> limit of the sensor -> stuck -> resolution -> volts -> converter's rails -> code
 
-Every step works on one sample at a time, so a run does not depend on how it is cut into calls.
+Every step works on one sample at a time, so a run does not depend on its division into calls.
 """
 
 # Fields of a record are known to numba, not to mypy.
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 SENSOR_STATE = ("lagged", "drifted", "held", "high_pass_in", "high_pass_out")
 SENSOR_STATE_TYPE = np.dtype([(name, np.float64) for name in SENSOR_STATE])
 SENSOR_TRAITS = ("noise", "range", "resolution", "volts_per_si", "volts_per_code", "high_pass")
-"""What a sensor is: SI units, volts, and the corner of its high-pass [Hz], 0 for none."""
+"""A sensor: SI units, volts, and the corner of its high-pass [Hz], 0 for none."""
 SENSOR_TRAITS_TYPE = np.dtype([(name, np.float64) for name in SENSOR_TRAITS])
 SENSOR_DELAY_LINE = 128
 _SPIKES_PER_SECOND = 2.0
@@ -42,7 +42,7 @@ def high_passed(value: float, warped: float, s: Record) -> float:
 
 @njit(cache=True, error_model="numpy")
 def delayed(value: float, line: Floats, sample: int, late: float) -> float:
-    """`value` as it was `late` samples ago, between samples by a straight line."""
+    """`value` delayed by `late` samples, interpolated linearly."""
     line[sample % SENSOR_DELAY_LINE] = value
     late = min(late, SENSOR_DELAY_LINE - 2.0)
     whole = int(late)

@@ -1,4 +1,4 @@
-"""The simulated device at its connectors: serial frames on a pty, Modbus over TCP or a pty."""
+"""The interfaces of the simulated device: serial frames on a pty, Modbus over TCP or a pty."""
 
 from sim_plant.serve.commands import Commands, Controlled
 from sim_plant.serve.control import ControlServer, ask, control_path

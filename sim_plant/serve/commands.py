@@ -1,4 +1,4 @@
-"""What the control lines do: effects of the plant, faults of the line, troubles of the device."""
+"""Executes control lines: effects of the plant, faults of the line and the device."""
 
 import threading
 from collections import deque
@@ -10,25 +10,25 @@ from sim_plant.serve.line_faults import NAMES, LineFaults
 from sim_plant.serve.source import Device
 
 ALIASES = {"friction": "coulomb"}
-"""Plain words for effects that people ask for first."""
+"""Short names of common effects."""
 
 
 class Effects(Protocol):
-    """A plant whose effects can be set while it runs; `sim_plant.rig.Rig` is one."""
+    """A plant whose effects can be set while it runs, such as `sim_plant.rig.Rig`."""
 
     @property
     def effects(self) -> dict[str, float]:
-        """Present value of every effect."""
+        """Current value of every effect."""
 
     def set_effect(self, name: str, value: float, over_s: float = 0.0) -> None:
-        """Give an effect a value; `ModelError` where there is no such effect."""
+        """Set an effect; raises `ModelError` if there is no such effect."""
 
 
 class Controlled:
     """A source whose effects are changed between samples, in the thread that simulates.
 
     Args:
-        source: has `advance(n)`.
+        source: object with `advance(n)`.
         effects: the plant of that source.
     """
 
@@ -38,7 +38,7 @@ class Controlled:
         self._waiting: deque[tuple[Callable[[], None], threading.Event, list[Exception]]] = deque()
 
     def advance(self, n: int) -> Any:
-        """The next n samples, after what has been asked for has been done."""
+        """The next n samples, after the requested changes."""
         while self._waiting:
             act, done, errors = self._waiting.popleft()
             try:
@@ -49,7 +49,7 @@ class Controlled:
         return self._source.advance(n)
 
     def do(self, act: Callable[[], None], timeout: float = 2.0) -> None:
-        """Have `act` done before the next sample; its error is raised here."""
+        """Run `act` before the next sample; its error is raised here."""
         done, errors = threading.Event(), list[Exception]()
         self._waiting.append((act, done, errors))
         if not done.wait(timeout):
@@ -62,7 +62,7 @@ class Controlled:
         self.do(lambda: self._effects.set_effect(ALIASES.get(name, name), value, over_s))
 
     def values(self) -> Mapping[str, float]:
-        """Present value of every effect."""
+        """Current value of every effect."""
         return self._effects.effects
 
 
@@ -72,7 +72,7 @@ class Commands:
     Args:
         plant: its effects.
         device: counters and clock.
-        faults: of the line, None where there is no line to disturb.
+        faults: faults of the line, None if there is no line.
         neutral: value of every effect at which it is absent.
     """
 
@@ -101,7 +101,7 @@ class Commands:
         """The answer to a line.
 
         Raises:
-            DeviceError: the line means nothing.
+            DeviceError: the command is unknown.
             ModelError: there is no such effect.
         """
         word, *rest = line.split() or [""]

@@ -1,13 +1,13 @@
-"""Talking to the plant while it runs: one line in, one line back, over a UNIX socket.
+"""Controls the running plant over a UNIX socket: one line in, one line back.
 
-    set friction=0.4        an effect takes a value at once
-    set friction=0.4 over 5 … or within so many seconds
-    clear                   all effects back to nothing
-    effects                 the present value of every effect
+    set friction=0.4        set an effect at once
+    set friction=0.4 over 5 ramp it over 5 seconds
+    clear                   remove all effects
+    effects                 show the value of every effect
     fault flip 20           a fault of the line for 20 frames (0: until `heal`)
-    heal                    the line is sound again
-    restart                 the device starts anew: new boot, counter 0
-    clock +0.5              the device's clock jumps
+    heal                    end all faults of the line
+    restart                 restart the device: new boot, counter 0
+    clock +0.5              make the device's clock jump
 
 The answer begins with "ok" or "error".
 """
@@ -27,7 +27,7 @@ Answer = Callable[[str], str]
 
 
 def control_path(rig: str) -> Path:
-    """Where the plant of the rig called `rig` listens."""
+    """The socket of the plant of the rig `rig`."""
     return (
         Path(os.environ.get("XDG_RUNTIME_DIR") or tempfile.gettempdir()) / f"rigwatch-{rig}.plant"
     )
@@ -37,7 +37,7 @@ def ask(path: Path, line: str) -> str:
     """The running plant's answer to `line`, without its "ok".
 
     Raises:
-        DeviceError: no plant runs there, or it refuses.
+        DeviceError: no plant runs there, or it refuses the command.
     """
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as talk:
@@ -61,7 +61,7 @@ class ControlServer:
     """Answers lines on a UNIX socket, in a thread of its own.
 
     Args:
-        path: the socket; one that a dead plant left is replaced.
+        path: the socket; a stale one is replaced.
         answer: the reply to a line; a `RigwatchError` becomes an "error" line.
     """
 
@@ -84,7 +84,7 @@ class ControlServer:
 
     def __exit__(self, *_: object) -> None:
         if self._socket is not None:
-            # Closing alone does not wake a thread that waits in accept().
+            # Closing alone does not wake a thread blocked in accept().
             with contextlib.suppress(OSError):
                 self._socket.shutdown(socket.SHUT_RDWR)
             self._socket.close()

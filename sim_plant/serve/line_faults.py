@@ -1,14 +1,14 @@
-"""What can go wrong on a line, switched while it runs.
+"""Faults of a line, switched while it runs.
 
-A fault acts on the next `count` frames or for good where `count` is 0:
+A fault acts on the next `count` frames, or permanently if `count` is 0:
 
     garbage     random bytes in place of the frame, as a wrong baud rate gives
-    flip        one bit turned over
+    flip        one bit inverted
     drop        some bytes missing
-    insert      some bytes too many
+    insert      some extra bytes
     duplicate   the frame twice
-    lose        the frame not at all
-    unplug      the line away for that many frames, then back
+    lose        no frame
+    unplug      no line for that many frames
 """
 
 import random
@@ -50,10 +50,10 @@ NAMES = (*EDITS, "unplug")
 
 
 class LineFaults:
-    """Faults of one line; may be switched from another thread.
+    """The faults of one line; may be switched from another thread.
 
     Args:
-        seed: of what is random in them.
+        seed: seed of their random parts.
     """
 
     def __init__(self, seed: int = 1) -> None:
@@ -63,11 +63,11 @@ class LineFaults:
         self._new_link: Path | None = None
 
     def start(self, name: str, count: int = 0, link: Path | None = None) -> None:
-        """Let the fault `name` act on the next `count` frames, 0 for good.
+        """Apply the fault `name` to the next `count` frames; 0 is permanent.
 
         Args:
             name: one of `NAMES`.
-            count: frames.
+            count: number of frames.
             link: name under which the line comes back after "unplug".
 
         Raises:
@@ -85,7 +85,7 @@ class LineFaults:
             self._active.pop(name, None)
 
     def apply(self, frame: bytes) -> bytes:
-        """The bytes that go out in place of `frame`."""
+        """The bytes sent in place of `frame`."""
         with self._lock:
             for name in [name for name in self._active if name in EDITS]:
                 frame = EDITS[name](frame, self._chance) if len(frame) > 1 else frame
@@ -93,7 +93,7 @@ class LineFaults:
         return frame
 
     def switch(self, line: PtyLine) -> None:
-        """Plug or unplug the line where that fault asks for it; called once a frame."""
+        """Plug or unplug the line as that fault requires; called once per frame."""
         with self._lock:
             if "unplug" not in self._active:
                 if not line.plugged:

@@ -28,15 +28,15 @@ class ModbusServer:
     """Serves the register map of a device until stopped.
 
     Args:
-        device: what is sampled.
+        device: the device.
         bank: its ring.
         rate: sample rate [Hz].
         unit: unit id.
-        trace: sees and may change every packet (sending, bytes), for faults of the line.
-        heartbeat: told how many samples were taken, where given.
+        trace: called with every packet (sending, bytes), and may change it, for line faults.
+        heartbeat: called with the number of samples taken.
 
     Attributes:
-        exception: code with which every request is refused, 0 for none.
+        exception: exception code in every answer, 0 for none.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class ModbusServer:
         """Serve on TCP until `stop` is set.
 
         Raises:
-            DeviceError: the port cannot be listened on.
+            DeviceError: it cannot listen on the port.
         """
         asyncio.run(self._serve(lambda: self._tcp(host, port), stop, f"{host}:{port}"))
 

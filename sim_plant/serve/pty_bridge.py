@@ -15,7 +15,7 @@ class PtyBridge:
     """A cable with the device's end at `device_end` and the reader's at `link`.
 
     Args:
-        link: where the symbolic link to the reader's end is made.
+        link: path of the symbolic link to the reader's end.
     """
 
     def __init__(self, link: Path | str) -> None:
@@ -48,7 +48,7 @@ class PtyBridge:
     def _carry(self) -> None:
         while not self._stop.is_set():
             if not self.line.heard():
-                # A line that nobody has open is readable all the time: look again later.
+                # A line that no process has open is always readable: retry later.
                 self._to_reader(0.02)
                 continue
             ready, _, _ = select.select([self._master, self.line.fileno()], [], [], 0.1)

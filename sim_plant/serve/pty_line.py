@@ -1,7 +1,7 @@
 """A serial line made of a pseudo terminal: raw, never waiting for its reader, and pluggable.
 
-The device holds the master's end. A symbolic link gives the other end a name that stays. While
-nobody has the line open its bytes are lost, as on a wire.
+The device holds the master's end. A symbolic link gives the other end a stable name. While no
+process has the line open its bytes are lost, as on a wire.
 """
 
 import contextlib
@@ -18,10 +18,10 @@ class PtyLine:
     """The device's end of a line.
 
     Args:
-        link: where the symbolic link to the reader's end is made; an older link is replaced.
+        link: path of the symbolic link to the reader's end; an older link is replaced.
 
     Attributes:
-        dropped: bytes lost because nobody read them.
+        dropped: bytes lost for lack of a reader.
     """
 
     def __init__(self, link: Path | str) -> None:
@@ -40,10 +40,10 @@ class PtyLine:
         return -1 if self._master is None else self._master
 
     def plug(self, link: Path | str | None = None) -> None:
-        """Make the line, under another name where `link` is given.
+        """Create the line, under another name if `link` is given.
 
         Raises:
-            DeviceError: the link cannot be made.
+            DeviceError: the link cannot be created.
         """
         self.unplug()
         self.link = Path(link or self.link)
@@ -54,14 +54,14 @@ class PtyLine:
         os.close(slave)
 
     def unplug(self) -> None:
-        """Take the line away; readers see it close."""
+        """Remove the line; readers see it close."""
         if self._master is not None:
             os.close(self._master)
             self._master = None
             self._remove_link()
 
     def heard(self) -> bool:
-        """Whether somebody has the line open at its other end."""
+        """Whether a process has the other end open."""
         if self._master is None:
             return False
         poll = select.poll()
@@ -69,7 +69,7 @@ class PtyLine:
         return not any(events & select.POLLHUP for _, events in poll.poll(0))
 
     def write(self, data: bytes) -> None:
-        """Send what there is room for; the rest is lost, and counted. Never waits."""
+        """Send as much as fits; count the rest as lost. Never waits."""
         sent = 0
         if self.heard():
             with contextlib.suppress(OSError):
@@ -77,14 +77,14 @@ class PtyLine:
         self.dropped += len(data) - sent
 
     def read(self) -> bytes:
-        """What has come from the other end, empty where nothing has."""
+        """The bytes received from the other end, empty if none."""
         try:
             return os.read(self.fileno(), 4096)
         except OSError:
             return b""
 
     def _remove_link(self) -> None:
-        """Only the link that was made here: another plant may have put its own in its place."""
+        """Only this line's link: another plant may have replaced it."""
         with contextlib.suppress(OSError):
             if str(self.link.readlink()) == self._target:
                 self.link.unlink()

@@ -1,4 +1,4 @@
-"""The device's sample ring as Modbus registers, made when they are asked for."""
+"""The device's sample ring as Modbus registers, computed on request."""
 
 import threading
 from collections import deque
@@ -15,7 +15,7 @@ class RegisterBank:
 
     Args:
         channels: number of channels.
-        order: which half of a 32-bit value comes first.
+        order: which 16-bit half of a 32-bit value comes first.
     """
 
     def __init__(self, channels: int, order: WordOrder = "big") -> None:
@@ -32,7 +32,7 @@ class RegisterBank:
         return self._header.registers()
 
     def add(self, sent: Sent) -> None:
-        """Put samples in."""
+        """Add samples."""
         if not len(sent):
             return
         rows = zip(sent.seq.tolist(), sent.device_us.tolist(), sent.codes.tolist(), strict=True)
@@ -49,7 +49,7 @@ class RegisterBank:
             )
 
     def read(self, address: int, count: int) -> list[int]:
-        """Registers from `address` on, all of one moment."""
+        """Registers from `address` on, a consistent snapshot."""
         with self._lock:
             head = encode_header(self._header, self._order)
             length = self._header.slot_length

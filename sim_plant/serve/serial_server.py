@@ -13,8 +13,8 @@ class SerialServer:
     """Sends each sample of `device` when it is due.
 
     Args:
-        device: what is sampled.
-        line: where the frames go; plugged and unplugged by the faults.
+        device: the device.
+        line: the line, plugged and unplugged by the faults.
         rate: sample rate [Hz].
         faults: what goes wrong on the line, nothing where None.
         heartbeat: told how many samples were sent, where given.

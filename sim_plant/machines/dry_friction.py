@@ -1,0 +1,28 @@
+"""Dry friction that truly sticks (D. Karnopp, 1985), for plants that step speed by speed."""
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, inline="always")
+def slid(v: float, drive: float, dry: float, mass: float, h: float) -> float:
+    """Speed a step later under a drive and dry friction; zero where friction holds.
+
+    Args:
+        v: speed now [m/s or rad/s].
+        drive: sum of all other forces [N or N m].
+        dry: the most that friction can hold [the same].
+        mass: mass or inertia.
+        h: step [s].
+    """
+    if dry <= 0.0:
+        return v + h * drive / mass
+    if v == 0.0:
+        if abs(drive) <= dry:
+            return 0.0
+        return float(h * (drive - np.sign(drive) * dry) / mass)
+    later = float(v + h * (drive - np.sign(v) * dry) / mass)
+    if np.sign(later) != np.sign(v):
+        # It comes to rest within the step, and goes on only where the drive is stronger.
+        return 0.0 if abs(drive) <= dry else later
+    return later

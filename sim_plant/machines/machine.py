@@ -1,0 +1,148 @@
+"""What a machine's log holds: signals as sensors read them, with noise and steps of a converter."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigwatch.wire.arrays import FloatArray
+from sim_plant.machines import damper, motor, pendulum, tanks
+from sim_plant.oscillator import EFFECTS as OSCILLATOR_EFFECTS
+from sim_plant.oscillator import RATE as OSCILLATOR_RATE
+from sim_plant.oscillator import Hidden, oscillate
+from sim_plant.strengths import strength_that_causes
+
+STEP = 0.3
+"""Step of a sensor's converter over its noise."""
+FINEST = 2e-5
+"""Least step of a converter, over the rms of what it reads: 16 bits."""
+BETTER = 0.05
+"""Noise of a sensor that reads what drives the model, over the level asked for."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine on a bench.
+
+    Attributes:
+        rate: samples a second.
+        columns: names of what its log holds beside the time, with units as loggers write them.
+        commanded: how many of the columns are commands, which have no noise.
+        precise: how many of those after them come from sensors that are better than the others.
+        effects: what may be hidden.
+        drive: a drawn excitation, from a seed.
+        run: columns at each sample without noise, of an excitation and strengths of effects.
+    """
+
+    rate: float
+    columns: tuple[str, ...]
+    commanded: int
+    precise: int
+    effects: tuple[str, ...]
+    drive: Callable[[int], FloatArray]
+    run: Callable[[FloatArray, Mapping[str, float]], FloatArray]
+
+
+def strength_for(machine: Machine, effect: str, share: float, seed: int) -> float:
+    """The strength at which an effect changes the outputs by `share` of their rms.
+
+    Args:
+        machine: the machine, with nothing else hidden.
+        effect: one of its effects.
+        share: such as 0.1.
+        seed: of the excitation.
+    """
+    excitation, first = machine.drive(seed), machine.commanded + machine.precise
+    return strength_that_causes(
+        share, lambda strength: machine.run(excitation, {effect: strength})[:, first:]
+    )
+
+
+def log(
+    machine: Machine, hidden: Mapping[str, float], noise: float, seed: int
+) -> dict[str, FloatArray]:
+    """A recording as a logger writes it: time and columns, each of shape (n,).
+
+    Args:
+        machine: the machine.
+        hidden: strengths of what is hidden, by name.
+        noise: standard deviation of the sensors' noise over the rms of what they read.
+        seed: of excitation and noise.
+    """
+    clean = machine.run(machine.drive(seed), hidden)
+    random = np.random.default_rng([seed, 1])
+    table = {"time_s": np.arange(len(clean)) / machine.rate}
+    for index, name in enumerate(machine.columns):
+        level = noise * (BETTER if index < machine.commanded + machine.precise else 1.0)
+        signal = clean[:, index]
+        table[name] = signal if index < machine.commanded else _read(signal, level, random)
+    return table
+
+
+def _read(signal: FloatArray, level: float, random: np.random.Generator) -> FloatArray:
+    """A signal with noise, in steps of the converter."""
+    size = float(np.std(signal))
+    step = size * max(STEP * level, FINEST)
+    noisy = signal + level * size * random.standard_normal(len(signal))
+    return np.asarray(step * np.round(noisy / step))
+
+
+def _strengths(effects: tuple[str, ...], hidden: Mapping[str, float]) -> FloatArray:
+    return np.array([hidden.get(name, 0.0) for name in effects])
+
+
+def _driven(
+    kernel: Callable[..., None], effects: tuple[str, ...], outputs: int
+) -> Callable[..., FloatArray]:
+    """A plant whose log is its command and its outputs."""
+
+    def run(command: FloatArray, hidden: Mapping[str, float]) -> FloatArray:
+        out = np.empty((len(command), outputs))
+        kernel(command, _strengths(effects, hidden), out)
+        return np.column_stack([command, out])
+
+    return run
+
+
+def _damper(path: FloatArray, hidden: Mapping[str, float]) -> FloatArray:
+    out = np.empty((len(path) // damper.STEPS, 2))
+    damper.run(path, _strengths(damper.EFFECTS, hidden), out)
+    return out
+
+
+def _oscillator(force: FloatArray, hidden: Mapping[str, float]) -> FloatArray:
+    faults = tuple(Hidden(name, strength) for name, strength in hidden.items() if strength)
+    return np.column_stack([force, oscillate(force, faults, np.zeros(2), 0)])
+
+
+def _force(seed: int, samples: int = 3072) -> FloatArray:
+    """Force of lines from 0.25 to 8 Hz with drawn phases, rms 4 N, shape (samples,)."""
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, 31)
+    time, lines = np.arange(samples) / OSCILLATOR_RATE, np.arange(0.25, 8, 0.25)
+    return np.asarray(
+        4 * np.cos(2 * np.pi * np.outer(time, lines) + phases).sum(1) / np.sqrt(31 / 2)
+    )
+
+
+MACHINES: dict[str, Machine] = {
+    "oscillator": Machine(
+        OSCILLATOR_RATE, ("force_N", "position_m", "acceleration_m_s2"), 1, 0,
+        OSCILLATOR_EFFECTS, _force, _oscillator,
+    ),
+    "motor": Machine(
+        motor.RATE, ("voltage_V", "speed_rad_s"), 1, 0,
+        motor.EFFECTS, motor.drive, _driven(motor.run, motor.EFFECTS, 1),
+    ),
+    "pendulum": Machine(
+        pendulum.RATE, ("voltage_V", "angle_rad"), 1, 0,
+        pendulum.EFFECTS, pendulum.drive, _driven(pendulum.run, pendulum.EFFECTS, 1),
+    ),
+    "damper": Machine(
+        damper.RATE, ("displacement_m", "force_N"), 0, 1, damper.EFFECTS, damper.drive, _damper
+    ),
+    "tanks": Machine(
+        tanks.RATE, ("voltage_V", "level1_m", "level2_m"), 1, 0,
+        tanks.EFFECTS, tanks.drive, _driven(tanks.run, tanks.EFFECTS, 2),
+    ),
+}  # fmt: skip
+"""The machines by name."""

@@ -1,0 +1,86 @@
+"""A winding, balanced as flux, and a motor that drives a load through a shaft, as momenta."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from rigwatch.wire.arrays import FloatArray
+from sim_plant.specimens.specimen import between, sines
+
+STEPS = 24
+"""Between two samples."""
+LINES = np.array([0.7, 1.9, 4.3, 9.1, 14.0])
+"""[Hz]."""
+RESISTANCE, INDUCTANCE = 1.2, 0.06
+"""[ohm], [H]."""
+
+
+def volts(time: FloatArray, seed: int) -> FloatArray:
+    """Voltage [V], speed of the rotor [rad/s] and warming of the winding [K]."""
+    warmer = 60.0 * time / time[-1] + sines(time, LINES[:1], 5.0, seed + 1)
+    return np.column_stack([
+        sines(time, LINES, 6.0, seed), sines(time, LINES, 20.0, seed + 2), warmer
+    ])  # fmt: skip
+
+
+def _magnetising(flux: float) -> float:
+    """Current of an iron core that bends off softly [A]."""
+    return flux / INDUCTANCE * (1 + 12.0 * flux * flux)
+
+
+def conduct(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
+    """Current of the winding [A], shape (n, 1)."""
+    flux, h = 0.0, dt / STEPS
+    read = np.empty((len(inputs), 1))
+    for k in range(len(inputs)):
+        for step in range(STEPS):
+            volt, speed, warmer = between(inputs, k, step / STEPS)
+            current = flux / INDUCTANCE
+            if hidden == "saturating_inductance":
+                current = _magnetising(flux)
+            if step == 0:
+                read[k] = current
+            copper = 1 + 0.0039 * warmer if hidden == "resistance_by_temperature" else 1.0
+            induced = 0.05 * speed if hidden == "back_emf" else 0.0
+            brushes = math.copysign(0.6, current) if hidden == "brush_drop" else 0.0
+            flux += h * (volt - RESISTANCE * copper * current - brushes - induced)
+    return read
+
+
+TORQUE, MOTOR, LOAD, SHAFT, LOSS = 0.1, 1.2e-3, 2e-3, 15.0, 0.02
+"""[N m/A], [kg m^2], [kg m^2], [N m/rad], [N m s/rad]."""
+
+
+def amps(time: FloatArray, seed: int) -> FloatArray:
+    """Current of the motor [A], with a mean that keeps it turning."""
+    return sines(time, LINES, 2.0, seed, 0.3)[:, None]
+
+
+def _as_sent(amp: float, _angle: float) -> float:
+    return amp
+
+
+PUSHES: dict[str, Callable[[float, float], float]] = {
+    "commutation_ripple": lambda amp, angle: amp * (1 + 0.2 * math.cos(2 * angle)),
+}
+"""Command and angle of the rotor → current."""
+
+
+def turn_load(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
+    """Speeds of motor and load [rad/s], shape (n, 2)."""
+    push = PUSHES.get(hidden, _as_sent)
+    angle, beyond, own, driven, h = 0.0, 0.0, 0.0, 0.0, dt / STEPS
+    read = np.empty((len(inputs), 2))
+    for k in range(len(inputs)):
+        for step in range(STEPS):
+            speed, load = own / MOTOR, driven / LOAD
+            if step == 0:
+                read[k] = speed, load
+            through = SHAFT * (angle - beyond) + LOSS * (speed - load)
+            amp = push(between(inputs, k, step / STEPS)[0], angle)
+            own += h * (TORQUE * amp - through - 2e-3 * speed)
+            driven += h * (through - 1e-3 * load)
+            angle += h * own / MOTOR
+            beyond += h * driven / LOAD
+    return read

@@ -1,0 +1,46 @@
+"""Which effect of the library is hidden in which machine, and what it may be called."""
+
+from sim_plant.specimens import electric, heat_and_flow, mass
+from sim_plant.specimens.specimen import Machine, Specimen
+
+_MASS = Machine("mass-spring-damper", 128.0, mass.drive, mass.march)
+_BLOCK = Machine("heated-block", 1.0, heat_and_flow.heat, heat_and_flow.warm)
+_VESSEL = Machine("vessel", 50.0, heat_and_flow.gas, heat_and_flow.fill)
+_BEARING = Machine("bearing", 50.0, heat_and_flow.turn, heat_and_flow.rub)
+_WINDING = Machine("winding", 256.0, electric.volts, electric.conduct)
+_MOTOR = Machine("two-mass-drive", 256.0, electric.amps, electric.turn_load)
+
+HIDDEN: dict[str, Specimen] = {
+    name: Specimen(machine, name, named)
+    for machine, effects in (
+        (_MASS, {
+            **{n: (f"{n}@load",) for n in mass.CONTACTS},
+            **{n: (f"{n}@drive",) for n in mass.DRIVES},
+            "hum": ("hum@acceleration_sensor",),
+            "sensor_play": ("sensor_play@position_sensor",),
+        }),
+        (_BLOCK, {n: (f"{n}@loss",) for n in heat_and_flow.LOSSES if n != "convection"}),
+        (_VESSEL, {n: (f"{n}@outlet",) for n in heat_and_flow.OUTLETS}),
+        (_BEARING, {
+            "viscous_by_temperature": ("viscous_by_temperature@race",),
+            "coulomb_by_temperature": ("coulomb_by_temperature@race",),
+            "zero_by_temperature": ("zero_by_temperature@torque_sensor",),
+            "gain_by_temperature": ("gain_by_temperature@torque_sensor",),
+            "cross_axis": ("cross_axis@torque_sensor",),
+        }),
+        (_WINDING, {
+            "back_emf": ("back_emf@drive",),
+            "brush_drop": ("brush_drop@contact",),
+            "resistance_by_temperature": ("resistance_by_temperature@contact",),
+            "saturating_inductance": ("saturating_inductance@iron",),
+        }),
+        (_MOTOR, {n: (f"{n}@drive",) for n in electric.PUSHES}),
+    )
+    for name, named in effects.items()
+}  # fmt: skip
+"""By the effect's name."""
+
+
+def specimen(effect: str) -> Specimen:
+    """The machine that hides this effect."""
+    return HIDDEN[effect]

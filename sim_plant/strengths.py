@@ -1,0 +1,43 @@
+"""How strong a hidden effect must be to change what sensors read by a given share."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq
+
+from rigwatch.wire.arrays import FloatArray
+
+LIMIT = 1e6
+"""Share that stands for a plant that diverges (NaN or infinite)."""
+LEAST, MOST = 1e-9, 1e9
+"""Strengths that are looked at, in the effect's own unit."""
+
+
+def strength_that_causes(share: float, read: Callable[[float], FloatArray]) -> float:
+    """The strength at which an effect changes the outputs by `share` of their rms.
+
+    The largest of the shares of all channels counts.
+
+    Args:
+        share: such as 0.05.
+        read: what the sensors read at a strength, without noise, shape (n, outputs); at 0 the
+            plant is healthy.
+    """
+    healthy = read(0.0)
+    size = np.std(healthy, axis=0)
+
+    def caused(strength: float) -> float:
+        moved = read(strength) - healthy
+        found = float(np.max(np.sqrt(np.mean(moved**2, axis=0)) / size))
+        return found if np.isfinite(found) else LIMIT
+
+    low = high = LEAST
+    while caused(high) < share and high < MOST:
+        low, high = high, high * 4
+    if low == high or caused(high) < share:
+        return high
+
+    def surplus(logarithm: float) -> float:
+        return float(np.log(max(caused(np.exp(logarithm)), 1e-12) / share))
+
+    return float(np.exp(brentq(surplus, np.log(low), np.log(high), xtol=1e-3)))
