@@ -1,7 +1,7 @@
 """`python -m benchmarks [NAME...]`: runs the benchmarks and prints one table.
 
-A benchmark is a module of this folder with `def run(quick: bool) -> list[Row]`; nothing else has
-to be registered. `--page` keeps the results and writes them to docs/benchmarks.md.
+A benchmark is a module in a room of this folder with `def run(quick: bool) -> list[Row]`; nothing
+else has to be registered. `--page` keeps the results and writes them to docs/benchmarks.md.
 """
 
 import argparse
@@ -20,10 +20,14 @@ from benchmarks import results_page
 from benchmarks.table import Row, as_markdown, as_text, failed
 
 
-def names() -> list[str]:
-    """All benchmarks there are: the modules of this folder that have a function `run`."""
-    sources = sorted(Path(benchmarks.__path__[0]).glob("*.py"))
-    return [path.stem for path in sources if "\ndef run(" in path.read_text(encoding="utf-8")]
+def modules() -> dict[str, str]:
+    """All benchmarks there are, by name: the modules of the rooms that have a function `run`."""
+    sources = sorted(Path(benchmarks.__path__[0]).glob("*/*.py"), key=lambda path: path.stem)
+    return {
+        path.stem: f"benchmarks.{path.parent.name}.{path.stem}"
+        for path in sources
+        if "\ndef run(" in path.read_text(encoding="utf-8")
+    }
 
 
 def machine() -> dict[str, str]:
@@ -51,7 +55,7 @@ def measure(name: str, quick: bool) -> list[Row]:
     started = time.perf_counter()
     print(f"{name} ...", end=" ", file=sys.stderr, flush=True)
     try:
-        rows: list[Row] = importlib.import_module(f"benchmarks.{name}").run(quick)
+        rows: list[Row] = importlib.import_module(modules()[name]).run(quick)
     except Exception as error:
         traceback.print_exc()
         rows = [failed(name, error)]
@@ -64,9 +68,9 @@ def main() -> int:
     parser = _parser()
     arguments = parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do
-    if unknown := set(arguments.names) - set(names()):
-        parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(names())}")
-    results = {name: measure(name, arguments.quick) for name in arguments.names or names()}
+    if unknown := set(arguments.names) - set(modules()):
+        parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(modules())}")
+    results = {name: measure(name, arguments.quick) for name in arguments.names or modules()}
     rows = [row for found in results.values() for row in found]
     print("measured on " + ", ".join(f"{key} {value}" for key, value in machine().items()) + "\n")
     print(as_markdown(rows) if arguments.markdown else as_text(rows))
@@ -81,7 +85,9 @@ def main() -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks", description=__doc__, epilog=f"benchmarks: {', '.join(names())}"
+        prog="python -m benchmarks",
+        description=__doc__,
+        epilog=f"benchmarks: {', '.join(modules())}",
     )
     parser.add_argument("names", nargs="*", metavar="NAME", help="which, default all")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, to try them")

@@ -1,11 +1,18 @@
 """Waiting for other processes and threads: tests wait for a condition, never for a time."""
 
+import time
 from collections.abc import Callable
-
-from rigwatch.wire.bus.bus import wait_until
 
 PATIENCE = 180.0
 """Longest that anything may take before a test fails; machines are slow at times [s]."""
+
+
+def wait_until(holds: Callable[[], bool], timeout: float, pause: float = 0.02) -> bool:
+    """Poll until `holds()` or until `timeout` [s] has passed; returns what it said last."""
+    deadline = time.monotonic() + timeout
+    while not (done := holds()) and time.monotonic() < deadline:
+        time.sleep(pause)
+    return done
 
 
 def eventually(holds: Callable[[], bool], what: str) -> None:

@@ -106,3 +106,49 @@ def test_a_flood_that_ends_within_a_block_ends_before_what_follows_in_it():
         said.append(steps(heard))
     assert said[0] == said[1]
     assert said[0][-1] == ("sensor_spike.voltage", "unacknowledged", ends + 12)
+
+
+def flap(alarms: AlarmManager, name: str, count: int, apart: int = 256, begin: int = 0):
+    """The condition comes and goes `count` times, `apart` samples from coming to coming."""
+    said = []
+    for i in range(count):
+        for active, after in ((True, 0), (False, apart // 2)):
+            at = Occasion("rig", 7, t_ns=time_of(begin + i * apart + after))
+            said += alarms.report(name, at, active=active)
+    return said
+
+
+def test_a_flapping_link_is_one_alarm_with_a_count_and_no_flood():
+    alarms = AlarmManager()
+    said = flap(alarms, "link", 60)
+    assert len(steps(said)) == 4 * 2 + 1 + 3, "four comings and goings, then at 5, 10, 20 and 40"
+    assert said[-1].cause.endswith("came 40 times")
+    assert [one.name for one in alarms.standing()] == ["link"]
+    assert "came 60 times" in alarms.standing()[0].cause
+    assert alarms.standing()[0].state == "unacknowledged"
+
+
+def test_a_series_that_is_over_clears_its_alarm_and_the_next_begins_anew():
+    alarms = AlarmManager()
+    flap(alarms, "link", 20)
+    gone = 19 * 256 + 128
+    assert run_quiet(alarms, gone + MINUTE - 1) == []
+    (cleared,) = run_quiet(alarms, gone + MINUTE)
+    assert (cleared.name, cleared.state) == ("link", "cleared_unacknowledged")
+    assert len(steps(flap(alarms, "link", 2, begin=gone + 2 * MINUTE))) == 4
+
+
+def test_a_flapping_alarm_that_was_acknowledged_stays_so():
+    alarms = AlarmManager()
+    flap(alarms, "stale", 8)
+    alarms.command(order("stale", "acknowledge", at=8 * 256))
+    flap(alarms, "stale", 8, begin=9 * 256)
+    assert [one.state for one in alarms.standing()] == ["acknowledged"]
+
+
+def test_a_flood_never_groups_an_alarm_that_asks_for_the_rig_to_be_stopped():
+    for name in ("dry_friction", "stiction"):
+        alarms = AlarmManager()
+        raised(alarms, 15)
+        said = alarms.report(name, Occasion("rig", t_ns=time_of(20 * 256)), active=True)
+        assert steps(said) == [(name, "unacknowledged", -1)]

@@ -187,3 +187,24 @@ def test_an_endless_line_is_one_bad_line(tmp_path):
     records, bad = read_journal(path)
     assert len(records) == good.count(b"\n")
     assert bad == 1
+
+
+def test_a_journal_that_has_grown_is_rotated_and_keeps_the_state_of_every_alarm(tmp_path):
+    old = faulty_manager()
+    changes = old.take_changes()
+    path = tmp_path / "alarms.jsonl"
+    journal = AlarmJournal(path, largest=20_000)
+    for _ in range(200):
+        journal.write(changes)
+        assert path.stat().st_size < 20_000 + 10_000
+    journal.close()
+    assert journal.failure == ""
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["alarms.jsonl"] + [
+        f"alarms.jsonl.{number}" for number in range(1, 9)
+    ]
+    expected = AlarmManager()
+    expected.restore(last_records(changes))
+    assert restarted(path).standing() == expected.standing() != []
+    reopened = AlarmJournal(path)
+    assert {one.alarm.name for one in reopened.newest()} == {one.alarm.name for one in changes}
+    reopened.close()

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rigwatch.wire.delivery.sample_order import Loss
 from rigwatch.wire.messages.message_types import Column, Gap, SampleBlock
+from rigwatch.wire.ordering.sample_order import Loss
 
 PERIOD_NS = 3_906_250
 

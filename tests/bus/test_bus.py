@@ -244,7 +244,7 @@ def test_a_message_says_from_which_process_it_came(join: Join) -> None:
     one, other, reader = join("one"), join("other"), join("reader")
     heard: list[tuple[bytes, str]] = []
     close = reader.transport.listen_from(
-        reader.key(EVENTS.key), lambda payload, sender: heard.append((payload, sender))
+        reader.key(EVENTS.key), lambda payload, sender, _: heard.append((payload, sender))
     )
     for bus in (one, other):
         sent = encode(event(bus.process))

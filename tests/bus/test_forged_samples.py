@@ -4,21 +4,21 @@ from collections.abc import Callable
 
 import pytest
 
-from rigwatch.wire.bus.bus import wait_until
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.delivery.ownership import Owners
 from rigwatch.wire.delivery.ring import SampleRing
-from rigwatch.wire.delivery.sample_order import (
+from rigwatch.wire.delivery.sample_reader import SampleReader
+from rigwatch.wire.messages import SAMPLES, Event, SampleBlock
+from rigwatch.wire.ordering.ownership import Owners
+from rigwatch.wire.ordering.sample_order import (
     FORGED,
     POSITION_WRONG,
     SUSPECT,
     Loss,
     SampleOrder,
 )
-from rigwatch.wire.delivery.sample_reader import SampleReader
-from rigwatch.wire.messages import SAMPLES, Event, SampleBlock
 from tests.bus.samples import block
 from tests.bus.test_sample_order import Bench
+from tests.waiting import wait_until
 
 BILLION = 10**9
 

@@ -11,8 +11,8 @@ from daq.adapters import adapter_for
 from daq.adapters.serial_line import SerialPort
 from rigwatch.commands import main
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.delivery.ring_protocol import Ask, RingReply
 from rigwatch.wire.messages.topics import EVENTS, HEALTH, RING_KEY, SAMPLES
+from rigwatch.wire.ordering.ring_protocol import Ask, RingReply
 from sim_plant.serve.pty_line import PtyLine
 from sim_plant.serve.serial_server import SerialServer
 from sim_plant.serve.source import Device

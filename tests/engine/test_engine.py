@@ -9,6 +9,7 @@ from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.dimension import describe, dimension
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import Model, shipped_models
+from rigwatch.physics.engine.equations.quantities import spelt_out
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
@@ -147,9 +148,10 @@ MISTAKES = [
 
 @pytest.mark.parametrize(("right", "wrong", "said"), MISTAKES, ids=[m[1] for m in MISTAKES])
 def test_a_wrong_equation_is_named(right, wrong, said):
-    state = MASS_SPRING_DAMPER.states["v"]
+    model = spelt_out(MASS_SPRING_DAMPER)
+    state = model.states["v"]
     broken = replace(state, derivative=state.derivative.replace(right, wrong))
-    model = replace(MASS_SPRING_DAMPER, states=MASS_SPRING_DAMPER.states | {"v": broken})
+    model = replace(model, states=model.states | {"v": broken})
     with pytest.raises(ModelError, match=r"state v|expected") as error:
         compose(model)
     assert said in str(error.value)

@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from benchmarks.fits_from_afar import SAMPLES, Plant, excitation, moved, position_alone
+from benchmarks.explaining.fits_from_afar import SAMPLES, Plant, excitation, moved, position_alone
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.system import compose
-from rigwatch.physics.engine.fit.convergence import promise
-from rigwatch.physics.engine.fit.drawn_starts import drawn_start
-from rigwatch.physics.engine.fit.equation_error import equation_error_starts
-from rigwatch.physics.engine.fit.fit_from_afar import fit_from_afar, growing_horizons
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import fit
+from rigwatch.physics.engine.search.convergence import promise
+from rigwatch.physics.engine.search.drawn_starts import drawn_start
+from rigwatch.physics.engine.search.equation_error import equation_error_starts
+from rigwatch.physics.engine.search.fit_from_afar import fit_from_afar
+from rigwatch.physics.engine.search.short_horizons import ShortHorizons, growing_horizons
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.typed_files.loading import parse
 
@@ -55,10 +56,10 @@ def error_over_noise(found, noise):
 @pytest.mark.parametrize("start", [(1.0, 1.0, 1.0), (1e3, 1e-3, 1e-2), (1e-3, 1e3, 4e5)])
 def test_the_floor_is_reached_from_starts_six_decades_apart(start, horizon, hold):
     recording, noise = recorded(hold)
-    found, ended = fit_from_afar(
+    found, ended = fit_from_afar(ShortHorizons(
         compiled_with(hold), recording, horizon, start=np.array(start), scale=noise, noise=noise,
         substeps=2,
-    )  # fmt: skip
+    ))  # fmt: skip
     assert error_over_noise(found, noise) < 1.05
     assert found.parameters == pytest.approx(PLANT.values, rel=0.01)
     assert ended.converged
@@ -129,7 +130,7 @@ def test_a_hidden_state_is_reached_by_growing_horizons_and_what_is_open_is_said(
     start = np.array([3000.0, 1e-2, 1e-2])
     assert equation_error_starts(compiled, recording, start) == []
     found, ended = fit_from_afar(
-        compiled, recording, 256, start=start, scale=noise, noise=noise, substeps=2
+        ShortHorizons(compiled, recording, 256, start=start, scale=noise, noise=noise, substeps=2)
     )
     assert error_over_noise(found, noise) < 1.1
     assert ended.converged
@@ -145,7 +146,9 @@ def test_a_parameter_at_its_bound_is_named():
 
     recording, noise = recorded()
     _, ended = fit_from_afar(
-        compiled_with(change=stiff), recording, 128, scale=noise, noise=noise, substeps=2
+        ShortHorizons(
+            compiled_with(change=stiff), recording, 128, scale=noise, noise=noise, substeps=2
+        )
     )
     assert ended.at_bound == ("k",)
 
@@ -186,4 +189,6 @@ def test_what_blows_up_from_everywhere_is_an_error():
     recording, noise = recorded()
     spoiled = Recording(DT, recording.inputs * 1e306, recording.outputs)
     with pytest.raises(ModelError):
-        fit_from_afar(compiled_with(), spoiled, 64, scale=noise, noise=noise, substeps=2)
+        fit_from_afar(
+            ShortHorizons(compiled_with(), spoiled, 64, scale=noise, noise=noise, substeps=2)
+        )

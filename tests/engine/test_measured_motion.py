@@ -23,12 +23,13 @@ from rigwatch.physics.engine.equations.model import (
     shipped_models,
 )
 from rigwatch.physics.engine.equations.system import Placement, compose
-from rigwatch.physics.engine.fit.convergence import Convergence
 from rigwatch.physics.engine.fit.measured_recording import motion_recording
-from rigwatch.physics.engine.fit.motion_fit import fit_along_motion
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.smoothing import best_width, smoothed
 from rigwatch.physics.engine.fit.windowed_fit import Fit, fit
+from rigwatch.physics.engine.search.convergence import Convergence
+from rigwatch.physics.engine.search.fit_from_afar import fit_from_afar
+from rigwatch.physics.engine.search.whole_runs import WholeRuns
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
@@ -240,7 +241,7 @@ def _fitted_from_afar(t_high: float) -> tuple[Fit, Convergence]:
         {"k": 2 * SPRING, "c": DAMPER / 2, "K": 2 * FORCE_A_VOLT, "T": LATE / 2}
     )
     noise = 0.01 * recording.outputs[:, 1:].std(axis=0)
-    return fit_along_motion(compiled, motion, start=start, scale=noise)
+    return fit_from_afar(WholeRuns(compiled, [motion], noise, start=start))
 
 
 def test_fit_along_the_motion_says_that_it_converged() -> None:

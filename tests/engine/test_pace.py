@@ -52,7 +52,7 @@ def test_every_effect_is_followed_as_by_steps_that_are_fine_everywhere(placement
     found, fine = run(system, 2, 256), run(system, 256, 1)
     wrong = np.sqrt(np.mean((found.outputs - fine.outputs) ** 2, axis=(0, 1)))
     # A jump that lies a hair before or after a sample is a sample's worth of difference there.
-    assert (wrong < 0.01 * fine.outputs.std(axis=(0, 1))).all()
+    assert (wrong <= 0.01 * fine.outputs.std(axis=(0, 1))).all()
 
 
 def test_friction_needs_fine_steps_about_standstill_and_gets_them():

@@ -53,6 +53,17 @@ def test_accelerometer_fault_is_not_called_friction() -> None:
     assert not names & {"dry_friction", "stiction"}
 
 
+def test_position_that_jumps_is_said_and_not_called_friction() -> None:
+    channels = run(SINE, 10.0, seed=5)
+    channels["position"][round(6.0 * RATE) :] += 2e-3
+
+    times = raised(watched(channels))
+
+    assert times["sensor_jumped.position"] == pytest.approx(6.0, abs=1.0 / RATE)
+    assert times["other_fault"] == pytest.approx(6.0, abs=3.0 / RATE)
+    assert not times.keys() & {"dry_friction", "stiction"}
+
+
 def test_block_sizes_change_no_bit() -> None:
     channels = run(SINE, 5.0, coulomb(3.0), seed=6)
     whole = ObserverMonitor(model()).update(block(channels))
@@ -81,9 +92,9 @@ def test_gap_restarts_and_says_that_it_is_not_armed() -> None:
 
 def test_motion_beyond_the_range_is_said_and_not_judged() -> None:
     channels = run(SINE, 8.0, seed=8)
-    late = slice(round(5.0 * RATE), None)
+    grown = np.interp(np.arange(round(8.0 * RATE)) / RATE, [5.0, 6.0], [1.0, 8.0])
     for name in channels:
-        channels[name][late] *= 8.0
+        channels[name] *= grown
 
     names = raised(watched(channels)).keys()
 

@@ -25,7 +25,7 @@ def noise(n: int) -> np.ndarray:
 
 
 def settled(speed: np.ndarray) -> np.ndarray:
-    return SpectralWidth(SLOW, RATE).update(speed, states(speed.size))[512:]
+    return SpectralWidth(SLOW, RATE).update(speed, states(speed.size)).narrow[512:]
 
 
 @pytest.mark.parametrize("frequency", [4.0, 8.0, 16.0])
@@ -46,6 +46,15 @@ def test_rest_is_not_broad() -> None:
     assert np.all(settled(0.3 * SLOW * rng.standard_normal(2048)) == 1.0)
 
 
+@pytest.mark.parametrize("frequency", [4.0, 9.6])
+def test_pace_of_a_tone_is_its_frequency(frequency: float) -> None:
+    speed = 0.2 * np.sin(2.0 * np.pi * frequency * np.arange(2048) / RATE)
+    found = SpectralWidth(SLOW, RATE).update(speed, states(speed.size))
+
+    assert found.pace[512:] == pytest.approx(frequency, rel=0.06)
+    assert found.size[1024:] == pytest.approx(0.2 * 2.0 * np.pi * frequency / 2**0.5, rel=0.1)
+
+
 def test_any_cut_gives_the_same() -> None:
     speed, code = noise(1000), states(1000)
     whole = SpectralWidth(SLOW, RATE).update(speed, code)
@@ -53,4 +62,6 @@ def test_any_cut_gives_the_same() -> None:
 
     parts = [cut.update(speed[a:b], code[a:b]) for a, b in ((0, 1), (1, 300), (300, 1000))]
 
-    assert np.array_equal(np.concatenate(parts), whole)
+    for name in whole._fields:
+        pieces = [getattr(part, name) for part in parts]
+        assert np.array_equal(np.concatenate(pieces), getattr(whole, name)), name

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from monitor.commissioning.unhealthy import check_healthy
+from monitor.commissioning.unhealthy import check_healthy, check_moves
+from monitor.signals.recordings import recording_of
 from rigwatch.wire.errors import ModelError
 
 RATE, SAMPLES = 256.0, 5120
@@ -37,3 +38,25 @@ def test_one_that_rubs_all_the_time_is_told_from_the_others() -> None:
 
 def test_one_kind_of_rubbing_in_all_of_them_is_the_rig() -> None:
     check_healthy(["a", "b", "c"], [part(k, 0.3) for k in range(3)], RATE)
+
+
+def test_a_short_recording_is_refused_with_what_to_do() -> None:
+    moving = recording_of("healthy", "brief", RATE, {"position": np.sin(np.arange(512) / 5.0)})
+
+    with pytest.raises(ModelError, match=r"brief: found 2\.0 s .* at least 5 s .*record longer"):
+        check_moves([moving], ["position"])
+
+
+def test_a_recording_at_rest_is_refused_with_its_channel() -> None:
+    rng = np.random.default_rng(4)
+    still = 0.02 + 1e-5 * rng.standard_normal(SAMPLES)
+
+    with pytest.raises(ModelError, match="rest: found no motion in position"):
+        check_moves([recording_of("healthy", "rest", RATE, {"position": still})], ["position"])
+
+
+def test_motion_of_ordinary_size_passes() -> None:
+    rng = np.random.default_rng(5)
+    moving = 1e-3 * np.sin(np.arange(SAMPLES) / 5.0) + 1e-5 * rng.standard_normal(SAMPLES)
+
+    check_moves([recording_of("healthy", "sine", RATE, {"position": moving})], ["position"])

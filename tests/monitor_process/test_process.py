@@ -12,7 +12,6 @@ from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
 from rigwatch.wire.bus.alarm_list import ask_alarm_list
-from rigwatch.wire.bus.bus import wait_until
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.delivery.ring import SampleRing
@@ -33,6 +32,7 @@ from rigwatch.wire.rig_config import load_rig
 from tests.bus.publisher import wave
 from tests.bus.rig import PATIENCE, TestRig
 from tests.monitor_process.model import MODEL, monitor_section
+from tests.waiting import wait_until
 
 
 class Bench:
@@ -201,10 +201,17 @@ def test_a_killed_monitor_has_its_alarms_and_misses_no_sample(bench: Bench) -> N
         bench.send(wave(seq, 1, 7, 0))
     bench.alarm_states()
     bench.start()
-    assert ("disk", "unacknowledged") in bench.alarm_states()
+    assert wait_until(lambda: ("disk", "unacknowledged") in bench.alarm_states(), PATIENCE)
     bench.send(wave(700, 1, 7, 0))
     bench.turn_until(700)
-    after = estimates_of(bench.heard[ESTIMATES])
+    heard: list[EstimateBlock] = []
+
+    def all_heard() -> bool:
+        heard.extend(bench.heard[ESTIMATES].drain())
+        return bool(heard) and heard[-1].seq + len(heard[-1]) > 700
+
+    assert wait_until(all_heard, PATIENCE)
+    after = concatenate(heard)
     assert (after.seq, len(after)) == (400, 301)
     whole = RigMonitor(MODEL).update(wave_of(701))
     assert whole is not None
@@ -297,14 +304,72 @@ def test_a_clock_that_was_set_is_noticed_and_one_that_runs_is_not() -> None:
     assert watch.clock_step(seen(4 - 30, 4)) == 0
 
 
-def test_the_recorders_trouble_with_its_disk_is_an_alarm_and_clears(bench: Bench) -> None:
-    def say(trouble: float) -> None:
-        counters = {"disk_trouble": trouble, "free_share": 0.004}
-        bench.daq.publish(HEALTH, Health("recorder", 1, "recording", "", counters))
-        bench.turn()
+def test_the_recorders_troubles_are_alarms_and_clear(bench: Bench) -> None:
+    names = ("disk", "disk_almost_full", "recording_stopped")
 
-    said = []
-    for trouble in (0.0, 1.0, 1.0, 0.0):
-        say(trouble)
-        said.append([state for name, state in bench.alarm_states() if name == "disk"])
-    assert said == [[], ["unacknowledged"], [], ["cleared_unacknowledged"]]
+    def told(state: str, free: float, trouble: float) -> set[tuple[str, str]]:
+        counters = {"disk_trouble": trouble, "free_share": free}
+        bench.daq.publish(HEALTH, Health("recorder", 1, state, "", counters))
+        bench.turn()
+        return {(name, state) for name, state in bench.alarm_states() if name in names}
+
+    raised, cleared = "unacknowledged", "cleared_unacknowledged"
+    assert told("recording", 0.4, 0.0) == set()
+    assert told("recording", 0.09, 1.0) == {("disk", raised)}
+    assert told("recording", 0.019, 1.0) == {("disk_almost_full", raised)}
+    assert told("not recording", 0.0, 1.0) == {("recording_stopped", raised)}
+    assert told("recording", 0.4, 0.0) == {(name, cleared) for name in names}
+
+
+@pytest.mark.parametrize(
+    ("alarm", "state", "counters"),
+    [
+        ("line_noise", "garbage", {}),
+        ("slow_device", "slow", {}),
+        ("clock_drift", "running", {"drift_ppm": -600.0}),
+    ],
+)
+def test_what_daq_says_of_its_device_is_an_alarm_and_clears(
+    bench: Bench, alarm: str, state: str, counters: dict[str, float]
+) -> None:
+    told = []
+    for at, figures in ((state, counters), ("running", {"drift_ppm": 20.0})):
+        bench.daq.publish(HEALTH, Health("daq/rig", 1, at, "", figures))
+        bench.turn()
+        told += [change for change in bench.alarm_states() if change[0] == alarm]
+    assert told == [(alarm, "unacknowledged"), (alarm, "cleared_unacknowledged")]
+
+
+def test_samples_without_estimates_are_an_alarm(bench: Bench) -> None:
+    whole = wave(0, 600, 7, 0)
+    channels = whole.channels[:2]
+    bench.send(SampleBlock("rig", 7, 0, whole.device_us, whole.t_ns, channels))
+    bench.turn_until(599)
+    bench.turn()
+    assert ("estimates_missing", "unacknowledged") in bench.alarm_states()
+
+
+def test_the_return_of_a_router_is_told_to_those_who_only_listen(bench: Bench) -> None:
+    bench.network.up = False
+    bench.turn()
+    bench.network.up = True
+    bench.turn()
+    assert "ROUTER BACK" in [event.code for event in bench.heard[EVENTS].drain()]
+
+
+def test_a_recorder_that_dies_is_an_alarm_and_one_that_is_stopped_is_none(bench: Bench) -> None:
+    def stopped() -> list[str]:
+        bench.turn()
+        return [state for name, state in bench.alarm_states() if name == "recording_stopped"]
+
+    recorder = bench.network.bus("bench", "recorder")
+    recorder.publish(HEALTH, Health("recorder", 1, "recording", "", {}))
+    assert stopped() == []
+    recorder.close()
+    assert stopped() == ["unacknowledged"]
+    recorder = bench.network.bus("bench", "recorder")
+    recorder.publish(HEALTH, Health("recorder", 1, "recording", "", {}))
+    assert stopped() == ["cleared_unacknowledged"]
+    recorder.publish(HEALTH, Health("recorder", 1, "stopped", "", {}))
+    recorder.close()
+    assert stopped() == []

@@ -9,12 +9,12 @@ import pytest
 
 from monitor.alarms import Occasion
 from monitor.process.cursor import Cursor
-from rigwatch.wire.bus.bus import wait_until
 from rigwatch.wire.bus.model_change import Granted, Wish, ask_for_model
 from rigwatch.wire.messages import ALARMS, COMMANDS, ESTIMATES, AlarmCommand
 from tests.bus.publisher import wave
 from tests.bus.rig import PATIENCE
 from tests.monitor_process.test_process import Bench
+from tests.waiting import wait_until
 
 YEAR_NS = 365 * 86_400 * 1_000_000_000
 

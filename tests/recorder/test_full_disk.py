@@ -53,6 +53,58 @@ def in_small_disk(folder: Path, script: str) -> "subprocess.CompletedProcess[str
     )
 
 
+STARTING = """
+import json, sys
+from pathlib import Path
+from monitor.alarms import AlarmJournal, AlarmManager, Occasion
+from rigwatch.recorder.process import Recorder
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.messages import HEALTH
+from rigwatch.wire.rig_config import RigConfig
+from rigwatch.wire.session import run_info
+from rigwatch.wire.typed_files import parse
+
+disk = Path(sys.argv[1])
+try:
+    with (disk / "ballast").open("wb", buffering=0) as ballast:
+        while ballast.write(bytes(4096)):
+            pass
+except OSError:
+    pass
+text = '[rig]\\nid="b"\\n[[channels]]\\nname="v"\\nunit="V"\\ngain=1.0\\n[daq.device]\\n'
+text += 'adapter="serial"\\nport="/dev/null"\\n[recorder]\\nfolder="%s"\\n' % (disk / "s")
+network = MemoryNetwork()
+heard = network.bus("b", "observer").subscribe(HEALTH)
+config = parse(text, RigConfig, "rig.toml")
+recorder = Recorder(config, run_info("b", 256.0, t_ns=1), network.bus("b", "recorder"))
+journal, alarms = AlarmJournal(disk / "alarms.jsonl"), AlarmManager()
+alarms.report("disk", Occasion(), active=True)
+journal.write(alarms.take_changes())
+failed = journal.failure
+for turn in range(3):
+    recorder.turn(float(turn), turn)
+states = [health.state for health in heard.drain()]
+(disk / "ballast").unlink()
+journal.write([])
+recorder.turn(4.0, 4)
+states += [health.state for health in heard.drain()]
+print(json.dumps({"states": states, "failed": failed, "after": journal.failure}))
+"""
+
+
+def test_recorder_and_journal_start_on_a_full_disk_and_write_once_there_is_room(
+    tmp_path: Path,
+) -> None:
+    if shutil.which("unshare") is None or in_small_disk(tmp_path, "").returncode:
+        pytest.skip("no mount namespaces for users here")
+    done = in_small_disk(tmp_path, STARTING)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["states"][-2:] == ["not recording", "recording"]
+    assert "cannot be written" in found["failed"]
+    assert found["after"] == ""
+
+
 def test_recording_goes_on_when_a_full_disk_has_room_again(tmp_path: Path) -> None:
     if shutil.which("unshare") is None or in_small_disk(tmp_path, "").returncode:
         pytest.skip(

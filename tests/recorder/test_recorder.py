@@ -72,6 +72,10 @@ def block(seq: int, n: int = 1) -> SampleBlock:
     return SampleBlock("rig", 7, seq, index * 3906, t_ns, (column,))
 
 
+def alarm(seq: int) -> Alarm:
+    return Alarm("gap", "normal", "info", "", "", "rig", 7, seq, 5, 0.0, 0.0, 0.0, False, "", seq)
+
+
 class Source:
     """Stands where the acquisition stands: ring and publisher on the bus."""
 
@@ -107,8 +111,7 @@ def test_everything_said_is_kept_once(config: Path) -> None:
         monitor.publish(ESTIMATES, EstimateBlock("rig", 7, seq, np.array([seq]), column))
     monitor.publish(EVENTS, Event("monitor", 5, "info", "HELLO", "here"))
     monitor.publish(GAPS, Gap("rig", 7, 200, 201, 5, "monitor", "not in the ring"))
-    alarm = Alarm("gap", "normal", "info", "", "", "rig", 7, 1, 5, 0.0, 0.0, 0.0, False, "", 1)
-    monitor.publish(ALARMS, alarm)
+    monitor.publish(ALARMS, alarm(1))
     recorder.turn(0.0, time.time_ns())
     recorder.close(1.0, time.time_ns())
     session = open_session(recorder.store.folder)
@@ -170,6 +173,34 @@ def test_a_session_goes_on_after_a_short_break_only(tmp_path: Path, config: Path
     other = run_info("bench1", 256.0, t_ns=run.t_ns, configuration_sha256="changed")
     assert choose(tmp_path / "sessions", other).folder != folder
     assert choose(tmp_path / "nowhere", run).last is None
+
+
+def test_a_recorder_started_again_keeps_what_was_said_meanwhile(config: Path) -> None:
+    network = MemoryNetwork()
+    source = Source(network.bus("bench1", "daq"))
+    monitor = network.bus("bench1", "monitor")
+    rig = load_rig(config)
+
+    def record(seqs: range) -> Path:
+        recorder = Recorder(rig, describe_run(config, rig), network.bus("bench1", "recorder"))
+        for seq in seqs:
+            monitor.publish(ALARMS, alarm(seq))
+        source.send(5)
+
+        def done() -> bool:
+            recorder.turn(0.0, time.time_ns())
+            return recorder.feed.positions()["alarms"]["monitor"][1] + 1 >= seqs.stop
+
+        eventually(done, "all alarms are taken")
+        recorder.feed.close()
+        return recorder.store.folder
+
+    record(range(3))
+    for seq in range(3, 7):
+        monitor.publish(ALARMS, alarm(seq))
+    folder = record(range(7, 9))
+    said = [item.message for item in open_session(folder).messages(["alarms"])]
+    assert [message.seq for message in said if isinstance(message, Alarm)] == list(range(9))
 
 
 @pytest.fixture

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from rigwatch.demo.narrator import Narrator, acts
-from rigwatch.demo.rig_file import as_toml, write_rig_file
+from rigwatch.demo.rig_file import write_rig_file
 from rigwatch.demo.verdict import complaints, newest_session, read_recording
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, SampleBlock
 from rigwatch.wire.rig_config import SerialSection, load_rig
 from rigwatch.wire.session import SessionWriter, run_info
 from rigwatch.wire.typed_files.shipped import find_config
+from rigwatch.wire.typed_files.writing import as_toml
 from sim_plant.scenario import load_scenario
 
 RATE = 256

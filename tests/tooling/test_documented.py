@@ -18,6 +18,7 @@ PRINTED_PAGES = (
     ("configuration.md", "config_docs"),
     ("commands.md", "command_docs"),
     ("units.md", "unit_docs"),
+    ("effects.md", "effect_docs"),
 )
 
 

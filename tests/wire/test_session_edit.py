@@ -93,7 +93,7 @@ def test_info(session: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert voltage["flags"] == {"saturated": 10, "good": 1060}
     assert (voltage["low"], voltage["high"]) == (0.0, 1149.0)
     assert position["flags"] == {"good": 1070}
-    assert found["reported_lost"] == 100
+    assert (found["unknown_ends"], found["lost_messages"]) == (0, {})
     assert found["topics"]["alarms"] == 4
     assert [item["name"] for item in found["alarms"]] == ["link", "gap", "gap", "dry_friction"]
     assert found["alarms"][0]["low"] is None

@@ -1,0 +1,97 @@
+"""Studies of `sim_plant.machines`: logs as CSV, imported, with the study that a user writes."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.wire.exchange import ImportMapping, import_file
+from rigwatch.workbench.study import Study, open_study
+from sim_plant.machines import MACHINES, log, strength_for
+
+UNITS = {"N": "N", "m": "m", "m_s2": "m/s^2", "V": "V", "rad_s": "rad/s", "rad": "rad", "s": "s"}
+"""Units by what ends the names of columns."""
+STUDIES = {
+    "oscillator": 'model = "mass-spring-damper"\nhorizon = 1.0\n',
+    "motor": 'model = "motor"\nhorizon = 0.3\nstart = { R = 2.0, K = 0.06 }\n',
+    "pendulum": 'model = "pendulum"\nhorizon = 1.0\nstart = { R = 4.0, K = 0.5 }\n',
+    "damper": 'model = "damper"\n[derive]\nlow_pass = 20.0\n'
+    'signals.velocity = { channel = "displacement", order = 1 }\n',
+    "tanks": 'model = "tanks"\nhorizon = 150.0\nstart = { A1 = 0.0028, A2 = 0.0032 }\n',
+}
+"""What the study of each machine says beside its recordings."""
+WITH_HEALTHY = ("oscillator",)
+"""Machines of which a recording with nothing wrong can be had."""
+RIGHT: dict[str, dict[str, tuple[str, ...]]] = {
+    "oscillator": {
+        "coulomb": ("coulomb@load",),
+        "cubic_stiffness": ("cubic_stiffness@load",),
+        "quadratic_drag": ("quadratic_drag@load",),
+        "dead_band": ("dead_band@drive",),
+        "acceleration_lag": ("lag@acceleration_sensor", "delay@acceleration_sensor"),
+    },
+    "motor": {
+        "coulomb": ("coulomb@shaft",),
+        "fan": ("quadratic_drag@shaft",),
+        "saturation": ("saturation@drive",),
+        "drag_by_direction": ("viscous_by_direction@shaft",),
+    },
+    "pendulum": {
+        "coulomb": ("coulomb@shaft",),
+        "air_drag": ("quadratic_drag@shaft",),
+        "late_drive": ("delay@drive", "lag@drive"),
+        "imbalance": ("constant_force@shaft", "offset@drive"),
+    },
+    "damper": {
+        "slider": ("jenkins@rod",),
+        "hardening": ("cubic_stiffness@rod",),
+        "joint": ("bouc_wen@rod",),
+        "orifice": ("quadratic_drag@rod",),
+        "preload": ("constant_force@rod", "offset@force_sensor"),
+    },
+    "tanks": {
+        "leak": ("orifice@upper",),
+        "dead_band": ("dead_band@pump",),
+        "saturation": ("saturation@pump",),
+        "late_pump": ("lag@pump", "delay@pump"),
+        "inlet": ("constant_force@lower",),
+    },
+}
+"""What the library calls each hidden effect; several where they are one on any recording."""
+
+
+def machine_study(
+    folder: Path, machine: str, shares: Mapping[str, float], noise: float, seed: int
+) -> Study:
+    """The study of a machine that hides effects.
+
+    Args:
+        folder: where its files go.
+        machine: its name.
+        shares: of the outputs' rms that each hidden effect changes alone.
+        noise: of the sensors, over the rms of what they read.
+        seed: of the recordings.
+    """
+    plant, text = MACHINES[machine], STUDIES[machine]
+    hidden = {name: strength_for(plant, name, share, seed) for name, share in shares.items()}
+    recordings = [("train", hidden, seed), ("held_out", hidden, seed + 1000)]
+    if machine in WITH_HEALTHY:
+        recordings.append(("healthy", {}, seed + 2000))
+    for use, effects, own_seed in recordings:
+        _write(folder / f"{use}.csv", log(plant, effects, noise, own_seed))
+        mapping = ImportMapping(channels=_channels(plant.columns), time="time_s[s]")
+        import_file(folder / f"{use}.csv", folder / f"{use}.mcap", mapping)
+        text += f'\n[[{use}]]\nsession = "{use}.mcap"\n'
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    return open_study(folder)
+
+
+def _channels(columns: tuple[str, ...]) -> dict[str, str]:
+    """Channels by the columns that they are read from, with their units."""
+    parts = (column.partition("_") for column in columns)
+    return {name: f"{name}_{end}[{UNITS[end]}]" for name, _, end in parts}
+
+
+def _write(path: Path, table: Mapping[str, np.ndarray]) -> None:
+    rows = np.column_stack(list(table.values()))
+    np.savetxt(path, rows, delimiter=",", header=",".join(table), comments="", fmt="%.9g")

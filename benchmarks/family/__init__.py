@@ -1,0 +1,1 @@
+"""Rigs as folders of recordings, played through the commands."""

@@ -1,0 +1,1 @@
+"""Structures of masses and springs: identified, and watched for damage."""

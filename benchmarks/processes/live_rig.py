@@ -1,0 +1,97 @@
+"""A whole rig on this machine for benchmarks: real processes, a real serial line, a real router."""
+
+import contextlib
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from rigwatch.demo.commissioning import ensure_model
+from rigwatch.demo.rig_file import write_rig_file
+from rigwatch.wire.bus.connection import connect
+from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.typed_files import find_config
+from tests.waiting import wait_until
+
+ROOT = Path(__file__).parents[2]
+START_TIMEOUT = 60.0
+
+
+class LiveRig:
+    """Processes of one rig, all ended on leaving.
+
+    Args:
+        folder: where configuration, model and recordings go.
+        needs_model: commission the simulated rig first, as the demonstration does.
+    """
+
+    def __init__(self, folder: Path, *, needs_model: bool = True) -> None:
+        self.folder = folder
+        self.path = write_rig_file(find_config("demo.toml"), folder, "web")
+        _set_apart(self.path)
+        if needs_model:
+            ensure_model(self.path, folder, lambda _: None)
+        self.config: RigConfig = load_rig(self.path)
+        self._running: list[subprocess.Popen[bytes]] = []
+
+    def start(self, *arguments: str) -> "subprocess.Popen[bytes]":
+        """`python ARGUMENTS` from the repository's root."""
+        process = subprocess.Popen(
+            [sys.executable, *arguments],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            stdout=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        self._running.append(process)
+        return process
+
+    def command(self, name: str) -> "subprocess.Popen[bytes]":
+        """`rigwatch NAME CONFIG`."""
+        return self.start("-m", "rigwatch", name, str(self.path))
+
+    def wait_for(self, *names: str) -> None:
+        """Wait until processes of these names are on the bus."""
+        bus = connect(self.config, "benchmark", START_TIMEOUT)
+        wanted = {f"alive/{name}" for name in names}
+        there = wait_until(lambda: wanted <= set(bus.tokens("alive/*")), START_TIMEOUT, 0.1)
+        bus.close()
+        if not there:
+            raise TimeoutError(f"not all of {', '.join(names)} came up")
+
+    def close(self) -> None:
+        """End all processes, in good order where they let themselves be ended."""
+        for process in reversed(self._running):
+            process.send_signal(signal.SIGTERM)
+        deadline = time.monotonic() + 5.0
+        for process in self._running:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(max(0.1, deadline - time.monotonic()))
+            process.kill()
+            process.wait()
+
+
+def _set_apart(path: Path) -> None:
+    """A port and a name of its own, so that no other rig on this machine is met on the bus."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    text = re.sub(r"tcp/127\.0\.0\.1:\d+", f"tcp/127.0.0.1:{port}", path.read_text())
+    path.write_text(re.sub(r'(?m)^id = ".*"$', f'id = "bench-{os.getpid()}"', text, count=1))
+
+
+@contextlib.contextmanager
+def live_rig(*, needs_model: bool = True) -> Iterator[LiveRig]:
+    """A rig in a folder of its own, gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="rigwatch-bench-") as folder:
+        rig = LiveRig(Path(folder), needs_model=needs_model)
+        try:
+            yield rig
+        finally:
+            rig.close()

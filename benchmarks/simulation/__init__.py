@@ -1,0 +1,1 @@
+"""The engine's simulation with sensitivities beside other people's."""

@@ -1,0 +1,185 @@
+"""Who may ask: what comes from elsewhere, without a token or leads out of the folder is refused."""
+
+import http.client
+import json
+import threading
+from pathlib import Path
+
+import pytest
+
+from rigwatch.browser.server.access import COOKIE, Access, hosts_of
+from rigwatch.browser.server.places import PlaceError, Places
+from rigwatch.browser.server.serving import Options, serve
+from rigwatch.wire.errors import RigwatchError
+from tests.browser.page import Served
+
+pytestmark = pytest.mark.xdist_group("browser")
+
+
+def ask(
+    served: Served, path: str, method: str = "GET", *, token: bool = True, body: bytes = b"",
+    **headers: str,
+) -> tuple[int, str]:  # fmt: skip
+    """Status and text of an answer."""
+    host = served.address.removeprefix("http://")
+    given = {"Host": host, "Origin": served.address}
+    if token:
+        given["Cookie"] = f"{COOKIE}={served.token}"
+    given |= {name.replace("_", "-"): value for name, value in headers.items()}
+    line = http.client.HTTPConnection(host, timeout=60)
+    try:
+        line.request(method, path, body or None, {k: v for k, v in given.items() if v})
+        answer = line.getresponse()
+        return answer.status, answer.read().decode(errors="replace")
+    finally:
+        line.close()
+
+
+REFUSED = {
+    "forged Host": ("/", "GET", {"Host": "evil.example"}, 421),
+    "a name that was made to point here": ("/", "GET", {"Host": "evil.example:80"}, 421),
+    "forged Origin": ("/api/story/emps", "POST", {"Origin": "http://evil.example"}, 403),
+    "Origin of another port": ("/api/story/emps", "POST", {"Origin": "http://127.0.0.1:1"}, 403),
+    "no Origin": ("/api/story/emps", "POST", {"Origin": ""}, 403),
+    "Origin null": ("/api/story/emps", "POST", {"Origin": "null"}, 403),
+    "wrong token": ("/", "GET", {"Cookie": f"{COOKIE}=guess"}, 403),
+    "dots": ("/api/parts/..%2f..%2fetc", "GET", {}, 404),
+    "more dots": ("/api/recording/../../../etc/passwd", "GET", {}, 404),
+    "an absolute path": ("/api/recording//etc/passwd", "GET", {}, 404),
+    "dots in static": ("/static/..%2faccess.py", "GET", {}, 404),
+    "a zero byte": ("/api/recording/a%00.mcap", "GET", {}, 404),
+    "dots in an upload": ("/api/upload/..%2fa.csv", "PUT", {}, 404),
+    "a hidden upload": ("/api/upload/.profile", "PUT", {}, 404),
+    "a template that is a file": ("/api/template/pyproject.toml", "GET", {}, 409),
+    "another method": ("/api/begin/emps", "DELETE", {}, 405),
+}
+
+
+@pytest.mark.parametrize(("path", "method", "headers", "status"), REFUSED.values(), ids=REFUSED)
+def test_what_is_forged_is_refused(
+    served: Served, path: str, method: str, headers: dict[str, str], status: int
+) -> None:
+    assert ask(served, path, method, **headers)[0] == status
+    assert ask(served, "/")[0] == 200
+
+
+def test_without_a_token_nothing_is_shown(served: Served) -> None:
+    for path in ("/", "/new", "/static/study.js", "/api/recordings"):
+        status, text = ask(served, path, token=False)
+        assert status == 403
+        assert "token" in text
+
+
+def test_the_address_brings_the_token_once_and_leaves_it_out_of_what_others_see(
+    served: Served,
+) -> None:
+    line = http.client.HTTPConnection(served.address.removeprefix("http://"), timeout=60)
+    line.request("GET", f"/?token={served.token}")
+    answer = line.getresponse()
+    assert (answer.status, answer.headers["location"]) == (303, "/")
+    cookie = answer.headers["set-cookie"]
+    assert "HttpOnly" in cookie
+    assert "samesite=strict" in cookie.lower()
+    assert answer.headers["content-security-policy"].startswith("default-src 'self'")
+    assert answer.headers["referrer-policy"] == "no-referrer"
+
+
+def test_a_file_that_is_too_long_is_refused_and_leaves_nothing(served: Served) -> None:
+    before = sorted(served.folder.rglob("*"))
+    whole = ask(served, "/api/upload/long.csv", "PUT", Content_Length=str(1 << 30))
+    assert whole[0] == 413
+    # Without a length, in parts: it is counted as it comes.
+    host = served.address.removeprefix("http://")
+    line = http.client.HTTPConnection(host, timeout=60)
+    cookie = {"Cookie": f"{COOKIE}={served.token}", "Origin": served.address}
+    parts = (b"1,2\n" * 65536 for _ in range(64))
+    try:
+        line.request("PUT", "/api/upload/long.csv", parts, cookie, encode_chunked=True)
+        assert line.getresponse().status == 413
+    except (BrokenPipeError, ConnectionResetError):
+        pass  # the server has hung up before all was sent
+    assert ask(served, "/")[0] == 200
+    left = [path for path in served.folder.rglob("*") if path not in before and path.is_file()]
+    assert left == []
+
+
+def test_a_long_request_is_bounded(served: Served) -> None:
+    status, text = ask(served, "/api/new", "POST", body=b'{"name": "' + b"x" * (2 << 20) + b'"}')
+    assert status == 409
+    assert "expected a short request" in text
+
+
+@pytest.mark.parametrize("begin", ["/etc/passwd", "model:../../etc/passwd", "model:a.toml"])
+def test_a_study_begins_with_what_ships_alone(served: Served, begin: str) -> None:
+    (served.folder / "empty.mcap").write_bytes(b"")
+    spans = [{"use": use, "session": "empty.mcap"} for use in ("train", "held_out")]
+    body = json.dumps({"name": "stolen", "begin": begin, "spans": spans}).encode()
+    status, text = ask(served, "/api/new", "POST", body=body)
+    assert (status, "expected one of" in text) == (409, True)
+    assert not (served.folder / "stolen").exists()
+
+
+def test_links_do_not_lead_out(served: Served, tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text("model = 'emps-force'\n")
+    (tmp_path / "secret.mcap").write_bytes(b"secret")
+    links = {"linked": tmp_path, "linked.mcap": tmp_path / "secret.mcap"}
+    for name, target in links.items():
+        (served.folder / name).symlink_to(target)
+    try:
+        assert ask(served, "/api/parts/linked")[0] == 404
+        assert ask(served, "/study/linked")[0] == 404
+        assert ask(served, "/api/recording/linked.mcap")[0] == 404
+        assert "linked" not in ask(served, "/api/recordings")[1]
+    finally:
+        for name in links:
+            (served.folder / name).unlink()
+
+
+def test_a_study_that_names_files_outside_is_not_opened(served: Served, tmp_path: Path) -> None:
+    folder = served.folder / "outside"
+    folder.mkdir()
+    span = f'session = "{tmp_path}/a.mcap"\n'
+    text = f'model = "emps-force"\n[[train]]\n{span}[[held_out]]\n{span}'
+    (folder / "study.toml").write_text(text)
+    try:
+        status, told = ask(served, "/study/outside")
+        assert status == 404
+        assert "lies outside" in told
+    finally:
+        (folder / "study.toml").unlink()
+        folder.rmdir()
+
+
+def test_fifty_clients_are_served(served: Served) -> None:
+    found: list[int] = []
+
+    def work() -> None:
+        found.append(ask(served, "/new")[0])
+
+    clients = [threading.Thread(target=work) for _ in range(50)]
+    for client in clients:
+        client.start()
+    for client in clients:
+        client.join()
+    assert found == [200] * 50
+
+
+def test_others_are_let_in_by_tls_or_behind_a_proxy_alone(tmp_path: Path) -> None:
+    with pytest.raises(RigwatchError, match="--behind-proxy"):
+        serve(Options(tmp_path, "0.0.0.0"), lambda _: None)
+    with pytest.raises(RigwatchError, match="expected both"):
+        serve(Options(tmp_path, certificate=tmp_path / "a.pem"), lambda _: None)
+
+
+def test_a_proxy_is_named_without_its_port() -> None:
+    access = Access(hosts_of(["rig.example"], 443), secure=True)
+    assert "https://rig.example" in access.origins()
+    assert "http://rig.example" not in access.origins()
+
+
+def test_names_of_new_things_are_plain(tmp_path: Path) -> None:
+    places = Places(tmp_path.resolve())
+    for name in ("", ".", "..", "a/b", "../a", ".hidden", "a\x00", "a" * 200, "a\n"):
+        with pytest.raises(PlaceError):
+            places.new(name)
+    assert places.new("my study-1.a") == tmp_path.resolve() / "my study-1.a"

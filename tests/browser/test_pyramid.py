@@ -1,0 +1,54 @@
+"""What a chart shows of a long signal is what all of its samples would show."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigwatch.browser.signals.pyramid import FIRST, HIGH, LAST, LOW, Pyramid
+from rigwatch.browser.signals.trace import open_trace, write_trace
+
+
+@given(st.integers(1, 40_000), st.floats(0, 1), st.floats(0, 1), st.integers(1, 900), st.booleans())
+def test_each_column_has_the_extremes_of_its_samples(n, a, b, width, holes):
+    samples = np.random.default_rng(n).normal(size=n).astype(np.float32)
+    if holes:
+        samples[n // 3 : n // 2] = np.nan
+    begin, end = sorted((int(a * n), int(b * n)))
+    found = Pyramid(samples).span(begin, end, width)
+    assert len(found.values) == len(found.edges) - 1 <= width
+    if end > begin:
+        assert found.edges[0] <= begin
+        assert found.edges[-1] >= end
+    for row, first, last in zip(found.values, found.edges[:-1], found.edges[1:], strict=True):
+        part = samples[first:last]
+        if not np.isfinite(part).any():
+            continue
+        assert row[LOW] == np.nanmin(part)
+        assert row[HIGH] == np.nanmax(part)
+        np.testing.assert_equal(row[[FIRST, LAST]], part[[0, -1]])
+
+
+def test_a_spike_of_one_sample_is_seen_from_afar(tmp_path):
+    values = np.zeros(300_000)
+    values[123_456] = 7.0
+    write_trace(tmp_path, "spike", values, 1e-3)
+    trace = open_trace(tmp_path, "spike")
+    times, shown = trace.between(*trace.ends, 800)
+    assert len(shown) <= 4 * 800
+    assert shown.max() == 7.0
+    assert times[np.argmax(shown)] == pytest.approx(123.456, abs=0.4)
+    times, shown = trace.between(123.45, 123.46, 800)
+    assert times[np.argmax(shown)] == pytest.approx(123.456, abs=1e-9)
+
+
+def test_five_million_samples_are_shown_in_milliseconds(tmp_path):
+    write_trace(tmp_path, "long", np.random.default_rng(0).normal(size=5_000_000), 1e-3)
+    trace, took = open_trace(tmp_path, "long"), []
+    for k in range(60):
+        begun = time.perf_counter()
+        trace.between(40.0 * k, 5000.0 - 30.0 * k, 1200)
+        took.append(time.perf_counter() - begun)
+    assert np.quantile(took, 0.95) < 0.05

@@ -1,0 +1,152 @@
+"""Alarms and estimates reach every listener once: through loss, restarts, and a killed router."""
+
+import signal
+from pathlib import Path
+
+from rigwatch.wire.bus import Bus
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.bus.message_ring import MessageRing
+from rigwatch.wire.bus.subscription import Subscription
+from rigwatch.wire.messages import ALARMS, GAPS, Alarm, encode
+from rigwatch.wire.ordering import OPEN, Ask, Numbered
+from tests.bus.rig import TestRig, answers, kill
+from tests.waiting import PATIENCE, eventually, wait_until
+
+
+def alarm(seq: int) -> Alarm:
+    return Alarm("gap", "normal", "info", "", "", "rig", 7, seq, 5, 0.0, 0.0, 0.0, False, "", seq)
+
+
+def say(bus: Bus, seqs: range) -> None:
+    for seq in seqs:
+        bus.publish(ALARMS, alarm(seq))
+
+
+def heard(subscription: Subscription, until: int) -> list[int]:
+    """Numbers of the alarms up to the one called `until`."""
+    found: list[int] = []
+
+    def complete() -> bool:
+        found.extend(message.seq for message in subscription.drain())
+        return bool(found) and found[-1] >= until
+
+    assert wait_until(complete, PATIENCE, 0.005), found
+    return found
+
+
+def test_what_is_lost_on_the_way_is_fetched_once_and_in_order():
+    network = MemoryNetwork()
+    monitor, listener = network.bus("r", "monitor"), network.bus("r", "listener").subscribe(ALARMS)
+    say(monitor, range(3))
+    network.up = False
+    say(monitor, range(3, 60))
+    network.up = True
+    say(monitor, range(60, 62))
+    assert heard(listener, 61) == list(range(62))
+
+
+def test_the_last_word_before_a_silence_is_heard_too():
+    network = MemoryNetwork()
+    monitor, listener = network.bus("r", "monitor"), network.bus("r", "listener").subscribe(ALARMS)
+    say(monitor, range(2))
+    network.up = False
+    say(monitor, range(2, 4))
+    network.up = True
+    assert heard(listener, 3) == [0, 1, 2, 3]
+
+
+def test_one_who_joins_late_hears_what_is_said_from_then_on():
+    network = MemoryNetwork()
+    monitor = network.bus("r", "monitor")
+    say(monitor, range(5))
+    listener = network.bus("r", "listener").subscribe(ALARMS)
+    network.up = False
+    say(monitor, range(5, 6))
+    network.up = True
+    assert heard(listener, 5) == [5]
+
+
+def test_a_process_started_again_is_heard_from_its_first_word_on_and_the_break_is_told():
+    network = MemoryNetwork()
+    gaps = network.bus("r", "observer").subscribe(GAPS)
+    listener = network.bus("r", "listener").subscribe(ALARMS)
+    first = network.bus("r", "monitor")
+    say(first, range(4))
+    first.close()
+    second = network.bus("r", "monitor")
+    network.up = False
+    say(second, range(10, 12))
+    network.up = True
+    assert heard(listener, 11) == [0, 1, 2, 3, 10, 11]
+    told = gaps.drain()
+    assert [(gap.topic, gap.device, gap.last - gap.first + 1) for gap in told] == [
+        ("alarms", "monitor", 0)
+    ]
+
+
+def test_two_processes_that_say_alarms_are_both_heard():
+    network = MemoryNetwork()
+    listener = network.bus("r", "listener").subscribe(ALARMS)
+    say(network.bus("r", "monitor"), range(3))
+    say(network.bus("r", "structure"), range(100, 103))
+    assert sorted(heard(listener, 102)) == [0, 1, 2, 100, 101, 102]
+
+
+def test_an_alarm_in_the_name_of_another_is_dropped_and_counted():
+    network = MemoryNetwork()
+    monitor, stranger = network.bus("r", "monitor"), network.bus("r", "stranger")
+    listener = network.bus("r", "listener").listen(ALARMS)
+    say(monitor, range(1))
+    key, payload = monitor.key(ALARMS.key), encode(alarm(666))
+    assert monitor._outlet is not None
+    for mark in (Numbered(monitor._outlet.run, 1, b"").mark, Numbered(99, 0, b"").mark, b"", b"x"):
+        stranger.transport.put(key, payload, mark)
+    say(monitor, range(1, 3))
+    assert heard(listener, 2) == [0, 1, 2]
+    assert (listener.foreign, listener.rejected) == (2, 2)
+
+
+def test_what_the_ring_no_longer_has_is_counted_and_reported():
+    ring = MessageRing(7, capacity=1000)
+    for _ in range(50):
+        ring.add(b"x" * 100)
+    reply = ring.reply(Ask(7, 10, OPEN))
+    assert [message.seq for message in reply.blocks] == list(range(40, 50))
+    assert reply.settled == 49
+    assert ring.reply(Ask(8, 0, OPEN)).settled == -1
+
+    network = MemoryNetwork()
+    monitor, listening = network.bus("r", "monitor"), network.bus("r", "listener")
+    say(monitor, range(1))
+    listener = listening.listen(ALARMS)
+    assert monitor._outlet is not None
+    monitor._outlet._rings[ALARMS.name]._capacity = 5 * len(encode(alarm(1))) + 9
+    network.up = False
+    say(monitor, range(1, 40))
+    network.up = True
+    say(monitor, range(40, 41))
+    assert heard(listener, 40) == list(range(36, 41))
+    assert listener.lost == 35
+    (report,) = listener.reports()
+    assert (report.first, report.last, report.topic) == (1, 35, "alarms")
+
+
+def test_alarms_said_while_the_router_was_away_reach_every_listener_once(tmp_path: Path):
+    with TestRig(tmp_path) as rig:
+        router = rig.router()
+        monitor = rig.bus("monitor")
+        say(monitor, range(1))
+        one, other = (rig.bus(name).subscribe(ALARMS) for name in ("one", "other"))
+        say(monitor, range(1, 3))
+        assert [heard(listener, 2) for listener in (one, other)] == [[1, 2]] * 2
+        router.send_signal(signal.SIGKILL)
+        router.wait()
+        eventually(lambda: not monitor.connected(), "the router is missed")
+        say(monitor, range(3, 40))
+        again = rig.router()
+        eventually(lambda: answers(rig.listen), "the router is back")
+        assert [heard(listener, 39) for listener in (one, other)] == [list(range(3, 40))] * 2
+        say(monitor, range(40, 42))
+        assert [heard(listener, 41) for listener in (one, other)] == [[40, 41]] * 2
+        assert one.lost == other.lost == 0
+        kill(again)

@@ -1,0 +1,157 @@
+"""With keys only a rig's own processes are heard, each in its role; without, loopback only."""
+
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.keys import Authority
+from rigwatch.wire.bus import ROLES, Bus, connect, open_router
+from rigwatch.wire.errors import BusError, ConfigError, KeysError
+from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, AlarmCommand, Event, encode
+from rigwatch.wire.rig_config import RigConfig, load_rig
+from tests.bus.rig import TestRig
+from tests.bus.test_complete_subscription import alarm, heard, say
+from tests.waiting import PATIENCE, eventually, wait_until
+
+
+def config_with(
+    folder: Path, keys: Path | None, listen: str = "127.0.0.1", more: str = ""
+) -> RigConfig:
+    rig = TestRig(folder)
+    text = rig.path.read_text()
+    if keys:
+        more += f'keys = "{keys}"\n'
+        text = text.replace("tcp/", "tls/")
+    text = text.replace("/127.0.0.1", f"/{listen}")
+    rig.path.write_text(text.replace("[[channels]]", f"[bus.security]\n{more}[[channels]]", 1))
+    return load_rig(rig.path)
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("keys") / "keys"
+    authority = Authority.create(folder, "bench")
+    for role in ROLES:
+        authority.issue(role, role)
+    authority.issue("ann", "operator")
+    authority.revoke("ann")
+    return folder
+
+
+@pytest.fixture
+def secured(tmp_path: Path, keys: Path) -> Iterator[RigConfig]:
+    config = config_with(tmp_path, keys)
+    close = open_router(config)
+    yield config
+    close()
+
+
+def until_reached(sender: Bus, receiver: Bus) -> None:
+    """Both know of each other."""
+    events = receiver.subscribe(EVENTS)
+
+    def reached() -> bool:
+        sender.publish(EVENTS, Event("test", 1, "info", "TEST", ""))
+        return events.get(timeout=0.05) is not None
+
+    eventually(reached, "an event arrives")
+    events.close()
+
+
+def test_each_role_says_what_is_its_own_and_nothing_else(secured: RigConfig) -> None:
+    names = ("monitor", "alarms-1", "recorder", "dashboard", "daq")
+    monitor, operator, recorder, dashboard, daq = (connect(secured, n, PATIENCE) for n in names)
+    try:
+        alarms, commands = recorder.subscribe(ALARMS), monitor.subscribe(COMMANDS)
+        until_reached(monitor, recorder)
+        until_reached(operator, monitor)
+        say(monitor, range(1))
+        assert heard(alarms, 0) == [0]
+        overheard = recorder.overhear(ALARMS)
+        for stranger in (operator, dashboard, daq):
+            until_reached(stranger, monitor)
+            stranger.transport.put(stranger.key(ALARMS.key), encode(alarm(666)))
+        for stranger in (dashboard, daq, recorder):
+            stranger.publish(COMMANDS, AlarmCommand("*", "acknowledge", "nobody", 1))
+        operator.publish(COMMANDS, AlarmCommand("*", "acknowledge", "ann", 1))
+        assert commands.get(timeout=PATIENCE).user == "ann"
+        say(monitor, range(1, 2))
+        assert heard(alarms, 1) == [1]
+        assert [message.seq for message in overheard.drain()] == [1]
+        assert commands.drain() == []
+    finally:
+        for bus in (monitor, operator, recorder, dashboard, daq):
+            bus.close()
+
+
+def test_one_without_a_certificate_of_this_authority_is_not_let_in(
+    secured: RigConfig, tmp_path: Path
+) -> None:
+    other = tmp_path / "other"
+    authority = Authority.create(other, "bench")
+    authority.issue("monitor", "monitor")
+    text = (tmp_path / "rig.toml").read_text()
+    (tmp_path / "other.toml").write_text(text.replace(secured.bus.security.keys, str(other)))
+    with pytest.raises(BusError, match="no router answers"):
+        connect(load_rig(tmp_path / "other.toml"), "monitor", 0.5)
+    head, rest = text.replace("tls/", "tcp/").split("[bus.security]")
+    without_keys = head + rest[rest.index("[[channels]]") :]
+    (tmp_path / "plain.toml").write_text(without_keys)
+    with pytest.raises(BusError, match="no router answers"):
+        connect(load_rig(tmp_path / "plain.toml"), "monitor", 0.5)
+
+
+def test_a_revoked_certificate_says_nothing(secured: RigConfig, tmp_path: Path) -> None:
+    text = (tmp_path / "rig.toml").read_text()
+    (tmp_path / "ann.toml").write_text(
+        text.replace("[bus.security]", '[bus.security]\noperator = "ann"')
+    )
+    monitor, valid = (connect(secured, name, PATIENCE) for name in ("monitor", "ack-1"))
+    revoked = connect(load_rig(tmp_path / "ann.toml"), "ack-2", PATIENCE)
+    commands = monitor.subscribe(COMMANDS)
+    until_reached(valid, monitor)
+    revoked.publish(COMMANDS, AlarmCommand("*", "acknowledge", "ann", 1))
+    valid.publish(COMMANDS, AlarmCommand("*", "acknowledge", "bob", 1))
+    assert wait_until(lambda: len(commands) > 0, PATIENCE)
+    assert [command.user for command in commands.drain()] == ["bob"]
+    for bus in (monitor, valid, revoked):
+        bus.close()
+
+
+def test_beyond_loopback_a_router_asks_for_keys(tmp_path: Path, keys: Path) -> None:
+    with pytest.raises(ConfigError, match=r"without keys, expected a loopback address, or keys"):
+        open_router(config_with(tmp_path, None, "0.0.0.0"))
+    open_router(config_with(tmp_path, None, "0.0.0.0", "isolated_network = true\n"))()
+    open_router(config_with(tmp_path, keys, "0.0.0.0"))()
+    plain = config_with(tmp_path, None, more=f'keys = "{keys}"\n')
+    with pytest.raises(ConfigError, match=r"expected tls/"):
+        open_router(plain)
+
+
+def test_missing_keys_are_told_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(KeysError, match=r"router\.pem|authority\.pem"):
+        open_router(config_with(tmp_path, tmp_path / "nowhere"))
+
+
+def test_the_command_makes_issues_revokes_and_shows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "keys"
+    assert main(["keys", "new", str(folder), "--rig", "bench", "--address", "192.0.2.5"]) == 0
+    assert {path.stem for path in folder.glob("*.pem")} == {"authority", *ROLES}
+    assert all(stat.S_IMODE(p.stat().st_mode) == 0o600 for p in folder.glob("*.key"))
+    assert main(["keys", "issue", str(folder), "ann", "--role", "operator"]) == 0
+    assert main(["keys", "issue", str(folder), "ann", "--role", "operator"]) == 0
+    assert main(["keys", "revoke", str(folder), "ann"]) == 0
+    capsys.readouterr()
+    assert main(["keys", "show", str(folder)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[2] for line in lines if line.startswith("ann")] == ["revoked"] * 2
+    assert sum("valid until" in line for line in lines) == len(ROLES)
+    for wrong in (["new", str(folder), "--rig", "b"], ["issue", str(folder), "x", "--role", "king"],
+                  ["revoke", str(folder), "ann"], ["show", str(tmp_path)]):  # fmt: skip
+        assert main(["keys", *wrong]) == 2
+    assert capsys.readouterr().err.count("\n") == 4

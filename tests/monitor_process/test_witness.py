@@ -1,0 +1,99 @@
+"""A monitor that is gone or hangs is told of by a process that is not the monitor."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.wire.bus import ask_alarm_list
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.messages import ALARMS, ESTIMATES, Alarm, EstimateBlock
+from rigwatch.wire.rig_config import WitnessSection
+from rigwatch.witness.notices import Notices
+from rigwatch.witness.process import Witness
+from tests.bus.rig import TestRig, stopped
+from tests.bus.test_complete_subscription import alarm as remark
+from tests.monitor_process.model import monitor_section
+from tests.waiting import eventually
+
+
+def fault(name: str = "stale", state: str = "unacknowledged") -> Alarm:
+    figures = (0.0, 0.0, 0.0)
+    return Alarm(name, state, "critical", "why", "", "", 0, -1, 1, *figures, False, "", -1)  # type: ignore[arg-type]
+
+
+def estimates(seq: int) -> EstimateBlock:
+    return EstimateBlock("rig", 7, seq, np.zeros(1, np.int64), ())
+
+
+def test_a_silent_monitor_is_an_alarm_that_clears_and_stands_in_the_list(tmp_path: Path) -> None:
+    network, beat = MemoryNetwork(), tmp_path / "beat"
+    monitor, screen = network.bus("r", "monitor"), network.bus("r", "dashboard")
+    shown = screen.subscribe(ALARMS)
+    settings = WitnessSection(heartbeat_file=str(beat))
+    witness = Witness(settings, network.bus("r", "witness"), 0.0)
+    said = []
+    for tenth in range(40):
+        if tenth < 10 or tenth >= 30:
+            monitor.publish(ESTIMATES, estimates(tenth))
+        witness.turn(tenth / 10, tenth * 10**8)
+        said += [(one.name, one.state, tenth) for one in shown.drain()]
+        if tenth == 25:
+            (standing,) = ask_alarm_list(screen)
+            assert standing.name == "monitor_stale"
+            before = beat.read_text()
+        if tenth == 29:
+            assert beat.read_text() == before, "no heartbeat while nobody watches the rig"
+    assert said == [
+        ("monitor_stale", "unacknowledged", 20),
+        ("monitor_stale", "cleared_unacknowledged", 30),
+    ]
+    assert beat.read_text() != before
+    assert ask_alarm_list(screen) == []
+
+
+def test_people_are_notified_once_and_again_until_somebody_has_seen_it() -> None:
+    notices = Notices(WitnessSection(repeat_minutes=1.0))
+    assert notices.hear(remark(1), 0.0) == []
+    assert [one.name for one in notices.hear(fault(), 0.0)] == ["stale"]
+    assert notices.hear(fault(), 5.0) == []
+    assert notices.due(59.0) == []
+    assert [one.name for one in notices.due(60.0)] == ["stale"]
+    assert notices.due(61.0) == []
+    notices.hear(fault(state="acknowledged"), 70.0)
+    assert notices.due(600.0) == []
+    assert len(notices.hear(fault(), 700.0)) == 1
+
+
+def test_a_hung_monitor_is_told_of_by_the_witness_and_the_command_is_run(tmp_path: Path) -> None:
+    told = tmp_path / "told"
+    line = "sys.argv[1] + ' ' + sys.stdin.read() + chr(10)"
+    code = f"import sys; open({str(told)!r}, 'a').write({line})"
+    command = ", ".join(map(json.dumps, (sys.executable, "-c", code)))
+    section = f"\n[witness]\nnotify = [{command}]\n"
+    with TestRig(tmp_path, monitor_section(tmp_path) + section) as rig:
+        rig.router()
+        observer = rig.bus("observer")
+        alarms, judged = observer.subscribe(ALARMS), observer.subscribe(ESTIMATES)
+        monitor = rig.start("-m", "rigwatch", "monitor", str(rig.path))
+        rig.start("-m", "rigwatch", "witness", str(rig.path))
+        eventually(
+            lambda: {"alive/monitor", "alive/witness"} <= set(observer.tokens("alive/*")), "both"
+        )
+        rig.publisher(5, "--wave")
+        eventually(lambda: len(judged.drain()) > 0, "estimates come")
+        found: list[tuple[str, str]] = []
+
+        def said(state: str) -> bool:
+            found.extend((one.name, one.state) for one in alarms.drain())
+            return ("monitor_stale", state) in found
+
+        with stopped(monitor):
+            eventually(lambda: said("unacknowledged"), "the alarm")
+        eventually(lambda: said("cleared_unacknowledged"), "its end")
+        eventually(lambda: told.exists() and "monitor_stale" in told.read_text(), "the command")
+        found_line = next(
+            one for one in told.read_text().splitlines() if one.startswith("monitor_stale")
+        )
+        assert json.loads(found_line.partition(" ")[2])["severity"] == "critical"

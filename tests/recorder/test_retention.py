@@ -1,0 +1,98 @@
+"""Old recordings go by age and size; those with alarms stay longer, the present one always."""
+
+import os
+from pathlib import Path
+
+from rigwatch.recorder.retention import DAY, Retention
+from rigwatch.wire.messages import Alarm, Event
+from rigwatch.wire.rig_config import RecorderSection
+from rigwatch.wire.session import SessionWriter, run_info
+
+NOW = 1_800_000_000.0
+
+
+def segment(folder: Path, number: int, age_days: float, alarm: bool = False, closed: bool = True):
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{number:06d}.mcap"
+    writer = SessionWriter(path, run_info("bench", 256.0, t_ns=1))
+    writer.write(Event("x", 1, "info", "FILLER", os.urandom(2000).hex()))
+    if alarm:
+        nan = float("nan")
+        writer.write(
+            Alarm(
+                "link",
+                "unacknowledged",
+                "critical",
+                "",
+                "",
+                "",
+                0,
+                0,
+                2,
+                nan,
+                nan,
+                nan,
+                True,
+                "",
+                0,
+            )
+        )
+    if closed:
+        writer.close()
+    else:
+        writer.flush()
+        writer.abandon()
+    os.utime(path, (NOW - age_days * DAY,) * 2)
+    return path
+
+
+def rules(root: Path, **limits: float) -> Retention:
+    return Retention(RecorderSection(folder=str(root), **limits), "bench")
+
+
+def left(root: Path) -> set[str]:
+    return {f"{path.parent.name}/{path.stem}" for path in root.glob("*/*.mcap")}
+
+
+def test_age_alarms_and_other_rigs_decide_what_goes(tmp_path: Path) -> None:
+    old, current = tmp_path / "bench-20260101T000000Z", tmp_path / "bench-20260301T000000Z"
+    segment(old, 1, age_days=40)
+    (old / "positions.json").write_text("{}")
+    segment(current, 1, age_days=40)
+    segment(current, 2, age_days=40, alarm=True)
+    segment(current, 3, age_days=40, closed=False)
+    segment(current, 4, age_days=10)
+    segment(current, 5, age_days=40)
+    segment(tmp_path / "other-20260101T000000Z", 1, age_days=400)
+    retention = rules(tmp_path, keep_days=30, keep_alarm_days=90)
+    (event,) = retention.update(0.0, int(NOW * 1e9), current)
+    assert "2 segment(s) removed" in event.text
+    assert not old.exists()
+    name = current.name
+    assert left(tmp_path) == {f"{name}/00000{n}" for n in (2, 3, 4, 5)} | {
+        "other-20260101T000000Z/000001"
+    }
+    assert retention.update(1.0, int(NOW * 1e9), current) == [], "not every second"
+    later = int((NOW + 60 * DAY) * 1e9)
+    retention.update(100.0, later, current)
+    assert left(tmp_path) == {f"{name}/000005", "other-20260101T000000Z/000001"}
+
+
+def test_above_the_size_limit_the_oldest_go_and_those_with_alarms_last(tmp_path: Path) -> None:
+    current = tmp_path / "bench-20260301T000000Z"
+    sizes = [
+        segment(current, n, age_days=20 - n, alarm=n in (1, 3)).stat().st_size for n in range(1, 8)
+    ]
+    limit = (sum(sizes[:1]) + sizes[2] + sizes[5]) / 1e9
+    rules(tmp_path, keep_gigabytes=limit * 1.001).update(0.0, int(NOW * 1e9), current)
+    assert {path.stem for path in current.glob("*.mcap")} == {
+        "000001", "000003", "000006", "000007"
+    }  # fmt: skip
+
+
+def test_without_limits_nothing_is_removed(tmp_path: Path) -> None:
+    current = tmp_path / "bench-20260301T000000Z"
+    segment(current, 1, age_days=4000)
+    segment(current, 2, age_days=1)
+    assert rules(tmp_path).update(0.0, int(NOW * 1e9), current) == []
+    assert len(left(tmp_path)) == 2

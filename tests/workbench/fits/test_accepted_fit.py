@@ -1,0 +1,74 @@
+"""The fit that an effect was accepted with is the one that stays in the study."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.workbench.compare.compare import compare
+from rigwatch.workbench.ranking.ranked import accepted_from
+from rigwatch.workbench.steps.change import add, undo
+from rigwatch.workbench.steps.ledger_replay import replay
+from rigwatch.workbench.study.study import Study, open_study
+from tests.workbench.machine import studied
+
+WAVES = """
+name = "waves"
+summary = "A force that goes up and down with position: its wave number has many local minima."
+inputs.position = { unit = "m" }
+parameters.a = { value = 1.0, unit = "N" }
+parameters.w = { value = 0.074, unit = "1/cm" }
+outputs.force = { unit = "N", expression = "a*sin(w*position) + load" }
+ports.load = { kind = "force", unit = "N", variables.x = { expression = "position", unit = "m" } }
+"""
+UNITS = {"position": "m", "force": "N"}
+
+
+def waves(seed: int) -> dict[str, np.ndarray]:
+    position = 1.5 * np.sin(np.arange(400) / (9 + seed))
+    noise = np.random.default_rng(seed).normal(size=400)
+    return {"position": position, "force": 3 * np.sin(2 * position) + 4 + 0.05 * noise}
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Study:
+    return studied(tmp_path, WAVES, [waves(0)], [waves(1)], UNITS)
+
+
+def test_the_headline_and_the_table_are_of_one_fit(study: Study) -> None:
+    change = add(study, "constant_force")
+    assert change.step == "add"
+    assert "→ 0.045" in change.text
+    assert change.after.held_out_error == pytest.approx(0.0456, rel=0.02)
+    again = compare(open_study(study.folder))
+    assert again.held_out_error == pytest.approx(change.after.held_out_error, rel=1e-6)
+    # In the model file's unit: 2 rad/m.
+    assert again.parameters["w"].value == pytest.approx(0.02, rel=0.01)
+
+
+def test_a_second_step_keeps_the_values_of_the_first(study: Study) -> None:
+    add(study, "constant_force")
+    change = add(open_study(study.folder), "linear_stiffness", anyway=True)
+    assert change.after.held_out_error < 0.06
+    assert "load_constant_force_" in (study.folder / "study.toml").read_text()
+
+
+def test_undoing_the_step_takes_its_fit_away_and_the_ledger_repeats_both(study: Study) -> None:
+    before = compare(study).parameters["w"].value
+    add(study, "constant_force")
+    undo(open_study(study.folder))
+    again = open_study(study.folder)
+    assert compare(again).parameters["w"].value == pytest.approx(before)
+    assert [check.same for check in replay(again)] == [True, True]
+
+
+def test_a_step_that_gets_worse_when_it_is_fitted_again_is_refused(
+    study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As if the file could not keep the fit: it begins at the model file's values again.
+    monkeypatch.setattr("rigwatch.workbench.steps.trial.whole", accepted_from)
+    before = (study.folder / "study.toml").read_bytes()
+    change = add(study, "constant_force")
+    assert change.step == "refused"
+    assert "fitted once more it leaves 1.9" in change.text
+    assert (study.folder / "study.toml").read_bytes() == before

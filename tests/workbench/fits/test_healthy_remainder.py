@@ -1,0 +1,117 @@
+"""A black box along the measured motion learns what a healthy rig does, and no period of it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.equations.measured_motion import along_measured_motion
+from rigwatch.physics.engine.equations.model import shipped_models
+from rigwatch.physics.engine.equations.system import compose
+from rigwatch.simulated import write_session
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare.preparation import open_bench
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.fit import healthy_remainder
+from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_products
+from rigwatch.workbench.study.study import Study, create
+from sim_plant.excitation import Multisine
+from sim_plant.scenario import Scenario
+
+TEMPLATE = Path(__file__).parents[3] / "configs" / "studies" / "rig_black_box.toml"
+SIZES = {
+    "load": {"x": 0.01, "v": 0.3},
+    "remainder": {"push": 3.0, "flow": 0.3, "speed": 0.3, "place": 0.01},
+}
+
+
+def record(folder: Path, name: str, noise: int, phases: int, **effects: float) -> None:
+    shape = Multisine(amplitude=2.5, start=0.5, stop=12.0, period=1000 + phases, seed=phases)
+    scenario = Scenario(
+        name=name, duration_s=24.0, lead_in_s=8.0, excitation=shape, effects=effects
+    )
+    write_session(folder / f"{name}.mcap", scenario, seed=noise)
+
+
+def study(folder: Path, cut: str = "") -> Study:
+    text = TEMPLATE.read_text(encoding="utf-8")
+    template = folder / "template.toml"
+    template.write_text(text.split(cut)[0] if cut else text, encoding="utf-8")
+    return create(folder / "study", template)
+
+
+def test_what_is_learned_holds_under_an_excitation_that_was_not_learned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record(tmp_path, "healthy", 1, phases=1)
+    record(tmp_path, "rig", 2, phases=2)
+    opened = study(tmp_path)
+    taught = open_bench(opened)
+    monkeypatch.setattr(healthy_remainder, "STEPS", {})
+    bare = open_bench(opened)
+    assert taught.floor.rms[0] < bare.floor.rms[0]
+    assert taught.base.held_out_error < bare.base.held_out_error
+    assert ranking(taught)[1].word != "missing_effect"
+
+
+def test_friction_is_named_in_newtons_under_an_excitation_that_was_not_learned(
+    tmp_path: Path,
+) -> None:
+    record(tmp_path, "healthy", 1, phases=1)
+    record(tmp_path, "rig", 2, phases=2, coulomb=0.5)
+    bench = open_bench(study(tmp_path))
+    rows, verdict = ranking(bench)
+    assert verdict.word == "missing_effect"
+    best = next(row for row in rows if row.label == "coulomb@load")
+    assert best.label in verdict.members
+    assert best.fitted is not None
+    assert best.fitted.train.values()["load_coulomb_Fc"] == pytest.approx(0.5, rel=0.2)
+
+
+def test_without_a_healthy_recording_it_says_what_is_needed(tmp_path: Path) -> None:
+    record(tmp_path, "healthy", 1, phases=1)
+    record(tmp_path, "rig", 2, phases=2)
+    with pytest.raises(ModelError, match="found no healthy recording"):
+        open_bench(study(tmp_path, "[[healthy]]"))
+
+
+def test_products_leave_hidden_states_bounded_whatever_their_coefficients() -> None:
+    model = with_products(along_measured_motion(shipped_models()["fourth-order"]), SIZES, 3)
+    compiled = compile_system(compose(model))
+    start = compiled.vector({f"{LEARNED}push_push_push": 1e4})
+    inputs = 0.01 * np.sin(np.arange(2000))[:, None] * np.ones(3)
+    run = compiled.simulate(
+        inputs, 1 / 256, np.zeros(1, np.int64), 2000, initial=np.full((1, 4), 10.0),
+        parameters=start, substeps=4,
+    )  # fmt: skip
+    assert np.isfinite(run.last).all()
+    assert abs(run.last).max() < 1e5
+
+
+def test_products_that_stand_already_are_not_added_again() -> None:
+    model = along_measured_motion(shipped_models()["fourth-order"])
+    some = with_products(model, SIZES, 3, without=("flow",))
+    every = with_products(some, SIZES, 3)
+    counts = [sum(n.startswith(LEARNED) and p.kept for n, p in m.parameters.items())
+              for m in (some, every)]  # fmt: skip
+    assert counts == [10, 20]
+
+
+def test_terms_vanish_at_the_start_of_a_fit() -> None:
+    model = along_measured_motion(shipped_models()["fourth-order"])
+    larger = with_products(with_friction(model, SIZES), SIZES, 3)
+    inputs = np.random.default_rng(1).normal(size=(500, 3)) * [1.0, 0.01, 0.3]
+    runs = [
+        compile_system(compose(m)).simulate(
+            inputs, 1 / 256, np.zeros(1, np.int64), 500, initial=np.zeros((1, 4)),
+            parameters=compile_system(compose(m)).parameters, substeps=4,
+        ).outputs
+        for m in (model, larger)
+    ]  # fmt: skip
+    assert runs[0] == pytest.approx(runs[1], abs=1e-9)
+
+
+def test_a_model_without_the_port_learns_no_products() -> None:
+    model = shipped_models()["mass-spring-damper"]
+    assert with_products(model, SIZES, 3) is model

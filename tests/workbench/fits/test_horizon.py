@@ -1,0 +1,54 @@
+"""The horizon spans what the model does by itself, is said, kept with an effect, or given."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.workbench.compare.compare import compare
+from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.steps.change import add, undo
+from rigwatch.workbench.study.study import Study, open_study
+from tests.workbench.machine import studied
+from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS
+
+SLOW = SPEED.replace("value = 1.0", "value = 0.3") + PORT
+
+
+def fan(seed: int, samples: int = 6000) -> dict[str, np.ndarray]:
+    """A motor that takes seconds to run up, against the drag of the air."""
+    generator = np.random.default_rng(seed)
+    u = np.repeat(4 * generator.uniform(-1, 1, size=samples // 300), 300)
+    v = np.zeros(samples)
+    for i in range(1, samples):
+        v[i] = v[i - 1]
+        for _ in range(2):
+            drag = 0.05 * abs(v[i]) * v[i]
+            v[i] += 0.005 * (-0.25 * v[i] + 0.6 * u[i - 1] - drag)
+    return {"u": u, "v": v + 0.08 * generator.normal(size=samples)}
+
+
+def studied_with(folder: Path, keys: str = "") -> Study:
+    return studied(folder, SLOW, [fan(0)], [fan(1)], UNITS, keys)
+
+
+def test_it_spans_the_models_time_constants_and_the_right_effect_is_named(tmp_path: Path) -> None:
+    found = explain(studied_with(tmp_path))
+    assert (found.verdict, found.ranking[0].effect) == ("missing_effect", "quadratic_drag")
+    (said,) = [remark for remark in found.comparison.remarks if "horizon" in remark]
+    assert "horizon 6 s, chosen from the model's time constant of 2.4 s" in said
+
+
+def test_it_stays_with_the_first_effect_and_goes_with_it(tmp_path: Path) -> None:
+    study = studied_with(tmp_path)
+    change = add(study, "quadratic_drag")
+    assert "horizon = 6.0" in (study.folder / "study.toml").read_text()
+    again = compare(open_study(study.folder))
+    assert again.held_out_error == pytest.approx(change.after.held_out_error, rel=1e-6)
+    undo(open_study(study.folder))
+    assert "horizon" not in (study.folder / "study.toml").read_text()
+
+
+def test_what_is_given_is_taken(tmp_path: Path) -> None:
+    found = compare(studied_with(tmp_path, "horizon = 0.5"))
+    assert not any("horizon" in remark for remark in found.remarks)

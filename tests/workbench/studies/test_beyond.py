@@ -1,0 +1,58 @@
+"""Intervals of a model that a healthy recording told: what that left uncertain is in them."""
+
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.workbench.compare.preparation import open_bench
+from rigwatch.workbench.compare.uncertainty_budget import beyond
+from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.fit.intervals import values
+from rigwatch.workbench.study.study import create
+from tests.workbench.rigs.test_black_box import record
+from tests.workbench.simulated import multisine, opened
+
+STUDY = """
+model = "servo-pneumatic"
+
+[[train]]
+session = "rig.mcap"
+end = 12.0
+
+[[held_out]]
+session = "rig.mcap"
+start = 12.0
+
+[[healthy]]
+session = "healthy.mcap"
+"""
+DRAG = 0.1
+
+
+def test_what_is_named_has_an_interval_that_is_wider_than_its_recording_says(tmp_path: Path):
+    record(tmp_path, "healthy", 1)
+    record(tmp_path, "rig", 2, viscous=DRAG)
+    template = tmp_path / "template.toml"
+    template.write_text(STUDY, encoding="utf-8")
+    study = create(tmp_path / "study", template)
+    found = explain(study)
+    assert found.ranking[0].effect == "viscous"
+    low, high = found.ranking[0].parameters["d"].interval
+    assert low < DRAG < high
+    accepted = open_bench(study.with_effects([]))
+    more = beyond(accepted.study, accepted.data, accepted.bare, accepted.base)
+    assert set(more) == set(accepted.base.compiled.system.free)
+    alone, whole = (values(accepted.base.train, extra) for extra in (None, more))
+    for name, variance in more.items():
+        assert variance > 0
+        assert width(whole[name]) > width(alone[name])
+
+
+def test_without_a_healthy_recording_that_tells_parameters_nothing_is_added():
+    bench = opened(multisine(np.arange(0.5, 8.0, 0.5), 1.0, seconds=5.0))
+    assert beyond(bench.study, bench.data, bench.bare, bench.base) == {}
+
+
+def width(value) -> float:
+    low, high = value.interval
+    return high - low

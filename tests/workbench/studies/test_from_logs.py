@@ -1,0 +1,119 @@
+"""From logs of a machine to a study, by the command that a newcomer types."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.workbench.data.signals import prepare
+from rigwatch.workbench.study.study import open_study
+from sim_plant.machines import MACHINES, log
+
+MOTOR = ["--model", "motor", "--set", "R=2.0", "--set", "K=0.06"]
+
+
+def written(path: Path, table: Mapping[str, np.ndarray], separator=",", point=".") -> Path:
+    rows = [separator.join(table)]
+    rows += [
+        separator.join(f"{value:.9g}".replace(".", point) for value in row)
+        for row in zip(*table.values(), strict=True)
+    ]
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def run() -> dict[str, np.ndarray]:
+    return log(MACHINES["motor"], {"coulomb": 0.02}, 0.003, seed=1)
+
+
+def made(folder: Path, *logs: Path, more: list[str] = MOTOR) -> int:
+    return main(["study", "new", str(folder / "study"), "--data", *map(str, logs), *more])
+
+
+def test_headers_tell_channels_and_units_and_the_study_can_be_fitted(tmp_path, run, capsys):
+    other = log(MACHINES["motor"], {"coulomb": 0.02}, 0.003, seed=2)
+    paths = [written(tmp_path / f"run{i}.csv", t) for i, t in enumerate((run, other), 1)]
+    assert made(tmp_path, *paths) == 0
+    assert f"next: rigwatch explain {tmp_path / 'study'}" in capsys.readouterr().out
+    study = open_study(tmp_path / "study")
+    assert {span.session for span in (*study.file.train, *study.file.held_out)} == {
+        "run1.mcap", "run2.mcap",
+    }  # fmt: skip
+    data = prepare(study)
+    spans = (*study.file.train, *study.file.held_out)
+    read = {"run1.mcap": run, "run2.mcap": other}
+    for span, recording in zip(spans, (data.train, data.held_out), strict=True):
+        told = read[span.session]["speed_rad_s"][:500]
+        np.testing.assert_allclose(recording.outputs[:500, 0], told, rtol=1e-8)
+
+
+def test_one_log_is_cut_in_two_where_it_moves(tmp_path, run):
+    rest = 3000
+    still = {name: np.concatenate([values, np.zeros(rest)]) for name, values in run.items()}
+    still["time_s"] = np.arange(len(still["time_s"])) / 200.0
+    assert made(tmp_path, written(tmp_path / "run.csv", still)) == 0
+    file = open_study(tmp_path / "study").file
+    (told,), (decides,) = file.train, file.held_out
+    moves = len(run["time_s"]) / 200.0
+    assert told.end == decides.start
+    assert told.end < moves
+    assert decides.end < moves + 0.5
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_a_decimal_comma_gives_the_same_study(tmp_path, run, separator):
+    assert made(tmp_path, written(tmp_path / "run.csv", run, separator, ",")) == 0
+    data = prepare(open_study(tmp_path / "study"))
+    np.testing.assert_allclose(data.train.outputs[:100, 0], run["speed_rad_s"][:100], atol=1e-6)
+
+
+def test_loggers_of_slightly_different_rates_and_jitter_are_combined(tmp_path, run):
+    random = np.random.default_rng(0)
+    paths = []
+    for name, rate in (("slow", 188.1), ("fast", 188.8)):
+        times = np.arange(len(run["time_s"])) / rate
+        times += random.uniform(-0.2, 0.2, len(times)) / rate
+        paths.append(written(tmp_path / f"{name}.csv", {**run, "time_s": times}))
+    assert made(tmp_path, *paths) == 0
+    data = prepare(open_study(tmp_path / "study"))
+    assert 1 / data.train.dt == pytest.approx(188.1, rel=2e-3)
+
+
+def test_a_speed_that_no_column_shows_is_made_from_the_displacement(tmp_path):
+    table = log(MACHINES["damper"], {}, 0.002, seed=1)
+    path = written(tmp_path / "run.csv", table)
+    assert made(tmp_path, path, more=["--model", "damper"]) == 0
+    study = open_study(tmp_path / "study")
+    data = prepare(study)
+    place = list(study.model.inputs).index("velocity")
+    expected = np.gradient(table["displacement_m"], 1 / 200.0)[: len(data.train)]
+    assert np.corrcoef(data.train.inputs[:, place], expected)[0, 1] > 0.99
+
+
+def test_columns_without_names_are_named_by_an_option(tmp_path, run):
+    path = written(tmp_path / "run.csv", run)
+    path.write_text(path.read_text().partition("\n")[2])
+    columns = ["--columns", "time_s,voltage_V,speed_rad_s"]
+    assert made(tmp_path, path, more=[*MOTOR, *columns]) == 0
+
+
+@pytest.mark.parametrize(
+    ("columns", "more", "said"),
+    [
+        pytest.param(("time_s", "a", "b"), MOTOR, "--map voltage=COLUMN[V]", id="no such column"),
+        pytest.param((), ["--model", "moter"], "did you mean 'motor'", id="no such model"),
+        pytest.param((), [], "--model", id="no model"),
+        pytest.param((), [*MOTOR, "--set", "R"], "expected NAME=VALUE", id="no value"),
+    ],
+)
+def test_what_is_missing_is_said_and_nothing_is_left_behind(tmp_path, capsys, columns, more, said):
+    run = log(MACHINES["motor"], {}, 0.003, seed=1)
+    table = dict(zip(columns or run, run.values(), strict=True))
+    assert made(tmp_path, written(tmp_path / "run.csv", table), more=more) != 0
+    error = capsys.readouterr().err
+    assert said in error
+    assert "Traceback" not in error
+    assert not (tmp_path / "study").exists()

@@ -1,0 +1,84 @@
+"""What an effect remembers of one recording is forgotten at the beginning of the next."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.workbench.compare.preparation import Bench, open_bench
+from rigwatch.workbench.ranking.candidates import candidates
+from rigwatch.workbench.ranking.scoring import rank_only
+from rigwatch.workbench.study.study import Accepted
+from tests.workbench.machine import studied
+
+DAMPER = """
+name = "damper"
+summary = "Force of a damper of which displacement and speed are known."
+inputs.x = { unit = "m" }
+inputs.v = { unit = "m/s" }
+parameters.c = { value = 1.0, unit = "N*s/m" }
+outputs.force = { unit = "N", expression = "c*v - load" }
+[ports.load]
+kind = "force"
+unit = "N"
+variables.x = { expression = "x", unit = "m" }
+variables.v = { expression = "v", unit = "m/s" }
+"""
+UNITS = {"x": "m", "v": "m/s", "force": "N"}
+BRUSH = [Accepted(effect="jenkins", port="load")]
+
+
+def stroke(seed: int, samples: int, first: float) -> dict[str, np.ndarray]:
+    """A spring in series with a slider, integrated here; it begins bent."""
+    t = np.arange(samples) / 100
+    x = 0.02 * np.sin(2 * np.pi * (0.4 + 0.1 * seed) * t + seed) + first * t
+    z, force = (-1.0) ** seed * 20.0, np.empty(samples)
+    for i, step in enumerate(np.diff(x, prepend=x[0])):
+        z = float(np.clip(z + 5000.0 * step, -20.0, 20.0))
+        force[i] = z
+    v = np.gradient(x, 0.01)
+    noise = np.random.default_rng(seed).normal(size=samples)
+    return {"x": x, "v": v, "force": 3 * v + force + 0.2 * noise}
+
+
+TRAIN = [stroke(0, 700, 0.0), stroke(1, 500, 0.01)]
+HELD = [stroke(2, 400, 0.0), stroke(3, 650, 0.02), stroke(4, 300, -0.01)]
+
+
+def opened(folder: Path, train: list, held_out: list, keys: str = "") -> Bench:
+    study = studied(folder, DAMPER, train, held_out, UNITS, keys)
+    return open_bench(study.with_effects(BRUSH))
+
+
+def test_the_held_out_error_does_not_depend_on_the_recordings_order(tmp_path: Path) -> None:
+    one = opened(tmp_path / "a", TRAIN, HELD)
+    other = opened(tmp_path / "b", TRAIN, HELD[::-1])
+    assert other.base.held_out_error == pytest.approx(one.base.held_out_error, rel=1e-9)
+    assert one.base.held_out_error < 0.4
+
+
+def test_each_recording_counts_as_it_does_alone(tmp_path: Path) -> None:
+    together = opened(tmp_path / "a", TRAIN, HELD)
+    squared = np.split(together.base.held_out.residuals[0, :, 0] ** 2, [400, 1050])
+    for index, piece in enumerate(squared):
+        alone = opened(tmp_path / f"{index}", TRAIN, HELD[index : index + 1])
+        assert np.sqrt(np.nanmean(piece)) == pytest.approx(alone.base.held_out_error, rel=1e-9)
+
+
+def test_so_it_is_where_residuals_are_thinned(tmp_path: Path) -> None:
+    thin = "thin = { factor = 4, edge = 2 }"
+    one = opened(tmp_path / "a", TRAIN, HELD, thin)
+    other = opened(tmp_path / "b", TRAIN, HELD[::-1], thin)
+    assert other.base.held_out_error == pytest.approx(one.base.held_out_error, rel=1e-9)
+
+
+def test_the_score_begins_each_recording_anew(tmp_path: Path) -> None:
+    study = studied(tmp_path / "a", DAMPER, TRAIN, HELD, UNITS)
+    turned = studied(tmp_path / "b", DAMPER, TRAIN[::-1], HELD, UNITS)
+    explained = [_explained(open_bench(each)) for each in (study, turned)]
+    assert explained[0] == pytest.approx(explained[1], rel=1e-6)
+
+
+def _explained(bench: Bench) -> float:
+    found = [c for c in candidates(bench.study, bench.data.train) if c.name == "jenkins"]
+    return rank_only(bench.study, bench.data, bench.base, found).explained

@@ -1,0 +1,110 @@
+"""Effects and models described, drawn and checked; the guide's models are as good as it says."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.model import Model, shipped_models
+from rigwatch.wire.typed_files.loading import parse
+from rigwatch.workbench.catalogue import effect_curves, listed, model_report, text_plot
+
+GUIDE = Path(__file__).parents[2] / "docs" / "models.md"
+SNIPPETS = re.findall(r"```toml\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
+UNSEEN = """
+name = "unseen"
+summary = "Two masses of which one is read."
+inputs.force = { unit = "N" }
+parameters.m = { value = 2.0, unit = "kg" }
+parameters.spare = { value = 2.0, unit = "kg" }
+quantities.never = { expression = "m*v", unit = "kg m/s" }
+states.v = { unit = "m/s", derivative = "force/m", measured = "speed" }
+states.x = { unit = "m", derivative = "v" }
+states.a = { unit = "m/s", derivative = "-a/(1.0*tau)" }
+states.b = { unit = "m/s", derivative = "-b/tau" }
+parameters.tau = { value = 0.5, unit = "s" }
+outputs.speed = { unit = "m/s", expression = "v + a - b" }
+"""
+
+
+@pytest.mark.parametrize("text", SNIPPETS, ids=[s.split('"')[1] for s in SNIPPETS])
+def test_a_model_of_the_guide_can_work(text: str) -> None:
+    given = {"ambient": 293.0} if "ambient" in text else {}
+    assert model_report(parse(text, Model, "guide"), given).fine
+
+
+@pytest.mark.parametrize("name", sorted(shipped_models()))
+def test_a_model_that_ships_can_work(name: str) -> None:
+    given = {"heated-block": {"ambient": 293.0}, "vessel": {"outside": 1e5}}.get(name, {})
+    assert model_report(shipped_models()[name], given).fine
+
+
+def test_what_no_output_shows_and_nothing_uses_is_told() -> None:
+    found = model_report(parse(UNSEEN, Model, "unseen"), {})
+
+    assert not found.fine
+    assert found.unused == ("spare", "never")
+    assert found.unseen == ("x",)
+    assert found.tied == ("a", "b")
+    assert found.start == ("x", "a", "b")
+
+
+def test_every_effect_is_drawn_and_does_something() -> None:
+    for name, effect in library().items():
+        curves = effect_curves(effect)
+        assert all(np.isfinite(curve.y).all() for curve in curves), name
+        straight = all(np.allclose(c.y, c.x) for c in curves if c.across == "arrives")
+        forced = effect.port == "force" and any(np.any(c.y != 0) for c in curves)
+        assert forced or not straight or (effect.port != "force" and np.ptp(curves[1].y)), name
+        assert text_plot(curves[0])[0].endswith(curves[0].across)
+
+
+def test_a_dry_contacts_loop_is_the_closed_form() -> None:
+    """Dahl's contact slips where it was moved far: ±Fc, entered as an exponential of the way."""
+    loop = effect_curves(library()["dahl"])[0]
+
+    assert loop.y.max() == pytest.approx(0.5, rel=1e-3)
+    assert loop.y.min() == pytest.approx(-0.5, rel=1e-3)
+
+
+def test_all_effects_are_listed_once(capsys: pytest.CaptureFixture[str]) -> None:
+    assert sorted(n for found in listed().values() for n in found) == sorted(library())
+
+    assert main(["effects"]) == 0
+    said = capsys.readouterr().out
+    assert all(f"  {name} " in said for name in library())
+
+
+def test_an_effect_is_described_and_saved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["effects", "dahl", "--json", "--save", str(tmp_path / "dahl.svg")]) == 0
+
+    told = json.loads(capsys.readouterr().out)
+    assert told["effect"]["source"].startswith("P. R. Dahl")
+    assert len(told["curves"]) == 3
+    assert (tmp_path / "dahl.svg").read_text("utf-8").startswith("<svg")
+    assert (tmp_path / "dahl_3.svg").is_file()
+    assert main(["effects", "dall"]) == 2
+    assert "did you mean" in capsys.readouterr().err
+
+
+def test_a_model_is_begun_and_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mine.toml"
+    assert main(["model", "new", str(file), "--like", "two-mass-drive"]) == 0
+    assert main(["model", "check", str(file), "--save", str(tmp_path / "run.svg")]) == 0
+    assert "angle: no output depends on it" in capsys.readouterr().out
+    assert (tmp_path / "run_2.svg").is_file()
+
+    assert main(["model", "new", str(file)]) == 2
+    assert "found a file" in capsys.readouterr().err
+    assert main(["model", "check", str(file), "--input", "torque=1"]) == 2
+    assert "found input 'torque'" in capsys.readouterr().err
+    assert main(["model", "list", "--json"]) == 0
+    assert set(json.loads(capsys.readouterr().out)) == set(shipped_models())
+    assert main(["model", "show", "bearing"]) == 0
+    assert 'name = "bearing"' in capsys.readouterr().out

@@ -1,0 +1,120 @@
+"""Accepted is what lowers the held-out error by more than chance, with a strength that is told."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.ranking.paired_test import difference
+from rigwatch.workbench.steps.change import add
+from tests.workbench.dampers import damper, effect
+from tests.workbench.machine import studied
+from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS
+
+SAMPLES = 2000
+SENSOR = '[ports.v_sensor]\nkind = "sensor"\nsignal = "v"\n'
+
+
+def left(error: np.ndarray) -> Any:
+    """A fit that leaves this error of the recordings held out."""
+    return SimpleNamespace(residuals=error.reshape(1, -1, 1), scale=np.ones(1))
+
+
+def transient() -> np.ndarray:
+    """What an effect does that shows after one step alone."""
+    since = np.maximum(np.arange(SAMPLES) - 700, 0)
+    return np.where(since > 0, 3 * np.exp(-since / 30), 0.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_gain_in_one_transient_alone_counts_and_so_does_a_loss(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    noise, missing = 0.3 * generator.normal(size=SAMPLES), transient()
+    found = difference(left(noise + missing), left(noise + 0.1 * missing))
+    assert found.p_falls < 0.01
+    assert found.relative > 0.15
+    turned = difference(left(noise + 0.1 * missing), left(noise + missing))
+    assert turned.p_rises < 0.01
+    assert turned.p_falls > 0.5
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.97, 0.99])
+def test_what_is_not_there_is_accepted_no_oftener_than_the_level_says(memory: float) -> None:
+    accepted = 0
+    for seed in range(200):
+        generator = np.random.default_rng(seed)
+        noise, apart = (_remembering(generator, memory) for _ in range(2))
+        share = 0.3 * generator.normal()
+        accepted += difference(left(noise), left(noise - share * apart)).p_falls < 0.025
+    assert accepted <= 0.025 * 200 + 3
+
+
+def _remembering(generator: np.random.Generator, memory: float) -> np.ndarray:
+    """A series each of whose values keeps a share of the one before."""
+    new = np.sqrt(1 - memory**2) * generator.normal(size=2 * SAMPLES)
+    return np.asarray(lfilter([1.0], [1.0, -memory], new)[SAMPLES:])
+
+
+def test_samples_count_that_both_have() -> None:
+    generator = np.random.default_rng(3)
+    noise = generator.normal(size=SAMPLES)
+    one, other = noise + 1, noise.copy()
+    other[: SAMPLES // 2] = np.nan
+    found = difference(left(one), left(other))
+    assert found.mean == pytest.approx(np.mean((one**2 - noise**2)[SAMPLES // 2 :]))
+
+
+def motor(seed: int, levels: list[float], lag: float) -> dict[str, np.ndarray]:
+    """Speed of a motor behind a slow sensor, its voltage in steps of five seconds."""
+    u = np.repeat(levels, 500)
+    v, read = np.zeros(len(u)), np.zeros(len(u))
+    for i in range(1, len(u)):
+        v[i] = v[i - 1] + 0.01 * (-2 * v[i - 1] + 3 * u[i - 1])
+        read[i] = read[i - 1] + 0.01 / lag * (v[i] - read[i - 1])
+    return {"u": u, "v": read + 0.005 * np.random.default_rng(seed).normal(size=len(u))}
+
+
+def test_a_lag_that_one_step_shows_is_accepted(tmp_path: Path) -> None:
+    train = motor(0, [0, 1, -1, 0.5, 1], 0.08)
+    held = motor(1, [0, 0, 0, 1, 1, 1, 1, 1], 0.08)
+    change = add(
+        studied(tmp_path, SPEED + PORT + SENSOR, [train], [held], UNITS), "lag", "v_sensor"
+    )
+    assert change.step == "add"
+
+
+def rubbing(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return 3 * np.tanh(v / 0.005)
+
+
+def wavy(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A force that no effect describes, beside a little friction."""
+    return 4 * np.sin(2 * np.pi * x / 0.011) + 1.5 * np.tanh(v / 0.003)
+
+
+TIED = effect(
+    "tied",
+    "-A*tanh(v/w) - B*tanh(v/(1.02*w))",
+    A="unit = '{F}', role = 'strength'",
+    B="unit = '{F}', role = 'shape', value = 0.1",
+    w="unit = '{v}', role = 'constant', value = 0.005",
+)
+
+
+def test_a_strength_that_may_as_well_be_neutral_is_not_accepted(tmp_path: Path) -> None:
+    change = add(damper(tmp_path, rubbing, TIED), "tied")
+    assert change.step == "refused"
+    assert "the training does not tell its strength" in change.text
+    assert change.tried is not None
+    assert change.tried[1] < 0.5 * change.before.held_out_error
+
+
+def test_what_helps_a_little_is_not_called_the_answer(tmp_path: Path) -> None:
+    found = explain(damper(tmp_path, wavy))
+    assert found.verdict == "unknown_effect"
+    assert "% of the error's energy stays, 14 times the noise floor" in found.text
+    assert "accepted as well: stribeck@load" in found.text

@@ -1,0 +1,64 @@
+"""Training that does not excite the model is told before a ranking, with a better split."""
+
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.study.study import create
+from tests.workbench.machine import recorded, studied
+from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS
+
+
+def motor(levels: list[float], seed: int = 0, each: int = 200) -> dict[str, np.ndarray]:
+    """Speed of a motor at rest and after steps of its voltage, two seconds each."""
+    u = np.repeat(levels, each)
+    u = u + 1e-3 * np.random.default_rng(seed + 9).normal(size=len(u))
+    v = np.zeros(len(u))
+    for i in range(1, len(u)):
+        v[i] = v[i - 1]
+        for _ in range(5):
+            v[i] += 0.002 * (-6 * v[i] + 9 * u[i - 1])
+    return {"u": u, "v": v + 0.01 * np.random.default_rng(seed).normal(size=len(u))}
+
+
+def split(folder: Path, table: dict[str, np.ndarray], spans: str) -> str:
+    """What `explain` says of one recording in parts."""
+    folder.mkdir(exist_ok=True)
+    (folder / "model.toml").write_text(SPEED + PORT)
+    recorded(folder / "run.mcap", table, UNITS)
+    text = f'model = "model.toml"\nhorizon = 0.5\n{spans}'
+    (folder / "template.toml").write_text(text)
+    found = explain(create(folder / "study", folder / "template.toml"))
+    assert found.verdict == "model_inadequate"
+    return found.text
+
+
+def test_a_part_without_motion_is_told_and_another_split_is_proposed(tmp_path: Path) -> None:
+    table = motor([0] * 5 + [1, -1, 0.5, 2, -2, 1, 0.5, -1, 1.5, 0])
+    spans = '[[train]]\nsession = "run.mcap"\nend = 10.0\n'
+    spans += '[[held_out]]\nsession = "run.mcap"\nstart = 10.0\n'
+    said = split(tmp_path, table, spans)
+    assert "the training does not excite the model: it leaves" in said
+    assert "b = " in said
+    assert "run.mcap from 0 s to 15 s and hold out ../run.mcap from 15 s to 30 s" in said
+
+
+def test_steps_without_their_transients_are_told(tmp_path: Path) -> None:
+    table = motor([1, -1, 0.5, 2, -2, 1, 0.5, -1, 1.5, 0.2])
+    parts = [(use, 2 * k + 1.0) for k, use in enumerate(["train", "held_out"] * 5)]
+    spans = "".join(
+        f'[[{use}]]\nsession = "run.mcap"\nstart = {at}\nend = {at + 1}\n' for use, at in parts
+    )
+    said = split(tmp_path, table, spans)
+    assert "a = " in said
+    assert "run.mcap from 1 s to 10.5 s and hold out ../run.mcap from 10.5 s to 20 s" in said
+
+
+def test_training_that_tells_its_model_is_ranked(tmp_path: Path) -> None:
+    table = motor([0, 1, -1, 0.5, 2, -2, 1, 0.5, -1, 1.5, 0])
+    keys = "horizon = 0.5"
+    found = explain(
+        studied(tmp_path, SPEED + PORT, [table], [motor([1, -1, 2, 0], 3)], UNITS, keys)
+    )
+    assert found.verdict == "nothing_missing"

@@ -1,0 +1,75 @@
+"""What is not claimed: one effect where much is left, anything of a model that nobody checked."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigwatch.workbench.data.noise_floor import NoiseFloor
+from rigwatch.workbench.explain.adequacy import unchecked
+from rigwatch.workbench.explain.rough_verdict import leaves_much, modest, not_alone
+from rigwatch.workbench.explain.verdict import Verdict
+
+
+def left(times: float) -> Any:
+    """A fit that leaves so many noise floors of the recordings held out."""
+    held_out = SimpleNamespace(rms=np.array([times]))
+    return SimpleNamespace(held_out=held_out, convergence=None, calm=None)
+
+
+def naming(times: float, second: tuple[str, ...] = ()) -> Verdict:
+    """A verdict that is sure of dry friction, which leaves so many noise floors."""
+    row: Any = SimpleNamespace(fitted=left(times), label="coulomb@load", gain=None)
+    return Verdict("missing_effect", row, ("coulomb@load",), (), "coulomb is missing", second)
+
+
+def bench(base: float, *, healthy: bool = False, method: str = "quiet band") -> Any:
+    """A study along the measured motion whose model leaves so many noise floors."""
+    data = SimpleNamespace(healthy=object() if healthy else None, along_motion=True)
+    return SimpleNamespace(data=data, base=left(base), floor=NoiseFloor(np.ones(1), method))
+
+
+FLOOR = NoiseFloor(np.ones(1), "healthy motion")
+
+
+def test_one_effect_that_leaves_much_of_a_rough_model_is_not_named_with_confidence() -> None:
+    found = modest(left(4.0), [], FLOOR, naming(2.0))
+
+    assert found.word == "undetermined"
+    assert "leaves 2.00 times" in found.text
+    assert not_alone(left(4.0), FLOOR, naming(2.0)) == found, "nor of any other model"
+
+
+def test_a_strong_effect_may_leave_more_as_it_changes_the_motion() -> None:
+    assert modest(left(28.0), [], FLOOR, naming(3.3)).word == "missing_effect"
+    assert modest(left(7.3), [], FLOOR, naming(2.0)).word == "undetermined"
+
+
+@pytest.mark.parametrize("found", [naming(1.3), naming(2.0, ("cubic_stiffness@load",))])
+def test_what_leaves_little_and_a_pair_stay_named(found: Verdict) -> None:
+    assert not leaves_much(left(4.0), FLOOR, found)
+    assert modest(left(4.0), [], FLOOR, found).word == "missing_effect"
+
+
+@pytest.mark.parametrize(
+    ("best", "method", "word"),
+    [
+        pytest.param(11.0, "quiet band", "model_inadequate", id="much is left"),
+        pytest.param(2.0, "periods", "undetermined", id="a little is left"),
+        pytest.param(1.0, "quiet band", "undetermined", id="the floor is a guess"),
+        pytest.param(1.0, "periods", "missing_effect", id="nothing but noise is left"),
+    ],
+)
+def test_without_a_healthy_recording_little_is_claimed(best: float, method: str, word: str) -> None:
+    found = unchecked(bench(16.0, method=method), naming(best))
+
+    assert found.word == word
+    if word != "missing_effect":
+        assert "[[healthy]]" in found.text
+
+
+def test_a_model_that_was_checked_keeps_its_verdict() -> None:
+    found = naming(2.0)
+
+    assert unchecked(bench(16.0, healthy=True), found) is found
