@@ -20,9 +20,10 @@ endif
 
 RUN_LOCKS := requirements/lock.txt requirements/build.txt
 VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
+BROWSER_PACKAGES := chromium chromium-driver
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test docs demo bench lint unit demo-headless lock viewer-packages clean
+.PHONY: help setup test docs demo bench lint unit demo-headless mutate lock viewer-packages clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -55,16 +56,21 @@ docs: $(STAMPS)/run  ## write the pages, tables and pictures that are made by th
 	@python -m tools.config_docs
 	@python -m tools.command_docs
 	@python -m tools.format_docs
+	@python -m tools.effect_docs
 	@python -m tools.alarm_docs
 	@python -m tools.unit_docs
 	@python -m tools.pictures
 	@python -m benchmarks.results_page
 
+mutate: $(STAMPS)/mutation  ## change the code a little and see which changes no test notices (MUTATE names some)
+	@CI=true mutmut run --max-children 2 $(MUTATE)
+	@mutmut results
+
 lock: $(STAMPS)/dev  ## write the lock files again (UPGRADE=1 takes newer versions)
 	@tools/lock.sh $(PYTHON_IN)
 
-viewer-packages:  # what the headless viewer of the dashboard test draws with
-	@tools/debian_packages.sh --wish $(VIEWER_PACKAGES)
+viewer-packages:  # what the tests of the dashboard and of the workbench's pages look with
+	@tools/debian_packages.sh --wish $(VIEWER_PACKAGES) $(BROWSER_PACKAGES)
 
 # Each environment is made anew only when its lock files or the project's metadata change.
 $(STAMPS)/run: $(RUN_LOCKS) pyproject.toml tools/setup.sh
@@ -76,6 +82,10 @@ $(STAMPS)/dev: requirements/dev.txt $(STAMPS)/run
 	@mkdir -p $(STAMPS) && touch $@
 
 BENCH_LOCKS := requirements/bench.txt requirements/bench_unresolved.txt
+$(STAMPS)/mutation: requirements/mutation.txt $(STAMPS)/dev
+	@tools/setup.sh $(VENV) requirements/mutation.txt
+	@mkdir -p $(STAMPS) && touch $@
+
 $(STAMPS)/bench: $(BENCH_LOCKS) $(STAMPS)/dev
 	@tools/setup.sh $(VENV) $(BENCH_LOCKS)
 	@mkdir -p $(STAMPS) && touch $@

@@ -1,0 +1,39 @@
+"""Prints docs/effects.md from the library of effects: `make docs` writes it."""
+
+import sys
+from pathlib import Path
+
+from rigwatch.physics.engine.equations import library
+from rigwatch.workbench.catalogue import listed, markdown
+
+TARGET = Path(__file__).parent.parent / "docs" / "effects.md"
+HEAD = """<!-- Printed by `make docs` from rigwatch/physics/effects. -->
+
+# Effects of the library
+
+{count} effects, each an expression at a port of a model ([models](models.md#ports)). `rigwatch
+effects NAME` says everything about one and draws it: force against position and speed, response to
+a step. "Looks like" names effects that may explain the same recording; `rigwatch explain` says
+when it cannot tell them apart.
+
+At a force port the expression is what is added, in the port's variables: `x` and `v` motion, `L`
+load, `p` pressure or level, `T` temperature, `i` current, `psi` flux linkage. At a signal it is
+what leaves, of `u` that arrives. An effect is tried only where its port has all that it names.
+[Own effects](workbench.md#own-effects)
+
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    return HEAD.format(count=len(library())) + markdown(listed())
+
+
+def main() -> int:
+    """Write the page."""
+    TARGET.write_text(page(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
