@@ -1,11 +1,13 @@
 """Alarms and estimates reach every listener once: through loss, restarts, and a killed router."""
 
 import signal
+import threading
 from pathlib import Path
 
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.message_ring import MessageRing
+from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.messages import ALARMS, GAPS, Alarm, encode
 from rigwatch.wire.ordering import OPEN, Ask, Numbered
@@ -150,3 +152,26 @@ def test_alarms_said_while_the_router_was_away_reach_every_listener_once(tmp_pat
         assert [heard(listener, 41) for listener in (one, other)] == [[40, 41]] * 2
         assert one.lost == other.lost == 0
         kill(again)
+
+
+def test_no_thread_asks_any_more_once_the_bus_is_closed(tmp_path: Path):
+    """An interpreter that ends while a thread waits for a reply aborts."""
+    asked, done = threading.Event(), threading.Event()
+
+    def keep_waiting(_: bytes) -> list[bytes]:
+        asked.set()
+        done.wait(PATIENCE)
+        return []
+
+    with TestRig(tmp_path) as rig:
+        rig.router()
+        rig.bus("slow").serve("slow", keep_waiting)
+        before = threading.enumerate()
+        bus = rig.bus("asks")
+        questions = RingQuestions(bus, lambda *_: None)
+        questions.ask("slow", Ask(1, 0, 0))
+        assert asked.wait(PATIENCE)
+        assert not set(threading.enumerate()) <= set(before)
+        bus.close()
+        assert set(threading.enumerate()) <= set(before)
+        done.set()

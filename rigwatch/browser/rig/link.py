@@ -59,11 +59,13 @@ class RigLink:
         }
         self._units: dict[str, str] = {}
         self._lock, self._ended = threading.Lock(), threading.Event()
-        threading.Thread(target=self._run, name="rig", daemon=True).start()
+        self._thread = threading.Thread(target=self._run, name="rig", daemon=True)
+        self._thread.start()
 
     def close(self) -> None:
         """Listen no more."""
         self._ended.set()
+        self._thread.join(TIMEOUT)
 
     def seen(self) -> dict[str, Any]:
         """Signals of the last seconds, their units, alarms, and what is wrong with the link."""

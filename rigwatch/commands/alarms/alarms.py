@@ -31,9 +31,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     bus = connect(load_rig(arguments.config), unique_process("alarms"), TIMEOUT)
     try:
-        changes = bus.subscribe(ALARMS)
+        changes = bus.subscribe(ALARMS) if arguments.follow else None
         standing = ask_alarm_list(bus, TIMEOUT)
-        if arguments.follow:
+        if changes is not None:
             _follow(standing, changes, arguments.json)
         elif arguments.json:
             print(json.dumps([as_dict(alarm) for alarm in standing], indent=2))

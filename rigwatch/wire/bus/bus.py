@@ -36,6 +36,7 @@ class Bus:
         self.process = process
         self._outlet: Outlet | None = None
         self._lock = threading.Lock()
+        self._at_close: list[Close] = []
         transport.declare_token(self.key(f"{ALIVE_KEY}/{process}"))
 
     def key(self, key: str) -> str:
@@ -118,9 +119,15 @@ class Bus:
         """Whether the router is reached now."""
         return self.transport.connected()
 
+    def at_close(self, end: Close) -> None:
+        """Have `close` call `end`, which returns once a thread no longer uses the bus."""
+        self._at_close.append(end)
+
     def close(self) -> None:
-        """Leave the bus; the process's tokens vanish."""
+        """Leave the bus; the process's tokens vanish, and no thread waits for a reply any more."""
         self.transport.close()
+        for end in self._at_close:
+            end()
 
 
 def unique_process(name: str) -> str:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from rigwatch.wire.bus.bus import Bus
 
 REPLY_TIMEOUT = 1.0
+END_TIMEOUT = 2.0
+"""How long the bus waits at its end for the thread that asks [s]."""
 PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
 """Waits before a question that nobody answered goes out again [s]."""
 
@@ -31,7 +33,9 @@ class RingQuestions:
         self._bus, self._answered = bus, answered
         self._questions: SimpleQueue[tuple[str, Ask] | None] = SimpleQueue()
         self._closed = False
-        threading.Thread(target=self._ask_on, name="ring-questions", daemon=True).start()
+        self._thread = threading.Thread(target=self._ask_on, name="ring-questions", daemon=True)
+        self._thread.start()
+        bus.at_close(self._end)
 
     def ask(self, key: str, ask: Ask) -> None:
         """Put the question to the rings at `key`."""
@@ -41,6 +45,11 @@ class RingQuestions:
         """Ask no more."""
         self._closed = True
         self._questions.put(None)
+
+    def _end(self) -> None:
+        # An interpreter that ends while a thread waits in Zenoh aborts the process (CPython 87135).
+        self.close()
+        self._thread.join(END_TIMEOUT)
 
     def _ask_on(self) -> None:
         repeats: dict[str, tuple[Ask, int]] = {}
