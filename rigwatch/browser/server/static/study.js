@@ -15,6 +15,7 @@ const HOVER = 90;
 let chosen = null;
 let place = null;
 let refreshing = null;
+let sought = state.latest ? null : state.step; // the step that is shown or on its way; null: the newest
 
 const charts = new Charts({ signals: $("signals"), residual: $("residual") }, (what, content) => {
   if (what === "point") $("readout").textContent = content;
@@ -83,7 +84,8 @@ function channels() {
 }
 
 /** Takes what the server says of the study; charts keep their span, lists their place. */
-async function refresh(step = state.latest ? null : state.step) {
+async function refresh(step = sought) {
+  sought = step;
   refreshing?.abort();
   refreshing = new AbortController();
   const query = step === null ? "" : `?step=${step}`;
