@@ -126,13 +126,18 @@ def try_add(
     changed = append_effect(keep_holds(held), accepted)
     progress(f"fitting once more with {row.label}")
     after = warm.comparison(changed)
-    if after.held_out_error > WORSE * errors[1] and not anyway:
+    if not (led_back(errors[1], after.held_out_error, after.noise_floor) or anyway):
         reason = f"fitted once more it leaves {after.held_out_error:.4g} {after.unit}"
         row = replace(row, reason=reason)
         return _refused(study, row, before, f"{words}, but {row.reason}")
     line = {"parameters": accepted.parameters, "model_parameters": accepted.model}
     change = Change("add", effect, where, before, after, errors, words)
     return Trial(study, changed, change, _which(change) | line | _numbers(after))
+
+
+def led_back(accepted: float, again: float, floor: float) -> bool:
+    """Whether a fit once more leaves what the accepted fit leaves, or less than the noise floor."""
+    return again <= max(WORSE * accepted, floor)
 
 
 def try_undo(study: Study, progress: Progress = unheard, warm: Warm | None = None) -> Trial:
@@ -147,30 +152,32 @@ def try_undo(study: Study, progress: Progress = unheard, warm: Warm | None = Non
     if not study.file.effects:
         raise ModelError(f"{study.folder}: found no effect to undo")
     last = study.file.effects[-1]
-    label = f"{last.effect}@{last.port}"
-    progress("fitting the model as it is")
-    before = warm.comparison(study)
-    changed = drop_effect(study)
-    progress(f"fitting without {label}")
-    after = warm.comparison(changed)
-    text = f"{label} taken away: held-out error {before.held_out_error:.4g} →"
-    text = f"{text} {after.held_out_error:.4g} {after.unit}"
-    change = Change("undo", last.effect, last.port, before, after, None, text)
-    return Trial(study, changed, change, _which(change) | _numbers(after))
+    after = drop_effect(study)
+    change = _without(study, after, (last.effect, last.port), progress, warm)
+    return Trial(study, after, change, _which(change) | _numbers(change.after))
 
 
 def _as_written(study: Study, progress: Progress, warm: Warm) -> Trial:
     """The study with its model as it was written."""
     named = ", ".join(study.file.variants)
+    after = use_variants(study, ())
+    change = _without(study, after, (named, ""), progress, warm)
+    line = {"variants": [], "before": list(study.file.variants), **_numbers(change.after)}
+    return Trial(study, after, change, line, step="base")
+
+
+def _without(
+    study: Study, after: Study, what: tuple[str, str], progress: Progress, warm: Warm
+) -> Change:
+    """The step from a study to the same without something."""
+    label = "@".join(filter(None, what))
     progress("fitting the model as it is")
-    before, changed = warm.comparison(study), use_variants(study, ())
-    progress(f"fitting without {named}")
-    after = warm.comparison(changed)
-    text = f"{named} taken away: held-out error {before.held_out_error:.4g} →"
-    text = f"{text} {after.held_out_error:.4g} {after.unit}"
-    change = Change("undo", named, "", before, after, None, text)
-    line = {"variants": [], "before": list(study.file.variants), **_numbers(after)}
-    return Trial(study, changed, change, line, step="base")
+    before = warm.comparison(study)
+    progress(f"fitting without {label}")
+    found = warm.comparison(after)
+    errors = f"{before.held_out_error:.4g} → {found.held_out_error:.4g} {found.unit}"
+    text = f"{label} taken away: held-out error {errors}"
+    return Change("undo", *what, before, found, None, text)
 
 
 def _which(change: Change) -> dict[str, Any]:

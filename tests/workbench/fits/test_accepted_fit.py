@@ -9,6 +9,7 @@ from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.ranking.ranked import accepted_from
 from rigwatch.workbench.steps.change import add, undo
 from rigwatch.workbench.steps.ledger_replay import replay
+from rigwatch.workbench.steps.trial import led_back
 from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.machine import studied
 
@@ -72,3 +73,9 @@ def test_a_step_that_gets_worse_when_it_is_fitted_again_is_refused(
     assert change.step == "refused"
     assert "fitted once more it leaves 1.9" in change.text
     assert (study.folder / "study.toml").read_bytes() == before
+
+
+@pytest.mark.parametrize(("left", "same"), [(1.009, True), (1.02, False)])
+def test_a_fit_that_leaves_more_than_noise_must_be_found_again(left: float, same: bool) -> None:
+    assert led_back(1.0, left, floor=0.5) is same
+    assert led_back(1.0, left, floor=1.1)
