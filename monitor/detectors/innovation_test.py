@@ -40,6 +40,15 @@ def new_nis_window(length: int) -> NisWindow:
 
 
 @njit(cache=True)
+def clear_nis(window: NisWindow) -> None:
+    """Empty the window."""
+    for k in range(window.values.size):
+        window.values[k] = 0.0
+    window.total[0] = 0.0
+    window.place[0] = window.place[1] = 0
+
+
+@njit(cache=True)
 def push_nis(window: NisWindow, nis: float) -> float:
     """Add one; the sum over the window, NaN until it is full.
 

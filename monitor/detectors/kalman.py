@@ -27,6 +27,7 @@ from monitor.detectors.small_matrices import (
     inverse,
     product,
     product_transposed,
+    put_sum,
     times,
     transposed_product,
 )
@@ -43,17 +44,25 @@ def kalman_update(
     Returns the normalised innovation squared νᵀ·S⁻¹·ν, ν = y - H·x, S = H·P·Hᵀ + V: chi-square with
     m degrees of freedom if model and noise are right; NaN if S is singular, and nothing changes.
     """
-    innovation = y - times(h, x)
+    innovation = times(h, x)
+    for i in range(y.size):
+        innovation[i] = y[i] - innovation[i]
     ph = product_transposed(p, h)
-    s = product(h, ph) + v
+    s = product(h, ph)
+    put_sum(s, s, v)
     s_inverse = np.empty_like(s)
     if not inverse(s, s_inverse):
         return np.nan
     gain = product(ph, s_inverse)
-    keep = np.eye(x.size) - product(gain, h)
+    keep = product(gain, h)
+    for i in range(x.size):
+        for j in range(x.size):
+            keep[i, j] = (1.0 if i == j else 0.0) - keep[i, j]
     noise = product_transposed(product(gain, v), gain)
-    p[:, :] = product_transposed(product(keep, p), keep) + noise
-    x[:] = x + times(gain, innovation)
+    put_sum(p, product_transposed(product(keep, p), keep), noise)
+    change = times(gain, innovation)
+    for i in range(x.size):
+        x[i] += change[i]
     weighted = times(s_inverse, innovation)
     total = 0.0
     for i in range(innovation.size):
@@ -89,13 +98,21 @@ def generalised_update(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     if not inverse(p, p_inverse):
         return False
     prior, measured = transposed_product(e, p_inverse), transposed_product(c, v_inverse)
-    information = product(prior, e) + product(measured, c)
+    information = product(prior, e)
+    put_sum(information, information, product(measured, c))
     covariance = np.empty_like(information)
     if not inverse(information, covariance):
         return False
-    augmented[:] = times(covariance, times(prior, x) + times(measured, y))
-    x[:] = augmented[:n]
-    p[:, :] = covariance[:n, :n]
+    known, seen = times(prior, x), times(measured, y)
+    for i in range(known.size):
+        known[i] += seen[i]
+    best = times(covariance, known)
+    for i in range(best.size):
+        augmented[i] = best[i]
+    for i in range(n):
+        x[i] = best[i]
+        for j in range(n):
+            p[i, j] = covariance[i, j]
     return True
 
 

@@ -1,7 +1,8 @@
 """Products and inverses of matrices of a few rows, in plain loops.
 
 A linear algebra library sums in an order that depends on the processor; these sum from left to
-right, so that a replay is identical to the bit everywhere, and for five rows they are faster.
+right, so that a replay is identical to the bit everywhere, and for five rows they are faster. Sums
+are loops too: an expression of whole arrays takes the compiler seconds.
 """
 
 import numpy as np
@@ -54,6 +55,22 @@ def times(a: FloatArray, x: FloatArray) -> FloatArray:
         for k in range(a.shape[1]):
             out[i] += a[i, k] * x[k]
     return out
+
+
+@njit(cache=True)
+def put_sum(out: FloatArray, a: FloatArray, b: FloatArray) -> None:
+    """out = a + b, of matrices."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            out[i, j] = a[i, j] + b[i, j]
+
+
+@njit(cache=True)
+def put_identity(out: FloatArray, scale: float) -> None:
+    """out = scale·I."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = scale if i == j else 0.0
 
 
 @njit(cache=True)

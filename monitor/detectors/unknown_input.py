@@ -25,9 +25,16 @@ from numpy.typing import NDArray
 
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
 from monitor.detectors.high_pass import forgetting, high_pass_sample, leaky
-from monitor.detectors.innovation_test import NisWindow, new_nis_window, push_nis
+from monitor.detectors.innovation_test import NisWindow, clear_nis, new_nis_window, push_nis
 from monitor.detectors.kalman import augmented_matrices, generalised_update, kalman_update
-from monitor.detectors.small_matrices import inverse, product, product_transposed, times
+from monitor.detectors.small_matrices import (
+    inverse,
+    product,
+    product_transposed,
+    put_identity,
+    put_sum,
+    times,
+)
 from monitor.detectors.state_space import state_space
 from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
 from rigwatch.physics.transfer import TransferFunction
@@ -140,26 +147,25 @@ def new_filter_state(model: FilterModel, window: int) -> FilterState:
 @njit(cache=True)
 def _start(model: FilterModel, state: FilterState, beta: float, signals: FloatArray) -> None:
     """Start at the measured position, with unknown motion."""
-    state.raw[:] = signals
-    state.high[:] = 0.0
-    if beta == 1.0:
-        state.high[:] = signals
-    state.plain[:] = state.high[1]
-    state.general[:] = state.high[1]
+    for i in range(signals.size):
+        state.raw[i] = signals[i]
+        state.high[i] = signals[i] if beta == 1.0 else 0.0
+    for i in range(model.b.size):
+        state.plain[i] = state.general[i] = state.high[1]
     spread = 1e4 * (model.v[0, 0] + model.w[0, 0])
-    state.plain_p[:, :] = spread * np.eye(model.b.size)
-    state.general_p[:, :] = spread * np.eye(model.b.size)
-    state.window.values[:] = 0.0
-    state.window.total[0] = 0.0
-    state.window.place[:] = 0
+    put_identity(state.plain_p, spread)
+    put_identity(state.general_p, spread)
+    clear_nis(state.window)
     state.last[0], state.last[1] = state.high[0], state.high[state.high.size - 1]
     state.counts[0] = 0
 
 
 @njit(cache=True)
 def _predict(model: FilterModel, x: FloatArray, p: FloatArray, u: float) -> None:
-    x[:] = times(model.a, x) + model.b * u
-    p[:, :] = product_transposed(product(model.a, p), model.a) + model.w
+    ahead = times(model.a, x)
+    for i in range(x.size):
+        x[i] = ahead[i] + model.b[i] * u
+    put_sum(p, product_transposed(product(model.a, p), model.a), model.w)
 
 
 @njit(cache=True)
@@ -169,8 +175,9 @@ def _step(model: FilterModel, state: FilterState, y: FloatArray) -> float:
     ok = generalised_update(
         state.general, state.general_p, model.e, model.c, model.v_inverse, y, state.augmented
     )
-    whole = ok and np.isfinite(state.plain).all() and np.isfinite(state.general).all()
-    return nis if whole else np.nan
+    for i in range(state.plain.size):
+        ok = ok and np.isfinite(state.plain[i]) and np.isfinite(state.general[i])
+    return nis if ok else np.nan
 
 
 @njit(cache=True)
