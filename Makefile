@@ -33,7 +33,12 @@ setup: $(STAMPS)/dev  ## only the virtual environment, in .venv
 demo: $(STAMPS)/run  ## simulated rig, monitor and live dashboard: friction appears, an alarm names it
 	@rigwatch demo $(DEMO)
 
-test: lint demo-headless unit  ## everything that is checked: style, types, layers, demo, tests
+# The demo mostly waits for its rig: style and types are checked beside it.
+SYNC := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
+
+test: $(STAMPS)/dev  ## everything that is checked: style, types, layers, demo, tests
+	@$(MAKE) --no-print-directory -j3 $(SYNC) lint demo-headless viewer-packages
+	@$(MAKE) --no-print-directory unit
 
 lint: $(STAMPS)/dev  ## ruff, mypy --strict and the rules of which layer imports which
 	@ruff check .
