@@ -17,7 +17,7 @@ from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.compare.uncertainty_budget import beyond
 from rigwatch.workbench.data.noise_floor import quiet_scale
 from rigwatch.workbench.fit.intervals import values
-from rigwatch.workbench.ranking.candidates import candidates
+from rigwatch.workbench.ranking.candidates import shapes_of
 from rigwatch.workbench.ranking.refitting import refit
 from rigwatch.workbench.ranking.scoring import rank_only
 
@@ -53,7 +53,7 @@ def covers(case: Case) -> bool:
     data = simulated(case, {name: true}, healthy)
     bench = bench_of(study, data, quiet_scale(data.train))
     effect, port, parameter = STRENGTHS[name]
-    found = [c for c in candidates(study, data.train) if (c.name, c.port) == (effect, port)]
+    found = shapes_of(study, data.train, effect, port)
     row = rank_only(study, data, bench.base, found)
     refit(study, data, bench.base, row)
     assert row.fitted is not None

@@ -94,8 +94,7 @@ def suspects(evidence: Evidence, model: RigModel, effects: Mapping[str, Effect])
     An effect whose strength has the wrong sign is excluded.
     """
     ports = rig_ports(model, _bridged(evidence.signals))
-    tried = {name: effect for name, effect in effects.items() if not effect.elective}
-    found = _candidates(ports, tried, model)
+    found = _candidates(ports, effects, model)
     pushes = _pushes(ports, found, evidence.onset, 1 / model.sample_rate)
     moved = np.empty_like(pushes)
     for index, candidate in enumerate(found):

@@ -71,7 +71,7 @@ def test_every_effect_stands_where_it_can_in_each_of_its_shapes() -> None:
     wanted = {("coulomb", "load"), ("stribeck", "load"), ("coulomb", "other")}
     found = candidates(
         ["load", "other"],
-        ["coulomb", "stribeck"],
+        {name: EFFECTS[name] for name in ("coulomb", "stribeck")},
         lambda name, port: EFFECTS[name].scaled(SIZES) if (name, port) in wanted else None,
     )
     assert {(c.name, c.port) for c in found} == wanted

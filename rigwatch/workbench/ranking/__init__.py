@@ -5,10 +5,10 @@
 """
 
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, STEP, judge_fit, left_over
-from rigwatch.workbench.ranking.candidates import candidates
+from rigwatch.workbench.ranking.candidates import candidates, shapes_of
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import rank
-from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, start_of
+from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from
 from rigwatch.workbench.ranking.refitting import Progress, refit, unheard
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all
 
@@ -29,6 +29,6 @@ __all__ = [
     "rank_only",
     "refit",
     "score_all",
-    "start_of",
+    "shapes_of",
     "unheard",
 ]

@@ -1,8 +1,8 @@
-"""What a study tries: every effect at every port where it makes sense and does not stand yet."""
+"""What a study tries: every effect at every port where it makes sense, or one that is named."""
 
 from rigwatch.physics.engine.equations import Effect
 from rigwatch.physics.engine.fit import Recording
-from rigwatch.physics.engine.score import Candidate, suits
+from rigwatch.physics.engine.score import Candidate, shaped, suits
 from rigwatch.physics.engine.score import candidates as every_candidate
 from rigwatch.workbench.data import port_sizes
 from rigwatch.workbench.ranking.separate_recordings import check_ports
@@ -10,10 +10,9 @@ from rigwatch.workbench.study import Study
 
 
 def candidates(study: Study, recording: Recording) -> list[Candidate]:
-    """Every effect at every port where it makes sense and does not stand yet.
+    """Every effect at every port where it makes sense and is not in the model yet.
 
-    Elective effects are ranked where the study asks for the whole library: verdicts are calibrated
-    without them, and more candidates make larger classes.
+    Elective effects are among them where the study asks for the whole library.
 
     Args:
         study: its model, its effects and those already accepted.
@@ -28,9 +27,11 @@ def candidates(study: Study, recording: Recording) -> list[Candidate]:
             return None
         return study.effect_at(name, port).scaled(sizes[port])
 
-    ranked = {
-        name: effect
-        for name, effect in study.effects.items()
-        if study.file.whole_library or not effect.elective
-    }
-    return every_candidate(ports, ranked, effect_at)
+    return every_candidate(ports, study.effects, effect_at, elective=study.file.whole_library)
+
+
+def shapes_of(study: Study, recording: Recording, effect: str, port: str) -> list[Candidate]:
+    """One effect at one port in each of its shapes, elective or not."""
+    check_ports(study)
+    sizes = port_sizes(study.model, recording)[port]
+    return shaped(effect, study.effect_at(effect, port).scaled(sizes), port)

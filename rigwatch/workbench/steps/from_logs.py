@@ -11,8 +11,8 @@ from pathlib import Path
 
 from msgspec import structs
 
-from rigwatch.physics.engine.equations import Input, Model, Output, load_model, shipped_models
-from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError, nearest
+from rigwatch.physics.engine.equations import Input, Model, Output, model_named
+from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError
 from rigwatch.wire.exchange import ImportMapping, import_file, read_table
 from rigwatch.workbench.data import (
     RATES_ALIKE,
@@ -59,7 +59,7 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
     """
     if (folder / FILE).exists():
         raise ConfigError(folder / FILE, "", "a study", "a folder without one")
-    model, made_folder, written = _model(logs.model), not folder.exists(), list[Path]()
+    model, made_folder, written = model_named(logs.model), not folder.exists(), list[Path]()
     folder.mkdir(parents=True, exist_ok=True)
     try:
         reading, remarks = _imported(folder, logs, model, written)
@@ -74,15 +74,6 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
         if made_folder:
             folder.rmdir()
         raise
-
-
-def _model(name: str) -> Model:
-    if name.endswith(".toml"):
-        return load_model(Path(name))
-    models = shipped_models()
-    if name not in models:
-        raise ModelError(f"--model: found {name!r}{nearest(name, models)}")
-    return models[name]
 
 
 def _imported(

@@ -20,9 +20,9 @@ from rigwatch.workbench.ranking import (
     Progress,
     Ranked,
     accepted_from,
-    candidates,
     rank_only,
     refit,
+    shapes_of,
     unheard,
 )
 from rigwatch.workbench.study import (
@@ -251,9 +251,7 @@ def _port(study: Study, name: str, port: str | None) -> str:
 
 
 def _tried(bench: Bench, effect: str, port: str) -> Ranked:
-    found = [
-        c for c in candidates(bench.study, bench.data.train) if (c.name, c.port) == (effect, port)
-    ]
+    found = shapes_of(bench.study, bench.data.train, effect, port)
     row = rank_only(bench.study, bench.data, bench.base, found)
     refit(bench.study, bench.data, bench.base, row)
     if row.fitted is None:

@@ -24,9 +24,8 @@ from rigwatch.physics.engine.equations import (
     Parameter,
     check_model,
     library,
-    load_model,
+    model_named,
     offered,
-    shipped_models,
     units_at,
     with_variants,
 )
@@ -269,8 +268,9 @@ def study_of(folder: Path, text: str) -> Study:
     file = parse(text, StudyFile, folder / FILE)
     given = offered(folder / name for name in file.effect_files)
     effects = {**library(), **given}
-    file = known_in_si(_written(folder, file), file, folder / FILE)
-    model, holds = _base(folder, file)
+    written = _written(folder, file)
+    file = known_in_si(written, file, folder / FILE)
+    model, holds = _held(known_as_inputs(written, file), file)
     study = Study(folder, file, model, effects, frozenset(given), holds=holds, text=text)
     for accepted in file.effects:
         study.effect(accepted.effect)
@@ -316,26 +316,12 @@ def _unit(parameter: Parameter | EffectParameter | None) -> Unit:
     return unit_of((parameter.shown or parameter.unit) if parameter else "")
 
 
-def _model(folder: Path, name: str) -> Model:
-    if name.endswith(".toml"):
-        path = folder / name
-        model = load_model(path)
-        check_model(model, str(path))
-        return model
-    models = shipped_models()
-    if name not in models:
-        raise ModelError(f"{folder / FILE}: found model {name!r}{nearest(name, models)}")
-    return models[name]
-
-
-def _base(folder: Path, file: StudyFile) -> tuple[Model, dict[str, Held]]:
-    """The study's model with its variants and its holds, and the holds."""
-    return _held(known_as_inputs(_written(folder, file), file), file)
-
-
 def _written(folder: Path, file: StudyFile) -> Model:
     """The study's model with its variants, as its file describes it."""
-    return with_variants(_model(folder, file.model), file.variants)
+    model = model_named(file.model, folder)
+    if file.model.endswith(".toml"):
+        check_model(model, str(folder / file.model))
+    return with_variants(model, file.variants)
 
 
 def varied(study: Study, variants: Sequence[str]) -> Study:
@@ -345,7 +331,7 @@ def varied(study: Study, variants: Sequence[str]) -> Study:
         ModelError: a variant is unknown, or two of them exclude each other.
     """
     file = structs.replace(study.file, variants=tuple(variants))
-    model, holds = _base(study.folder, file)
+    model, holds = _held(known_as_inputs(_written(study.folder, file), file), file)
     return replace(study, file=file, model=model, kept=None, holds=holds)
 
 

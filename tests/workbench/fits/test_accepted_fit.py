@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from rigwatch.workbench.compare.compare import compare
+from rigwatch.workbench.compare.preparation import open_bench
+from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.ranking.ranked import accepted_from
 from rigwatch.workbench.steps.change import add, undo
 from rigwatch.workbench.steps.ledger_replay import replay
@@ -79,3 +81,9 @@ def test_a_step_that_gets_worse_when_it_is_fitted_again_is_refused(
 def test_a_fit_that_leaves_more_than_noise_must_be_found_again(left: float, same: bool) -> None:
     assert led_back(1.0, left, floor=0.5) is same
     assert led_back(1.0, left, floor=1.1)
+
+
+def test_an_elective_effect_is_not_ranked_and_may_be_added(study: Study) -> None:
+    bench = open_bench(study)
+    assert "stop_above" not in {row.effect for row in ranking(bench)[0]}
+    assert add(study, "stop_above", anyway=True).step == "add"

@@ -250,15 +250,15 @@ def model_text(name: str) -> str:
     return Path(name).read_text("utf-8") if name.endswith(".toml") else _shipped_texts()[name]
 
 
-def model_named(name: str) -> Model:
-    """A model that ships, by its name, or a file of one's own.
+def model_named(name: str, folder: Path | None = None) -> Model:
+    """A model that ships, by its name, or a file of one's own, in `folder` if one is given.
 
     Raises:
         ConfigError: the file does not fit.
         ModelError: nothing has this name.
     """
     if name.endswith(".toml"):
-        return load_model(Path(name))
+        return load_model((folder or Path()) / name)
     known = shipped_models()
     if name not in known:
         raise ModelError(f"found model {name!r}{nearest(name, known)}")

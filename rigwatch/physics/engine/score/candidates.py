@@ -32,15 +32,21 @@ class Candidate:
 
 
 def candidates(
-    ports: Iterable[str], effects: Iterable[str], effect_at: EffectAt
+    ports: Iterable[str],
+    effects: Mapping[str, Effect],
+    effect_at: EffectAt,
+    *,
+    elective: bool = False,
 ) -> list[Candidate]:
     """Every effect at every port where it can stand, in each of its shapes.
 
     Args:
         ports, effects: by name.
         effect_at: which effect stands where.
+        elective: whether elective effects are among them: verdicts are calibrated without these,
+            and more candidates make larger classes.
     """
-    names = list(effects)
+    names = [name for name, effect in effects.items() if elective or not effect.elective]
     placed = ((name, effect_at(name, port), port) for port in ports for name in names)
     return [
         candidate
