@@ -8,10 +8,10 @@ model.history.jsonl       who did what, when and why, one line each
 
 import hashlib
 import json
-import os
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.host import replace_file
 
 
 def install(path: Path, text: str, t_ns: int, user: str, why: str) -> None:
@@ -23,8 +23,8 @@ def install(path: Path, text: str, t_ns: int, user: str, why: str) -> None:
     try:
         before = path.read_text(encoding="utf-8")
         number = max(_numbers(path), default=0) + 1
-        _write(_version(path, number), before)
-        _write(path, text)
+        replace_file(_version(path, number), before)
+        replace_file(path, text)
         _note(path, "promote", text, t_ns=t_ns, user=user, why=why)
     except OSError as error:
         raise ConfigError(path, "", error.strerror or str(error), "a file to write") from error
@@ -53,8 +53,8 @@ def roll_back(path: Path, t_ns: int, user: str, why: str) -> str:
     text = version_before(path)
     try:
         undone = path.read_text(encoding="utf-8")
-        _write(path.with_name(f"{path.stem}.undone-{_sha256(undone)[:8]}.toml"), undone)
-        _write(path, text)
+        replace_file(path.with_name(f"{path.stem}.undone-{_sha256(undone)[:8]}.toml"), undone)
+        replace_file(path, text)
         _version(path, max(_numbers(path))).unlink()
         _note(path, "rollback", text, t_ns=t_ns, user=user, why=why)
     except OSError as error:
@@ -71,16 +71,6 @@ def _numbers(path: Path) -> list[int]:
 
 def _version(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}.v{number}.toml")
-
-
-def _write(path: Path, text: str) -> None:
-    """Whole or not at all."""
-    beside = path.with_suffix(".new")
-    with beside.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)
 
 
 def _note(path: Path, step: str, text: str, *, t_ns: int, user: str, why: str) -> None:

@@ -1,9 +1,10 @@
-"""Services of the operating system: systemd notifications, real-time priority, ports, signals."""
+"""Services of the system: systemd notifications, real-time priority, ports, signals, files."""
 
 from rigwatch.wire.host.ending import set_at_signal
 from rigwatch.wire.host.heartbeat import Heartbeat
 from rigwatch.wire.host.ports import endpoint_address, free_port, is_free
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
+from rigwatch.wire.host.whole_file import replace_file, write_through
 
 __all__ = [
     "DAQ",
@@ -15,5 +16,7 @@ __all__ = [
     "is_free",
     "prepare_for_real_time",
     "raise_priority",
+    "replace_file",
     "set_at_signal",
+    "write_through",
 ]

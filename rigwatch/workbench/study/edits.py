@@ -1,6 +1,6 @@
-"""Edits of a study's file: each gives the study as it would be, and writes nothing.
+"""Edits of a study's file: each gives the study as it would be, and leaves the file alone.
 
-`commit` writes the outcome, with the ledger's line that tells it.
+`commit` writes the outcome and the ledger's line. Only a user's effect file is copied at once.
 """
 
 import re
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rigwatch.physics.engine.equations import load_effects
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.study.folder import replace_file
+from rigwatch.wire.host import replace_file
 from rigwatch.workbench.study.study import GIVEN, Accepted, Study, converted, study_of
 
 _TABLE = "\n[[effects]]\n"

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import msgspec
 
+from rigwatch.wire.host import write_through
+
 FILE = "study.toml"
 LEDGER = "ledger.jsonl"
 NEW = "study.new"
@@ -46,18 +48,11 @@ def write_step(folder: Path, ledger: int, line: bytes, text: str | None) -> None
     """
     _drop_torn_line(ledger)
     if text is not None:
-        _write(folder / NEW, text)
+        write_through(folder / NEW, text)
     os.write(ledger, line)
     os.fsync(ledger)
     if text is not None:
         (folder / NEW).replace(folder / FILE)
-
-
-def replace_file(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    beside = path.with_name(f"{path.name}.{os.getpid()}.part")
-    _write(beside, text)
-    beside.replace(path)
 
 
 def settle(folder: Path) -> None:
@@ -73,13 +68,6 @@ def settle(folder: Path) -> None:
             new.replace(folder / FILE)
         else:
             new.unlink()
-
-
-def _write(path: Path, text: str) -> None:
-    with path.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
 
 
 def _last_study(folder: Path) -> str:
