@@ -153,7 +153,8 @@ def test_tokens_show_who_is_alive(join: Join) -> None:
     worker = join("worker")
     close = worker.declare_token("alive/part")
     eventually(lambda: ("alive/part", True) in seen, "the token is seen")
-    assert {"alive/watcher", "alive/worker", "alive/part"} <= set(watcher.tokens("alive/*"))
+    there = {"alive/watcher", "alive/worker", "alive/part"}
+    eventually(lambda: there <= set(watcher.tokens("alive/*")), "all three are alive")
     close()
     eventually(lambda: ("alive/part", False) in seen, "the token's end is seen")
     worker.close()
