@@ -6,8 +6,10 @@ STAMPS := $(VENV)/stamps
 
 # Compiled kernels are kept in the checkout, so that every process and every run finds them.
 export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba_cache
-# Two test workers on two cores: threads of the linear algebra would only wait for each other.
+# Each test worker has a core: threads of the linear algebra would only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
+# One worker more than cores, as many tests wait for devices and pages.
+WORKERS ?= $(shell cores=$$(nproc 2>/dev/null || echo 2); echo $$((cores < 3 ? cores + 1 : 4)))
 export PATH := $(abspath $(VENV)/bin):$(PATH)
 
 # Measured data, where they lie beside the checkout.
@@ -52,7 +54,7 @@ demo-headless: $(STAMPS)/run
 unit: $(STAMPS)/dev viewer-packages
 	@if [ "$${CI:-}" = true ] && [ ! -d "$${RIGWATCH_DATA:-}" ]; then \
 		echo "test: RIGWATCH_DATA names no folder with the measured data sets" >&2; exit 1; fi
-	@pytest -n 2 --dist loadgroup $(TESTS)
+	@pytest -n $(WORKERS) --dist loadgroup $(TESTS)
 
 bench: $(STAMPS)/bench  ## run the benchmarks (BENCH names some) and write docs/benchmarks.md
 	@python -m benchmarks --page $(BENCH)
