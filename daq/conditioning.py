@@ -11,13 +11,14 @@ same time. All others must move, so that a mass held by friction is not mistaken
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from numba import njit
 
 from daq.adapter import RawBlock
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.device import Calibration
+from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import ByteArray, Column, SampleBlock
 from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.rig_config import ChannelSection
@@ -95,8 +96,8 @@ class Conditioner:
         return values, flags
 
 
-@njit(cache=True)
-def _hold_last(values, flags, state):  # type: ignore[no-untyped-def]
+@kernel()
+def _hold_last(values: FloatArray, flags: ByteArray, state: Any) -> None:
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):
             if np.isfinite(values[i, k]):
@@ -106,8 +107,8 @@ def _hold_last(values, flags, state):  # type: ignore[no-untyped-def]
                 flags[i, k] |= quality.NON_FINITE
 
 
-@njit(cache=True)
-def _follow(code, moves, s):  # type: ignore[no-untyped-def]
+@kernel()
+def _follow(code: float, moves: float, s: Any) -> None:
     """Track how long a channel's code has been constant, and how long it has not moved."""
     s.equal = s.equal + 1 if code == s.code else 1
     s.code = code
@@ -117,8 +118,15 @@ def _follow(code, moves, s):  # type: ignore[no-untyped-def]
         s.since_move = 0
 
 
-@njit(cache=True)
-def _judge(codes, values, flags, limits, stuck_after, state):  # type: ignore[no-untyped-def]  # noqa: PLR0917
+@kernel()
+def _judge(  # noqa: PLR0917 -- a compiled kernel takes no keywords
+    codes: FloatArray,
+    values: FloatArray,
+    flags: ByteArray,
+    limits: FloatArray,
+    stuck_after: IntArray,
+    state: Any,
+) -> None:
     n, channels = codes.shape
     for i in range(n):
         for k in range(channels):
@@ -133,16 +141,16 @@ def _judge(codes, values, flags, limits, stuck_after, state):  # type: ignore[no
                 values[i, k] = state[k].good
 
 
-@njit(cache=True)
-def _others_move(state, k, within):  # type: ignore[no-untyped-def]
+@kernel()
+def _others_move(state: Any, k: int, within: int) -> bool:
     for j in range(len(state)):  # noqa: SIM110 (no generators in a compiled kernel)
         if j != k and state[j].since_move >= within:
             return False
     return True
 
 
-@njit(cache=True)
-def _flags_of(code, value, limits, s):  # type: ignore[no-untyped-def]
+@kernel()
+def _flags_of(code: float, value: float, limits: FloatArray, s: Any) -> int:
     s.since_good += 1
     if not np.isfinite(value):
         return quality.NON_FINITE

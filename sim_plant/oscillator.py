@@ -15,11 +15,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 RATE = 256.0
 """Sample rate [Hz]."""
@@ -132,12 +132,12 @@ def strength_for(name: str, force: FloatArray, share: float, *, held: bool = Fal
     return float(np.exp(brentq(surplus, np.log(low), np.log(high), xtol=1e-3)))
 
 
-@njit(cache=True)
+@kernel()
 def _clipped(value: float, limit: float) -> float:
     return max(-limit, min(limit, value))
 
 
-@njit(cache=True)
+@kernel()
 def _run(force: FloatArray, s: FloatArray, held: bool, out: FloatArray) -> None:  # noqa: C901, PLR0912, PLR0915 -- a kernel
     h = 1.0 / (RATE * STEPS)
     x, v, a, played, bent, yielded, branch = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

@@ -27,8 +27,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from rigwatch.wire.kernel import kernel
 
 Record = Any
 """One record of a structured array; numba compiles its fields as attributes."""
@@ -50,7 +51,7 @@ _GAP_STIFFNESS = 5.0e4
 _GAP_DAMPING = 10.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def orifice(area_mm2: float, p: Record) -> float:
     """Conductance c of an orifice of `area_mm2` [m^3/s]."""
     n = p.heat_capacity_ratio
@@ -58,7 +59,7 @@ def orifice(area_mm2: float, p: Record) -> float:
     return 2.0e-6 * psi * p.discharge * area_mm2 * math.sqrt(_GAS * p.temperature)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def flow(pressure_a: float, pressure_b: float, conductance: float, resistance: float) -> float:
     """Flow from a to b through an orifice behind a laminar resistance [Pa m^3/s]."""
     upstream = max(pressure_a, pressure_b)
@@ -70,7 +71,7 @@ def flow(pressure_a: float, pressure_b: float, conductance: float, resistance: f
     return amount if pressure_a > pressure_b else -amount
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def dry_friction(  # noqa: PLR0917
     free_velocity: float,
     velocity: float,
@@ -97,7 +98,7 @@ def dry_friction(  # noqa: PLR0917
     return toward * max(abs(free_velocity) - kinetic * per_mass, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def end_stop(x: float, v: float, p: Record) -> float:
     """Force of the end stops on the piston [N]: stiff, dissipative, never pulling."""
     over = abs(x) - 0.5 * p.stroke
@@ -108,7 +109,7 @@ def end_stop(x: float, v: float, p: Record) -> float:
     return -force if x > 0.0 else force
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def contact(offset: float, closing: float, gap: float) -> float:
     """Force of the rod on the load across play of width `gap` [N]; `offset` is rod less load."""
     over = abs(offset) - 0.5 * gap
@@ -118,7 +119,7 @@ def contact(offset: float, closing: float, gap: float) -> float:
     return toward * max(_GAP_STIFFNESS * over + _GAP_DAMPING * closing * toward, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def other_forces(x: float, time: float, e: Record) -> float:
     """Hidden forces on the load that are neither dry nor proportional to velocity [N]."""
     force = e.constant_force - e.spring * x - e.cubic_spring * x**3
@@ -127,7 +128,7 @@ def other_forces(x: float, time: float, e: Record) -> float:
     return force
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def valve_voltage(line: Floats, sample: int, s: Record, e: Record, p: Record) -> float:
     """The drive voltage at the flapper, after the actuator's faults [V]."""
     late = min(e.actuator_delay * p.sample_rate, DELAY_LINE - 2.0)
@@ -148,14 +149,14 @@ def valve_voltage(line: Floats, sample: int, s: Record, e: Record, p: Record) ->
     return min(max(volts, -limit), limit)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def upstream(lift: float, supply: float, p: Record) -> float:
     """Pressure at a nozzle that the flapper lifts by `lift`, with a share of the supply [Pa]."""
     pressure = min(max(p.mean_pressure + lift, p.atmosphere), p.highest_pressure)
     return p.atmosphere + supply * (pressure - p.atmosphere)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def advance_plant(  # noqa: PLR0915, PLR0917
     command: Floats,
     parameters: NDArray[np.void],
@@ -266,7 +267,7 @@ def advance_plant(  # noqa: PLR0915, PLR0917
     s.friction, s.sensed_a = friction, sensed
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _upstream(pressure: float, wanted: float, port: float, p: Record) -> float:
     """Upstream pressure that drives the flow `wanted` into a chamber at `pressure` [Pa]."""
     found = pressure
@@ -278,7 +279,7 @@ def _upstream(pressure: float, wanted: float, port: float, p: Record) -> float:
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def balance(parameters: NDArray[np.void]) -> tuple[float, float, float]:
     """Pressures at which the piston rests at mid stroke, and the valve's null that gives them.
 

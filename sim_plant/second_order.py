@@ -15,9 +15,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import expm
+
+from rigwatch.wire.kernel import kernel
 
 Floats = NDArray[np.float64]
 
@@ -114,14 +115,14 @@ def _noisy(signal: Floats, time: Floats, random: np.random.Generator) -> Floats:
     return signal + random.uniform(-width, width, signal.size)
 
 
-@njit(cache=True)
+@kernel()
 def _braked(velocity: float, impulse: float) -> tuple[float, float]:
     """The velocity after dry friction, which cannot reverse it, and the rest of `impulse`."""
     used = min(abs(velocity), impulse)
     return velocity - math.copysign(used, velocity), impulse - used
 
 
-@njit(cache=True)
+@kernel()
 def _run(  # noqa: PLR0917
     state: Floats,
     matrix: Floats,

@@ -13,8 +13,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from rigwatch.wire.kernel import kernel
 
 Record = Any
 """One record of a structured array; numba compiles its fields as attributes."""
@@ -29,7 +30,7 @@ SENSOR_DELAY_LINE = 128
 _SPIKES_PER_SECOND = 2.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def high_passed(value: float, warped: float, s: Record) -> float:
     """First-order high-pass, bilinear, as a piezo element with its charge amplifier has.
 
@@ -40,7 +41,7 @@ def high_passed(value: float, warped: float, s: Record) -> float:
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def delayed(value: float, line: Floats, sample: int, late: float) -> float:
     """`value` delayed by `late` samples, interpolated linearly."""
     line[sample % SENSOR_DELAY_LINE] = value
@@ -51,7 +52,7 @@ def delayed(value: float, line: Floats, sample: int, late: float) -> float:
     return value + part * line[(sample - whole - 1) % SENSOR_DELAY_LINE]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def reading(  # noqa: PLR0917
     value: float,
     noise: float,
@@ -77,7 +78,7 @@ def reading(  # noqa: PLR0917
     return value
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def advance_sensors(  # noqa: PLR0917
     true_values: Floats,
     normal: Floats,

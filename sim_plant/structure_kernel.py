@@ -13,8 +13,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from rigwatch.wire.kernel import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -59,7 +60,7 @@ class Loads(NamedTuple):
     record_step: float
 
 
-@njit(cache=True)
+@kernel()
 def pull(law: int, k: float, length: float, d: float) -> float:
     """Force of the law itself at elongation d [N]."""
     if law == HARDENING:
@@ -71,7 +72,7 @@ def pull(law: int, k: float, length: float, d: float) -> float:
     return k * d
 
 
-@njit(cache=True)
+@kernel()
 def push(loads: Loads, t: float, middle: float, force: Floats) -> float:
     """Adds the loads at t to `force`; returns the base's acceleration.
 
@@ -102,7 +103,7 @@ def push(loads: Loads, t: float, middle: float, force: Floats) -> float:
     return base
 
 
-@njit(cache=True)
+@kernel()
 def accelerate(  # noqa: PLR0917 -- a kernel
     t: float,
     middle: float,
@@ -137,7 +138,7 @@ def accelerate(  # noqa: PLR0917 -- a kernel
         a[i] = a[i] / mass[i] - base
 
 
-@njit(cache=True)
+@kernel()
 def integrate(  # noqa: C901, PLR0912, PLR0917 -- a kernel
     grid: Floats,
     parts: int,

@@ -24,6 +24,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 SPAN = 256
 """Samples. Extremes are those of the running span and of the one before it, so that a peak from
@@ -68,7 +69,7 @@ def new_flat_tops(channels: int) -> FlatTops:
     return state
 
 
-@njit(cache=True)
+@kernel()
 def forget_flat_tops(state: FlatTops) -> None:
     """Reset to the initial state; the counts stay."""
     state.score[:, :] = 0.0
@@ -77,7 +78,7 @@ def forget_flat_tops(state: FlatTops) -> None:
     state.filled[0] = 0
 
 
-@njit(cache=True)
+@kernel()
 def judge_flat_tops(  # noqa: PLR0917
     values: FloatArray,
     good: NDArray[np.bool_],

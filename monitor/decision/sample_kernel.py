@@ -4,9 +4,6 @@
     change ─▶ sums and history ─▶ estimates ─▶ departure ─▶ episode ─▶ verdict
 
 Before that, the healthy reference takes the samples until it is armed.
-
-Only `watch_block` is kept compiled. numba compiles it anew where this file has changed and knows
-nothing of the files that it calls, so their fingerprint stands here; a test says what to put in.
 """
 
 # Compiled functions are untyped to mypy.
@@ -66,12 +63,10 @@ from monitor.signals import (
 )
 from monitor.signals import MODELLED as MODELLED_COLUMN
 from rigwatch.wire.arrays import FloatArray
-
-FINGERPRINT = "9ac5f8f8094a"
-"""Of every source file whose code is compiled into `watch_block`."""
+from rigwatch.wire.kernel import kernel
 
 
-@njit(cache=True)
+@kernel()
 def watch_block(  # noqa: PLR0917
     data: FloatArray,
     code: Codes,

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.kernel import kernel
 
 NOISE_FACTOR = 4.0
 """Smallest floor, in standard deviations of the residual's noise [1]."""
@@ -69,7 +69,7 @@ def new_threshold_state() -> ThresholdState:
     return ThresholdState(np.zeros(2))
 
 
-@njit(cache=True)
+@kernel()
 def threshold_sample(coefficients: FloatArray, state: ThresholdState, u: float) -> float:
     """J(t) for the next input `u`."""
     floor, gain, ratio, decay = coefficients
@@ -80,7 +80,7 @@ def threshold_sample(coefficients: FloatArray, state: ThresholdState, u: float) 
     return float(floor + memory[1])
 
 
-@njit(cache=True)
+@kernel()
 def threshold_block(coefficients: FloatArray, state: ThresholdState, u: FloatArray) -> FloatArray:
     """`threshold_sample` over a block, shape (n,)."""
     limit = np.empty(u.size)

@@ -6,10 +6,10 @@ fc  corner [Hz]    fs  sample rate [Hz]    β  share that is remembered; 1 for f
 """
 
 import numpy as np
-from numba import njit
 
 from rigwatch.physics.transfer import TransferFunction
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 
 def forgetting(corner: float, sample_rate: float) -> float:
@@ -35,7 +35,7 @@ def leaky(function: TransferFunction, corner: float, sample_rate: float) -> Tran
     return TransferFunction.of(function.b, np.real(np.poly(poles)))
 
 
-@njit(cache=True)
+@kernel()
 def high_pass_sample(beta: float, last: FloatArray, high: FloatArray, values: FloatArray) -> None:
     """One sample of several signals: `high` becomes the output, `last` the input."""
     for i in range(values.size):

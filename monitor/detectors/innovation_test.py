@@ -13,11 +13,11 @@ are independent.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 
 class NisWindow(NamedTuple):
@@ -39,7 +39,7 @@ def new_nis_window(length: int) -> NisWindow:
     return NisWindow(np.zeros(length), np.zeros(1), np.zeros(2, np.int64))
 
 
-@njit(cache=True)
+@kernel()
 def clear_nis(window: NisWindow) -> None:
     """Empty the window."""
     for k in range(window.values.size):
@@ -48,7 +48,7 @@ def clear_nis(window: NisWindow) -> None:
     window.place[0] = window.place[1] = 0
 
 
-@njit(cache=True)
+@kernel()
 def push_nis(window: NisWindow, nis: float) -> float:
     """Add one; the sum over the window, NaN until it is full.
 

@@ -21,7 +21,6 @@ The steps take a prediction and its covariance, so that they serve linear and no
 """
 
 import numpy as np
-from numba import njit
 
 from monitor.detectors.small_matrices import (
     inverse,
@@ -33,9 +32,10 @@ from monitor.detectors.small_matrices import (
 )
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.kernel import kernel
 
 
-@njit(cache=True)
+@kernel()
 def kalman_update(
     x: FloatArray, p: FloatArray, h: FloatArray, v: FloatArray, y: FloatArray
 ) -> float:
@@ -70,7 +70,7 @@ def kalman_update(
     return total
 
 
-@njit(cache=True)
+@kernel()
 def generalised_update(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     x: FloatArray,
     p: FloatArray,

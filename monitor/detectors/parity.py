@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from monitor.detectors.adaptive_threshold import (
@@ -38,6 +37,7 @@ from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
 from rigwatch.physics.transfer import TransferFunction, filter_sample
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.kernel import kernel
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +80,7 @@ def _new_state(order: int) -> ParityState:
     return ParityState(*filters, np.zeros(6), new_threshold_state(), np.zeros(2, np.int64))
 
 
-@njit(cache=True)
+@kernel()
 def small_signal(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     forget: float, u0: float, y0: float, state: ParityState, u: float, y: float
 ) -> None:
@@ -96,7 +96,7 @@ def small_signal(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     point[0], point[1] = u, y
 
 
-@njit(cache=True)
+@kernel()
 def _forget_start(forget: float, state: ParityState, residual: float) -> float:
     """The residual without the effect of the model's initial state."""
     if forget == 1.0:
@@ -107,7 +107,7 @@ def _forget_start(forget: float, state: ParityState, residual: float) -> float:
     return float(point[5])
 
 
-@njit(cache=True)
+@kernel()
 def _restart(state: ParityState) -> None:
     state.output[:] = 0.0
     state.input[:] = 0.0
@@ -116,7 +116,7 @@ def _restart(state: ParityState) -> None:
     state.counts[:] = 0
 
 
-@njit(cache=True)
+@kernel()
 def parity_block(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     moving_average: bool,
     function: tuple[FloatArray, FloatArray],

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
@@ -40,6 +39,7 @@ from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
 from rigwatch.physics.transfer import TransferFunction
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.kernel import kernel
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ def new_filter_state(model: FilterModel, window: int) -> FilterState:
     )
 
 
-@njit(cache=True)
+@kernel()
 def _start(model: FilterModel, state: FilterState, beta: float, signals: FloatArray) -> None:
     """Start at the measured position, with unknown motion."""
     for i in range(signals.size):
@@ -160,7 +160,7 @@ def _start(model: FilterModel, state: FilterState, beta: float, signals: FloatAr
     state.counts[0] = 0
 
 
-@njit(cache=True)
+@kernel()
 def _predict(model: FilterModel, x: FloatArray, p: FloatArray, u: float) -> None:
     ahead = times(model.a, x)
     for i in range(x.size):
@@ -168,7 +168,7 @@ def _predict(model: FilterModel, x: FloatArray, p: FloatArray, u: float) -> None
     put_sum(p, product_transposed(product(model.a, p), model.a), model.w)
 
 
-@njit(cache=True)
+@kernel()
 def _step(model: FilterModel, state: FilterState, y: FloatArray) -> float:
     """Update both filters; normalised innovation squared, NaN if a filter failed."""
     nis = kalman_update(state.plain, state.plain_p, model.h, model.v, y)
@@ -180,7 +180,7 @@ def _step(model: FilterModel, state: FilterState, y: FloatArray) -> float:
     return nis if ok else np.nan
 
 
-@njit(cache=True)
+@kernel()
 def _measure(state: FilterState, beta: float, signals: FloatArray, y: FloatArray) -> None:
     """High-pass the signals; `y` becomes the position now and the acceleration one sample ago."""
     high_pass_sample(beta, state.raw, state.high, signals)
@@ -190,7 +190,7 @@ def _measure(state: FilterState, beta: float, signals: FloatArray, y: FloatArray
         state.last[1] = state.high[2]
 
 
-@njit(cache=True)
+@kernel()
 def unknown_input_block(
     model: FilterModel,
     state: FilterState,

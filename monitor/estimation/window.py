@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 
 from rigwatch.wire.arrays import FloatArray, IntArray
+from rigwatch.wire.kernel import kernel
 
 HEAD, FILL, FRONT_LEFT, LENGTH = 0, 1, 2, 3
 
@@ -131,7 +132,7 @@ def solve_two(s: FloatArray) -> tuple[float, float, float]:
     return theta1, theta2, condition
 
 
-@njit(cache=True)
+@kernel()
 def windowed_least_squares(
     window: Window, g1: FloatArray, g2: FloatArray, y: FloatArray, theta: FloatArray
 ) -> None:

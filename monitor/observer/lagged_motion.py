@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import savgol_coeffs
 
 from monitor.signals import DEAD, GOOD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 DELAY, MATCHED = -1, -2
 """Orders of columns that are only delayed, or smoothed as one that is differentiated twice is."""
@@ -72,7 +72,7 @@ def _kernel(order: int, half_width: int, rate: float) -> FloatArray:
     return np.asarray(savgol_coeffs(width, 3, deriv=order, delta=1.0 / rate, use="dot"))
 
 
-@njit(cache=True)
+@kernel()
 def _advance(  # noqa: PLR0917 -- a kernel
     signals: FloatArray,
     code: Codes,

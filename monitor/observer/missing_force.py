@@ -10,13 +10,13 @@ everything is judged above a corner: H is a Butterworth high-pass of second orde
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.signal import butter
 
 from monitor.model import RemainderSection
 from monitor.observer.lagged_motion import EMPTY, FIRST
 from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured")
 E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED = range(6)
@@ -76,7 +76,7 @@ class HighPassed:
         return out
 
 
-@njit(cache=True)
+@kernel()
 def _advance(  # noqa: PLR0917 -- a kernel
     columns: FloatArray,
     z: FloatArray,
@@ -107,7 +107,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
             out[k, c] = filter_sample(b, a, kept[c], value)
 
 
-@njit(cache=True)
+@kernel()
 def _at_rest(row: FloatArray, kept: FloatArray, b: FloatArray) -> None:
     """States of a high-pass that has seen this row for ever, in transposed direct form II."""
     for c in range(kept.shape[0]):

@@ -66,14 +66,13 @@ from monitor.observer.window_statistics import (
 )
 from monitor.signals import Codes
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 (
     HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
     ABOVE, JUMP_AGO, WAS_JUDGING,
 ) = range(13)  # fmt: skip
 """Places of `decision_state.Counts`, as the kernel needs constants."""
-FINGERPRINT = "f242553ae176"
-"""Of every source file whose code is compiled into `decide`."""
 LOOKS = 3
 """Samples in a row that must agree on friction."""
 LEAST_LOOK = 12
@@ -98,7 +97,7 @@ grown; what follows is no steady motion.
 """
 
 
-@njit(cache=True)
+@kernel()
 def decide(  # noqa: PLR0917 -- a kernel
     judged: FloatArray,
     speed: FloatArray,

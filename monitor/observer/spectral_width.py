@@ -10,11 +10,11 @@ in whatever they lack.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from monitor.observer.lagged_motion import EMPTY, FIRST
 from monitor.signals import Codes
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 SLOWEST = 1.0
 """Corner below which motion does not count: the mass drifts [Hz]."""
@@ -59,7 +59,7 @@ class SpectralWidth:
         return Spectrum(narrow, pace * self._rate / (2.0 * np.pi), size * self._rate)
 
 
-@njit(cache=True)
+@kernel()
 def _advance(  # noqa: PLR0917 -- a kernel
     speed: FloatArray,
     state: Codes,

@@ -15,13 +15,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from monitor.model import InertiaPlant, PromotedSection, RigModel
 from monitor.signals import DEAD, G1, G2, MODELLED, NEW_BOOT, RESTART, VELOCITY, Codes
 from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.kernel import kernel
 
 
 class PromotedFriction:
@@ -52,7 +52,7 @@ class PromotedFriction:
             data[:, MODELLED] -= known.viscous_by_direction * abs(g2)
 
 
-@njit(cache=True)
+@kernel()
 def _smoothed(  # noqa: PLR0917
     data: FloatArray,
     code: Codes,

@@ -9,10 +9,10 @@ counts and periods stay aligned.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import NON_FINITE, SATURATED, SPIKE, STALE, Column, SampleBlock, valid
 
 GOOD, HELD, DEAD, RESTART, NEW_BOOT = 0, 1, 2, 3, 4
@@ -127,7 +127,7 @@ def _usable(column: Column, stuck_counts: bool) -> NDArray[np.bool_]:
     return np.asarray(finite & ((column.quality & (STALE | SATURATED | NON_FINITE | SPIKE)) == 0))
 
 
-@njit(cache=True)
+@kernel()
 def _classify(  # noqa: PLR0917
     values: FloatArray,
     good: NDArray[np.bool_],

@@ -16,7 +16,6 @@ healthy average.
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
 from monitor.model import (
     BandSection,
@@ -32,6 +31,7 @@ from monitor.signals.admission import DEAD, NEW_BOOT, RESTART, Codes
 from monitor.signals.recordings import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.kernel import kernel
 
 CHANNELS = ("force", "position")
 _LEAST_SPEED = 0.02
@@ -83,7 +83,7 @@ class InertiaResidual:
         return out
 
 
-@njit(cache=True)
+@kernel()
 def _advance(  # noqa: PLR0917
     signals: FloatArray,
     code: Codes,

@@ -12,12 +12,12 @@ instead.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from monitor.model import RigModel, TransferPlant
 from monitor.signals.admission import DEAD, NEW_BOOT, RESTART, Codes
 from rigwatch.physics.transfer import TransferFunction, filter_sample, velocity_filter
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 COLUMNS = ("voltage", "position", "acceleration", "modelled", "velocity", "g1", "g2")
 """Columns of the stage's output."""
@@ -84,7 +84,7 @@ def _with_state(function: TransferFunction) -> tuple[FloatArray, FloatArray, Flo
     return b, a, np.zeros(max(b.size - 1, 1))
 
 
-@njit(cache=True)
+@kernel()
 def _advance(signals: FloatArray, code: Codes, f: _Filters, out: FloatArray) -> None:
     longest = f.late.shape[0]
     for k in range(code.size):

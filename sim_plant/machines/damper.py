@@ -10,9 +10,9 @@ Symbols: x displacement [m], v speed [m/s], F force [N].
 """
 
 import numpy as np
-from numba import njit
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 RATE = 200.0
 """Samples a second."""
@@ -34,7 +34,7 @@ EFFECTS = (
 """Names of the hidden effects, in the order of their strengths."""
 
 
-@njit(cache=True)
+@kernel()
 def run(path: FloatArray, s: FloatArray, out: FloatArray) -> None:
     """Displacement [m] and force [N] at each sample.
 

@@ -1,10 +1,11 @@
 """Dry friction that truly sticks (D. Karnopp, 1985), for plants that step speed by speed."""
 
 import numpy as np
-from numba import njit
+
+from rigwatch.wire.kernel import kernel
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def slid(v: float, drive: float, dry: float, mass: float, h: float) -> float:
     """Speed a step later under a drive and dry friction; zero where friction holds.
 

@@ -9,9 +9,9 @@ Symbols: V voltage [V], i current [A], w speed [rad/s], a angle [rad].
 """
 
 import numpy as np
-from numba import njit
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 from sim_plant.machines.dry_friction import slid
 
 RATE = 200.0
@@ -30,7 +30,7 @@ EFFECTS = (
 """Names of the hidden effects, in the order of their strengths."""
 
 
-@njit(cache=True)
+@kernel()
 def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
     """Speed [rad/s] at each sample.
 

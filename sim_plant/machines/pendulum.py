@@ -10,9 +10,9 @@ Symbols: V voltage [V], a angle [rad], w speed [rad/s].
 """
 
 import numpy as np
-from numba import njit
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 from sim_plant.machines.dry_friction import slid
 
 RATE = 100.0
@@ -37,7 +37,7 @@ STOP = 0.8
 """Where a rubber stop begins [rad]."""
 
 
-@njit(cache=True)
+@kernel()
 def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
     """Angle [rad] at each sample.
 

@@ -8,9 +8,9 @@ Symbols: u voltage of the pump [V], h levels [m].
 """
 
 import numpy as np
-from numba import njit
 
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 RATE = 1.0
 """Samples a second."""
@@ -32,12 +32,12 @@ EFFECTS = (
 """Names of the hidden effects, in the order of their strengths."""
 
 
-@njit(cache=True)
+@kernel()
 def _jet(level: float) -> float:
     return float(np.sqrt(2 * FALL * max(level, 0.0)))
 
 
-@njit(cache=True)
+@kernel()
 def _flows(v1: float, v2: float, flow: float, s: FloatArray) -> tuple[float, float]:
     upper, lower = v1 / GROUND[0], v2 / GROUND[1]
     between = HOLES[0] * _jet(upper)
@@ -46,7 +46,7 @@ def _flows(v1: float, v2: float, flow: float, s: FloatArray) -> tuple[float, flo
     return up, down
 
 
-@njit(cache=True)
+@kernel()
 def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
     """Levels of both tanks [m] at each sample; the first sample is at rest.
 

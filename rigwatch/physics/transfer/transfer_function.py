@@ -12,11 +12,11 @@ signal into blocks changes no bit of the result.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.kernel import kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ class Filter:
         return y
 
 
-@njit(cache=True)
+@kernel()
 def filter_sample(b: FloatArray, a: FloatArray, state: FloatArray, u: float) -> float:
     """One step of the filter; `b` and `a` of one length, `state` one shorter (at least one)."""
     y = b[0] * u + (state[0] if b.size > 1 else 0.0)
@@ -109,7 +109,7 @@ def filter_sample(b: FloatArray, a: FloatArray, state: FloatArray, u: float) -> 
     return y
 
 
-@njit(cache=True)
+@kernel()
 def filter_block(
     b: FloatArray, a: FloatArray, state: FloatArray, u: FloatArray, y: FloatArray
 ) -> None:

@@ -5,13 +5,13 @@ addresses of functions, as in `engine.compile.integrator`.
 """
 
 import numpy as np
-from numba import njit
 
 from rigwatch.physics.engine.compile import across, call, lateness, place
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _linear(  # noqa: PLR0917 -- a kernel
     rates: int, t: float, us: FloatArray, pp: int, xs: FloatArray, s: FloatArray, part: float,
     z: FloatArray, dz: FloatArray, out: FloatArray,
@@ -30,7 +30,7 @@ def _linear(  # noqa: PLR0917 -- a kernel
             out[i, j] += part * dz[n + i * width + j]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _add(dt: float, shares: FloatArray, ks: FloatArray, out: FloatArray) -> None:
     """Add the weighted rates of the stages so far."""
     for stage in range(shares.size):
@@ -41,7 +41,7 @@ def _add(dt: float, shares: FloatArray, ks: FloatArray, out: FloatArray) -> None
                     out[i, j] += weight * ks[stage, i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _between(nominal: FloatArray, k: int, share: float, xs: FloatArray) -> None:
     """The nominal trajectory, interpolated linearly from sample k to the next."""
     for i in range(xs.size):
@@ -50,7 +50,7 @@ def _between(nominal: FloatArray, k: int, share: float, xs: FloatArray) -> None:
             xs[i] += share * (nominal[k + 1, i] - nominal[k, i])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def sweep(  # noqa: C901, PLR0917 -- a kernel
     rates: int, read: int, u: FloatArray, dt: float, first: int, hold: FloatArray, a: FloatArray,
     b: FloatArray, c: FloatArray, apart: bool, nominal: FloatArray, p: FloatArray, s: FloatArray,
@@ -100,7 +100,7 @@ def sweep(  # noqa: C901, PLR0917 -- a kernel
         _add(dt, b, ks, s)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def slopes_along(  # noqa: PLR0917 -- a kernel
     values: int, u: FloatArray, dt: float, first: int, nominal: FloatArray, p: FloatArray,
     value: FloatArray, slopes: FloatArray,
@@ -115,7 +115,7 @@ def slopes_along(  # noqa: PLR0917 -- a kernel
         )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def forward(  # noqa: PLR0917 -- a kernel
     rates: int, u: FloatArray, dt: float, row: int, substeps: int, hold: FloatArray,
     x: FloatArray, p: FloatArray, s: FloatArray,

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 
 from rigwatch.wire.arrays import FloatArray, IntArray
+from rigwatch.wire.kernel import kernel
 
 _DOUBLE = ir.DoubleType()
 TINY = 1e-200
@@ -44,7 +45,7 @@ call: Any = intrinsic(_call)
 """call(address, t, a, u, p, out, slopes): arrays are given by addresses of their first elements."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def place(  # noqa: PLR0917 -- a kernel
     u: FloatArray, row: int, at: float, inside: float, hold: FloatArray, rows: int, dt: float,
     us: FloatArray,
@@ -66,7 +67,7 @@ def place(  # noqa: PLR0917 -- a kernel
             us[j] += at * (u[row + 1, j] - u[row, j])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def advance(  # noqa: PLR0917 -- a kernel
     rates: int, u: FloatArray, row: int, start: float, end: float, hold: FloatArray, rows: int,
     dt: float, pp: int,
@@ -95,7 +96,7 @@ def advance(  # noqa: PLR0917 -- a kernel
         z[i] += acc[i] + h / 6.0 * dz[i]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def lateness(hold: FloatArray) -> float:
     """Share of a sample after which inputs that are kept change."""
     late = 0.0
@@ -104,7 +105,7 @@ def lateness(hold: FloatArray) -> float:
     return late
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def across(  # noqa: PLR0917 -- a kernel
     rates: int, u: FloatArray, row: int, steps: int, late: float, hold: FloatArray, rows: int,
     dt: float, pp: int,
@@ -122,7 +123,7 @@ def across(  # noqa: PLR0917 -- a kernel
         advance(rates, u, row, start, end, hold, rows, dt, pp, z, zs, dz, acc, us)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def renew(  # noqa: PLR0917 -- a kernel
     update: int, u: FloatArray, row: int, hold: FloatArray, rows: int, dt: float, pp: int,
     z: FloatArray, dz: FloatArray, us: FloatArray,
@@ -135,7 +136,7 @@ def renew(  # noqa: PLR0917 -- a kernel
         z[i] = dz[i] if abs(dz[i]) > TINY else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
     """States as given for window w; each moves with its own initial value alone."""
     n = x0.shape[1]
@@ -147,7 +148,7 @@ def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
         z[n + i * m + m - n + i] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def needed(  # noqa: PLR0917 -- a kernel
     plain: int, pace: int, crossing: IntArray, u: FloatArray, row: int, hold: FloatArray,
     rows: int, dt: float, pp: int, z: FloatArray, dx: FloatArray, end: FloatArray,
@@ -177,7 +178,7 @@ def needed(  # noqa: PLR0917 -- a kernel
     return worst * dt
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def simulate(  # noqa: PLR0917 -- a kernel
     rates: int, read: int, plain: int, pace: int, update: int, updated: bool, asked: int,
     crossing: IntArray, m: int, rows: int, u: FloatArray, dt: float, substeps: int, finest: int,
@@ -222,7 +223,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
             last[w, i] = z[i]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
     rates: int, read_slopes: int, rate_slopes: int, update_slopes: int, u: FloatArray, dt: float,
     substeps: int, hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray,

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import sympy
-from numba import njit
 
 from rigwatch.physics.engine.compile import (
     CompiledSystem,
@@ -38,6 +37,7 @@ from rigwatch.physics.engine.equations import (
 from rigwatch.physics.engine.fit import Memory, held_at
 from rigwatch.physics.engine.score.candidates import Candidate
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
+from rigwatch.wire.kernel import kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +241,7 @@ def _propagated(
     return moved
 
 
-@njit(cache=True)
+@kernel()
 def _propagate(  # noqa: C901, PLR0917 -- a kernel
     along: FloatArray,
     across: FloatArray,
@@ -288,7 +288,7 @@ def _propagate(  # noqa: C901, PLR0917 -- a kernel
                         response[i, c] += 0.5 * h * (slope[i, c] + next_slope[i, c])
 
 
-@njit(cache=True)
+@kernel()
 def _slopes(
     along: FloatArray, across: FloatArray, push: FloatArray, at: FloatArray, out: FloatArray
 ) -> None:

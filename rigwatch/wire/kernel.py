@@ -1,0 +1,77 @@
+"""Compiled functions that are kept between runs, and compiled anew when anything in them changes.
+
+numba keeps what it compiles by the file that a function stands in, and knows nothing of the
+functions and constants of other files that are compiled into it. Here they are part of the key.
+"""
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping
+from types import CodeType, ModuleType
+from typing import Any, TypeVar
+
+import numpy as np
+from numba import njit
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def kernel(**options: Any) -> Callable[[F], F]:
+    """A decorator: compiled by numba with these options, and kept between runs."""
+
+    def compiled(function: F) -> F:
+        dispatcher = njit(**options)(function)
+        dispatcher._cache = _KeyedByCode(function)  # type: ignore[no-untyped-call]
+        return dispatcher  # type: ignore[no-any-return]
+
+    return compiled
+
+
+class _KeyedByCode(FunctionCache):
+    """What numba keeps of one function, found again while no code or constant in it has changed."""
+
+    def _index_key(self, sig: object, codegen: object) -> tuple[object, ...]:
+        by_signature = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]
+        return (*by_signature, fingerprint(self._py_func))
+
+
+def fingerprint(function: Callable[..., object]) -> str:
+    """SHA-256 of a function's code, of the constants that it names, and of all that it calls."""
+    text = "\n".join(_parts(function, set()))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _parts(function: Any, seen: set[object]) -> Iterator[str]:
+    if function in seen:
+        return
+    seen.add(function)
+    for code in _codes(function.__code__):
+        constants = [c for c in code.co_consts if not isinstance(c, CodeType)]
+        yield f"{code.co_name} {code.co_code.hex()} {code.co_names} {constants!r}"
+        for name, value in _globals(code, function.__globals__):
+            if isinstance(value, Dispatcher):
+                yield from _parts(value.py_func, seen)
+            elif isinstance(value, np.ndarray):
+                yield f"{name} {value.tolist()}"
+            elif isinstance(value, (bool, int, float, str, tuple)):
+                yield f"{name} {value!r}"
+            else:
+                yield f"{name} {getattr(value, '_fields', '')}"
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """A function's code, and that of what is defined within it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)
+
+
+def _globals(code: CodeType, known: Mapping[str, object]) -> Iterator[tuple[str, object]]:
+    """What a code's names stand for, those within modules too."""
+    for name in code.co_names:
+        value = known.get(name)
+        yield name, value
+        if isinstance(value, ModuleType):
+            yield from ((n, getattr(value, n)) for n in code.co_names if hasattr(value, n))

@@ -1,0 +1,63 @@
+"""A compiled function is kept between runs, and compiled anew when anything in it has changed."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+CALLER = """
+import called as parts
+from called import FACTOR, scaled
+from rigwatch.wire.kernel import kernel
+
+@kernel()
+def result(x: float) -> float:
+    return FACTOR * scaled(x) + parts.OFFSET
+
+print(result(1.0), sum(result.stats.cache_hits.values()))
+"""
+CALLED = """
+import numpy as np
+from numba import njit
+
+FACTOR, OFFSET, WEIGHTS = 2.0, 0.0, np.array([1.0, 2.0])
+
+@njit
+def scaled(x):
+    return deeper(x) * WEIGHTS[1]
+
+@njit
+def deeper(x):
+    return x + 1.0
+"""
+
+
+def run(folder: Path) -> list[str]:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache")}
+    environment["PYTHONPATH"] = os.pathsep.join([str(folder), *sys.path])
+    done = subprocess.run(
+        [sys.executable, str(folder / "caller.py")],
+        capture_output=True, text=True, check=True, env=environment,
+    )  # fmt: skip
+    return done.stdout.split()
+
+
+CHANGES = [
+    ("x + 1.0", "x + 2.0"),
+    ("FACTOR, OFFSET, WEIGHTS = 2.0", "FACTOR, OFFSET, WEIGHTS = 3.0"),
+    ("2.0, 0.0,", "2.0, 4.0,"),
+    ("[1.0, 2.0]", "[1.0, 3.0]"),
+]
+"""Each makes 12 of 8."""
+
+
+def test_what_another_file_holds_is_part_of_the_key(tmp_path: Path) -> None:
+    (tmp_path / "caller.py").write_text(CALLER)
+    called = tmp_path / "called.py"
+    called.write_text(CALLED)
+    assert run(tmp_path) == ["8.0", "0"]
+    for before, after in CHANGES:
+        called.write_text(CALLED.replace(before, after))
+        assert run(tmp_path) == ["12.0", "0"], after
+    called.write_text(CALLED)
+    assert run(tmp_path) == ["8.0", "1"]
