@@ -1,4 +1,4 @@
-"""What a study tries: every effect at every port where it makes sense and does not stand yet."""
+"""Candidates of a study: every effect at every compatible port where it is not yet in the model."""
 
 from rigwatch.physics.engine.equations import Effect
 from rigwatch.physics.engine.fit import Recording
@@ -10,14 +10,14 @@ from rigwatch.workbench.study import Study
 
 
 def candidates(study: Study, recording: Recording) -> list[Candidate]:
-    """Every effect at every port where it makes sense and does not stand yet.
+    """Every effect at every compatible port where it is not yet in the model.
 
-    Elective effects are ranked where the study asks for the whole library: verdicts are calibrated
-    without them, and more candidates make larger classes.
+    Elective effects are included only if the study asks for the whole library: verdicts are
+    calibrated without them, and more candidates make larger classes.
 
     Args:
         study: its model, its effects and those already accepted.
-        recording: shows how large the signals at the ports are.
+        recording: gives the size of the signals at the ports.
     """
     check_ports(study)
     ports, sizes = study.model.ports, port_sizes(study.model, recording)
