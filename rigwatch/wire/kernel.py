@@ -1,7 +1,7 @@
-"""Compiled functions that are kept between runs, and compiled anew when anything in them changes.
+"""Compiled functions cached between runs and recompiled when anything in them changes.
 
-numba keeps what it compiles by the file that a function stands in, and knows nothing of the
-functions and constants of other files that are compiled into it. Here they are part of the key.
+numba's cache checks only the file in which a function is defined. Here the code and constants of
+other files that are compiled into the function are part of the cache key too.
 """
 
 import hashlib
@@ -18,7 +18,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def kernel(**options: Any) -> Callable[[F], F]:
-    """A decorator: compiled by numba with these options, and kept between runs."""
+    """Decorator: compile with numba's `njit` and these options, and cache the result."""
 
     def compiled(function: F) -> F:
         dispatcher = njit(**options)(function)
@@ -29,7 +29,7 @@ def kernel(**options: Any) -> Callable[[F], F]:
 
 
 class _KeyedByCode(FunctionCache):
-    """What numba keeps of one function, found again while no code or constant in it has changed."""
+    """numba's cache of one function, keyed by all code and constants compiled into it."""
 
     def _index_key(self, sig: object, codegen: object) -> tuple[object, ...]:
         by_signature = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]
@@ -37,7 +37,7 @@ class _KeyedByCode(FunctionCache):
 
 
 def fingerprint(function: Callable[..., object]) -> str:
-    """SHA-256 of a function's code, of the constants that it names, and of all that it calls."""
+    """SHA-256 of a function's code, its global constants, and the compiled functions it calls."""
     text = "\n".join(_parts(function, set()))
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -61,7 +61,7 @@ def _parts(function: Any, seen: set[object]) -> Iterator[str]:
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
-    """A function's code, and that of what is defined within it."""
+    """A code object and those nested in it."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -69,7 +69,7 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 
 
 def _globals(code: CodeType, known: Mapping[str, object]) -> Iterator[tuple[str, object]]:
-    """What a code's names stand for, those within modules too."""
+    """The global names of a code object and their values, attributes of modules included."""
     for name in code.co_names:
         value = known.get(name)
         yield name, value

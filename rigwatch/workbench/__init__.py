@@ -1,4 +1,4 @@
-"""The workbench: compare a model with recordings, see where it fails, add what is missing.
+"""The workbench: compare a model with recordings, locate its errors, add missing effects.
 
 study = open_study("emps")
 print(compare(study).held_out_error)

@@ -1,7 +1,7 @@
-"""The workbench from Python and on a notebook's cell: the commands as functions.
+"""The workbench from Python and in notebooks: the commands as functions.
 
-Each takes the study's folder and reads it anew, as the commands do, so that a cell always shows the
-study as it is. What they return shows itself as a table where it is a cell's last line.
+Each function takes the study's folder and reads it again, as the commands do, so a cell always
+shows the current study. Results display as a table when they are a cell's last line.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,10 +29,10 @@ MOST_REGIONS = 3
 
 
 class Shown(Generic[Found]):
-    """A result that shows itself: as text, and as a block of text on a notebook's cell.
+    """A result with a text representation for the terminal and for notebooks.
 
     Attributes:
-        found: the result, with its numbers.
+        found: the result object.
     """
 
     def __init__(self, found: Found, lines: Callable[[Found], Sequence[str]]) -> None:
@@ -46,7 +46,7 @@ class Shown(Generic[Found]):
 
 
 def new(folder: Path | str, template: Path | str, sessions: Path | str | None = None) -> Path:
-    """Make a study after a template (`rigwatch study new`); its folder."""
+    """Create a study from a template (`rigwatch study new`); return its folder."""
     return create(folder, template, sessions).folder
 
 
@@ -62,23 +62,23 @@ def locate(folder: Path | str) -> Shown[list[Region]]:
 
 
 def explain(folder: Path | str) -> Shown[Explanation]:
-    """What may be missing (`rigwatch explain`)."""
+    """Which effects may be missing (`rigwatch explain`)."""
     return Shown(_explain(open_study(folder)), explanation_lines)
 
 
 def add(
     folder: Path | str, effect: str, port: str | None = None, *, anyway: bool = False
 ) -> Shown[Change]:
-    """Put an effect into the model, if the recordings held out speak for it (`rigwatch add`)."""
+    """Add an effect to the model if the held-out error supports it (`rigwatch add`)."""
     return Shown(change.add(open_study(folder), effect, port, anyway=anyway), change_lines)
 
 
 def undo(folder: Path | str) -> Shown[Change]:
-    """Take the last effect away (`rigwatch undo`)."""
+    """Remove the last effect (`rigwatch undo`)."""
     return Shown(change.undo(open_study(folder)), change_lines)
 
 
 def report(folder: Path | str, path: Path | str) -> Path:
-    """Write the study's page (`rigwatch study report`); its path."""
+    """Write the study's report (`rigwatch study report`); return its path."""
     write_report(open_study(folder), Path(path))
     return Path(path)

@@ -104,8 +104,14 @@ def test_measured_motion_sees_through_names() -> None:
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"spring": "k*x + 0.1*push"}, r"quantities: found the circle \w+ uses \w+ uses \w+,"),
-        ({"spring": "k*x + 0.1*spring"}, "quantities: found the circle spring uses spring,"),
+        (
+            {"spring": "k*x + 0.1*push"},
+            r"quantities: found the circular definition \w+ uses \w+ uses \w+,",
+        ),
+        (
+            {"spring": "k*x + 0.1*spring"},
+            "quantities: found the circular definition spring uses spring,",
+        ),
         ({"spring": "k*y"}, "quantity spring: found the unknown name 'y'"),
         ({"spring": "k*v"}, r"quantity spring: found 'k\*v' in .*, expected .*"),
         (

@@ -1,8 +1,8 @@
 """Linear models of the rig: transfer functions, their frequency responses and their fits.
 
 The thesis's friction-free model is `fit_transfer_function` over a measured frequency response
-(5.19); its friction filter is the output-error model (5.29). `period` says when an excitation
-repeats.
+(5.19); its friction filter is the output-error model (5.29). `period` finds the period of an
+excitation.
 """
 
 from rigwatch.physics.transfer.frequency_fit import fit_transfer_function

@@ -4,8 +4,8 @@
 
 Three steps: Levy's linear problem |A·G - B|²·W² gives a start; Sanathanan and Koerner's iteration
 divides its weight by the last |A|, which removes Levy's bias to high frequencies; Gauss-Newton
-with Levenberg's damping minimises (5.19) itself. Poles that wander out of the unit circle are
-mirrored back after each step.
+with Levenberg's damping minimises (5.19) itself. Poles that leave the unit circle are reflected
+into it after each step.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ DESCENT = Descent(steps=200, more=4.0, less=5.0, worth=1e-12)
 def fit_transfer_function(
     measured: FrequencyResponse, poles: int = 4, zeros: int = 0, delay: int = 1
 ) -> TransferFunction:
-    """The stable function b(q⁻¹)·q⁻ᵈ/A(q⁻¹) nearest to a measured response.
+    """The stable function b(q⁻¹)·q⁻ᵈ/A(q⁻¹) that fits a measured response best.
 
     Args:
         measured: lines to fit, already limited to their band.
@@ -37,7 +37,7 @@ def fit_transfer_function(
         delay: d [samples].
 
     Raises:
-        ModelError: the response has too few lines or the fit leads nowhere.
+        ModelError: the response has too few lines or the fit fails.
     """
     if measured.frequency.size < (poles + zeros + 1):
         raise ModelError(
@@ -76,7 +76,7 @@ class _Problem:
                 best, best_cost = stable, cost
             weight = self.w / np.abs(1.0 + self.denominator @ theta[self.zeros + 1 :])
         if not np.isfinite(best_cost):
-            raise ModelError("transfer function: the linear start gives nothing finite")
+            raise ModelError("transfer function: the linear start diverged (NaN or infinite)")
         return best
 
     def _levy(self, weight: FloatArray) -> FloatArray:

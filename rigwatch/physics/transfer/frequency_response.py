@@ -1,9 +1,9 @@
-"""Frequency response of a recording, with the coherence that tells where to believe it.
+"""Frequency response of a recording, with the coherence that shows where it is reliable.
 
     H1 = Suy / Suu,   γ² = |Suy|² / (Suu·Syy)
 
-averaged over overlapping Hann segments (Welch). The variance of H1 is about |H1|²·(1 -
-γ²)/(2·n·γ²) for n segments, which is where the weights of the fit come from.
+averaged over overlapping Hann segments (Welch). The variance of H1 is about
+|H1|²·(1 - γ²)/(2·n·γ²) for n segments, which gives the weights of the fit.
 """
 
 from dataclasses import dataclass
@@ -51,9 +51,7 @@ class FrequencyResponse:
         )
 
     def weights(self) -> FloatArray:
-        """Weights for relative errors: √(γ²/(1 - γ²))/|H|, capped at a coherence of 0.999, shape
-        (m,).
-        """
+        """Weights for relative errors: √(γ²/(1 - γ²))/|H|, γ² at most 0.999, shape (m,)."""
         coherence = np.clip(self.coherence, 1e-6, 0.999)
         return np.asarray(np.sqrt(coherence / (1.0 - coherence)) / np.abs(self.response))
 
@@ -70,7 +68,7 @@ def frequency_response(
             length.
 
     Raises:
-        ModelError: the recording is shorter than 64 samples, or the input does not move.
+        ModelError: the recording is shorter than 64 samples, or the input is constant.
     """
     if u.size < 64:
         raise ModelError(f"frequency response: found {u.size} samples, expected at least 64")

@@ -1,7 +1,7 @@
 """Damped Gauss-Newton steps for fits of transfer functions (Levenberg 1944, Marquardt 1963).
 
-Each column of the gradient is scaled to length 1, so that one damping serves all coefficients.
-Errors and gradients may be complex: real and imaginary parts count as errors of their own.
+Each column of the gradient is scaled to unit length, so one damping suits all coefficients. Errors
+and gradients may be complex: real and imaginary parts count as separate errors.
 """
 
 from collections.abc import Callable
@@ -17,11 +17,11 @@ START, LEAST, MOST = 1e-3, 1e-12, 1e8
 
 @dataclass(frozen=True)
 class Descent:
-    """How a search goes.
+    """Settings of a search.
 
     Attributes:
-        steps: trials at most.
-        more, less: factor and divisor of the damping after a step that fails or succeeds.
+        steps: most trials.
+        more, less: factor and divisor of the damping after a failed or a successful step.
         worth: relative gain below which the search ends.
     """
 
@@ -50,12 +50,12 @@ def descend(
     """The coefficients at which the search ends.
 
     Args:
-        theta: where it begins, shape (k,).
-        how: its rules.
-        errors: measured less modelled, shape (n,).
+        theta: initial coefficients, shape (k,).
+        how: settings.
+        errors: measured minus modelled, shape (n,).
         gradient: of the model by the coefficients, shape (n, k).
-        cost: what is to fall.
-        admissible: the nearest coefficients that are allowed, such as stable ones.
+        cost: the cost to minimise.
+        admissible: maps coefficients to the nearest allowed ones, e.g. stable ones.
     """
     size, damping = cost(theta), START
     for _ in range(how.steps):
@@ -81,7 +81,7 @@ def _damped_step(gradient: Any, error: Any, damping: float) -> FloatArray:
 
 
 def _stacked(values: Any) -> FloatArray:
-    """Real and imaginary parts below each other; real values as they are."""
+    """Real and imaginary parts stacked; real values unchanged."""
     return np.concatenate([values.real, values.imag]) if np.iscomplexobj(values) else values
 
 

@@ -36,7 +36,7 @@ class OutputErrorOrders:
 
 @dataclass(frozen=True, eq=False)
 class OutputErrorFit:
-    """What the search found.
+    """Result of the fit.
 
     Args:
         function: B/F, stable.
@@ -57,10 +57,10 @@ def fit_output_error(
     Args:
         u, y: shape (n,), finite.
         orders: of the model.
-        skip: first samples that are simulated and not scored [samples].
+        skip: first samples that are simulated but not scored [samples].
 
     Raises:
-        ModelError: too few samples, nothing to fit, or no start that is finite.
+        ModelError: too few samples, input or output of zeros, or every start diverges.
     """
     if u.size - skip < 4 * (orders.nb + orders.nf):
         raise ModelError(
@@ -93,7 +93,7 @@ class _Search:
         )
 
     def start(self) -> FloatArray:
-        """The best of Steiglitz-McBride's rounds from two beginnings."""
+        """The best Steiglitz-McBride iterate from two starts."""
         candidates = [*self._rounds(np.zeros(self.orders.nf)), *self._rounds(self._slow_poles())]
         costs = [self.cost(theta) for theta in candidates]
         best = int(np.argmin(costs))

@@ -1,7 +1,8 @@
-"""After how many samples an excitation repeats.
+"""Finds the period of an excitation in samples.
 
-A period is confirmed by the signal itself, which must differ from itself a lag later by no more
-than is allowed. Where many lags are possible, the autocorrelation says which are worth a try.
+A period is confirmed by the signal itself: the difference between the signal and its copy one
+period later must not exceed a tolerance. If many lags are possible, the autocorrelation selects the
+candidates.
 """
 
 from collections.abc import Callable, Iterable
@@ -11,34 +12,34 @@ import numpy as np
 from rigwatch.wire.arrays import FloatArray, IntArray
 
 FEWEST = 16
-"""Samples in which a period is looked for at least."""
+"""Minimum number of samples for a search."""
 MOST_PERIODS = 8
-"""Periods at most that a lag of the autocorrelation may hold."""
+"""Most periods within a lag of the autocorrelation."""
 Allowed = Callable[[FloatArray], float]
-"""Mean square by which a signal may differ from its part that is given, one lag later."""
+"""Allowed mean square difference one lag later, relative to the signal's."""
 
 
 def shortest_period(signal: FloatArray, lags: Iterable[int], allowed: Allowed) -> int:
-    """The first of the lags after which the signal repeats, 0 where it does after none.
+    """The first lag after which the signal repeats, 0 if there is none.
 
     Args:
         signal: shape (n,).
-        lags: below n, in samples, the shortest first.
-        allowed: mean square of the difference, for the part of the signal from the lag on.
+        lags: less than n [samples], shortest first.
+        allowed: allowed mean square difference, given the part of the signal after the lag.
     """
     return next((lag for lag in lags if _repeats(signal, lag, allowed)), 0)
 
 
 def period_by_correlation(signal: FloatArray, allowed: Allowed) -> int:
-    """Samples after which the signal repeats by its autocorrelation, 0 where it does not.
+    """Period of the signal in samples from its autocorrelation, 0 if it does not repeat.
 
     Args:
         signal: without its mean, shape (n,).
-        allowed: as of `shortest_period`.
+        allowed: as in `shortest_period`.
     """
     for lag in _likely_lags(signal).tolist():
         if _repeats(signal, lag, allowed):
-            # Two periods are alike, too: the shortest counts.
+            # Multiples of the period also match: take the shortest.
             parts = (lag // count for count in range(MOST_PERIODS, 0, -1) if lag % count == 0)
             return shortest_period(signal, parts, allowed)
     return 0
@@ -50,7 +51,7 @@ def _repeats(signal: FloatArray, lag: int, allowed: Allowed) -> bool:
 
 
 def _likely_lags(signal: FloatArray) -> IntArray:
-    """The three lags of highest autocorrelation, beyond where it has fallen to a half."""
+    """The three lags with the highest autocorrelation, after its first fall to one half."""
     n, nothing = len(signal), np.zeros(0, np.int64)
     if n < FEWEST or not np.any(signal):
         return nothing

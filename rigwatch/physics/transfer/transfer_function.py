@@ -1,9 +1,9 @@
-"""A discrete transfer function and its simulation, one sample after the other.
+"""A discrete transfer function and its simulation, sample by sample.
 
     y(t) = B(q⁻¹)/A(q⁻¹)·u(t),   A = 1 + a1·q⁻¹ + … + an·q⁻ⁿ
 
-The filter carries its state from call to call, in transposed direct form II, so that cutting a
-signal into blocks changes no bit of the result.
+The filter keeps its state between calls, in transposed direct form II, so dividing a signal into
+blocks does not change a bit of the result.
 """
 
 # Compiled functions are untyped to mypy.
@@ -42,7 +42,7 @@ class TransferFunction:
 
     @classmethod
     def of(cls, b: ArrayLike, a: ArrayLike) -> "TransferFunction":
-        """From any sequences of numbers; the denominator is made monic."""
+        """From any sequences of numbers; the denominator is normalised to be monic."""
         denominator = np.atleast_1d(np.asarray(a, dtype=np.float64))
         numerator = np.atleast_1d(np.asarray(b, dtype=np.float64))
         return cls(numerator / denominator[0], denominator / denominator[0])
@@ -68,11 +68,11 @@ class TransferFunction:
         return Filter(self).update(np.asarray(u, dtype=np.float64))
 
     def second_difference(self, sample_rate: float) -> "TransferFunction":
-        """The same followed by (1 - q⁻¹)²·fs²: position becomes acceleration, one sample late."""
+        """The function times (1 - q⁻¹)²·fs²: position to acceleration, delayed by one sample."""
         return TransferFunction(np.convolve(self.b, [1.0, -2.0, 1.0]) * sample_rate**2, self.a)
 
     def padded(self) -> tuple[FloatArray, FloatArray]:
-        """(b, a) padded with zeros to one length, as the kernels want them."""
+        """(b, a) zero-padded to equal length for the kernels."""
         order = max(self.b.size, self.a.size)
         b, a = np.zeros(order), np.zeros(order)
         b[: self.b.size], a[: self.a.size] = self.b, self.a
@@ -80,7 +80,7 @@ class TransferFunction:
 
 
 class Filter:
-    """A running transfer function: feed it blocks of any size."""
+    """A running transfer function for blocks of any size."""
 
     def __init__(self, function: TransferFunction) -> None:
         self._b, self._a = function.padded()
@@ -119,7 +119,7 @@ def filter_block(
 
 
 def reflected(a: FloatArray, margin: float = 1e-6) -> FloatArray:
-    """Monic polynomial `a` with roots outside the unit circle mirrored into it.
+    """Monic polynomial `a` with roots outside the unit circle reflected into it.
 
     Args:
         a: ascending powers of q⁻¹, a[0] = 1.

@@ -1,16 +1,16 @@
 """Velocity from an accelerometer alone (docs/theory.md 1.3), without the lead of a high-pass.
 
-A third-order Butterworth high-pass H(s) = s³/D(s), D = s³ + 2·c·s² + 2·c²·s + c³, removes what a
-piezo cannot know, and an integrator does the rest. Well above the corner c [rad/s] the high-pass
-leads by 2·c/ω, and the piezo's own corner p [rad/s] by another p/ω: enough to move the zero
-crossings of v, and with them sgn(v), by several samples. A zero at -(2·c + p) in place of one at
-the origin takes both back to first order:
+A third-order Butterworth high-pass H(s) = s³/D(s), D = s³ + 2·c·s² + 2·c²·s + c³, removes the low
+frequencies that a piezo does not measure, followed by an integrator. Well above the corner c
+[rad/s] the high-pass leads by 2·c/ω, and the piezo's own corner p [rad/s] by another p/ω: enough to
+shift the zero crossings of v, and with them sgn(v), by several samples. A zero at -(2·c + p)
+instead of one at the origin compensates both to first order:
 
     v/a = s·(s + 2·c + p) / D(s)          lead-compensated
     v/a = s² / D(s)                       plain
 
-Both have a zero at the origin left, so a bias of the accelerometer does not become a velocity. The
-bilinear transform makes the integrator trapezoidal; its pole has cancelled, so nothing drifts.
+Both keep a zero at the origin, so an accelerometer bias does not cause a velocity. The bilinear
+transform makes the integrator trapezoidal; its pole is cancelled, so there is no drift.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ def velocity_filter(
         corner: corner of the high-pass [Hz].
         sample_rate: [Hz].
         sensor_corner: corner of the accelerometer's own first-order high-pass, 0 for none [Hz].
-        compensate_lead: take back the lead of both; without it, the plain Butterworth.
+        compensate_lead: compensate the lead of both; otherwise the plain Butterworth.
     """
     c, p = 2.0 * np.pi * corner, 2.0 * np.pi * sensor_corner
     lead = 2.0 * c + p if compensate_lead else 0.0

@@ -1,7 +1,7 @@
-"""What there is to choose from, described and drawn: effects of the library, models of equations.
+"""Descriptions and drawings of the library's effects and of equation models.
 
-`effect_curves` runs an effect along a sine and a step, `drawings` draws curves as SVG and as text,
-`model_report` says what a model's file holds and what in it cannot work.
+`effect_curves` runs an effect along a sine and a step, `drawings` renders curves as SVG and text,
+`model_report` checks whether a model file can work.
 """
 
 from rigwatch.workbench.catalogue.drawings import plotted, text_plot

@@ -9,7 +9,7 @@ from rigwatch.workbench.catalogue.effect_curves import Curve
 WIDTH, HEIGHT = 320, 220
 """Of a picture [pixels]."""
 COLUMNS, LINES = 56, 13
-"""Of a drawing in characters."""
+"""Size of a text drawing in characters."""
 
 
 def plotted(curve: Curve, title: str) -> str:

@@ -1,7 +1,7 @@
-"""What an effect does along a sine and along a step of what it sees, in sizes of one.
+"""Curves of an effect along a unit sine and a unit step of its variables.
 
-A force is shown against the position and against the speed of the sine, a signal against the one
-that arrives; both against time after a step, which a force meets as a short move.
+A force is plotted against the position and the speed of the sine, a signal against its input. Both
+are plotted against time after a step; for a force the step is a short move.
 """
 
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from rigwatch.physics.engine.fit import Memory
 from rigwatch.wire.arrays import FloatArray
 
 FINE, SAMPLED = 1 / 400, 1 / 40
-"""Time between points for effects of equations, and for those of a computer [s]."""
+"""Time between points for continuous effects and for sampled ones [s]."""
 PERIODS, MOVE = 2, (0.2, 0.3)
-"""Periods of one second, of which the last is shown; begin and end of the move [s]."""
+"""Number of one-second periods, the last of which is shown; start and end of the move [s]."""
 SEEN = {"T": (1.0, 0.5), "pu": (2.0, 0.9), "pd": (1.0, 0.0), "Ta": (1.0, 0.0)}
-"""Middle and swing of what is no motion; everything else swings by one about zero."""
+"""Mean and amplitude of variables that are no motion; all others have amplitude 1 about zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Curve:
     """One curve.
 
     Attributes:
-        across, up: what is shown on the axes.
+        across, up: labels of the horizontal and the vertical axis.
         x, y: shape (points,).
     """
 
@@ -61,7 +61,7 @@ def effect_curves(effect: Effect) -> tuple[Curve, ...]:
 
 
 def _first(effect: Effect) -> str:
-    """What stands for the position: the first that the effect names."""
+    """The variable used as position: the first that the effect names."""
     seen = [n for n in ("x", "p", "pu", "i", "psi", "T") if n in _names(effect)]
     return seen[0] if seen else "x"
 
@@ -72,7 +72,7 @@ def _names(effect: Effect) -> frozenset[str]:
 
 
 def _along(effect: Effect, time: FloatArray, wave: FloatArray, speed: FloatArray) -> FloatArray:
-    """What is added or leaves, shape (n,)."""
+    """The effect's output along the signals, shape (n,)."""
     own = {*effect.parameters, *effect.states, TIME, LEFT}
     signals = {"v": speed, "x": wave, "u": wave}
     for name in _names(effect) - own - set(signals):
@@ -89,7 +89,7 @@ def _along(effect: Effect, time: FloatArray, wave: FloatArray, speed: FloatArray
 
 
 def _values(effect: Effect) -> dict[str, float]:
-    """Parameters to be drawn with: a strength that shows where the file starts from none."""
+    """Parameter values for drawing; a visible strength where the file's value is neutral."""
     found = {n: _within_the_sine(p) for n, p in effect.parameters.items()}
     p = effect.parameters[effect.strength]
     if p.role == "switch":
@@ -99,5 +99,5 @@ def _values(effect: Effect) -> dict[str, float]:
 
 
 def _within_the_sine(p: EffectParameter) -> float:
-    """A shape with which the sine shows the effect: a stop beyond it would do nothing."""
+    """A shape parameter within the sine's range, so that e.g. an end stop is reached."""
     return min(p.tried) if p.role == "shape" and p.tried and p.value > 1.0 else p.value

@@ -1,4 +1,4 @@
-"""Effects in words: a table of all, everything about one, and the page that is printed of them."""
+"""Effects as text: a table of all, the details of one, and the tables of the index page."""
 
 from collections.abc import Mapping
 
@@ -10,17 +10,17 @@ KINDS = {
     "signal": "Drives and sensors",
     "sensor": "Sensors",
 }
-"""Kinds of ports with the headings under which their effects stand."""
+"""Kinds of ports with the headings of their effects."""
 
 
 def listed() -> dict[str, dict[str, Effect]]:
-    """The effects of the library by the kind of port where they enter."""
+    """The library's effects by kind of port."""
     found = library()
     return {kind: {n: e for n, e in found.items() if e.port == kind} for kind in KINDS}
 
 
 def described(name: str, effect: Effect) -> list[str]:
-    """Everything about one effect, as lines."""
+    """The details of one effect, as lines."""
     lines = [
         f"{name}: {effect.physics}",
         "",

@@ -1,8 +1,8 @@
-"""Whether a model's file can work: units, names that nothing uses, states that no output shows.
+"""Checks a model file: units, unused names, unobservable states.
 
-Observability is read from a run of the model with its exact sensitivities: the outputs' slopes by
-the initial states, over as long as the slowest state takes to settle. A state whose column vanishes
-is shown by nothing, and states whose columns add up to nothing cannot be told apart (R. Hermann,
+Observability is computed from one run with exact sensitivities: the derivatives of the outputs by
+the initial states, over the settling time of the slowest state. A state whose column vanishes is
+unobservable; states with linearly dependent columns cannot be distinguished (R. Hermann,
 A. J. Krener, IEEE TAC 22(5), 1977; here numerically, along one run).
 """
 
@@ -24,27 +24,27 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.catalogue.effect_curves import Curve
 
 STEPS = (1.0, 0.1, 0.01, 0.0)
-"""What inputs step to, the first with which the run stays finite."""
+"""Step sizes of the inputs; the first with which the run stays finite is used."""
 MOST, FINEST, SETTLED = 4000, 20.0, 5.0
-"""Samples of a run at most, samples within the fastest time constant, slowest ones to run for."""
+"""Most samples of a run, samples per fastest time constant, slowest time constants per run."""
 SHOWN = 1e-9
-"""Slope by a state below which nothing shows it, over the largest."""
+"""Derivative by a state, relative to the largest, below which it is unobservable."""
 APART = 1e-7
-"""Smallest singular value of the slopes, over the largest, from which states are told apart."""
+"""Singular value, relative to the largest, above which states are distinguishable."""
 
 
 @dataclass(frozen=True, eq=False)
 class ModelReport:
-    """What is found.
+    """Result of the check.
 
     Attributes:
-        unused: parameters, quantities and inputs that no equation needs, by name.
+        unused: parameters, quantities and inputs that no equation uses, by name.
         unseen: states that no output shows.
-        tied: states that the outputs cannot tell from each other.
-        start: states that no channel shows and that therefore start where the file says.
-        step: what the inputs step to that are not given.
-        run: the outputs from the file's start with such inputs; none without states.
-        trouble: why there is no run.
+        tied: states that the outputs cannot distinguish.
+        start: states that no channel measures, which start at the file's values.
+        step: step size of the inputs that are not given.
+        run: the outputs from the file's initial state with these inputs; none without states.
+        trouble: why the run failed.
     """
 
     unused: tuple[str, ...]
@@ -57,7 +57,7 @@ class ModelReport:
 
     @property
     def fine(self) -> bool:
-        """Whether nothing is in a fit's way."""
+        """Whether nothing prevents a fit."""
         return not (self.unused or self.tied or self.trouble)
 
 
@@ -65,7 +65,7 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
     """Check a model.
 
     Args:
-        model: as it was read.
+        model: the model.
         inputs: values of some inputs during the run, by name.
         where: its file, for errors.
 
@@ -87,7 +87,7 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         if np.isfinite(outputs).all() and np.isfinite(slopes).all():
             break
     else:
-        trouble = "the run does not stay finite, expected other starts, parameters or inputs"
+        trouble = "the run diverged (NaN or infinite), expected other starts, parameters or inputs"
         return ModelReport(unused, (), (), start, 0.0, (), trouble)
     curves = tuple(
         Curve("time [s]", f"{name} [{own.shown or own.unit}]", time, outputs[:, column])
@@ -97,7 +97,7 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
 
 
 def _unused(model: Model, system: System) -> tuple[str, ...]:
-    """What stands in no equation, nor at a port where an effect may ask for it."""
+    """Names used in no equation and at no port where an effect could refer to them."""
     equations = (*system.derivatives.values(), *system.outputs.values())
     symbols = {s.name for equation in equations for s in equation.free_symbols}
     texts = [
@@ -114,7 +114,7 @@ def _unused(model: Model, system: System) -> tuple[str, ...]:
 
 
 def _run(system: System, inputs: Mapping[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Time (n,), outputs (n, outputs), and their slopes by initial states (n·outputs, states)."""
+    """Time (n,), outputs (n, outputs), their derivatives by initial states (n·outputs, states)."""
     compiled = compile_system(system)
     first = np.array([[state.start for state in system.states.values()]])
     values = np.array([[inputs[name] for name in system.model.inputs]])
@@ -133,7 +133,7 @@ def _run(system: System, inputs: Mapping[str, float]) -> tuple[FloatArray, Float
 
 
 def _grid(rates: FloatArray) -> tuple[float, int]:
-    """Time between samples [s] and their number: the slowest state settles if it can."""
+    """Sample period [s] and number of samples, so that the slowest state settles if possible."""
     moving = rates[rates > 1e-9 * max(float(rates.max()), 1e-300)]
     if not moving.size:
         return 0.01, 500
@@ -143,7 +143,7 @@ def _grid(rates: FloatArray) -> tuple[float, int]:
 
 
 def _observed(names: list[str], slopes: FloatArray) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """States that no output shows, and those that cannot be told apart."""
+    """States that no output shows, and states that cannot be distinguished."""
     size = np.linalg.norm(slopes, axis=0)
     seen = size > SHOWN * max(float(size.max()), 1e-300)
     kept = [name for name, one in zip(names, seen.tolist(), strict=True) if one]

@@ -14,7 +14,7 @@ from rigwatch.workbench.study import Held, Study
 
 @dataclass(frozen=True)
 class Channel:
-    """Errors of one output, in its unit; the free run is one long simulation held out."""
+    """Errors of one output, in its unit; the free run is one simulation of the held-out data."""
 
     train_error: float
     held_out_error: float
@@ -25,17 +25,17 @@ class Channel:
 
 @dataclass(frozen=True)
 class Comparison:
-    """How well the model does.
+    """Errors and parameters of a fitted model.
 
     Attributes:
         train_error, held_out_error, noise_floor: over all channels, in `unit`.
-        unit: the channel's where there is one, else "noise floors".
-        noise_from: how the floor is known.
+        unit: that of the channel if there is only one, otherwise "noise floors".
+        noise_from: method of the noise floor, in words.
         channels: by output.
-        parameters: by name, in the units that the model and its effects are written in.
-        effects: accepted so far, as "effect@port".
-        remarks: what was noticed, for people.
-        hold: what each input does between samples, by name.
+        parameters: by name, in the units of the model's and effects' files.
+        effects: accepted effects, as "effect@port".
+        remarks: notes for the user.
+        hold: hold of each input between samples, by name.
         convergence: how the fit of the model ended.
     """
 
@@ -53,11 +53,11 @@ class Comparison:
 
 
 def compare(study: Study, *, profiled: bool = False) -> Comparison:
-    """Errors, noise floor and parameters of the study's model as it is.
+    """Errors, noise floor and parameters of the study's current model.
 
     Args:
         study: the study.
-        profiled: intervals from the profile likelihood, which takes many fits.
+        profiled: compute intervals from the profile likelihood, which takes many fits.
     """
     bench = open_bench(study)
     found = comparison(bench)
@@ -68,7 +68,7 @@ def compare(study: Study, *, profiled: bool = False) -> Comparison:
 
 
 def comparison(bench: Bench) -> Comparison:
-    """The same of a bench that is open."""
+    """`compare` for an open bench."""
     base, floor = bench.base, bench.floor
     outputs = bench.study.model.outputs
     channels = {
@@ -97,7 +97,7 @@ def comparison(bench: Bench) -> Comparison:
 
 
 def _free(bench: Bench) -> list[float | None]:
-    """Errors of a free run; none without states, along the motion or of several recordings."""
+    """Errors of a free run; none without states, along the motion, or for several recordings."""
     model, file = bench.study.model, bench.study.file
     if not model.states or bench.data.along_motion or len(file.held_out) > 1:
         return [None] * len(model.outputs)

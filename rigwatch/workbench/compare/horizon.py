@@ -1,10 +1,10 @@
-"""How long a window is: long enough for the model's dynamics, short enough for many of them.
+"""Chooses the horizon: long enough for the model's dynamics, short enough for many windows.
 
-Over a horizon much shorter than its time constants a model hardly moves from where each window
-begins, and whatever is missing hides in that; over a long one errors add up, and few windows are
-left to judge on. So the horizon spans the slowest of the model's own motions that a recording
-shows: three time constants, or two periods where it oscillates. The model is fitted once over a
-horizon that the outputs suggest, to know them.
+Over a horizon much shorter than its time constants a model stays near each window's initial state,
+and missing physics does not show. Over a long horizon errors accumulate and few windows remain for
+statistics. The horizon therefore spans the slowest mode of the model that a recording shows: three
+time constants, or two periods if it oscillates. To find the modes, the model is fitted once over a
+horizon derived from the outputs.
 """
 
 from dataclasses import replace
@@ -24,15 +24,15 @@ SPANS = 3.0
 PERIODS = 2.0
 """Periods in a horizon, where the slowest motion oscillates."""
 WINDOWS = 10
-"""Windows at least of the shortest recording."""
+"""Minimum number of windows in the shortest recording."""
 FEWEST = 20
-"""Samples at least of a window."""
+"""Minimum number of samples in a window."""
 GONE = float(np.exp(-1))
-"""Autocorrelation at which an output has forgotten itself."""
+"""Autocorrelation that defines an output's correlation time."""
 
 
 def with_horizon(study: Study) -> Study:
-    """The study with a horizon, chosen where its file gives none.
+    """The study with a horizon, chosen from the data if its file gives none.
 
     Raises:
         ModelError: data do not suit the model.
@@ -56,12 +56,12 @@ def with_horizon(study: Study) -> Study:
         return study
     constant, name = slowest
     chosen = float(np.clip(constant, least, max(longest, least)))
-    bound = ", as far as the shortest recording has ten of it" if chosen < constant else ""
+    bound = ", limited to a tenth of the shortest recording" if chosen < constant else ""
     return _with(study, f"{name}{bound}", chosen)
 
 
 def with_horizon_of(study: Study, other: Study) -> Study:
-    """The study with the horizon that was chosen for another opening of it."""
+    """The study with the horizon chosen for another instance of it."""
     if not other.horizon_from:
         return study
     file = structs.replace(study.file, horizon=other.file.horizon)
@@ -82,9 +82,9 @@ def _once(study: Study) -> Fitted:
 
 
 def _slowest(found: ComplexArray, longest: float) -> tuple[float, str] | None:
-    """Horizon that the slowest motion asks for [s], and what it is; None where nothing moves.
+    """Horizon for the slowest mode [s], and its description; None without a mode.
 
-    What takes longer than the recording lasts, as an integrator does, is no motion that it shows.
+    Modes slower than the recording, for example integrators, are ignored.
     """
     rate = np.sort_complex(found.ravel())
     seen = rate[np.abs(rate) * longest > 1]
@@ -92,7 +92,7 @@ def _slowest(found: ComplexArray, longest: float) -> tuple[float, str] | None:
         return None
     turning = np.abs(seen.imag) > np.abs(seen.real)
     asked = np.where(turning, 2 * np.pi * PERIODS / np.abs(seen), SPANS / np.abs(seen))
-    # Modes of all windows together: the slowest that is no exception.
+    # Modes of all windows: the slowest that is not an outlier.
     wanted = float(np.quantile(asked, 1 - 0.5 / found.shape[1]))
     at = int(np.argmin(np.abs(asked - wanted)))
     if turning[at]:
@@ -101,7 +101,7 @@ def _slowest(found: ComplexArray, longest: float) -> tuple[float, str] | None:
 
 
 def _memory(recording: Recording) -> float:
-    """Three times how long the slowest output is like itself [s]."""
+    """Three times the correlation time of the slowest output [s]."""
     spans = [_like_itself(filled(column)) for column in recording.outputs.T]
     return SPANS * max(spans) * recording.dt
 

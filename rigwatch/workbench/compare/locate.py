@@ -1,8 +1,8 @@
 """Where a model fails: its residual by time, motion, direction, amplitude and frequency.
 
-Each view cuts the residual into regions. A region stands out where its mean squared residual is
-above the average by more than chance, tested over the blocks that the region is spread over; the
-regions carry the numbers of their samples, so that one can look at them.
+Each view divides the residual into regions. A region is significant if its mean squared residual
+exceeds the average by more than chance, tested over the blocks that it spans. Regions list their
+sample numbers for inspection.
 """
 
 from dataclasses import dataclass
@@ -25,14 +25,14 @@ class Region:
     """A part of a recording.
 
     Attributes:
-        view: how it was cut: time, motion, direction, amplitude, input, frequency, lines.
-        name: which part, in words.
-        channel: output that the residual is of.
+        view: kind of division: time, motion, direction, amplitude, input, frequency, lines.
+        name: the part, in words.
+        channel: output of the residual.
         rms: of the residual there, in the channel's unit.
         mean: of the residual there, in the channel's unit.
         share: of the residual's energy above the noise floor, 0 to 1.
-        p_value: that it is no worse than the rest by chance.
-        samples: numbers of its samples in the training recording; empty for frequencies.
+        p_value: of a mean squared residual this far above the average by chance.
+        samples: sample numbers in the training recording; empty for frequencies.
     """
 
     view: str
@@ -46,7 +46,7 @@ class Region:
 
 
 def locate(bench: Bench) -> list[Region]:
-    """Every region of every view, those with most of the energy of their view first."""
+    """All regions of all views, in each view those with the most energy first."""
     found: list[Region] = []
     for index, channel in enumerate(bench.study.model.outputs):
         residual = bench.base.train.residuals[..., index].ravel()
@@ -80,7 +80,7 @@ def _channel(bench: Bench, channel: str, residual: FloatArray, floor: float) -> 
 
 
 def sample_numbers(recording: Recording, count: int) -> IntArray:
-    """Number in the recording of each residual."""
+    """Sample number in the recording of each residual."""
     if recording.thinning is None:
         return np.arange(count)
     every = np.arange(len(recording))[None, :, None].astype(np.float64)
@@ -146,7 +146,7 @@ def _by_size(signal: FloatArray, name: str) -> list[str]:
 
 
 def _driven(bench: Bench, rows: IntArray) -> dict[str, FloatArray]:
-    """What drives the model, as measured: inputs at which an actuator stands."""
+    """The measured inputs that drive the model: those at an actuator port."""
     model, columns = bench.study.model, bench.data.train.inputs[rows]
     driven = {port.signal for port in model.ports.values() if port.kind == "actuator"}
     return {name: columns[:, i] for i, name in enumerate(model.inputs) if name in driven}
@@ -208,10 +208,10 @@ def _spectrum(channel: str, residual: FloatArray, floor: float, dt: float) -> li
 
 
 def _lines(channel: str, residual: FloatArray, period: int) -> list[Region]:
-    """Energy on even and odd multiples of the excitation's rate: even or odd nonlinearities."""
+    """Energy at even and odd harmonics of the excitation: even or odd nonlinearities."""
     periods = np.nan_to_num(residual)[: len(residual) // period * period].reshape(-1, period)
     energy = np.abs(np.fft.rfft(periods.mean(axis=0))) ** 2 * 2 / period**2
-    # The mean is no line: an offset would hide what the others say.
+    # The mean is not a harmonic: an offset would mask the others.
     total = max(float(energy[1:].sum()), 1e-300)
     return [
         Region(

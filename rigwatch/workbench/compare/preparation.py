@@ -1,8 +1,7 @@
-"""What every step of a study starts from: data prepared, model fitted, noise floor known.
+"""Starting point of every step of a study: prepared data, fitted model, noise floor.
 
-Signals on one grid, how inputs are held, what the healthy recording tells (parameters, reference,
-remainder), then the fit of the model with the effects accepted so far, and the error that noise
-alone would leave.
+In order: signals on one time grid, holds of the inputs, results from the healthy recording
+(parameters, reference, remainder), fit of the model with the accepted effects, noise floor.
 """
 
 from dataclasses import dataclass, replace
@@ -34,13 +33,13 @@ from rigwatch.workbench.study import Study, check_data
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A study with its data and its model fitted: what every step starts from.
+    """A study with its data and its fitted model, from which every step starts.
 
     Attributes:
         study, data: prepared.
-        base: the model with the effects accepted so far.
-        floor: of the held-out recordings' error.
-        bare: the model alone, fitted to the healthy recording; None where there is none.
+        base: the model with the accepted effects, fitted.
+        floor: noise floor of the held-out recordings.
+        bare: the model alone, fitted to the healthy recording; None if there is none.
     """
 
     study: Study
@@ -60,7 +59,7 @@ def open_bench(study: Study) -> Bench:
 
 
 def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
-    """The study as its healthy recordings leave it, its data, and how channels are weighed.
+    """The study with the results of its healthy recordings, its data, and the channels' weights.
 
     Raises:
         ModelError: data have changed, or do not suit the model.
@@ -71,7 +70,7 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
 
 
 def told_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:
-    """The same of recordings that are in memory, for the study's model as it was written.
+    """`prepared` for recordings in memory, for the study's unmodified model.
 
     Raises:
         ModelError: the model cannot be fitted to the healthy recording.
@@ -96,7 +95,7 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
 
     Args:
         study, data: prepared.
-        scale: divisor of each output's residuals, shape (outputs,); its spread if None.
+        scale: divisor of each output's residuals, shape (outputs,); its standard deviation if None.
     """
     study = with_hold(study, data, scale)
     base = fit_base(study, data, scale)
@@ -109,10 +108,10 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
 
 
 def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> NoiseFloor:
-    """The floor from a healthy recording.
+    """The noise floor from a healthy recording.
 
-    There effects may be needed, or not even be able to vanish: a delay is not shorter than its
-    bound. So the model counts with them or without, whichever does better.
+    An accepted effect may be part of the healthy rig, or unable to vanish (a delay has a lower
+    bound). The floor is therefore the smaller error of the model with and without the effects.
     """
     fits = [bare]
     if base.placements:

@@ -1,15 +1,15 @@
-"""What an interval must hold that no single recording shows: the healthy recording's part.
+"""Uncertainty contributions that no single recording shows: those of the healthy recording.
 
-Two things make a fit wrong in the same way all along a recording. The parameters that were taken
-from the healthy recording (`kept`), and those that are known to some deviation, such as a mass, are
-uncertain themselves: with S their covariance, J_θ and J_κ the slopes of the residual by what is
-fitted and by what is kept,
+Two contributions bias a fit equally along a whole recording. First, the parameters kept from the
+healthy recording, and those known to a stated deviation (for example a mass), are uncertain. With S
+their covariance, and J_θ and J_κ the derivatives of the residual by the fitted and the kept
+parameters,
 
     Cov θ ← Cov θ + A·S·Aᵀ,   A = J_θ⁺·J_κ
 
-And a model that is not quite the rig sees a little of every effect even there. What an effect seems
-to be on a healthy recording is taken for a standard deviation of its strength. Both are added as
-JCGM 100:2008 (GUM), 5.1, adds independent contributions: by their squares.
+Second, model error mimics a little of every effect. The apparent strength of an effect on a healthy
+recording is used as a standard deviation of its strength. Both are independent contributions and
+add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
 import dataclasses
@@ -27,10 +27,10 @@ from rigwatch.workbench.study import Kept, Study
 
 
 def beyond(study: Study, data: Data, bare: Fitted | None, fitted: Fitted) -> dict[str, float]:
-    """Variances to be added to those of the parameters, by name; none without kept parameters.
+    """Variances to add to those of the parameters, by name; none without kept parameters.
 
     Args:
-        study, data: as they were fitted.
+        study, data: as fitted.
         bare: the model alone, fitted to the healthy recording.
         fitted: the model with some effects.
     """
@@ -46,7 +46,7 @@ def beyond(study: Study, data: Data, bare: Fitted | None, fitted: Fitted) -> dic
 
 
 def _from_kept(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str, float]:
-    """What the uncertainty of the kept parameters does to the fitted ones."""
+    """Variances of the fitted parameters due to the kept ones."""
     train = fitted.train
     compiled = compile_system(compose(loosened(study.model, kept.names), fitted.placements))
     loose = dataclasses.replace(
@@ -63,7 +63,7 @@ def _from_kept(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str
 
 
 def apparent_strength(healthy: Data, bare: Fitted, placement: Placement, fitted: Fitted) -> float:
-    """Strength that an effect seems to have on the healthy recording, to first order."""
+    """Apparent strength of an effect on the healthy recording, to first order."""
     effect, values = placement.effect, fitted.train.values()
     shape = {n: values[placement.prefix + n] for n in effect.parameters if n != effect.strength}
     candidate = Candidate(placement.name, effect, placement.port, shape)

@@ -1,4 +1,4 @@
-"""What was fitted stays for the next step, found by the hashes of what it stood on."""
+"""Cache of fits between steps, keyed by the hashes of their inputs."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -13,10 +13,10 @@ FEW = 6
 
 
 class Warm:
-    """Fits of a study that its next steps begin with; a study that has changed finds none.
+    """Cached fits of a study; a changed study finds none.
 
     Args:
-        most: results that are kept, the latest used.
+        most: number of most recently used results to keep.
     """
 
     def __init__(self, most: int = FEW) -> None:
@@ -24,7 +24,7 @@ class Warm:
         self._kept: OrderedDict[tuple[str, ...], Any] = OrderedDict()
 
     def get(self, key: tuple[str, ...], make: Callable[[], T]) -> T:
-        """What is kept under `key`, made where it is not."""
+        """The result cached under `key`, computed if missing."""
         if key not in self._kept:
             self._kept[key] = make()
             while len(self._kept) > self._most:

@@ -1,4 +1,4 @@
-"""What a study measures: signals on one grid, their scales, and the noise floor."""
+"""A study's measured data: signals on one time grid, their scales, and the noise floor."""
 
 from rigwatch.workbench.data.columns import Columns
 from rigwatch.workbench.data.motion import along_motion, goes_along_motion

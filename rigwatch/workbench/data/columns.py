@@ -1,4 +1,4 @@
-"""Channels over equally spaced samples, as a session gives them."""
+"""Channels of a session over equally spaced samples."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,8 +14,8 @@ class Columns:
 
     Attributes:
         dt: time between samples [s].
-        values: by channel, each of shape (n,), in SI; NaN where nothing valid was measured.
-        units: of the channels as they were recorded.
+        values: by channel, each of shape (n,), in SI; NaN where no valid sample was measured.
+        units: of the channels as recorded.
     """
 
     dt: float
@@ -27,7 +27,7 @@ class Columns:
 
 
 def bridged(signal: FloatArray) -> FloatArray:
-    """The signal with straight lines over what is missing."""
+    """The signal with gaps (NaN) interpolated linearly."""
     good = np.isfinite(signal)
     if good.all() or not good.any():
         return signal

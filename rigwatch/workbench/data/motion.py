@@ -1,9 +1,9 @@
-"""A study along its measured motion, where its model has states that no channel shows.
+"""A study along its measured motion, for models with states that no channel measures.
 
-Guessed pressures, fluxes or temperatures make free runs drift; driven by the measured motion they
-are known within a fraction of a second, and a whole recording is one run without windows. So that
-form is taken wherever channels show some of a model's states but not all and an output is left to
-predict; a study may ask for either (`prediction`).
+With unknown initial pressures, fluxes or temperatures free runs drift. Driven by the measured
+motion these states converge within a fraction of a second, and a whole recording is one run without
+windows. This form is used if channels measure some but not all of a model's states and at least one
+output remains to be predicted; a study can request either form (`prediction`).
 """
 
 from dataclasses import replace
@@ -22,16 +22,16 @@ from rigwatch.workbench.data.signals import Data, MotionSensor
 from rigwatch.workbench.study import Study
 
 SETTLING = 1.0
-"""What hidden states are given to forget their start [s]; at most a tenth of a part."""
+"""Settling time allowed for hidden states [s]; at most a tenth of a part."""
 SLOW = 0.05
-"""Speed over its rms below which samples are not counted: there a smoothed motion does not show
-which way the rig slides, or whether it sticks."""
+"""Speed over its rms below which samples do not count: there a smoothed motion does not show
+the direction of sliding, nor whether the rig sticks."""
 UNCHECKED = (
     "no healthy recording: the model cannot be checked; record one with nothing wrong and list it"
     " under [[healthy]]"
 )
 BEYOND = 1.2
-"""Range of a motion over that of the healthy recording from which it is said to be beyond it."""
+"""Ratio of motion ranges above which a recording is reported to exceed the healthy one."""
 FORM = "predicted along the measured motion: {shown} drive the model, {hidden} are simulated"
 
 
@@ -47,14 +47,14 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     """The study with its model along the measured motion, and its recordings for that.
 
     Args:
-        study: as it was opened.
-        data: its recordings, for the model as it was written.
+        study: as opened.
+        data: its recordings, for the unmodified model.
 
     Raises:
-        ModelError: no channel shows any of the model's states, or nothing is left to predict.
+        ModelError: no channel measures any of the model's states, or no output is left to predict.
     """
     model = along_measured_motion(study.model)
-    # One width for all recordings: the smoothing is part of the model that is fitted to one.
+    # One width for all recordings: the smoothing is part of the fitted model.
     shown_by = data.healthy or data.train
     widths = motion_widths(study.model, shown_by)
     slow = SLOW * _rms(motion_recording(study.model, shown_by, widths=widths).inputs)
@@ -89,7 +89,7 @@ def _while_moving(study: Study, recording: Recording, slow: FloatArray) -> Recor
 
 
 def _sensors(study: Study) -> tuple[MotionSensor, ...]:
-    """The sensors that show a position and, as its rate, a speed."""
+    """Sensors that measure a position whose rate is a speed input."""
     model, columns = study.model, dict[str, dict[int, int]]()
     for column, state in enumerate(measured_states(model), start=len(model.inputs)):
         columns.setdefault(state.channel, {})[state.order] = column
@@ -106,14 +106,14 @@ def _sensors(study: Study) -> tuple[MotionSensor, ...]:
 
 
 def _rms(signals: FloatArray) -> FloatArray:
-    """Of each column, shape (columns,)."""
+    """Root mean square of each column, shape (columns,)."""
     return np.asarray(np.sqrt(np.mean(signals**2, axis=0)))
 
 
 def beyond_healthy_motion(
     study: Study, train: Recording, held_out: Recording, healthy: Recording | None
 ) -> list[str]:
-    """In words, where a motion goes beyond what the healthy recording has shown."""
+    """Remarks on motions that exceed the range of the healthy recording."""
     found: list[str] = []
     if healthy is None:
         return found
@@ -125,7 +125,7 @@ def beyond_healthy_motion(
             if reach > BEYOND * known:
                 unit = study.model.states[state.name].unit
                 found.append(
-                    f"{use}: {state.name} goes over {reach:.3g} {unit}, and the healthy recording"
+                    f"{use}: {state.name} spans {reach:.3g} {unit}, and the healthy recording"
                     f" shows {known:.3g} {unit}: record a healthy motion as wide"
                 )
     return found

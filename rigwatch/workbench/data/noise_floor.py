@@ -1,8 +1,8 @@
-"""How small the error can become: what is noise, and how that is known.
+"""The noise floor: the smallest error that can be reached, and how it is estimated.
 
-Best are repeated periods of the excitation: what differs from one to the next is noise. Next best
-is a recording with nothing wrong, which counts the model's own faults as well. Else the quietest
-band of the residual, taken for white noise, gives a lower limit.
+Repeated periods of the excitation are best: their differences are noise. Next best is a healthy
+recording, which also includes model error. Otherwise the quietest band of the residual, assumed to
+be white noise, gives a lower limit.
 """
 
 import math
@@ -16,17 +16,17 @@ from rigwatch.physics.transfer import period_by_correlation
 from rigwatch.wire.arrays import BoolArray, FloatArray
 
 METHODS = {
-    "periods": "what differs between repeated periods of the excitation",
-    "healthy": "the error of the model on a recording with nothing wrong",
-    "healthy motion": "the error of the model along the motion of a recording with nothing wrong",
-    "quiet band": "the quietest band of the residual, taken for white noise: a lower limit",
+    "periods": "differences between repeated periods of the excitation",
+    "healthy": "the error of the model on a healthy recording",
+    "healthy motion": "the error of the model along the motion of a healthy recording",
+    "quiet band": "the quietest band of the residual, assumed to be white noise: a lower limit",
 }
 ALLOWED = {"periods": 1.1, "healthy": 1.1, "healthy motion": 1.05, "quiet band": 1.25}
-"""Error over noise floor up to which nothing is left to explain, by how the floor is known."""
+"""Largest ratio of error to noise floor at which nothing remains to be explained, by method."""
 BANDS = 8
 FEWEST_PERIODS = 3
 REPEATED = 2e-4
-"""Mean square by which an input may differ a period later, over its own: rms 1 % of each."""
+"""Mean square difference of an input one period later, relative to its own; rms 1 % of each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class NoiseFloor:
     method: str
 
     def ratio(self, fitted: Fit, at: BoolArray | None = None) -> float:
-        """Error over the floor, over all channels; `at` some samples, shape (windows, length)."""
+        """Error over the floor, over all channels; `at`: samples used, shape (windows, length)."""
         rms = fitted.rms if at is None else fitted.rms_at(at)
         return float(np.sqrt(np.mean((rms / self.rms) ** 2)))
 
@@ -51,18 +51,18 @@ class NoiseFloor:
         return max(1 - self.ratio(fitted) ** -2, 0.0)
 
     def reached(self, fitted: Fit) -> bool:
-        """Whether the error is as small as noise makes it."""
+        """Whether the error is at the noise floor."""
         return self.ratio(fitted) <= ALLOWED[self.method]
 
     def left_over(
         self, before: Fit, after: Fit, at: BoolArray | None = None, *, tolerant: bool = False
     ) -> float:
-        """Share of the energy above the floor that is left from one fit to a better one.
+        """Share of the energy above the floor that remains from one fit to a better one.
 
         Args:
             before, after: the fits.
-            at: samples that count, shape (windows, length); all if None.
-            tolerant: whether an error that counts as small as noise makes it leaves nothing.
+            at: samples to use, shape (windows, length); all if None.
+            tolerant: count an error at the noise floor as zero.
         """
         least = ALLOWED[self.method] ** 2 if tolerant else 1.0
         above = self.ratio(before, at) ** 2 - 1
@@ -70,12 +70,12 @@ class NoiseFloor:
 
 
 def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int) -> NoiseFloor:
-    """The floor from repeated periods where there are enough, else from the quietest band.
+    """The floor from repeated periods if there are enough, otherwise from the quietest band.
 
     Args:
-        fitted: the residuals.
-        recording: what they are of.
-        period: of the excitation [s]; 0 to look for one in the inputs.
+        fitted: the fit with its residuals.
+        recording: the recording it was fitted to.
+        period: of the excitation [s]; 0 to search for one in the inputs.
         horizon: samples between re-initialisations; a period must hold a whole number of them.
     """
     factor = recording.thinning.factor if recording.thinning else 1
@@ -91,7 +91,7 @@ def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int
 
 
 def find_period(recording: Recording) -> int:
-    """Samples after which the first input repeats itself to 1 %, 0 where it does not."""
+    """Period in samples after which the first input repeats to 1 %; 0 if it does not."""
     if recording.inputs.shape[1] == 0:
         return 0
     signal = recording.inputs[:, 0] - recording.inputs[:, 0].mean()
@@ -118,7 +118,7 @@ def _quiet(series: FloatArray, rate: float, top: float) -> float:
 
 
 def quiet_scale(recording: Recording) -> FloatArray:
-    """Noise of each channel as its own quietest band shows it: how channels are weighed."""
+    """Noise of each channel from its own quietest band, used as weight of the channel."""
     sizes = np.nanstd(recording.outputs, axis=0)
     quiet = np.array([_quiet(c, 1 / recording.dt, 0.5) for c in recording.outputs.T])
     least: FloatArray = 1e-6 * np.where(sizes > 0, sizes, 1.0)

@@ -1,7 +1,8 @@
-"""Recordings of different rates on one: low-passed where they are thinned, then interpolated.
+"""Resamples recordings to one sample rate: low-pass if the rate is reduced, then interpolation.
 
-Loggers that are not clocked together differ by parts of a percent. Such recordings are put on the
-slowest rate among them; others only where the study says `rate`, as that changes what is seen.
+Loggers without a common clock differ by fractions of a percent. Such recordings are resampled to
+the slowest rate among them. Larger differences are resampled only if the study gives `rate`, as
+that changes the signal content.
 """
 
 from collections.abc import Sequence
@@ -16,11 +17,11 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data.columns import Columns, bridged
 
 SAME = 1e-3
-"""Difference of rates, over the rate, from which recordings are resampled."""
+"""Relative difference of rates above which recordings are resampled."""
 ALIKE = 0.05
-"""Difference up to which they are without being asked to."""
+"""Relative difference up to which they are resampled without `rate`."""
 THINNED = 1.1
-"""Ratio of rates from which signals are low-passed first."""
+"""Ratio of rates above which signals are low-passed first."""
 PASSED = 0.4
 """Corner of the low-pass over the new rate; a zero-phase Butterworth of order 8."""
 
@@ -31,16 +32,16 @@ def on_one_rate(
     rate: float | None,
     kept: frozenset[str] = frozenset(),
 ) -> tuple[list[Columns], list[str]]:
-    """The recordings on one rate, and what was done in words.
+    """The recordings at one sample rate, and remarks on what was resampled.
 
     Args:
         tables: the recordings.
         names: of their sessions.
-        rate: that the study asks for [Hz], None to take the slowest where they are alike.
-        kept: channels that are kept from sample to sample and must not be rounded off.
+        rate: requested by the study [Hz]; None to take the slowest if they are nearly equal.
+        kept: channels with a zero-order hold, whose steps must not be smoothed.
 
     Raises:
-        ModelError: rates differ by more than loggers do, or the study asks for a faster one.
+        ModelError: rates differ by more than clock tolerances, or the study requests a faster one.
     """
     found = [1 / table.dt for table in tables]
     target = rate or min(found)
@@ -65,7 +66,7 @@ def on_one_rate(
 
 
 def resampled(table: Columns, rate: float, kept: frozenset[str] = frozenset()) -> Columns:
-    """The channels at a rate [Hz] that is no faster; NaN beside what is missing."""
+    """The channels resampled to an equal or lower rate [Hz]; NaN next to gaps."""
     count = int(np.floor((len(table) - 1) * table.dt * rate + 1e-9)) + 1
     at = np.arange(count) / (rate * table.dt)
     values = {
@@ -76,12 +77,12 @@ def resampled(table: Columns, rate: float, kept: frozenset[str] = frozenset()) -
 
 
 def _held(signal: FloatArray, at: FloatArray) -> FloatArray:
-    """The last sample before each place."""
+    """The last sample before each point."""
     return signal[np.minimum(np.floor(at + 1e-9).astype(np.int64), len(signal) - 1)]
 
 
 def _smooth(signal: FloatArray, at: FloatArray, ratio: float) -> FloatArray:
-    """Low-passed where `ratio` of the old rate over the new one asks for it, and interpolated."""
+    """Interpolate; low-pass first if `ratio`, the old rate over the new one, is large enough."""
     good = np.isfinite(signal)
     if not good.any():
         return np.full(len(at), np.nan)

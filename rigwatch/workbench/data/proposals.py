@@ -1,6 +1,6 @@
-"""What a new study is proposed: which part decides, and where speeds are cut off.
+"""Proposals for a new study: the split into training and held-out parts, and the low-pass.
 
-All of it comes from the recordings alone, stands in the study's file, and may be changed there.
+They are derived from the recordings, written to the study's file, and can be changed there.
 """
 
 from collections.abc import Sequence
@@ -13,17 +13,17 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data.columns import Columns, bridged
 
 QUIET = 0.02
-"""Change over the range of a signal up to which nothing happens."""
+"""Change over the range of a signal up to which it counts as at rest."""
 WORTH_CUTTING = 0.05
-"""Share of a recording without motion at an end from which it is left out."""
+"""Smallest share of a recording at rest at an end for that end to be cut off."""
 KEPT = 20
-"""Samples at rest that stay before the motion, as they show the start."""
+"""Samples at rest kept before the motion, as they show the initial state."""
 TOLD = 0.6
-"""Share of a single recording that is fitted to; the rest decides."""
+"""Share of a single recording used for training; the rest is held out."""
 ENERGY, BEYOND = 0.999, 4.0
-"""Share of a signal's energy below a frequency, and the low-pass over that frequency."""
+"""Share of a signal's energy that defines its top frequency, and ratio of low-pass to that."""
 BELOW_NYQUIST = 0.8
-"""Low-pass over half the rate at most."""
+"""Largest ratio of low-pass to the Nyquist frequency."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Part:
     """A part of a recording.
 
     Attributes:
-        recording: which one.
-        start, end: [s]; `end` is infinite where it goes on to the recording's end.
+        recording: index of the recording.
+        start, end: [s]; `end` is infinite for the recording's end.
     """
 
     recording: int
@@ -41,7 +41,7 @@ class Part:
 
 
 def moving(table: Columns, names: Sequence[str]) -> tuple[float, float]:
-    """Seconds between which something moves; long quiet ends of a recording show nothing."""
+    """Start and end of the motion [s]; long ends at rest carry no information."""
     signals = [bridged(table.values[name]) for name in names]
     restless = np.zeros(len(table), bool)
     for signal in signals:
@@ -59,10 +59,10 @@ def moving(table: Columns, names: Sequence[str]) -> tuple[float, float]:
 def proposed_split(
     tables: Sequence[Columns], names: Sequence[str]
 ) -> tuple[list[Part], list[Part]]:
-    """Parts to fit to, and parts that decide.
+    """Training parts and held-out parts.
 
-    Of several recordings the one decides whose excitation goes least beyond the others'; a single
-    one is cut in two, where it moves.
+    Of several recordings, the one whose excitation exceeds the others' least is held out; a single
+    one is split into two within its motion.
 
     Args:
         tables: the recordings.
@@ -78,7 +78,7 @@ def proposed_split(
 
 
 def _beyond(tables: Sequence[Columns], names: Sequence[str], index: int) -> float:
-    """How far one recording's excitation goes beyond the others', over their range."""
+    """How far one recording's excitation exceeds the others', relative to their range."""
     worst = 0.0
     for name in names:
         own = bridged(tables[index].values[name])
@@ -104,7 +104,7 @@ def proposed_low_pass(tables: Sequence[Columns], name: str) -> float:
 
 
 def _top(signal: FloatArray, rate: float) -> float:
-    """Frequency below which nearly all of a signal's energy is [Hz]."""
+    """Frequency below which nearly all of a signal's energy lies [Hz]."""
     frequencies, density = welch(signal, rate, nperseg=min(len(signal), 1024), detrend="linear")
     share = np.cumsum(density) / max(float(np.sum(density)), 1e-300)
     return float(frequencies[min(int(np.searchsorted(share, ENERGY)), len(frequencies) - 1)])

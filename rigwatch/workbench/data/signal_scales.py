@@ -1,4 +1,4 @@
-"""How large the signals at each port are: starts and bounds of effects are shares of that."""
+"""Sizes of the signals at each port, to which initial values and bounds of effects are scaled."""
 
 import numpy as np
 from scipy.signal import detrend
@@ -13,10 +13,10 @@ Sizes = dict[str, float]
 
 
 def port_sizes(model: Model, recording: Recording) -> dict[str, Sizes]:
-    """Root mean squares of what effects at each port see, as the recording shows it.
+    """Root mean square of each port's variables on the recording.
 
-    Beside the port's own variables there are `dt`, the time between samples [s], and at a signal
-    `u` and `rate`, the size of its rate of change.
+    In addition to the port's own variables there are `dt`, the sample period [s], and, at a signal
+    port, `u` and `rate`, the rms of the signal and of its rate of change.
     """
     model = spelt_out(model)
     signals = _measured(model, recording)
@@ -46,7 +46,7 @@ def _sizes(port: Port, model: Model, signals: dict[str, FloatArray], recording: 
 
 
 def _travel(speed: FloatArray, recording: Recording) -> FloatArray:
-    """Distance that a speed goes to and fro in, its drift left out; shape (n,)."""
+    """Displacement: the integral of a speed with its drift removed, shape (n,)."""
     ends = np.cumsum(recording.parts or (len(recording),))[:-1]
     pieces = np.split(np.nan_to_num(speed), ends)
     return np.concatenate([detrend(np.cumsum(piece)) * recording.dt for piece in pieces])

@@ -1,7 +1,7 @@
-"""Units of recorded channels against those of a model's signals.
+"""Checks units of recorded channels against those of a model's signals.
 
-A channel that was recorded in mm is converted; one that measures something else is refused. A
-channel without a unit is taken in the model's SI unit, as nothing else is known of it.
+A channel recorded in mm is converted; one of another dimension is refused. A channel without a unit
+is assumed to be in the model's SI unit.
 """
 
 import re
@@ -13,7 +13,7 @@ from rigwatch.wire.units import GRAM, UnitError, names_gram, unit_of
 
 
 def in_si(values: FloatArray, unit: str) -> FloatArray:
-    """The values of a channel in SI; as they are where its unit is unknown, see `check_unit`."""
+    """The values of a channel in SI; unchanged if its unit is unknown, see `check_unit`."""
     try:
         found = unit_of(unit)
     except UnitError:
@@ -22,15 +22,15 @@ def in_si(values: FloatArray, unit: str) -> FloatArray:
 
 
 def check_unit(recorded: str, signal: Input | Output, channel: str, where: str) -> None:
-    """Refuse a channel whose unit does not measure what the model's signal is.
+    """Check that a channel's unit has the dimension of the model's signal.
 
     Args:
-        recorded: the channel's unit, empty where none is known.
+        recorded: the channel's unit, empty if none is known.
         signal: of the model.
-        channel, where: what is read, and for what, for the error.
+        channel, where: names of channel and signal, for the error message.
 
     Raises:
-        ModelError: it measures something else, or its unit is unknown.
+        ModelError: the dimension differs, or the unit is unknown.
     """
     if not recorded:
         return
@@ -48,6 +48,6 @@ def check_unit(recorded: str, signal: Input | Output, channel: str, where: str) 
 
 
 def _turns_for_angle(one: str, other: str) -> bool:
-    """Whether one unit counts turns and the other angles: 1 Hz is 2π rad/s, of one dimension."""
+    """Whether one unit counts turns and the other angles: 1 Hz is 2π rad/s, equal in dimension."""
     angle = re.compile("rad|deg|rpm|rev|°")
     return any("Hz" in a and angle.search(b) is not None for a, b in ((one, other), (other, one)))

@@ -1,7 +1,7 @@
-"""Recordings as a model needs them: sessions read, channels matched, velocities derived.
+"""Prepares recordings for a model: reads sessions, matches channels, derives velocities.
 
-Samples that are invalid or were lost are NaN. An input is bridged there by a straight line, as a
-simulation needs it everywhere, and the outputs beside it are not counted.
+Invalid and lost samples are NaN. Inputs are interpolated linearly there, since a simulation needs
+them everywhere; the outputs at those samples do not count.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,9 +22,9 @@ from rigwatch.workbench.data.signal_units import check_unit, in_si
 from rigwatch.workbench.study import Derive, Span, Study, StudyFile
 
 USUAL = 0.5
-"""Horizon where nothing else is known [s]."""
+"""Default horizon [s]."""
 MOST_MISSING = 0.2
-"""Share of samples that may be missing from an input."""
+"""Largest share of samples that may be missing from an input."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class MotionSensor:
     """A sensor whose reading drives a model along its measured motion.
 
     Attributes:
-        port: where effects at it would enter the model as it was written.
+        port: port of the unmodified model at which the sensor's effects enter.
         position, rate: columns of the inputs.
     """
 
@@ -43,15 +43,15 @@ class MotionSensor:
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """What a study is fitted to, and what decides.
+    """Training, held-out and healthy recordings of a study.
 
     Attributes:
         train, held_out: recordings for the model of the study.
-        healthy: recording with nothing wrong, None where there is none.
+        healthy: recording of the healthy rig, None if there is none.
         horizon: samples from one re-initialisation to the next.
-        remarks: what was noticed on the way, for people.
+        remarks: notes for the user.
         along_motion: whether the recordings are for a model along its measured motion.
-        motion: sensors whose position and rate are among the inputs then.
+        motion: sensors whose position and rate are inputs of that model.
     """
 
     train: Recording
@@ -64,7 +64,7 @@ class Data:
 
     @property
     def of_healthy(self) -> "Data | None":
-        """The healthy recording to be fitted and judged by itself, None where there is none."""
+        """The healthy recording as both training and held-out data; None if there is none."""
         if self.healthy is None:
             return None
         return replace(self, train=self.healthy, held_out=self.healthy, healthy=None, remarks=())
@@ -102,10 +102,10 @@ def read_columns(folder: Path, span: Span) -> Columns:
 
 
 def with_derived(columns: Columns, derive: Derive | None) -> Columns:
-    """The channels and the signals that are made from them.
+    """The channels and the signals derived from them.
 
     Raises:
-        ModelError: a channel is not there, or the low-pass lies beyond half the rate.
+        ModelError: a channel is missing, or the low-pass is above half the sample rate.
     """
     if derive is None:
         return columns
@@ -141,7 +141,8 @@ def prepare(study: Study) -> Data:
     """The recordings of a study, ready to be fitted.
 
     Raises:
-        ModelError: rates differ, a channel is missing, nothing excites the model, too much is lost.
+        ModelError: rates differ, a channel is missing, the model is not excited, or too many
+            samples are missing.
     """
     file, remarks = study.file, list[str]()
     tables = {
@@ -163,14 +164,14 @@ def prepare(study: Study) -> Data:
     assert made["held_out"] is not None
     if study.horizon_from:
         remarks.append(
-            f"horizon {file.horizon:g} s, chosen from {study.horizon_from}; `horizon` in the study"
-            " says otherwise"
+            f"horizon {file.horizon:g} s, chosen from {study.horizon_from}; set `horizon` in the"
+            " study to override"
         )
     return Data(made["train"], made["held_out"], made["healthy"], horizon, tuple(remarks))
 
 
 def _with_known(study: Study, tables: Mapping[str, list[Columns]]) -> dict[str, list[Columns]]:
-    """Channels, and what is known of each recording beside them, as if it had been measured."""
+    """Channels, with the recording's known parameters as further constant channels."""
     spans = {use: getattr(study.file, use) for use in tables}
     return {
         use: [_beside(span, table) for span, table in zip(spans[use], group, strict=True)]
@@ -202,7 +203,7 @@ def _on_one_rate(
 def _recording(
     study: Study, tables: Sequence[Columns], horizon: int, use: str, remarks: list[str]
 ) -> Recording:
-    """Parts behind one another, each cut to whole windows so that no window bridges two of them."""
+    """Parts joined in sequence, each cut to whole windows so that no window spans two parts."""
     inputs, outputs = [], []
     for table in tables:
         length = len(table) // horizon * horizon if study.model.states else len(table)
@@ -277,10 +278,10 @@ def _check_excitation(model: Model, u: FloatArray, use: str) -> None:
 
 
 def parameters_of(file: StudyFile) -> dict[str, float]:
-    """Values to start from, by the system's names: the model's and the accepted effects'."""
+    """Initial values of the model and the accepted effects, by the system's names."""
     found = dict(file.start)
     for accepted in file.effects:
         prefix = f"{accepted.port}_{accepted.effect}_"
         found |= {prefix + name: value for name, value in accepted.parameters.items()}
-    # The last effect keeps the whole fit that it was accepted with.
+    # The last effect stores the whole fit with which it was accepted.
     return found | dict(file.effects[-1].model if file.effects else {})

@@ -1,7 +1,8 @@
-"""Judges the model before anything is built on it: does it describe the rig with nothing wrong?
+"""Model adequacy: does the model describe the healthy rig before any effect is added?
 
-A fit that has not converged, or a model of another machine, leaves a healthy recording far above
-its noise. Whatever is then added to it explains some of that, and would be named with confidence.
+If the fit has not converged, or the model describes another machine, the residual of a healthy
+recording is far above its noise. Any added effect explains part of it and would be named with
+confidence.
 """
 
 from dataclasses import replace
@@ -16,11 +17,9 @@ from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.study import Study
 
 MOST = 5.0
-"""Error on the healthy recording over its noise up to which a model can judge."""
+"""Largest ratio of the healthy recording's error to its noise at which a model is adequate."""
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
-VARIED = (
-    "`rigwatch study base {study} --take enough` looks for variants of the model that do better"
-)
+VARIED = "`rigwatch study base {study} --take enough` searches for better variants of the model"
 
 UNTOLD = (
     "the model could not be checked on a healthy recording: record one with nothing wrong and list"
@@ -29,9 +28,9 @@ UNTOLD = (
 
 
 def inadequate(bench: Bench) -> Verdict | None:
-    """The verdict where a study's model cannot judge, None where it can.
+    """`model_inadequate` if the study's model does not describe the healthy rig, otherwise None.
 
-    A rough model is held against what it leaves of a healthy recording and needs no such check.
+    A rough model is compared with its own residual on a healthy recording and skips this check.
     """
     healthy, bare, model = bench.data.of_healthy, bench.bare, bench.study.model
     if healthy is None or bare is None or model.rough:
@@ -42,25 +41,25 @@ def inadequate(bench: Bench) -> Verdict | None:
         return None
     channel = _worst(model, bare.train.rms / noise.rms)
     text = (
-        f"the healthy recording is left at {ratio:.3g} times its noise (worst: {channel};"
+        f"the error on the healthy recording is {ratio:.3g} times its noise (worst: {channel};"
         f" {METHODS[noise.method]}), expected at most {MOST:g}: {ADVICE}"
     )
     return Verdict("model_inadequate", None, (), (), text)
 
 
 def with_base_offered(study: Study, found: Verdict) -> Verdict:
-    """The verdict with the command that looks for a better base, where the model has variants."""
+    """The verdict, with the command that searches for a better base if the model has variants."""
     if found.word != "model_inadequate" or not study.model.variants or not study.file.healthy:
         return found
     return replace(found, text=f"{found.text}; {VARIED.format(study=study.folder)}")
 
 
 def unchecked(bench: Bench, found: Verdict) -> Verdict:
-    """The verdict of a model along its measured motion that no healthy recording has told.
+    """The verdict for a model along its measured motion if there is no healthy recording.
 
-    What the model itself does wrong and a fault look alike then. So an effect is named only where
-    it leaves nothing but what differs between repeated periods of the excitation; and where even
-    the best leaves many times that, the model does not describe the rig.
+    Model error and a fault cannot be told apart then. An effect is named only if its residual is
+    no larger than the difference between repeated periods of the excitation. If even the best
+    effect leaves many times that, the model does not describe the rig.
 
     Args:
         bench: the study.
@@ -73,7 +72,7 @@ def unchecked(bench: Bench, found: Verdict) -> Verdict:
     periods = bench.floor.method == "periods"
     if ratio > MOST and found.word != "model_inadequate":
         text = (
-            f"the best that is known leaves the held-out error at {ratio:.3g} times its noise"
+            f"with the best known effect the held-out error is {ratio:.3g} times its noise"
             f" ({METHODS[bench.floor.method]}), expected at most {MOST:g}; {UNTOLD}"
         )
         return Verdict("model_inadequate", None, (), (), text)

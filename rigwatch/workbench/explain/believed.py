@@ -1,7 +1,7 @@
-"""An effect is believed only if it is stronger than it seems to be on the healthy recording.
+"""An effect is credible only if it is clearly stronger than its apparent strength when healthy.
 
-A model that is not quite the rig sees a little of every effect where nothing is wrong. What an
-effect seems to be there, to first order, says how much of it the model's own faults pretend.
+Model error mimics a little of every effect on a healthy recording. The apparent strength of an
+effect there, to first order, is the part that model error can account for.
 """
 
 from rigwatch.workbench.compare import Bench, apparent_strength
@@ -9,21 +9,21 @@ from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.ranking import Ranked
 
 STRONGER = 3.0
-"""Strength over that on the healthy recording from which an effect is believed."""
+"""Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
 
 
 def believed(bench: Bench, rows: list[Ranked]) -> Verdict:
-    """The verdict among the effects that are believed; the others are no longer accepted."""
+    """The verdict among the credible effects; the others are no longer accepted."""
     verdict = judge(bench.base, rows, bench.floor)
     while verdict.best is not None and pretended(bench, verdict.best):
         verdict.best.accepted = False
-        verdict.best.reason = "seems nearly as strong where nothing is wrong"
+        verdict.best.reason = "nearly as strong on the healthy recording"
         verdict = judge(bench.base, rows, bench.floor)
     return verdict
 
 
 def pretended(bench: Bench, row: Ranked) -> bool:
-    """Whether the healthy recording shows nearly as much of the effect."""
+    """Whether the effect appears nearly as strong on the healthy recording."""
     healthy = bench.data.of_healthy
     if healthy is None or bench.bare is None or not healthy.along_motion or row.fitted is None:
         return False

@@ -1,9 +1,9 @@
-"""Whether the training recordings excite the model: what they do not tell, and a split that does.
+"""Whether the training recordings excite the model, and if not, a split that does.
 
-A part in which nothing moves, or steps each without its transient, leave parameters of the model
-open. What is then held against other recordings is an accident, and no effect can be judged by it.
-So before anything is ranked every parameter is asked for; where one is open, other splits of the
-same recordings are tried, and one that tells it is proposed.
+Recordings at rest, or steps cut off before their transient, leave model parameters undetermined.
+Such parameters take arbitrary values, so the held-out error says nothing about an effect. Before
+anything is ranked every parameter's interval is checked. If one is undetermined, other splits of
+the same recordings are tried, and one that determines it is proposed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,13 +20,14 @@ from rigwatch.workbench.fit import Value, fit_base, shown, values
 from rigwatch.workbench.study import Span, Study
 
 OPEN, TOLD = 1.0, 0.25
-"""Half of an interval over its value from which a parameter is open, and up to which it is told."""
+"""Half-width of an interval over its value: above the first a parameter counts as undetermined,
+below the second as determined."""
 SHARES = (0.5, 2 / 3)
-"""Shares of each recording that are tried as training."""
+"""Shares of each recording tried as training data."""
 
 
 def unexcited(bench: Bench) -> Verdict | None:
-    """The verdict where the training leaves parameters open that another split would tell."""
+    """The verdict if another split determines parameters that the training data do not."""
     left_open = {n: v for n, v in _own(bench).items() if _width(v) > OPEN}
     in_memory = len(bench.data.train.parts) != len(bench.study.file.train)
     if not left_open or in_memory or bench.data.along_motion or bench.study.model.rough:
@@ -38,7 +39,7 @@ def unexcited(bench: Bench) -> Verdict | None:
             said = ", ".join(f"{name} = {shown(value)}" for name, value in left_open.items())
             then = ", ".join(f"{name} = {shown(found[name])}" for name in left_open)
             text = (
-                f"the training does not excite the model: it leaves {said}; train on"
+                f"the training does not excite the model ({said}); train on"
                 f" {_said(study.file.train)} and hold out {_said(study.file.held_out)}, which gives"
                 f" {then}"
             )
@@ -47,20 +48,20 @@ def unexcited(bench: Bench) -> Verdict | None:
 
 
 def _own(bench: Bench) -> dict[str, Value]:
-    """The model's free parameters with their intervals, as its training tells them."""
+    """The model's free parameters with their intervals from the training fit."""
     known = bench.study.model.parameters
     return {n: v for n, v in values(bench.base.train).items() if n in known and v.interval}
 
 
 def _width(value: Value) -> float:
-    """Half of the interval over the value."""
+    """Half-width of the interval over the value."""
     assert value.interval is not None
     low, high = value.interval
     return (high - low) / 2 / max(abs(value.value), 1e-300)
 
 
 def _values(study: Study, bench: Bench) -> tuple[dict[str, Value], dict[str, Value]]:
-    """What both sides of another split tell of the model's parameters; nothing without a fit."""
+    """Model parameters fitted to each side of another split; empty if the fit fails."""
     try:
         data = prepare(study)
         fitted = fit_base(study, data, bench.base.train.scale)
@@ -74,7 +75,7 @@ def _values(study: Study, bench: Bench) -> tuple[dict[str, Value], dict[str, Val
 
 
 def _splits(study: Study, data: Data) -> Iterator[Study]:
-    """The study with other parts of the same recordings to train on."""
+    """The study with other splits of the same recordings into training and held-out parts."""
     train, held = study.file.train, study.file.held_out
     whole = _whole(_ending(train, data.train) + _ending(held, data.held_out))
     tries = [(list(held), list(train))]
@@ -89,7 +90,7 @@ def _splits(study: Study, data: Data) -> Iterator[Study]:
 
 
 def _ending(spans: Sequence[Span], recording: Recording) -> list[Span]:
-    """Spans with ends in seconds, as far as they are counted."""
+    """Spans with finite ends [s]."""
     lengths = zip(spans, recording.parts, strict=True)
     return [
         structs.replace(s, end=min(s.end, s.start + length * recording.dt)) for s, length in lengths
@@ -97,7 +98,7 @@ def _ending(spans: Sequence[Span], recording: Recording) -> list[Span]:
 
 
 def _whole(spans: Sequence[Span]) -> list[Span]:
-    """One span a session, from where its first part begins to where its last one ends."""
+    """One span per session, from the start of its first part to the end of its last."""
     names = dict.fromkeys(span.session for span in spans)
     groups = [[span for span in spans if span.session == name] for name in names]
     return [

@@ -1,4 +1,4 @@
-"""Explains the gap: ranks what may be missing, gives a verdict and says what to do next."""
+"""Ranks the effects that may be missing, gives a verdict and proposes the next experiment."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,13 +23,13 @@ class Row:
     """One effect of the ranking.
 
     Attributes:
-        effect, port: which one.
-        train_error, held_out_error: with it in the model, None where it was not fitted.
+        effect, port: names of the effect and its port.
+        train_error, held_out_error: with the effect in the model, None if not fitted.
         p_value: corrected for the number of candidates.
-        class_: effects that it cannot be told from on this recording, as "effect@port".
-        parameters: its own, by name.
-        accepted: whether the held-out error falls beyond chance.
-        reason: in words.
+        class_: effects indistinguishable from it on this recording, as "effect@port".
+        parameters: the effect's own, by name.
+        accepted: whether the held-out error falls by more than chance.
+        reason: why it is accepted, refused or not fitted, in words.
     """
 
     effect: str
@@ -45,19 +45,20 @@ class Row:
 
 @dataclass(frozen=True)
 class Explanation:
-    """What a study learns from its recordings.
+    """Result of explaining a study.
 
     Attributes:
         verdict: nothing_missing, missing_effect, undetermined, unknown_effect or model_inadequate.
         text: the verdict in a sentence.
-        comparison: the model as it is.
+        comparison: the current model against the recordings.
         ranking: best first.
-        also: what is missing as well, where two effects hide at once.
-        rivals: of different physics that the recording cannot tell from the best.
-        next_experiment: what would tell them apart, None where nothing needs to be told.
-        wrong_probability: of the verdict, calibrated on simulated cases; None for a model along its
-            measured motion, as all of those were free runs.
-        like_this: simulated cases with such a verdict, and how many of them were wrong.
+        rivals: effects of different physics that the recording cannot tell from the best.
+        also: second missing effect, if two are missing at once.
+        next_experiment: an excitation that separates the rivals; None if there are none, or if
+            none is found.
+        wrong_probability: probability that the verdict is wrong, calibrated on simulated cases;
+            None for a model along its measured motion, as all simulated cases were free runs.
+        like_this: number of simulated cases with a similar verdict, and how many were wrong.
     """
 
     verdict: str
@@ -76,19 +77,19 @@ def explain(study: Study, progress: Progress = unheard) -> Explanation:
 
     Args:
         study: the study.
-        progress: told what begins.
+        progress: called with a line of text as each part begins.
 
     Raises:
         ModelError: data have changed, or do not suit the model.
     """
-    progress("fitting the model as it is")
+    progress("fitting the current model")
     bench = open_bench(study)
     rows, verdict = ranking(bench, progress)
     return explanation(bench, rows, verdict)
 
 
 def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], Verdict]:
-    """The ranking, what the verdict names in front, and the verdict."""
+    """The ranking, with the effect named by the verdict first, and the verdict."""
     stopped = _stopped(bench)
     if stopped is not None:
         rows = rank_all(bench.study, bench.data, bench.base)
@@ -100,7 +101,7 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
         along and leaves_much(bench.base, bench.floor, verdict)
     )
     if much and verdict.best is not None:
-        progress(f"{verdict.best.label} leaves much: trying two effects at once")
+        progress(f"{verdict.best.label} leaves a large residual: trying two effects at once")
         verdict = two_effects(bench, rows, verdict, progress)
     verdict = with_motion_sensor(bench, verdict)
     if along and bench.study.model.rough:
@@ -114,7 +115,7 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
 
 
 def _stopped(bench: Bench) -> Verdict | None:
-    """The verdict where no effect can be judged, None where they can."""
+    """The verdict if the model is not fit to judge effects, otherwise None."""
     kept, bare = bench.study.kept, bench.bare
     ended = {
         "the model": bench.base.convergence,
@@ -125,10 +126,10 @@ def _stopped(bench: Bench) -> Verdict | None:
 
 
 def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanation:
-    """The same for people and programs."""
+    """Converts a ranking and a verdict to the result shown to users and programs."""
     members, rivals = [*verdict.members, *verdict.rivals], list(verdict.rivals)
     experiment = None
-    # An excitation is tried by simulating the motion, which a model along it does not.
+    # Excitations are compared by simulating the motion; a model along the measured motion cannot.
     if verdict.best is not None and rivals and not bench.data.along_motion:
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
     more: dict[str, float] = {}
@@ -171,7 +172,7 @@ def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None)
 
 
 def as_data(found: Explanation) -> dict[str, object]:
-    """What `rigwatch explain --json` prints."""
+    """The result as plain data, as printed by `rigwatch explain --json`."""
     ranking = [
         {name.rstrip("_"): getattr(row, name) for name in row.__dataclass_fields__}
         for row in found.ranking

@@ -1,13 +1,14 @@
-"""Faults of the sensor whose motion drives the model, which no port of such a model can hold.
+"""Faults of the sensor whose measured motion drives the model; no port can represent them.
 
-Along the measured motion a sensor's fault enters the equations wherever position or speed does. So
-it is taken out of what was read, to first order in its strength s, and the rate follows,
+Along the measured motion a sensor fault enters the equations wherever position or speed does. The
+fault is therefore subtracted from the reading, to first order in its strength s, and likewise from
+the rate:
 
     x = x_read - s·d(x_read),   v = v_read - s·(∂d/∂x·v_read + ∂d/∂t)
 
-and s is found by Gauss-Newton steps: the change of the error by s is a difference of two
-simulations, and the parameters are fitted anew after each step. What is left on the recordings held
-out decides, as of any other effect.
+s is found by Gauss-Newton steps. The derivative of the error with respect to s is a finite
+difference of two simulations; the parameters are refitted after each step. The held-out error
+decides, as for any other effect.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,16 +30,17 @@ from rigwatch.workbench.ranking import Ranked, judge_fit
 STEPS = 2
 """Gauss-Newton steps; the error is nearly linear in the strength."""
 CHANGE, LARGEST = 0.05, 0.5
-"""Change of the position over its spread: of a difference, and of a step at most."""
+"""Change of position over its standard deviation: of the finite difference, and of a step at
+most."""
 WORTH = 0.1
-"""Share of the error's energy above the floor that is worth fits, to first order."""
+"""Smallest share of the error's energy above the floor, to first order, that justifies a fit."""
 
 LATE = "lag"
-"""The effect that can only be positive: no sensor reads what is yet to come."""
+"""The effect that can only be positive, since a sensor is causal."""
 
 Motion = tuple[FloatArray, FloatArray]
 Direction = Callable[[FloatArray, FloatArray, FloatArray], Motion]
-"""From position, speed and time, each of shape (n,)."""
+"""Changes of position and speed from position, speed and time, each of shape (n,)."""
 
 DIRECTIONS: Mapping[str, Direction] = {
     "gain": lambda x, v, _: (x, v),
@@ -47,11 +49,11 @@ DIRECTIONS: Mapping[str, Direction] = {
     "curvature": lambda x, v, _: (x * x, 2 * x * v),
     LATE: lambda _, v, t: (-v, -np.gradient(v, t)),
 }
-"""What effects at such a sensor do to position and speed, for a strength of 1."""
+"""Change of position and speed by each sensor effect of strength 1."""
 
 
 def motion_sensor_rows(bench: Bench) -> list[Ranked]:
-    """Effects at the sensors of the motion that may be missing, fitted and judged."""
+    """Candidate effects at the motion sensors, fitted and judged."""
     found = []
     least = WORTH * bench.floor.above(bench.base.train)
     for sensor in bench.data.motion:
@@ -74,7 +76,7 @@ def motion_sensor_rows(bench: Bench) -> list[Ranked]:
 
 
 def _row(placement: Placement, explained: float, strength: float) -> Ranked:
-    """A row whose `start` is what was found: a gain is what the sensor makes of the position."""
+    """A row whose `start` is the strength found; a gain is reading over true position."""
     value = 1 / (1 - strength) if placement.name == "gain" else strength
     start = {placement.effect.strength: value}
     return Ranked(placement, "sensor", 0.0, explained, start, [], {}, {})
@@ -83,7 +85,7 @@ def _row(placement: Placement, explained: float, strength: float) -> Ranked:
 def _fitted(
     bench: Bench, sensor: MotionSensor, direction: Direction, strength: float
 ) -> tuple[Fitted, float]:
-    """The base model on the motion without the sensor's fault, and how strong that is."""
+    """The base model refitted on the corrected motion, and the strength of the fault."""
     base = bench.base
     for step in range(STEPS):
         data = _undone(bench.data, sensor, direction, strength)
@@ -98,7 +100,7 @@ def _fitted(
 def _step(
     at: Fitted, data: Data, sensor: MotionSensor, direction: Direction
 ) -> tuple[float, float]:
-    """A Gauss-Newton step of the strength, free parameters beside it; the share it explains."""
+    """A Gauss-Newton step of the strength, jointly with the free parameters; share explained."""
     change = CHANGE * _unit(data.train, sensor, direction)
     moved = undone(data.train, sensor, direction, change)
     there = evaluate(at.train, moved, at.horizon, at.substeps, at.train.initial)
@@ -114,7 +116,7 @@ def _step(
 
 
 def _unit(recording: Recording, sensor: MotionSensor, direction: Direction) -> float:
-    """Strength that changes the position as much as it spreads."""
+    """Strength that changes the position by its standard deviation (rms)."""
     x, v = (recording.inputs[:, c] for c in (sensor.position, sensor.rate))
     change = direction(x, v, _times(recording, len(x)))[0]
     return float(np.std(x) / max(float(np.sqrt(np.mean(change**2))), 1e-300))
@@ -132,7 +134,7 @@ def _undone(data: Data, sensor: MotionSensor, direction: Direction, strength: fl
 def undone(
     recording: Recording, sensor: MotionSensor, direction: Direction, strength: float
 ) -> Recording:
-    """The recording with the motion as it is without the sensor's fault."""
+    """The recording with the sensor's fault removed from the motion."""
     inputs, begin = recording.inputs.copy(), 0
     for length in recording.parts or (len(recording),):
         part = inputs[begin : begin + length]
@@ -145,10 +147,10 @@ def undone(
 
 
 def with_motion_sensor(bench: Bench, found: Verdict) -> Verdict:
-    """The verdict with faults of the motion's sensors weighed against what was named.
+    """The verdict after comparing motion-sensor faults with the effect named.
 
     Args:
-        bench: the study; along the measured motion, else nothing changes.
+        bench: the study; unchanged unless the model runs along the measured motion.
         found: the verdict on effects at the ports of the model along the motion.
     """
     if found.best is None and bench.floor.reached(bench.base.held_out):
@@ -170,7 +172,7 @@ def with_motion_sensor(bench: Bench, found: Verdict) -> Verdict:
 
 
 def _named(bench: Bench, best: Ranked, rows: list[Ranked]) -> Verdict:
-    """The verdict that a sensor's fault is missing."""
+    """The verdict that names a sensor fault."""
     alike = [row.label for row in rows if row is not best and not _ahead(best, row)]
     name, value = next(iter(best.start.items()))
     assert best.fitted is not None
@@ -184,7 +186,7 @@ def _named(bench: Bench, best: Ranked, rows: list[Ranked]) -> Verdict:
 
 
 def _ahead(one: Ranked, other: Ranked) -> bool:
-    """Whether one does better on the recordings held out, beyond chance."""
+    """Whether one has the lower held-out error by more than chance."""
     assert one.fitted is not None
     assert other.fitted is not None
     difference = block_differences(other.fitted.held_out, one.fitted.held_out)

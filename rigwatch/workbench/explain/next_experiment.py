@@ -1,12 +1,13 @@
-"""What to try next: the excitation under which rivals would differ most, predicted by simulation.
+"""Next experiment: the excitation that separates rivals most, predicted by simulation.
 
-Rivals look alike where the recording moves them alike. For each excitation within what the rig has
-been driven with so far, the fitted model is run, the rivals' directions are computed along it, and
-what the model's own parameters could make of the difference is taken out. What is left,
+Each excitation within the range driven so far is simulated with the fitted model. The rivals'
+directions along that trajectory are projected off the subspace of the model's own parameters. The
+remainder
 
-    separation = strength · ‖d_best − (d_best·d_rival) d_rival/‖d_rival‖²‖ / √samples,
+    separation = strength · ‖d_best − (d_best·d_rival) d_rival/‖d_rival‖²‖ / √samples
 
-is the difference [channel's unit] that the new recording would show between the best and a rival.
+is the rms difference between the best effect and a rival that the new recording would show. Each
+output is divided by its noise floor, so separations are in noise floors.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,24 +27,24 @@ from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Derived
 
 DURATION = 20.0
-"""Length of the recordings that are predicted [s]."""
+"""Length of the simulated recordings [s]."""
 MOST_SAMPLES = 8000
 Shape = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A recording that would tell the best from its rivals.
+    """A recording that would separate the best effect from its rivals.
 
     Attributes:
         shape: of the excitation, in words.
-        signal: which input is driven.
-        amplitude: of it, in `unit`.
+        signal: the driven input.
+        amplitude: of the driven input, in `unit`.
         unit: the input's unit.
         duration: [s].
-        separation: rms difference that the recording would show, by rival, in noise floors.
-        now: the same for the recording at hand.
-        text: in a sentence.
+        separation: predicted rms difference per rival, in noise floors.
+        now: the same on the current recording.
+        text: summary in one sentence.
     """
 
     shape: str
@@ -57,7 +58,7 @@ class Experiment:
 
 
 def propose(bench: Bench, best: Ranked, rivals: Sequence[Ranked]) -> Experiment | None:
-    """The best of the excitations that are tried; None where none would do better than now."""
+    """The best excitation tried; None if none separates better than the current recording."""
     rows = [best, *rivals]
     train = bench.data.train
     now = _separation(bench, rows, train.inputs[:MOST_SAMPLES], _first_states(bench))
@@ -98,13 +99,13 @@ def _worded(
 
 
 def _in_words(amplitude: float, driven: Input) -> str:
-    """An amplitude in the unit that the model's file is written in; an offset has no part in it."""
+    """An amplitude in the unit of the model's file; a unit's offset does not apply."""
     shown = driven.shown or driven.unit
     return f"{amplitude / float(unit_of(shown).factor):.3g} {shown}"
 
 
 def _driven(bench: Bench) -> str:
-    """The input that is varied: of an inverse model the one whose rates are the others."""
+    """The input that is varied; in an inverse model the one whose derivatives are the others."""
     derive = bench.study.file.derive
     if derive is not None:
         for signal in derive.signals.values():
@@ -168,7 +169,7 @@ def _multisine(length: float, dt: float) -> Shape:
 
 
 def _inputs(bench: Bench, shape: FloatArray, share: float) -> FloatArray | None:
-    """All inputs for a shape of the driven one; None beyond what the rig has done so far."""
+    """All inputs for a shape of the driven input; None if a derivative exceeds its past range."""
     recording, names = bench.data.train, list(bench.study.model.inputs)
     driven = _driven(bench)
     middle = recording.inputs.mean(axis=0)

@@ -1,12 +1,12 @@
-"""Two effects at once: every pair is scored, and the likeliest are fitted.
+"""Two effects at once: every pair is scored, and the most promising are fitted.
 
-The best effect alone takes the place of one that is right only beside another, and a ranking beside
-it is led astray. But to first order all pairs are known from the ranking of single effects: with a
-and b the shares of the residual's amplitude that two directions explain alone, and c their cosine,
+Adding effects one at a time can fail: the best single effect may stand in for two true ones. To
+first order all pairs follow from the ranking of single effects: with a and b the shares of the
+residual's amplitude that two directions explain alone, and c their cosine,
 
     explained = (a² + b² - 2·a·b·c) / (1 - c²),   strengths ∝ (a - b·c), (b - a·c)
 
-Fits decide among the likeliest, on the recordings held out.
+The most promising pairs are fitted; the held-out error decides.
 """
 
 import dataclasses
@@ -25,7 +25,7 @@ from rigwatch.workbench.fit import Fitted, fit_model
 from rigwatch.workbench.ranking import SIMILAR, Progress, Ranked, judge_fit, refit
 
 LIKELY = 0.7
-"""Share of the energy above the floor that a pair must explain to first order to be fitted."""
+"""Share of the energy above the floor a pair must explain, to first order, to be fitted."""
 MOST_PAIRS = 4
 
 
@@ -34,9 +34,9 @@ class Pair:
     """Two effects.
 
     Attributes:
-        one, other: rows of the ranking, the one that explains more alone first.
-        explained: share of the residual's energy in training that both explain to first order.
-        start: values that their fit starts from, by the system's names.
+        one, other: rows of the ranking; the one that explains more alone comes first.
+        explained: share of the training residual's energy that both explain to first order.
+        start: initial values of the fit, by the system's names.
     """
 
     one: Ranked
@@ -46,25 +46,25 @@ class Pair:
 
     @property
     def free(self) -> int:
-        """Parameters that a fit of both moves."""
+        """Number of free parameters of both effects."""
         return self.one.free + self.other.free
 
     @property
     def sampled(self) -> int:
-        """How many of both work on samples."""
+        """Number of effects of the pair that act on samples."""
         return sum(row.placement.effect.sampled for row in (self.one, self.other))
 
 
 def two_effects(
     bench: Bench, rows: Sequence[Ranked], verdict: Verdict, progress: Progress
 ) -> Verdict:
-    """The verdict once pairs have been tried; as it was where no pair explains the error.
+    """The verdict after trying pairs; unchanged if no pair explains the error.
 
     Args:
         bench: the study.
         rows: the ranking of single effects.
-        verdict: that no known effect alone explains the error.
-        progress: told which pair is fitted.
+        verdict: the verdict on single effects, none of which explains the error alone.
+        progress: called with the pair about to be fitted.
     """
     fits = _fitted(bench, likely_pairs(bench, rows), progress)
     good = _enough(bench, fits)
@@ -80,12 +80,12 @@ def two_effects(
 
 
 def likely_pairs(bench: Bench, rows: Sequence[Ranked]) -> list[Pair]:
-    """The pairs that explain most to first order, but for doubles of one another."""
+    """The pairs that explain most to first order, without near-duplicates."""
     least = LIKELY * bench.floor.above(bench.base.train)
     every = [_pair(one, other) for one, other in combinations(rows, 2)]
     likely = [pair for pair in every if pair is not None and pair.explained > least]
     chosen: list[Pair] = []
-    # Of those that explain the same, what a computer does to samples comes last.
+    # Of pairs that explain equally much, those with effects on samples come last.
     for pair in sorted(likely, key=lambda pair: (-round(pair.explained, 2), pair.sampled)):
         if len(chosen) < MOST_PAIRS and not any(_same(pair, other) for other in chosen):
             chosen.append(pair)
@@ -93,14 +93,14 @@ def likely_pairs(bench: Bench, rows: Sequence[Ranked]) -> list[Pair]:
 
 
 def _pair(one: Ranked, other: Ranked) -> Pair | None:
-    """The pair, where its parts are not alike and each is as strong as its sign allows."""
+    """The pair; None if the two are too similar, or if one changes sign beside the other."""
     if other.explained > one.explained:
         one, other = other, one
     cosine = one.turned.get(other.label, 0.0)
     if abs(cosine) > SIMILAR:
         return None
     a, b = np.sqrt(one.explained), np.sqrt(other.explained)
-    # Over what each would be alone; what has another sign than alone is none of its kind.
+    # Amplitudes of the joint fit; a sign other than alone means that the pair is not meaningful.
     shares = (a - b * cosine) / (1 - cosine**2), (b - a * cosine) / (1 - cosine**2)
     if min(shares) <= 0:
         return None
@@ -110,7 +110,7 @@ def _pair(one: Ranked, other: Ranked) -> Pair | None:
 
 
 def _same(pair: Pair, other: Pair) -> bool:
-    """Whether two pairs say the same, and the other with no more parameters."""
+    """Whether two pairs are equivalent and the other has no more parameters."""
     straight = _double(pair.one, other.one) and _double(pair.other, other.other)
     crossed = _double(pair.one, other.other) and _double(pair.other, other.one)
     return (straight or crossed) and other.free <= pair.free
@@ -121,7 +121,7 @@ def _double(row: Ranked, other: Ranked) -> bool:
 
 
 def _fitted(bench: Bench, pairs: Sequence[Pair], progress: Progress) -> list[tuple[Pair, Fitted]]:
-    """The pairs that can be fitted, with their fits."""
+    """The pairs whose fit succeeds, with their fits."""
     base, found = bench.base, []
     for pair in pairs:
         progress(f"fitting {pair.one.label} and {pair.other.label} at once")
@@ -138,10 +138,10 @@ def _fitted(bench: Bench, pairs: Sequence[Pair], progress: Progress) -> list[tup
 
 
 def _enough(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pair, Fitted]]:
-    """Pairs that leave so little that they are worth naming.
+    """Pairs whose residual is small enough for them to be named.
 
-    Nothing but noise, as two wrong ones together explain much. Along the measured motion the model
-    leaves more, since what it leaves on a healthy rig changes with the fault.
+    The residual must be at the noise floor, since two wrong effects together explain much. Along
+    the measured motion more is tolerated, since a fault changes the model's own residual.
     """
     floor, tolerant = bench.floor, bench.data.along_motion
     return [
@@ -158,7 +158,7 @@ def _beside(
     known: Ranked,
     wanted: Ranked,
 ) -> Verdict | None:
-    """The verdict on what is missing beside one effect of a pair, among what was fitted with it."""
+    """The verdict on effects beside the known one of a pair; None if it does not name `wanted`."""
     known = dataclasses.replace(known)
     if known.fitted is None:
         refit(bench.study, bench.data, bench.base, known)
@@ -179,12 +179,12 @@ def _beside(
 
 
 def _row(rows: Sequence[Ranked], found: Ranked | None) -> Ranked | None:
-    """What was found beside another, as it does alone."""
+    """The single-effect row of an effect that was found beside another."""
     return next((row for row in rows if found is not None and row.label == found.label), None)
 
 
 def _both(bench: Bench, first: Verdict, second: Verdict, together: Fitted) -> Verdict:
-    """A verdict that names both."""
+    """The verdict that names both effects."""
     named = (*second.members, *second.rivals)
     assert first.best is not None
     reached = bench.floor.reached(together.held_out)

@@ -1,14 +1,14 @@
-"""What a verdict on a model along its measured motion may claim, and on a rough one.
+"""Limits on a verdict for a rough model, and for any model along its measured motion.
 
-A model that has learned what a healthy rig does knows it along the motions that it was shown. A
-fault changes the motion, and a little of what is left then is the model's own. So
+A model learned from a healthy rig is valid along the motions it was trained on. A fault changes the
+motion, so part of the residual is model error. Therefore:
 
-* where no more is left than on the healthy rig, nothing is missing, whatever would fit that better;
-* where hardly more is left, an effect that fits it is not named;
-* where the best effect leaves much more than the healthy rig does, another effect hides beside it
-  or in its place, and it is not named with confidence, whatever the model;
-* where the best effect leaves more than the healthy rig does, another one that does nearly as well
-  may be the right one: the model's own error may favour either.
+* residual no larger than on the healthy rig: nothing is missing, even if an effect lowers it;
+* residual slightly larger: an effect that fits it is not named;
+* best effect leaves much more than the healthy residual: another effect acts beside it or in its
+  place, and it is not named with confidence, for any model;
+* best effect leaves more than the healthy residual: one that does nearly as well may be the right
+  one, as the model error may favour either.
 """
 
 from collections.abc import Sequence
@@ -20,38 +20,38 @@ from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import Ranked
 
 TRANSFERS = 1.2
-"""Error over the healthy one up to which another motion may be all that is behind it.
+"""Ratio of the error to the healthy error that a changed motion alone can cause.
 
 Healthy rigs of the simulated family leave 1.07 to 1.3 times as much under another excitation.
 """
 MUCH, SHARE = 1.5, 0.03
-"""Error over the healthy one, and share of the squared error above it, from which one effect alone
-is not the whole truth.
+"""Ratio of the error to the healthy error, and share of the squared error above the healthy one,
+beyond which a single effect is not the full explanation.
 
-A rough model's own error grows with the motion, and a strong fault changes the motion: what is
-rightly named alone leaves up to 1.3 times the healthy error and 1.3 % on the rigs looked at, one
-of two hidden effects 2.0 times and 6 %.
+A rough model's own error grows with the motion, and a strong fault changes the motion. On the rigs
+examined, a single effect that was named correctly leaves up to 1.3 times the healthy error and
+1.3 %; one of two hidden effects leaves 2.0 times and 6 %.
 """
 
 
 def much_left(base: Fitted, floor: NoiseFloor, fitted: Fitted) -> bool:
-    """Whether a fit leaves so much that what it holds cannot be all that is missing.
+    """Whether the residual is so large that the fitted effects cannot be all that is missing.
 
-    Samples at which an effect jumps do not count, see `discontinuities.py`.
+    Samples at an effect's discontinuities do not count, see `discontinuities.py`.
     """
     left, before = (floor.ratio(fit, fitted.calm) for fit in (fitted.held_out, base.held_out))
     return left > MUCH and left**2 - 1 > SHARE * (before**2 - 1)
 
 
 def leaves_much(base: Fitted, floor: NoiseFloor, found: Verdict) -> bool:
-    """Whether the effect that is named alone leaves so much that another must hide beside it."""
+    """Whether the single effect named leaves so much that another must act beside it."""
     if found.word != "missing_effect" or found.second or found.best is None:
         return False
     return found.best.fitted is not None and much_left(base, floor, found.best.fitted)
 
 
 def not_alone(base: Fitted, floor: NoiseFloor, found: Verdict) -> Verdict:
-    """The verdict, with no confidence in one effect that leaves much."""
+    """The verdict, made undetermined if the single effect named leaves a large residual."""
     if not leaves_much(base, floor, found):
         return found
     assert found.best is not None
@@ -59,18 +59,18 @@ def not_alone(base: Fitted, floor: NoiseFloor, found: Verdict) -> Verdict:
     left = floor.ratio(found.best.fitted.held_out)
     text = (
         f"{found.best.label} explains most, but leaves {left:.2f} times the error on the"
-        f" healthy recording, expected at most {MUCH:g}: something else may hide beside it"
+        f" healthy recording, expected at most {MUCH:g}: another effect may act beside it"
     )
     return replace(found, word="undetermined", text=text)
 
 
 def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdict) -> Verdict:
-    """The verdict with no more claimed than a rough model can know.
+    """The verdict, weakened to what a rough model can support.
 
     Args:
-        base: the model as it is.
+        base: the current model.
         rows: the ranking.
-        floor: what the model leaves of the healthy recording.
+        floor: the model's residual on the healthy recording.
         found: the verdict on the ranking.
     """
     ratio = floor.ratio(base.held_out)
@@ -81,8 +81,8 @@ def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdi
         return found
     if ratio <= TRANSFERS:
         text = (
-            f"the held-out error is {ratio:.2f} times that on the healthy recording; as much may"
-            f" be the model's own under another motion; {found.best.label} would explain it"
+            f"the held-out error is {ratio:.2f} times that on the healthy recording, which a"
+            f" changed motion alone can cause; {found.best.label} would also explain it"
         )
         return replace(found, word="undetermined", text=text)
     if leaves_much(base, floor, found):
@@ -95,7 +95,7 @@ def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdi
 
 
 def _nearly_as_good(rows: Sequence[Ranked], floor: NoiseFloor, found: Verdict) -> tuple[str, ...]:
-    """Effects of other physics that may be right where the best leaves more than a healthy rig."""
+    """Effects of other physics nearly as good as a best one that leaves more than a healthy rig."""
     best = found.best
     assert best is not None
     assert best.fitted is not None

@@ -1,12 +1,12 @@
-"""The verdict: what the ranking means, in one of five words.
+"""The verdict: the conclusion from the ranking, in one of five words.
 
 `nothing_missing`, `missing_effect`, `undetermined` (rivals of different physics that this recording
 cannot tell apart), `unknown_effect` (the error stays above the noise floor, and no known effect
-brings it down) or `model_inadequate` (the model's own fit cannot be relied on, or does not describe
-the healthy rig, see `adequacy.py`; no effect is named). All five are results.
+explains it) or `model_inadequate` (the model's fit did not converge or does not describe the
+healthy rig, see `adequacy.py`; no effect is named). All five are valid results.
 
-Of effects that do equally well on the recordings held out, the one with the fewest parameters is
-named first; the others of its kind form its class.
+Of effects with equal held-out errors, the one with the fewest parameters is named first; the others
+of its kind form its class.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,19 +32,19 @@ Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
 ]
 EQUAL = 2.0
-"""Standard deviations of a paired difference below which two effects do equally well."""
+"""Standard deviations of a paired difference below which two effects count as equal."""
 NO_DIFFERENCE = 1e-4
-"""Relative difference of errors that only says where two fits happened to stop."""
+"""Relative difference of errors that reflects only where two fits stopped."""
 LITTLE_MORE = 0.01
-"""Relative difference of errors that is no reason for a further parameter, where more is left."""
+"""Relative difference of errors too small to justify a further parameter above the noise floor."""
 PERHAPS = 1.0
-"""Standard deviations by which an effect with more parameters may be the better one."""
+"""Standard deviations by which an effect with more parameters must be ahead to be a rival."""
 MUCH_WORSE = 1.5
-"""Ratio of held-out errors that no chance favour of what else is missing explains."""
+"""Ratio of held-out errors too large to be caused by other missing physics favouring one effect."""
 NEARLY = 0.8
-"""Share of the best effect's gain from which another one may be right as well."""
+"""Share of the best effect's gain above which another effect may be the right one."""
 MOST_OF_IT = 0.75
-"""Share of a gain that an effect of lower order must have to go first."""
+"""Share of the best effect's gain that an effect of lower order needs to be named instead."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,12 @@ class Verdict:
 
     Attributes:
         word: one of five.
-        best: what is named, None where nothing is.
-        members: labels that the best cannot be told from, itself first.
-        rivals: labels of other physics that this recording cannot tell from it.
-        text: a sentence for people.
-        second: labels of what is missing as well, where two effects hide at once.
-        evidence: what the verdict rests on.
+        best: the effect named, None if there is none.
+        members: labels of the best's class: itself first, then effects equivalent to it.
+        rivals: labels of effects of other physics that this recording cannot tell from it.
+        text: the verdict in a sentence.
+        second: labels of the second missing effect, if two are missing at once.
+        evidence: what the verdict is based on.
     """
 
     word: Word
@@ -71,15 +71,15 @@ class Verdict:
 
     @property
     def doubt(self) -> float:
-        """Probability of being wrong, calibrated on simulated cases."""
+        """Probability that the verdict is wrong, calibrated on simulated cases."""
         return doubt(self.word, self.evidence)
 
 
 def not_converged(fits: Mapping[str, Convergence | None]) -> Verdict | None:
-    """The verdict where a fit that the others build on did not converge, None where all did.
+    """`model_inadequate` if a fit that others build on did not converge, otherwise None.
 
     Args:
-        fits: how they ended, by what they are of, in words.
+        fits: convergence of each fit, by a description of what is fitted.
     """
     for name, ended in fits.items():
         if ended is not None and not ended.converged:
@@ -91,7 +91,7 @@ def not_converged(fits: Mapping[str, Convergence | None]) -> Verdict | None:
 
 
 def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
-    """The verdict on a ranking; `floor` is of the held-out recordings."""
+    """The verdict on a ranking; `floor` is the noise floor of the held-out recordings."""
     accepted = [row for row in rows if row.accepted]
     if not accepted:
         return _nothing_found(base, floor)
@@ -112,7 +112,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
 def _word(
     base: Fitted, best: Ranked, rivals: tuple[str, ...], floor: NoiseFloor
 ) -> tuple[Word, str]:
-    """The verdict where an effect lowers the error, and a sentence for people."""
+    """The verdict if an effect lowers the error, and its sentence."""
     if explains_too_little(base, best, floor):
         return "unknown_effect", (
             f"the best known effect, {best.label}, leaves much of the error above the noise floor"
@@ -128,7 +128,7 @@ def _word(
 
 
 def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> float:
-    """Standard deviations by which the best does better than all that it is not confused with."""
+    """Standard deviations by which the best beats every effect outside its class and rivals."""
     others = [row for row in rows if row.fitted is not None and row.label not in confused]
     return min((_ahead(best, row) for row in others), default=CLEAR)
 
@@ -136,14 +136,14 @@ def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> 
 def _undistinguished(
     best: Ranked, rows: Sequence[Ranked], *, trusted: bool
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Labels of what this recording cannot tell from the best: its own kind, and other physics.
+    """Labels of effects that this recording cannot tell from the best: its class, and rivals.
 
     Args:
-        best: what is named.
+        best: the effect named.
         rows: the ranking.
-        trusted: whether the best leaves nothing but noise. Where more is left, whatever causes it
-            may favour one of two effects that look alike, so that neither rules the other out, and
-            an effect with more parameters gains from it without a reason of its own.
+        trusted: whether the best's residual is at the noise floor. If not, the cause of the rest
+            may favour one of two similar effects, so that neither rules out the other, and it
+            may lower the error of an effect with more parameters for no physical reason.
     """
     members, rivals = [best.label], []
     for row in rows:
@@ -159,13 +159,13 @@ def _undistinguished(
 
 
 def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
-    """Whether other physics does as well: with more parameters only if it does no worse."""
+    """Whether an effect of other physics is a rival; with more parameters it must be no worse."""
     if not row.accepted:
         return False
     if row.free > best.free:
         no_worse = row.held_out_error <= best.held_out_error * (1 + NO_DIFFERENCE)
         better = cosine > SIMILAR and _ahead(row, best) > PERHAPS
-        # At another place it is no refinement of the best, whatever its shape needs.
+        # At another port it does not refine the best, however many parameters its shape has.
         as_good = row.port != best.port and _equal(best, row, cosine)
         return trusted and ((cosine > ALIKE and (no_worse or as_good)) or better)
     if cosine > ALIKE and not trusted and row.held_out_error < MUCH_WORSE * best.held_out_error:
@@ -174,9 +174,9 @@ def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
 
 
 def _elsewhere(best: Ranked, rows: Sequence[Ranked], known: tuple[str, ...]) -> tuple[str, ...]:
-    """Labels of what looks similar at another kind of port, where more than noise is left.
+    """Labels of similar effects at another kind of port, if the residual is above the noise floor.
 
-    A sensor that is late in a way that no effect describes is met nearly as well by a late drive.
+    For example, a sensor delay that no effect describes fits nearly as well as a drive delay.
     """
     return tuple(
         row.label
@@ -196,7 +196,7 @@ def _kin(best: Ranked, row: Ranked) -> bool:
 
 
 def _earns(best: Ranked, row: Ranked) -> bool:
-    """Whether it is no refinement, with more parameters or of higher order, without a reason."""
+    """Whether it needs no more parameters than the best and refines no effect of its class."""
     known = {best.effect, *(name.split("@")[0] for name in best.alike)}
     return row.free <= best.free and row.placement.effect.refines not in known
 
@@ -211,10 +211,10 @@ def _nothing_found(base: Fitted, floor: NoiseFloor) -> Verdict:
 
 
 def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranked:
-    """Of equals the one with the fewest parameters; what it refines first, while more is missing.
+    """Of equal effects, the simplest; above the noise floor, the one that it refines instead.
 
-    While more is missing an effect of higher order takes some of that, too. Where it leaves nothing
-    but noise, or explains what the other does not, it is what is missing.
+    While other physics is missing, an effect of higher order also absorbs part of that. It is named
+    only if its residual is at the noise floor, or if it alone explains the error.
     """
     top = min(accepted, key=lambda row: row.held_out_error)
     equals = [row for row in accepted if _as_good(top, row, floor)]
@@ -231,14 +231,14 @@ def _named(base: Fitted, accepted: Sequence[Ranked], floor: NoiseFloor) -> Ranke
 
 
 def _simplest(row: Ranked) -> tuple[int, bool, float]:
-    """Order of equals: fewest parameters, what a computer does to samples last."""
+    """Order of equal effects: fewest parameters first, effects on samples last."""
     return row.free, row.placement.effect.sampled, row.held_out_error
 
 
 def _as_good(top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
-    """Whether a row is as good as the one that leaves least.
+    """Whether a row is as good as the one with the smallest held-out error.
 
-    Where more than noise is left, a little less of it is no reason for a further parameter.
+    Above the noise floor a slightly smaller error does not justify a further parameter.
     """
     assert top.fitted is not None
     if row is top or _equal(top, row, 0.0):
@@ -248,7 +248,7 @@ def _as_good(top: Ranked, row: Ranked, floor: NoiseFloor) -> bool:
 
 
 def _equal(one: Ranked, other: Ranked, cosine: float) -> bool:
-    """Whether two do equally well on the recordings held out; unfitted, whether they are one."""
+    """Whether two have equal held-out errors; if one is not fitted, whether they are parallel."""
     if other.fitted is None:
         return cosine > SAME
     assert one.fitted is not None
@@ -259,7 +259,7 @@ def _equal(one: Ranked, other: Ranked, cosine: float) -> bool:
 
 
 def _ahead(one: Ranked, other: Ranked) -> float:
-    """Standard deviations of the paired held-out difference by which one does better."""
+    """Paired held-out difference in standard deviations; positive if `one` is better."""
     assert one.fitted is not None
     assert other.fitted is not None
     difference = block_differences(other.fitted.held_out, one.fitted.held_out)

@@ -1,15 +1,14 @@
-"""How often a verdict like this one was wrong where the truth was known.
+"""How often a similar verdict was wrong on simulated plants, where the truth is known.
 
-A verdict is put into a cell by its word, by how much of the error above the floor the named effect
-leaves, and by how clearly it beats what it is not to be confused with. `calibration.toml` counts
-the verdicts of each cell on simulated plants and those of them that were wrong; with k of n wrong
+A verdict falls into a cell by its word, the share of the error above the floor that the named
+effect leaves, and the margin by which it beats effects outside its class. `calibration.toml` counts
+the verdicts of each cell on simulated plants and how many were wrong. With k of n wrong,
 
     probability of being wrong = (k + s·r)/(n + s),   r = (K + 1)/(N + 2)
 
 where K of N verdicts with the same word were wrong over all cells (P. S. Laplace's rule of
-succession, 1774) and count as much as s = 2 cases, so that a cell with few cases leans on the
-others. `benchmarks/explaining/hidden_effects` writes the file, and judges it on seeds that it was
-not made from.
+succession, 1774). The rate r weighs as much as s = 2 cases, so a cell with few cases relies on the
+others. `benchmarks/explaining/hidden_effects` writes the file and evaluates it on held-out seeds.
 """
 
 from dataclasses import dataclass
@@ -23,22 +22,22 @@ from msgspec import Meta
 from rigwatch.wire.typed_files import Section, parse
 
 LEFT = (0.02, 0.1)
-"""Edges of cells: share of the energy above the floor that the named effect leaves."""
+"""Cell edges: share of the energy above the floor that the named effect leaves."""
 MARGIN = (3.0, 6.0)
-"""Edges of cells: standard deviations by which it beats the best of the others."""
+"""Cell edges: standard deviations by which it beats the best of the others."""
 LEANING = 2.0
-"""Cases that a word's rate over all cells counts as in each."""
+"""Number of cases that a word's rate over all cells weighs in each cell."""
 FILE = "calibration.toml"
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a verdict rests on.
+    """What a verdict is based on.
 
     Attributes:
         left: share of the energy above the noise floor that the named effect leaves.
-        margin: standard deviations of the paired held-out difference to the best effect that it is
-            not confused with; `CLEAR` where none came near.
+        margin: paired held-out difference to the best effect outside its class and rivals, in
+            standard deviations; `CLEAR` if there is no such effect.
     """
 
     left: float = 1.0
@@ -49,7 +48,7 @@ CLEAR = 99.0
 
 
 class Cell(Section, frozen=True, kw_only=True):
-    """Verdicts that looked alike."""
+    """Counts of similar verdicts."""
 
     word: Annotated[str, Meta(description="the verdict")]
     left: Annotated[int, Meta(ge=0, le=len(LEFT), description="which cell of `left`")]
@@ -65,18 +64,18 @@ class Calibration(Section, frozen=True, kw_only=True):
 
 
 def cell_of(word: str, evidence: Evidence) -> tuple[str, int, int]:
-    """Which cell a verdict belongs to."""
+    """The cell of a verdict: word, index of `left`, index of `margin`."""
     left = int(np.searchsorted(LEFT, max(evidence.left, 0.0)))
     return word, left, int(np.searchsorted(MARGIN, evidence.margin))
 
 
 def seen(word: str, evidence: Evidence) -> tuple[int, int]:
-    """Simulated cases with a verdict like this one, and how many of them were wrong."""
+    """Number of simulated cases in the verdict's cell, and how many of them were wrong."""
     return _counts().get(cell_of(word, evidence), (0, 0))
 
 
 def doubt(word: str, evidence: Evidence) -> float:
-    """Probability that the verdict is wrong; one half where no such case was simulated."""
+    """Probability that the verdict is wrong; 0.5 if its cell has no simulated case."""
     cases, wrong = seen(word, evidence)
     if not cases:
         return 0.5

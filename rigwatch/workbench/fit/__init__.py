@@ -1,4 +1,4 @@
-"""A study's model fitted to its recordings, with intervals, healthy parameters and a free run."""
+"""Fits a study's model to its recordings: intervals, healthy parameters, holds, free run."""
 
 from rigwatch.workbench.fit.fitted_model import (
     Fitted,

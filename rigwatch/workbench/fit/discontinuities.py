@@ -1,8 +1,8 @@
-"""Samples at which an effect jumps, so that a sampled error says little about it.
+"""Samples at discontinuities of an effect, where the sampled error is not meaningful.
 
-Dry friction turns round where the motion does, in no time. A model that is late by a hundredth of a
-sample may read the acceleration on the wrong side of the jump, and misses that one sample by all of
-it: in a right model with little noise such samples hold most of the error.
+Dry friction changes sign instantly when the motion reverses. A model that is late by a hundredth of
+a sample may evaluate the acceleration on the wrong side of the jump, which makes the error at that
+sample as large as the jump. In a correct model with little noise such samples dominate the error.
 """
 
 import numpy as np
@@ -12,21 +12,21 @@ from rigwatch.physics.engine.fit import Fit, Recording, initial_states, seen, wi
 from rigwatch.wire.arrays import BoolArray
 
 JUMP = 0.5
-"""Change from one sample to the next, over the largest that the effect ever is."""
+"""Change per sample, relative to the largest value of the effect, that counts as a jump."""
 MOST = 0.3
-"""Share of samples beside jumps from which it is no jump but how the effect goes."""
+"""Share of samples beside jumps above which they are normal behaviour, not discontinuities."""
 
 
 def between_jumps(fitted: Fit, recording: Recording, horizon: int) -> BoolArray | None:
-    """Samples of a recording's windows that are beside no jump, shape (windows, length).
+    """Samples of a recording's windows away from jumps, shape (windows, length).
 
     Args:
         fitted: a model with effects.
-        recording: what it is judged on.
+        recording: the recording it is judged on.
         horizon: samples of a window.
 
     Returns:
-        None where nothing jumps, or samples were thinned.
+        None if there are no jumps, or if samples were decimated.
     """
     if recording.thinning is not None:
         return None
@@ -39,7 +39,7 @@ def between_jumps(fitted: Fit, recording: Recording, horizon: int) -> BoolArray 
 
 
 def _beside_jumps(fitted: Fit, recording: Recording) -> BoolArray:
-    """Whether an effect without memory changes at once before or after a sample, shape (n,)."""
+    """Whether an effect without states jumps right before or after a sample, shape (n,)."""
     system, values = fitted.compiled.system, fitted.values()
     beside = np.zeros(len(recording), np.bool_)
     able = [

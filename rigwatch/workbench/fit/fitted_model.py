@@ -1,4 +1,4 @@
-"""A model with some effects, fitted to the training recordings and judged on those held out."""
+"""A model with effects, fitted to the training recordings and judged on the held-out ones."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -32,33 +32,33 @@ from rigwatch.workbench.fit.discontinuities import between_jumps
 from rigwatch.workbench.study import Study
 
 LONG = 2000
-"""Samples of a horizon from which a fit goes by way of a shorter one."""
+"""Horizon in samples above which a fit starts with a shorter one."""
 SHORTER = 8
-"""The horizon over that one."""
+"""Ratio of the horizon to the shorter one."""
 WELL_ABOVE = 1.5
-"""Error over the channels' noise from which a fit may have ended in a local minimum."""
+"""Ratio of error to noise above which a fit may have ended in a local minimum."""
 FROM_AFAR = 5
-"""Free parameters from which a fit along the measured motion searches from several starts."""
+"""Number of free parameters above which a fit along the measured motion uses several starts."""
 FAST, SLOWED = 1.0, 0.5
-"""Eigenvalue times step from which a linearisation takes finer ones, and what it then takes."""
+"""Eigenvalue times step above which a linearisation uses finer steps, and its value then."""
 LOOKED_AT = 20
-"""Windows at most whose eigenvalues are looked at."""
+"""Largest number of windows whose eigenvalues are computed."""
 BLOCKS = 40
-"""Blocks that a recording of a model without states is cut into for statistics."""
+"""Number of blocks for statistics on a recording of a model without states."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """One model, fitted and judged.
+    """A fitted model with its held-out error.
 
     Attributes:
         placements: its effects.
-        train, held_out: the fit, and the same parameters on the other recordings.
-        substeps: integration steps a sample, where nothing is stiff.
+        train, held_out: the fit, and the same parameters on the held-out recordings.
+        substeps: integration steps per sample for non-stiff systems.
         horizon: samples from one re-initialisation to the next.
-        calm: samples held out that are beside no jump of an effect, shape (windows, length); None
-            where nothing jumps.
-        convergence: how the fit ended; None where it began at another's end and was not asked.
+        calm: held-out samples away from discontinuities of an effect, shape (windows, length); None
+            if there are none.
+        convergence: how the fit ended; None if it started from another fit and was not checked.
     """
 
     placements: tuple[Placement, ...]
@@ -75,7 +75,7 @@ class Fitted:
         return self.train.compiled
 
     def errors(self, fitted: Fit) -> float:
-        """One number for all channels: in the channel's unit where there is one, else scaled."""
+        """Training and held-out error over all channels, see `overall`."""
         return overall(fitted)
 
     @property
@@ -90,14 +90,14 @@ class Fitted:
 
 
 def overall(fitted: Fit) -> float:
-    """Error over all channels: in the channel's unit where there is one, else in noise floors."""
+    """Error over all channels: in the channel's unit if there is only one, else in noise floors."""
     if len(fitted.scale) == 1:
         return float(fitted.rms[0])
     return float(np.sqrt(np.mean((fitted.rms / fitted.scale) ** 2)))
 
 
 def block_errors(fitted: Fit) -> FloatArray:
-    """Mean squared error of each block, a window or a piece of one; NaN where nothing counts."""
+    """Mean squared error of each block (a window or part of one); NaN without valid samples."""
     scale = fitted.scale if len(fitted.scale) > 1 else 1.0
     squared = (fitted.residuals / scale) ** 2
     means = [np.nanmean(p) if np.isfinite(p).any() else np.nan for p in blocks(squared)]
@@ -105,20 +105,20 @@ def block_errors(fitted: Fit) -> FloatArray:
 
 
 def block_differences(one: Fit, other: Fit) -> FloatArray:
-    """By how much the error of `one` is above that of `other`, of blocks that count in both."""
+    """Mean squared error of `one` minus that of `other`, for blocks valid in both."""
     found = block_errors(one) - block_errors(other)
     return np.asarray(found[np.isfinite(found)])
 
 
 def blocks(windowed: FloatArray) -> list[FloatArray]:
-    """Windows (windows, samples, …) as blocks; few long windows are cut into pieces."""
+    """Windows (windows, samples, …) as blocks; few long windows are divided."""
     pieces = max(1, -(-BLOCKS // len(windowed)))
     cut = [np.array_split(window, min(pieces, len(window))) for window in windowed]
     return [piece for window in cut for piece in window]
 
 
 def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
-    """The accepted effects, with their bounds in sizes of the recording."""
+    """The accepted effects, with bounds scaled to the recording's signals."""
     sizes = port_sizes(study.model, recording)
     return tuple(
         Placement(a.effect, study.effect_at(a.effect, a.port).scaled(sizes[a.port]), a.port)
@@ -131,15 +131,15 @@ def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
 def fit_base(
     study: Study, data: Data, scale: FloatArray | None = None, *, afar: bool = False
 ) -> Fitted:
-    """The model of a study with the effects accepted so far.
+    """Fit the model of a study with its accepted effects.
 
-    It begins at the fit that the last of them was accepted with, and stays in its valley unless it
-    is told to look `afar`: another valley may be deeper in training, and was not accepted. Where it
-    cannot be simulated from the study's own starting values, it is fitted effect by effect, as it
-    was built.
+    The fit starts from the accepted fit of the last effect and stays in that minimum unless `afar`
+    is set: another minimum may have a lower training error but was not the one accepted. If the
+    model diverges from the study's initial values, it is fitted effect by effect in the order of
+    acceptance.
 
     Raises:
-        ModelError: it cannot be simulated that way either.
+        ModelError: the simulation diverges that way, too.
     """
     placements, start = placements_of(study, data.train), parameters_of(study.file)
     try:
@@ -157,7 +157,7 @@ def fit_base(
 
 
 def _kept(found: Fitted) -> Fitted:
-    """A fit that began at the accepted one, with how it ended."""
+    """A fit started from the accepted one, with its convergence."""
     return replace(
         found, convergence=convergence(found.train, [], "the accepted fit", near_noise=False)
     )
@@ -173,7 +173,7 @@ def fit_twice(
     base: Fitted | None = None,
     from_afar: bool = False,
 ) -> Fitted:
-    """`fit_model`, and once more where it may have ended in a local minimum."""
+    """`fit_model`, repeated if it may have ended in a local minimum."""
     found = fit_model(study, data, placements, start, scale, base=base, from_afar=from_afar)
     if scale is None or not may_be_better(study, data, found, start):
         return found
@@ -181,7 +181,7 @@ def fit_twice(
 
 
 def fit_again(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> Fitted:
-    """The better of a fit and another by way of short horizons."""
+    """The better of a fit and a second one that starts with short horizons."""
     try:
         again = fit_model(
             study, data, found.placements, start, found.train.scale, base=found,
@@ -194,7 +194,7 @@ def fit_again(study: Study, data: Data, found: Fitted, start: Mapping[str, float
 
 
 def _ended_again(found: Fitted, again: Fitted, best: Fitted) -> Convergence | None:
-    """How the better of two fits ended; None where neither was asked."""
+    """Convergence of the better of two fits; None if neither was checked."""
     if best is found or found.convergence is None:
         return found.convergence
     return convergence(again.train, [found.train], "short horizons", near_noise=False)
@@ -211,17 +211,17 @@ def fit_model(
     by_way_of_short: bool = False,
     from_afar: bool = False,
 ) -> Fitted:
-    """The study's model with `placements`, fitted from `start`.
+    """Fit the study's model with `placements` from `start`.
 
     Args:
-        study, data: what is fitted to.
+        study, data: the study and its recordings.
         placements: effects in the model.
-        start: values by name, the model's own where there are none.
+        start: initial values by name; the model's own for those not given.
         scale: divisor of each output's residuals, shape (outputs,).
-        base: a fit of less, whose initial states are a start for these.
-        by_way_of_short: whether the search begins where short horizons lead: over long ones what
-            sticks and slips has many local minima.
-        from_afar: whether `start` may be far from the truth, so that other starts are tried.
+        base: a fit with fewer effects, whose initial states are used as start.
+        by_way_of_short: start from a fit over short horizons, since stick-slip has many local
+            minima over long ones.
+        from_afar: whether `start` may be far from the optimum, so that other starts are tried.
 
     Raises:
         ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
@@ -249,9 +249,9 @@ def fit_model(
 
 
 def _settled(study: Study, data: Data, found: Fit, horizon: int, substeps: int) -> Fit:
-    """The fit with its ties settled, before anything is judged on it.
+    """The fit with undetermined parameter combinations resolved, before it is judged.
 
-    Along the motion priors settle them; what a rough model has learned is tied by nature.
+    Along the motion, priors resolve them; the learned terms of a rough model are inherently tied.
     """
     if data.along_motion or study.model.rough:
         return found
@@ -272,10 +272,10 @@ def _judged(  # noqa: PLR0917 -- they belong together
     initial: FloatArray | None,
     ended: Convergence | None,
 ) -> Fitted:
-    """A fit with its error on the recordings held out."""
+    """A fit with its held-out error."""
     beside = data.horizon if study.model.states else len(data.held_out)
     substeps = study.file.substeps
-    # Along the motion what is hidden is led by it; a rough model is judged beside its reference.
+    # Along the motion hidden states follow it; a rough model is judged with its reference.
     judging = not (data.along_motion or study.model.rough)
     judged = evaluate(found, data.held_out, beside, substeps, initial, judging=judging)
     calm = between_jumps(found, data.held_out, beside)
@@ -285,7 +285,7 @@ def _judged(  # noqa: PLR0917 -- they belong together
 def may_be_better(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> bool:
     """Whether a fit may have ended in a local minimum.
 
-    It leaves more than noise, and its last effect asks for finer steps than the model.
+    True if its residual exceeds the noise and its last effect needs finer steps than the model.
     """
     if not found.placements or _size(found.train) <= WELL_ABOVE**2:
         return False
@@ -305,7 +305,7 @@ def _even(system: System, recording: Recording, parameters: FloatArray) -> int:
 
 
 def nodes(fitted: Fitted, recording: Recording) -> int:
-    """Steps a sample that a linearisation takes, which are the same everywhere."""
+    """Integration steps per sample of a linearisation, equal for all samples."""
     system = fitted.compiled.system
     if not system.states:
         return 1
@@ -315,12 +315,12 @@ def nodes(fitted: Fitted, recording: Recording) -> int:
 
 
 def _fastest(fitted: Fitted, recording: Recording) -> float:
-    """Largest eigenvalue of the model at the beginning of its windows [1/s]."""
+    """Largest eigenvalue of the model at the start of its windows [1/s]."""
     return float(np.abs(eigenvalues(fitted, recording)).max(initial=0.0))
 
 
 def eigenvalues(fitted: Fitted, recording: Recording) -> ComplexArray:
-    """Eigenvalues of the model at the beginning of its windows [1/s], shape (windows, states)."""
+    """Eigenvalues of the model at the start of its windows [1/s], shape (windows, states)."""
     cut = windows(fitted.compiled.system, len(recording), fitted.horizon)
     run = fitted.compiled.linearise(
         recording.inputs, recording.dt, cut.starts[:LOOKED_AT], 2,

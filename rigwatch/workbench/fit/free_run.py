@@ -1,7 +1,7 @@
-"""The error of one long run from the measured start at rest, nothing re-initialised on the way.
+"""Error of a free run: one simulation from the measured initial state, without re-initialisation.
 
-It is what benchmarks publish, and a bad judge of plants that integrate: a right effect alone may
-make it worse. It is shown, and decides nothing.
+Benchmarks publish this error, but it is a poor criterion for integrating plants: a correct effect
+alone may increase it. It is shown for information only.
 """
 
 import numpy as np

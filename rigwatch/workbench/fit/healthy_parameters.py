@@ -1,9 +1,9 @@
-"""What a healthy recording tells once and for all: the parameters of a model that are kept.
+"""Kept parameters: fitted to a healthy recording once and fixed afterwards.
 
-The seal of a healthy cylinder leaks a little and its piston drags a little. If a fit to every new
-recording could move these, it would swallow the very fault that is looked for; so they are fitted
-to the healthy recording and fixed from then on. Without such a recording those that are fixed in
-the model stay as they are, and the others are fitted to each recording.
+The seal of a healthy cylinder leaks a little and its piston has some drag. If these parameters were
+refitted to every new recording, they would absorb the fault. They are therefore fitted to the
+healthy recording and then fixed. Without a healthy recording, parameters that are fixed in the
+model keep their values, and the others are fitted to each recording.
 """
 
 from collections.abc import Collection, Mapping
@@ -22,20 +22,20 @@ from rigwatch.workbench.fit.intervals import covariance
 from rigwatch.workbench.study import Kept, Study
 
 SAME = 1e-6
-"""Singular value over the largest below which a healthy recording knows a direction not at all."""
+"""Singular value, relative to the largest, below which a direction counts as undetermined."""
 LOOSE = 0.3
-"""Standard deviation of a kept parameter over its value from which it is said to be loose."""
+"""Relative standard deviation of a kept parameter above which a remark is given."""
 NEAR_ZERO = 0.01
-"""Share of its range that counts as a parameter's value at least."""
+"""Share of its range used as a lower limit of a parameter's value in relative deviations."""
 LONGEST = 600.0
-"""Healthy recording that one may be asked for [s]."""
+"""Longest healthy recording that a remark asks for [s]."""
 
 
 def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> Study:
     """The study with a model whose kept parameters come from the healthy recording.
 
     Args:
-        study: as it was opened.
+        study: as opened.
         data: its recordings.
         scale: divisor of each output's residuals, shape (outputs,).
 
@@ -59,14 +59,14 @@ def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> S
 
 
 def with_known(kept: Kept, healthy: Data, found: Fitted) -> Kept:
-    """The same with what is taken for known, of which the model tells a deviation.
+    """The kept parameters extended by known ones with a stated deviation.
 
-    With m off by d, the parameters beside it settle elsewhere on the healthy recording,
+    If a known parameter m is wrong by d, the others fitted to the healthy recording shift by
 
-        κ ← κ - H_κ⁺·H_m·d,   H: slopes of the residual there
+        κ ← κ - H_κ⁺·H_m·d,   H: derivatives of the residual there
 
     Args:
-        kept: what the healthy recording told.
+        kept: parameters from the healthy recording.
         healthy: that recording.
         found: the model's fit to it.
     """
@@ -96,9 +96,9 @@ def loosely_told(kept: Kept, model: Model, seconds: float) -> tuple[str, ...]:
     """Remarks on kept parameters that the healthy recording does not determine.
 
     Args:
-        kept: what the healthy recording told.
-        model: with the values that it told.
-        seconds: how long it is, shortened by what hidden states need to settle.
+        kept: parameters from the healthy recording.
+        model: the model with their values.
+        seconds: length of the recording less the settling time of hidden states [s].
     """
     deviations = np.sqrt(np.diag(kept.covariance))
     shares = {
@@ -122,13 +122,13 @@ def loosely_told(kept: Kept, model: Model, seconds: float) -> tuple[str, ...]:
 
 
 def _scale_of(p: Parameter) -> float:
-    """What a deviation is held against: the value, or a hundredth of the range for one near 0."""
+    """Reference of a relative deviation: the value, or a hundredth of the range if near 0."""
     span = p.high - p.low
     return max(abs(p.value), NEAR_ZERO * span if np.isfinite(span) else 0.0, 1e-300)
 
 
 def loosened(model: Model, names: Collection[str] = ()) -> Model:
-    """The model with its kept parameters and those named free, also where they have been fixed."""
+    """The model with its kept parameters and those named set free."""
     free = {
         name: structs.replace(p, fixed=p.fixed and not p.kept and name not in names)
         for name, p in model.parameters.items()

@@ -1,15 +1,16 @@
-"""What a rough model leaves on a healthy rig is not held against a recording.
+"""Subtracts a rough model's residual on a healthy rig from that on a recording.
 
-A linear black box leaves a tenth of the acceleration unexplained, and takes that for missing
-friction. Under the same excitation it leaves nearly the same on every run; so a healthy recording
-with this excitation tells what to add to the model's outputs, before a sensor reads them:
+A linear black box leaves a tenth of the acceleration unexplained, which could be mistaken for
+missing friction. Under the same excitation this residual repeats from run to run. A healthy
+recording with the same excitation therefore gives a reference that is added to the model's outputs,
+before the sensors:
 
     r(k) = mean over healthy periods of (y_h - model(u_h))(k mod T),   T: the period
 
-It enters the model as further inputs.
+It enters the model as additional inputs.
 
-The floor is what stays of each healthy period when the others are its reference, which counts the
-noise of the reference as well.
+The noise floor is the residual of each healthy period with the others as its reference, which
+includes the noise of the reference.
 """
 
 from dataclasses import dataclass, replace
@@ -27,9 +28,9 @@ from rigwatch.workbench.fit.fitted_model import Fitted, fit_model
 from rigwatch.workbench.study import Study
 
 UNLIKE = 0.2
-"""Rms by which an excitation may differ from the healthy one, over its own."""
+"""Largest rms difference between an excitation and the healthy one, relative to its own rms."""
 FEWEST = 2
-"""Healthy periods that are needed, so that each can be held against another."""
+"""Number of healthy periods needed, so that each can be compared with another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,7 @@ class _Periods:
 
     Attributes:
         inputs: shape (periods, samples, inputs).
-        outputs, left: measured, and what the model leaves of it, shape (periods, samples, outputs).
+        outputs, left: measured, and the model's residual, shape (periods, samples, outputs).
     """
 
     inputs: FloatArray
@@ -47,10 +48,10 @@ class _Periods:
 
 
 def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> tuple[Study, Data]:
-    """A rough model with what it leaves of the healthy recording added, and recordings of both.
+    """A rough model with its healthy residual added as input, and the recordings with that input.
 
     Args:
-        study: with what the healthy recording told, see `commissioned`.
+        study: with parameters from the healthy recording, see `commissioned`.
         data: its recordings.
         scale: divisor of each output's residuals, shape (outputs,).
 
@@ -66,11 +67,11 @@ def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> tup
             f"{name}: found no healthy recording, expected one with the same excitation,"
             " as this model leaves much unexplained on a healthy rig, too"
         )
-    # Without the effects accepted so far: nothing is wrong there that they could explain.
+    # Without the accepted effects: the healthy recording has nothing for them to explain.
     bare = fit_model(study, alone, (), study.file.start, scale, from_afar=True)
     periods = _matching(study, bare, data.train, data, "train")
     beside = _matching(study, bare, data.held_out, data, "held_out")
-    remark = f"{name}: what it leaves of {len(beside.left)} healthy periods is added to it"
+    remark = f"{name}: its mean residual over {len(beside.left)} healthy periods is added to it"
     return replace(study, model=_with_inputs(study.model)), replace(
         data,
         train=_beside(data.train, np.nanmean(periods.left, axis=0)),
@@ -101,7 +102,7 @@ def _matching(study: Study, bare: Fitted, recording: Recording, data: Data, use:
 
 
 def _starts(period: FloatArray, signal: FloatArray) -> FloatArray:
-    """Where in a longer signal a period begins, shape (times found,)."""
+    """Samples of a longer signal at which the period begins, shape (times found,)."""
     length = len(period)
     if len(signal) < length:
         return np.zeros(0, dtype=np.int64)
@@ -138,7 +139,7 @@ def _with_inputs(model: Model) -> Model:
 
 
 def _beside(recording: Recording, reference: FloatArray) -> Recording:
-    """The recording with a periodic reference as further inputs."""
+    """The recording with a periodic reference as additional inputs."""
     shown = reference[np.arange(len(recording)) % len(reference)]
     return replace(
         recording,
@@ -148,7 +149,7 @@ def _beside(recording: Recording, reference: FloatArray) -> Recording:
 
 
 def _against_each_other(dt: float, periods: _Periods) -> Recording:
-    """Each healthy period beside what the model leaves of the others."""
+    """Each healthy period with the mean residual of the others as its reference."""
     count = len(periods.left)
     others = (np.sum(periods.left, axis=0) - periods.left) / (count - 1)
     inputs, outputs, flat = (

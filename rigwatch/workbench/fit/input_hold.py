@@ -1,13 +1,13 @@
-"""How inputs go on between samples, chosen from the data where neither model nor study says.
+"""Chooses the hold of inputs between samples from the data if neither model nor study gives it.
 
-A converter keeps what it was told until it is told again; a signal that was itself measured
-continues along a line. The one taken for the other is half a sample late, which looks like a slow
-sensor. So the model is fitted with each, and with inputs that are kept and change a part of a
-sample late, as those of a converter that is written to after the sensors were read. Another hold
-than a line needs an error that falls block by block beyond chance, on recordings held out where
-there are some.
+A D/A converter holds its value until the next update (zero-order hold); a measured signal varies
+linearly between samples. Confusing the two shifts the input by half a sample, which looks like a
+slow sensor. The model is fitted with both, and with zero-order holds delayed by a fraction of a
+sample, as when the converter is written after the sensors are read. A hold other than linear
+requires an error that falls, over blocks, by more than chance, on held-out recordings if there are
+any.
 
-A healthy recording is asked where there is one: a fault cannot pass for a hold there.
+A healthy recording is used if available, as a fault cannot be mistaken for a hold there.
 """
 
 from collections.abc import Mapping
@@ -34,13 +34,13 @@ from rigwatch.workbench.study import Held, Study
 BEYOND_CHANCE = 3.0
 """Standard deviations by which the error must fall."""
 MATERIAL = 0.01
-"""Share of the squared error that it must fall by."""
+"""Relative fall of the squared error that is required."""
 AT_NOISE = 1.03
-"""Error over the sensors' noise below which no lateness is looked for."""
+"""Ratio of error to sensor noise below which no delay is searched for."""
 LATENESSES = (0.25, 0.5, 0.75, 1.0)
-"""Shares of a sample that are tried before the best is refined."""
+"""Delays tried before the best is refined, as shares of a sample."""
 FINE = 5e-4
-"""Shares of a sample to which lateness is told."""
+"""Resolution of the delay, as a share of a sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,15 +53,15 @@ class _Tried:
 
 
 def with_hold(study: Study, data: Data, scale: FloatArray | None = None) -> Study:
-    """The study with a model that says what every input does between samples.
+    """The study with a model that has a hold for every input.
 
     Args:
-        study: as it was opened.
+        study: as opened.
         data: its recordings.
         scale: divisor of each output's residuals, shape (outputs,).
 
     Raises:
-        ModelError: the model cannot be fitted whatever its inputs do.
+        ModelError: the model cannot be fitted with any hold.
     """
     model = study.model
     names = model.unheld()
@@ -83,7 +83,7 @@ def with_hold(study: Study, data: Data, scale: FloatArray | None = None) -> Stud
 
 
 def holding(model: Model, holds: Mapping[str, tuple[Hold, float]]) -> Model:
-    """The model with some inputs told what they do between samples."""
+    """The model with the holds of some inputs set."""
     inputs = {
         name: structs.replace(own, hold=holds[name][0], late=holds[name][1])
         if name in holds
@@ -94,7 +94,7 @@ def holding(model: Model, holds: Mapping[str, tuple[Hold, float]]) -> Model:
 
 
 def held_as(study: Study, holds: Mapping[str, Held]) -> Study:
-    """The study with inputs that do what was found for another opening of it."""
+    """The study with the holds found for another instance of it."""
     new = {n: (held.hold, held.late) for n, held in holds.items() if n in study.model.inputs}
     return replace(study, model=holding(study.model, new), holds=dict(holds))
 
@@ -104,7 +104,7 @@ def _chosen(
 ) -> tuple[_Tried, _Tried]:
     """The best hold, and a line."""
     try_one = partial(_tried, study, data, placements, scale)
-    # The healthy recording is described without the effects that were accepted since.
+    # The healthy recording is modelled without the accepted effects.
     start = parameters_of(study.file) if placements else dict(study.file.start)
     line = try_one("linear", 0.0, start, None)
     kept = try_one("zero", 0.0, line.fitted.train.values(), line.fitted)
@@ -134,7 +134,7 @@ def _tried(  # noqa: PLR0917 -- they belong together
 
 
 def _refined(try_late: "partial[_Tried]", kept: _Tried) -> _Tried | None:
-    """The best lateness; None where none can be fitted."""
+    """The best delay; None if no fit succeeds."""
     start, found = kept.fitted.train.values(), dict[float, _Tried]()
 
     def size(late: float) -> float:
@@ -148,7 +148,7 @@ def _refined(try_late: "partial[_Tried]", kept: _Tried) -> _Tried | None:
     sizes = [size(late) for late in LATENESSES]
     if not found:
         return None
-    # Where the coarse steps show nothing, no fine one does.
+    # If no coarse step improves the error, no fine one does.
     if min(sizes) < float(np.nanmean(block_errors(kept.fitted.train))):
         near = LATENESSES[int(np.argmin(sizes))]
         ends = (max(near - 0.25, 1e-3), min(near + 0.25, 1.0))
@@ -157,7 +157,7 @@ def _refined(try_late: "partial[_Tried]", kept: _Tried) -> _Tried | None:
 
 
 def _better(one: _Tried, other: _Tried) -> bool:
-    """Whether the error falls beyond chance from the other to the one."""
+    """Whether the error falls by more than chance from the other to the one."""
     before = _blocks(other.fitted)
     fall = block_differences(other.fitted.held_out, one.fitted.held_out)
     spread = float(np.std(fall, ddof=1) / np.sqrt(len(fall))) if len(fall) > 1 else 0.0

@@ -1,9 +1,9 @@
-"""Intervals of parameters that stay honest where residuals are not white.
+"""Confidence intervals of parameters that remain valid for autocorrelated residuals.
 
-A model that is wrong leaves residuals that are autocorrelated over many samples, and the textbook
-covariance, which takes each for itself, promises too much. Here whole blocks are left out instead,
-one after the other (the delete-a-block jackknife: B. Efron, C. Stein, Annals of Statistics 9, 1981;
-as cluster-robust covariance "CR3": R. M. Bell, D. F. McCaffrey, Survey Methodology 28, 2002):
+A wrong model leaves residuals that are autocorrelated over many samples, and the textbook
+covariance, which assumes independent residuals, is too small. Here whole blocks are left out, one
+at a time (delete-a-block jackknife: B. Efron, C. Stein, Annals of Statistics 9, 1981; as
+cluster-robust covariance "CR3": R. M. Bell, D. F. McCaffrey, Survey Methodology 28, 2002):
 
     θ − θ₋b = (N − Nb)⁻¹·gb,   cov θ = (B − 1)/B · Σ_b (θ − θ₋b)(θ − θ₋b)ᵀ
 
@@ -25,9 +25,9 @@ from rigwatch.workbench.fit.fitted_model import blocks
 
 CONFIDENCE = 0.95
 ENOUGH = 12
-"""Windows from which they are blocks of their own."""
+"""Number of windows above which each is a block of its own."""
 TIED = 0.98
-"""Correlation from which two parameters count as tied to each other."""
+"""Correlation above which two parameters count as tied."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Value:
     Attributes:
         value: in `unit`.
         unit: its unit.
-        interval: 95 %, None where the parameter was not fitted.
-        note: what is wrong with it, in words; empty where nothing is.
+        interval: 95 %, None if the parameter was not fitted.
+        note: remark on a poorly determined value; empty otherwise.
     """
 
     value: float
@@ -47,14 +47,14 @@ class Value:
     note: str = ""
 
     def shown_in(self, text: str) -> "Value":
-        """The same, from SI to the unit `text`."""
+        """The value converted from SI to the unit `text`."""
         unit = unit_of(text)
         ends = self.interval and (unit.from_si(self.interval[0]), unit.from_si(self.interval[1]))
         return replace(self, value=unit.from_si(self.value), unit=text, interval=ends)
 
 
 def shown(value: Value) -> str:
-    """A value with its unit and interval, for people."""
+    """A value with its unit and interval, as text."""
     if value.interval is None:
         return f"{value.value:.3g} {value.unit}"
     low, high = value.interval
@@ -62,7 +62,7 @@ def shown(value: Value) -> str:
 
 
 def as_written(found: Mapping[str, Value], system: System) -> dict[str, Value]:
-    """Every value of a system's parameters, from SI to the unit that people wrote."""
+    """Values of a system's parameters, converted from SI to the units of their files."""
     units = {name: system.parameters[name].shown for name in found}
     return {n: value.shown_in(units[n]) if units[n] else value for n, value in found.items()}
 
@@ -71,7 +71,7 @@ def covariance(fitted: Fit) -> tuple[FloatArray, int]:
     """Covariance of the free parameters, shape (m, m), and degrees of freedom."""
     m = fitted.jacobian.shape[-1]
     whole = fitted.jacobian.reshape(-1, m)
-    # In units of the columns' sizes, so that what is tiny beside others is not taken for nothing.
+    # Columns are scaled to equal norm, so that small ones are not truncated as rank-deficient.
     size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
     normal = (whole / size).T @ (whole / size)
     pairs = zip(_apart(fitted.jacobian / size), _apart(fitted.error), strict=True)
@@ -81,12 +81,12 @@ def covariance(fitted: Fit) -> tuple[FloatArray, int]:
 
 
 def _apart(windowed: FloatArray) -> list[FloatArray]:
-    """Windows as blocks where there are enough: pieces of one share its initial state."""
+    """Windows as blocks if there are enough, as parts of a window share its initial state."""
     return list(windowed) if len(windowed) >= ENOUGH else blocks(windowed)
 
 
 def _moved(normal: FloatArray, jacobian: FloatArray, error: FloatArray) -> FloatArray:
-    """How far the parameters move when a block is left out, shape (m,)."""
+    """Change of the parameters when a block is left out, shape (m,)."""
     return np.asarray(
         np.linalg.pinv(normal - jacobian.T @ jacobian, rcond=1e-12) @ (jacobian.T @ error)
     )
@@ -97,7 +97,7 @@ def values(fitted: Fit, beyond: Mapping[str, float] | None = None) -> dict[str, 
 
     Args:
         fitted: the fit.
-        beyond: variances that the recording does not show, by name.
+        beyond: additional variances that the recording does not show, by name.
     """
     system = fitted.compiled.system
     spread: dict[str, float] = {}
@@ -116,7 +116,7 @@ def values(fitted: Fit, beyond: Mapping[str, float] | None = None) -> dict[str, 
 
 
 def identifiability(fitted: Fit) -> dict[str, str]:
-    """What this recording cannot tell, in words, by parameter."""
+    """Remarks on parameters that this recording does not determine, by name."""
     names, m = fitted.compiled.system.free, fitted.jacobian.shape[-1]
     if m == 0:
         return {}

@@ -1,12 +1,12 @@
-"""Profile likelihood: intervals that need not be symmetric, for parameters that bend the model.
+"""Profile likelihood: asymmetric intervals, for parameters that enter the model nonlinearly.
 
-A parameter is held away from its best value, everything else is fitted again, and the interval ends
-where the squared error has risen by more than chance allows,
+A parameter is fixed away from its optimum, the others are refitted, and the interval ends where the
+squared error has risen by more than chance allows,
 
     Δ(Σ r²) = χ²(95 %, 1) · s² · swelling
 
-(D. Bates, D. Watts, Nonlinear Regression Analysis, 1988). The swelling is that of the jackknife's
-variance (`intervals.py`) over the textbook's, so that residuals may be autocorrelated here, too.
+(D. Bates, D. Watts, Nonlinear Regression Analysis, 1988). The swelling is the ratio of the
+jackknife's variance (`intervals.py`) to the textbook's, so residuals may be autocorrelated.
 """
 
 from dataclasses import dataclass, replace
@@ -21,14 +21,14 @@ from rigwatch.workbench.fit.fitted_model import Fitted
 from rigwatch.workbench.fit.intervals import CONFIDENCE, Value, covariance, values
 
 STEPS = 6
-"""Fits to find one end of an interval."""
+"""Largest number of fits to find one end of an interval."""
 CLOSE = 0.02
-"""Share of the allowed rise to which an end is found."""
+"""Tolerance of an end, as a share of the allowed rise."""
 
 
 @dataclass(frozen=True)
 class _Search:
-    """What the search for one end stands on."""
+    """Inputs of the search for one end."""
 
     fitted: Fit
     recording: Recording
@@ -42,8 +42,8 @@ def profile(fitted: Fitted, recording: Recording) -> dict[str, Value]:
     """Every parameter with its interval from the profile.
 
     Args:
-        fitted: the model.
-        recording: what it was fitted to.
+        fitted: the fitted model.
+        recording: the recording it was fitted to.
     """
     found, train = values(fitted.train), fitted.train
     robust, _ = covariance(train)
@@ -62,7 +62,7 @@ def profile(fitted: Fitted, recording: Recording) -> dict[str, Value]:
 
 
 def _end(search: _Search, name: str, step: float) -> float:
-    """Where the error has risen by what is allowed; the parameter's bound if that comes first."""
+    """Value at which the error has risen by the allowed amount, or the parameter's bound."""
     value = search.fitted.values()[name]
     parameter = search.fitted.compiled.system.parameters[name]
     for _ in range(STEPS):
@@ -77,11 +77,11 @@ def _end(search: _Search, name: str, step: float) -> float:
 
 
 def _error(search: _Search, name: str, at: float) -> float:
-    """Sum of squares with one parameter held and the others fitted again."""
+    """Sum of squares with one parameter fixed and the others refitted."""
     fitted = search.fitted
     system = fitted.compiled.system
     slack = 1e-9 * max(abs(at), 1e-12)
-    # Bounds that close on the value hold it, and the kernel stays the same.
+    # Bounds that enclose only the value fix it without compiling another kernel.
     held = changed(system.parameters[name], low=at - slack, high=at + slack)
     parameters = {**system.parameters, name: held}
     compiled = CompiledSystem(replace(system, parameters=parameters), fitted.compiled.kernel)

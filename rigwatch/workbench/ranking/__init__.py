@@ -1,7 +1,7 @@
 """Ranks every effect at every port: score test, refit of the best, held-out error, classes.
 
 `candidates` are scored (`scoring`) and become rows (`ranked`); those `worth_a_fit` are fitted
-(`refitting`) and judged on the recordings held out (`acceptance`). `rank` is all of it.
+(`refitting`) and judged by the held-out error (`acceptance`). `rank` runs all of these.
 """
 
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, STEP, judge_fit, left_over

@@ -1,7 +1,7 @@
-"""Whether an effect counts: the recordings held out decide.
+"""Decides from the held-out recordings whether an effect is accepted.
 
-Their error must fall by more than chance would do, and by enough to be worth it; and the recordings
-that are fitted must tell that the effect is there at all.
+The held-out error must fall by more than chance and by a material amount, and the training fit must
+show that the effect's strength differs from zero.
 """
 
 from rigwatch.workbench.data import NoiseFloor
@@ -10,18 +10,21 @@ from rigwatch.workbench.ranking.paired_test import Difference, difference
 from rigwatch.workbench.ranking.ranked import Ranked
 
 MATERIAL = 0.03
-"""Share by which the held-out error must fall at least to be worth an effect."""
+"""Smallest relative fall of the held-out error that justifies an effect."""
 STEP = 0.025
 """One-sided level at which the held-out error must fall."""
 EXPLAINED = 0.95
-"""Share of the energy above the floor that an effect must explain for the error to be known."""
+"""Share of the energy above the floor that an effect must explain to account for the error."""
 
 NEAR = 2.0
-"""Error over the floor beyond which something is left to explain, however much there was."""
+"""Ratio of error to floor above which something remains to be explained in any case."""
 
 
 def judge_fit(base: Fitted, row: Ranked) -> None:
-    """Say whether the held-out error falls by more than chance, with a strength that is told."""
+    """Accept the row if its held-out error falls by more than chance and its strength is nonzero.
+
+    Sets the row's `gain`, `accepted` and `reason`.
+    """
     assert row.fitted is not None
     found = difference(base.held_out, row.fitted.held_out)
     row.gain, row.reason = found.mean, _refused(found)
@@ -32,7 +35,7 @@ def judge_fit(base: Fitted, row: Ranked) -> None:
 
 
 def _refused(found: Difference) -> str:
-    """Why the recordings held out do not speak for an effect, empty where they do."""
+    """Why the held-out error does not support an effect; empty if it does."""
     if found.mean <= 0:
         more = "" if found.p_rises < STEP else ", no more than by chance"
         return f"held-out error rises{more}"
@@ -42,7 +45,7 @@ def _refused(found: Difference) -> str:
 
 
 def _vague(row: Ranked) -> str | None:
-    """What says that the effect may as well be absent, None where its strength is told."""
+    """Reason if the strength's interval contains its neutral value, otherwise None."""
     assert row.fitted is not None
     name = row.placement.effect.strength
     p, value = row.placement.effect.parameters[name], _strength(row)
@@ -51,7 +54,7 @@ def _vague(row: Ranked) -> str | None:
     low, high = value.interval
     if not low <= p.neutral <= high:
         return None
-    return f"the training does not tell its strength: {name} = {low:.3g} … {high:.3g}"
+    return f"the training does not determine its strength: {name} = {low:.3g} … {high:.3g}"
 
 
 def _strength(row: Ranked) -> Value | None:
@@ -60,14 +63,14 @@ def _strength(row: Ranked) -> Value | None:
 
 
 def left_over(base: Fitted, row: Ranked, floor: NoiseFloor, *, tolerant: bool = False) -> float:
-    """Share of the error above the floor that a row leaves, but for samples at which it jumps."""
+    """Share of the error above the floor that a row leaves, ignoring its discontinuities."""
     assert row.fitted is not None
     before, after = base.held_out, row.fitted.held_out
     return floor.left_over(before, after, row.fitted.calm, tolerant=tolerant)
 
 
 def leaves_nothing(row: Ranked, base: Fitted, floor: NoiseFloor) -> bool:
-    """Whether it explains so much of the error above the floor that only its like could as well."""
+    """Whether it explains so much of the error above the floor that only similar effects could."""
     assert row.fitted is not None
     near = floor.ratio(row.fitted.held_out, row.fitted.calm) < NEAR
     return near and left_over(base, row, floor) < 1 - EXPLAINED

@@ -1,4 +1,4 @@
-"""What a study tries: every effect at every port where it makes sense, or one that is named."""
+"""Candidates of a study: every effect at every compatible port, or one that is named."""
 
 from rigwatch.physics.engine.equations import Effect
 from rigwatch.physics.engine.fit import Recording
@@ -10,13 +10,13 @@ from rigwatch.workbench.study import Study
 
 
 def candidates(study: Study, recording: Recording) -> list[Candidate]:
-    """Every effect at every port where it makes sense and is not in the model yet.
+    """Every effect at every compatible port where it is not yet in the model.
 
-    Elective effects are among them where the study asks for the whole library.
+    Elective effects are included only if the study asks for the whole library.
 
     Args:
         study: its model, its effects and those already accepted.
-        recording: shows how large the signals at the ports are.
+        recording: gives the size of the signals at the ports.
     """
     check_ports(study)
     ports, sizes = study.model.ports, port_sizes(study.model, recording)

@@ -1,13 +1,14 @@
-"""Whether errors of two models on the same samples differ by more than chance: a paired sign test.
+"""Whether errors of two models on the same samples differ by more than chance: paired sign test.
 
-Samples are cut into blocks as long as what is left remembers itself, and no longer, so that an
-effect that shows in one short transient alone has many of them. Where there is no difference, that
-of each block is as likely to have either sign (R. A. Fisher, The Design of Experiments, 1935, 21):
+Samples are cut into blocks just longer than the correlation time of the difference, so that an
+effect visible in one short transient still spans many blocks. Under the null hypothesis each
+block's difference is equally likely to have either sign (R. A. Fisher, The Design of Experiments,
+1935, 21):
 
     p = P(Σ ±d_b ≥ Σ d_b)
 
-asks for no distribution of their sizes, so that one large block among small ones does not hide
-what all of them say, as it does in a test that divides by their spread.
+This makes no assumption about the distribution of block sizes. One large block among small ones
+does not mask the others, as it does in a test that divides by the standard deviation.
 """
 
 from dataclasses import dataclass
@@ -20,13 +21,14 @@ from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.arrays import FloatArray
 
 FORGOTTEN = 0.1
-"""Autocorrelation at which what is left has forgotten itself."""
+"""Autocorrelation below which samples count as uncorrelated."""
 MEMORIES = 2.0
-"""Blocks over that memory."""
+"""Block length over the correlation time."""
 FEWEST = 8
-"""Blocks at least: fewer could not tell anything at all."""
+"""Minimum number of blocks; fewer cannot reach significance."""
 COUNTED = 12
-"""Blocks up to which every choice of signs is counted; the sum over more is nearly normal."""
+"""Number of blocks up to which all sign combinations are enumerated; beyond, the sum is nearly
+normal."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,9 @@ class Difference:
     """Fall of the mean squared error from one model to another.
 
     Attributes:
-        mean: over the samples that count in both.
-        relative: share by which the error falls there.
-        p_falls, p_rises: how likely chance alone would do as much, one-sided.
+        mean: over the samples valid in both.
+        relative: relative fall of the rms error there.
+        p_falls, p_rises: one-sided p-values of a fall and of a rise this large by chance.
     """
 
     mean: float
@@ -46,7 +48,7 @@ class Difference:
 
 
 def difference(before: Fit, after: Fit) -> Difference:
-    """How the squared error of `after` differs from that of `before`, of the same recordings."""
+    """Difference of the squared errors of two fits on the same recordings."""
     one, other = _counted(before, after)
     squares = np.sum(one**2, axis=1), np.sum(other**2, axis=1)
     fall = squares[0] - squares[1]
@@ -59,7 +61,7 @@ def difference(before: Fit, after: Fit) -> Difference:
 
 
 def _counted(before: Fit, after: Fit) -> tuple[FloatArray, FloatArray]:
-    """Scaled residuals at the samples that count in both, each (samples, outputs)."""
+    """Scaled residuals at the samples valid in both, each of shape (samples, outputs)."""
     outputs = len(before.scale)
     scale = before.scale if outputs > 1 else np.ones(1)
     one, other = (fit.residuals.reshape(-1, outputs) / scale for fit in (before, after))
@@ -69,9 +71,9 @@ def _counted(before: Fit, after: Fit) -> tuple[FloatArray, FloatArray]:
 
 
 def _memory(one: FloatArray, other: FloatArray) -> float:
-    """Samples over which what is left is correlated where the two models differ.
+    """Correlation time [samples] of the product of residual and model difference.
 
-    What the difference of the models could make of the error by its size alone is taken out of it.
+    The part of the residual proportional to the model difference is removed first.
     """
     apart = one - other
     share = np.sum(one * apart) / max(float(np.sum(apart**2)), 1e-300)
@@ -85,7 +87,7 @@ def _memory(one: FloatArray, other: FloatArray) -> float:
 
 
 def _chance(blocks: FloatArray) -> float:
-    """Share of all choices of signs whose sum is as large as that of the blocks."""
+    """Share of all sign combinations whose sum is at least that of the blocks."""
     total, size = float(np.sum(blocks)), float(np.sqrt(np.sum(blocks**2)))
     if size == 0:
         return 1.0

@@ -1,10 +1,9 @@
 """Ranks every effect at every port: scored along the fitted model, the best fitted and judged.
 
-The score test asks all candidates at once which of them the residual looks like, with what has been
-fitted already taken out. Its p-value allows for autocorrelated residuals, as a wrong model leaves
-them, and is corrected for the number of candidates. The best are then fitted in full, and the
-recordings held out decide: an effect counts only if their error falls, block by block, by more
-than chance would do.
+The score test compares the residual with all candidates' directions at once, after projecting out
+the parameters already fitted. Its p-value allows for autocorrelated residuals, which a wrong model
+produces, and is corrected for the number of candidates. The best candidates are then fitted in
+full. An effect is accepted only if the held-out error falls, over blocks, by more than chance.
 """
 
 from collections.abc import Sequence
@@ -19,8 +18,8 @@ from rigwatch.workbench.ranking.worth_a_fit import worth_a_fit
 from rigwatch.workbench.study import Study
 
 AGAIN = 0.25
-"""Share of the energy above the floor that an effect must explain to first order to be fitted once
-more, where its fit may have ended in a local minimum."""
+"""Share of the energy above the floor that an effect must explain, to first order, to be fitted
+again where its fit may have ended in a local minimum."""
 
 
 def rank(
@@ -30,12 +29,12 @@ def rank(
     floor: NoiseFloor,
     progress: Progress = unheard,
 ) -> list[Ranked]:
-    """All effects at all ports, the best first; those worth it fitted and judged.
+    """All effects at all ports, best first; the most promising are fitted and judged.
 
     Args:
-        study, data, base: the model and what it was fitted to.
-        floor: of the held-out recordings.
-        progress: told which fit begins.
+        study, data, base: the study, its recordings and the fitted model.
+        floor: noise floor of the held-out recordings.
+        progress: called with a line of text as each fit begins.
     """
     rows = scored(study, data, base, candidates(study, data.train))
     kind = "dynamic" if study.model.states else "static"
@@ -46,25 +45,25 @@ def rank(
         likely = [row for row in chosen if row.explained > least]
         try_again(study, data, base, likely, progress)
     while spare := _in_place_of_troubled(rows):
-        progress(f"fitting {spare.label}, as what it looks like cannot be fitted")
+        progress(f"fitting {spare.label}, as the effect it resembles cannot be fitted")
         refit(study, data, base, spare, fit_model if enough else fit_twice)
     while double := _unfitted_double(rows, floor):
-        progress(f"fitting {double.label}, which looks like the best")
+        progress(f"fitting {double.label}, which resembles the best")
         refit(study, data, base, double, fit_model if enough else fit_twice)
     return in_order(rows)
 
 
 def _in_place_of_troubled(rows: Sequence[Ranked]) -> Ranked | None:
-    """What was left aside for another that then could not be fitted; None where nothing was."""
+    """A row skipped in favour of one whose fit then failed; None if there is none."""
     troubled = {row.label for row in rows if row.trouble}
     waiting = (row for row in rows if row.fitted is None and not row.trouble)
     return next((row for row in waiting if row.told_by in troubled), None)
 
 
 def _unfitted_double(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:
-    """What looks like the best to first order and was not fitted: only its fit shows whether.
+    """An unfitted row that resembles the best to first order; a fit must decide between them.
 
-    One that looks the same altogether is fitted only where the best leaves more than noise.
+    A row parallel to the best is fitted only if the best's residual is above the noise floor.
     """
     accepted = [row for row in rows if row.accepted]
     if not accepted:

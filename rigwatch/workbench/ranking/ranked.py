@@ -1,4 +1,4 @@
-"""One effect at one port as the ranking lists it, and the order of the rows."""
+"""One row of the ranking, an effect at a port, and the order of rows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.study import Accepted
 
 SAME = 0.9995
-"""Cosine above which two effects are one, whatever they are called."""
+"""Cosine above which two effects count as identical."""
 SIMILAR = 0.8
 """Cosine below which two effects explain different parts of the error."""
 
@@ -21,20 +21,20 @@ class Ranked:
     """One effect at one port.
 
     Attributes:
-        placement: which one, and where.
+        placement: the effect and its port.
         kind: of the port: force, actuator or sensor.
         p_value: of the score, corrected for the number of candidates.
-        explained: share of the residual's energy in training that it explains to first order.
-        start: values that its fit starts from.
-        alike: effects whose effect on this recording is nearly parallel, as "effect@port".
-        cosines: with every other effect, by its label.
-        turned: the same with a sign: negative where both explain the residual in opposite ways.
-        fitted: with it in the model; None where it was not worth a fit or the fit failed.
+        explained: share of the training residual's energy that it explains to first order.
+        start: initial values of its fit, by the effect's own parameter names.
+        alike: effects whose directions on this recording are nearly parallel, as "effect@port".
+        cosines: absolute cosine with every other effect, by label.
+        turned: signed cosine: negative if the two explain the residual with opposite signs.
+        fitted: the model fitted with it; None if not fitted or if the fit failed.
         gain: fall of the held-out mean squared error, None without a fit.
         accepted: whether the held-out error falls by more than chance.
-        reason: in words.
-        trouble: why it cannot be fitted, empty where it can.
-        told_by: what is fitted in its place, as it looks the same; empty where nothing is.
+        reason: why it is accepted, refused or not fitted, in words.
+        trouble: why its fit failed; empty otherwise.
+        told_by: label of the similar effect fitted in its place; empty if there is none.
     """
 
     placement: Placement
@@ -59,21 +59,21 @@ class Ranked:
 
     @property
     def port(self) -> str:
-        """Where it may be missing."""
+        """Name of the port."""
         return self.placement.port
 
     @property
     def free(self) -> int:
-        """Parameters that a fit of it moves."""
+        """Number of free parameters of the effect."""
         return self.placement.effect.free
 
     @property
     def label(self) -> str:
-        """Effect and port in one word."""
+        """Effect and port as "effect@port"."""
         return f"{self.effect}@{self.port}"
 
     def begin(self, share: float = 1.0) -> dict[str, float]:
-        """Values that its fit starts from, by the system's names: a share of its strength alone."""
+        """Initial values of its fit, by the system's names, at a share of its strength."""
         effect, values = self.placement.effect, dict(self.start)
         p = effect.parameters[effect.strength]
         values[effect.strength] = _within(p, share * (values[effect.strength] - p.neutral))
@@ -81,12 +81,12 @@ class Ranked:
 
     @property
     def held_out_error(self) -> float:
-        """Held-out error with it, infinite without a fit."""
+        """Held-out error with the effect in the model, infinite without a fit."""
         return self.fitted.held_out_error if self.fitted else float("inf")
 
 
 def row_of(candidate: Candidate, found: Standing, kind: str) -> Ranked:
-    """The row of an effect that is scored and not yet fitted; `kind` is its port's."""
+    """The row of a scored, not yet fitted effect; `kind` is that of its port."""
     return Ranked(
         Placement(candidate.name, candidate.effect, candidate.port),
         kind,
@@ -100,19 +100,19 @@ def row_of(candidate: Candidate, found: Standing, kind: str) -> Ranked:
 
 
 def start_of(candidate: Candidate, strength: float) -> dict[str, float]:
-    """Values that a fit of an effect of this strength begins with, by the effect's own names."""
+    """Initial values for fitting an effect of this strength, by the effect's own names."""
     effect = candidate.effect
     begin = _within(effect.parameters[effect.strength], strength)
     return {**candidate.shape, effect.strength: begin}
 
 
 def _within(p: EffectParameter, strength: float) -> float:
-    """Where the fit of an effect of this strength begins."""
+    """Initial value of the strength parameter, within its bounds."""
     return 1.0 if p.role == "switch" else float(np.clip(p.neutral + strength, p.low, p.high))
 
 
 def accepted_from(row: Ranked) -> Accepted:
-    """The row as a study's file lists it, its fit's values to start from."""
+    """The row as an entry of the study's file, with its fitted parameters."""
     assert row.fitted is not None
     prefix = row.placement.prefix
     values = {
@@ -124,7 +124,7 @@ def accepted_from(row: Ranked) -> Accepted:
 
 
 def in_order(rows: Sequence[Ranked]) -> list[Ranked]:
-    """What is accepted first, then what was fitted, each by its error, then all others."""
+    """Accepted rows first, then fitted rows, each by held-out error, then all others."""
     return sorted(rows, key=_order)
 
 

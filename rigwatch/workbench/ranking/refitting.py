@@ -14,7 +14,7 @@ Fitting = Callable[..., Fitted]
 
 
 def unheard(_: str) -> None:
-    """Progress that nobody asked for."""
+    """Default progress callback: does nothing."""
 
 
 def refit(
@@ -23,9 +23,9 @@ def refit(
     """Fit the model with the row's effect and judge it on the recordings held out.
 
     Args:
-        study, data, base: the model and what it was fitted to.
-        row: the effect; the fit and what is made of it are added.
-        fitting: `fit_model` to be content with the first minimum.
+        study, data, base: the study, its recordings and the fitted model.
+        row: the effect; its fit and the decision are stored in it.
+        fitting: `fit_model` accepts the first minimum, `fit_twice` also searches elsewhere.
     """
     placements, start = (*base.placements, row.placement), base.train.values() | row.begin()
     try:
@@ -44,7 +44,10 @@ def fit_each(  # noqa: PLR0917 -- they belong together
     rows: Sequence[Ranked],
     progress: Progress,
 ) -> list[Ranked]:
-    """Fit rows in turn; those that leave nothing, after which only what is like them is fitted."""
+    """Fit rows in turn and return those that explain the error.
+
+    Once a row explains the error, only rows similar to it are fitted.
+    """
     enough: list[Ranked] = []
     for number, row in enumerate(rows, start=1):
         if any(other.cosines[row.label] < SIMILAR for other in enough):
@@ -60,7 +63,7 @@ def fit_each(  # noqa: PLR0917 -- they belong together
 def try_again(
     study: Study, data: Data, base: Fitted, rows: Sequence[Ranked], progress: Progress
 ) -> None:
-    """Fit again what may have ended in a local minimum, as nothing explains the error."""
+    """Refit the rows that may have ended in a local minimum."""
     for row in rows:
         start = base.train.values() | row.begin()
         if row.fitted is None or not may_be_better(study, data, row.fitted, start):

@@ -1,4 +1,4 @@
-"""Scores candidates along the fitted model: what each explains of the residual, to first order."""
+"""Scores candidates along the fitted model: share of the residual each explains to first order."""
 
 from collections.abc import Sequence
 
@@ -29,7 +29,7 @@ def score_all(data: Data, base: Fitted, found: Sequence[Candidate]) -> Scores:
     """Scores of all candidates along the fitted base model.
 
     Args:
-        data, base: the model and what it was fitted to.
+        data, base: the recordings and the fitted model.
         found: the candidates.
     """
     fitted, recording = base.train, data.train
@@ -71,19 +71,19 @@ def rank_all(study: Study, data: Data, base: Fitted) -> list[Ranked]:
 
 
 def rank_only(study: Study, data: Data, base: Fitted, found: Sequence[Candidate]) -> Ranked:
-    """The row of one effect at one port, whatever its score; `found` are its shapes."""
+    """The row of one effect at one port, regardless of its score; `found` are its shapes."""
     return scored(study, data, base, found, every=True)[0]
 
 
 def scored(
     study: Study, data: Data, base: Fitted, found: Sequence[Candidate], *, every: bool = False
 ) -> list[Ranked]:
-    """One row an effect and port, scored and not yet fitted, the likeliest first.
+    """One row per effect and port, scored and not yet fitted, most promising first.
 
     Args:
-        study, data, base: the model and what it was fitted to.
-        found: the candidates; each row has the shape that the residual looks like most.
-        every: also those whose strength would be on the wrong side of its bounds.
+        study, data, base: the study, its recordings and the fitted model.
+        found: the candidates; each row keeps the shape that matches the residual best.
+        every: include effects whose strength would be outside its bounds.
     """
     scores = score_all(data, base, found)
     residual = np.nan_to_num(base.train.residuals / base.train.scale).ravel()

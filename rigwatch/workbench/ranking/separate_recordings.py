@@ -1,6 +1,6 @@
-"""Directions of candidates recording by recording, where a model without states has memory on it.
+"""Directions of candidates per recording, for effects with states on a model without states.
 
-What an effect remembers of one recording says nothing about the next, so each begins anew.
+Effect states do not carry over from one recording to the next; each recording starts afresh.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,16 +26,16 @@ def part_by_part(
     """`along` for the whole of the training recordings.
 
     Args:
-        along: directions of candidates (windows, samples, outputs, candidates) and slopes of the
-            model by its free parameters, then its initial states.
-        data, base, found: what it is given.
+        along: returns directions of candidates (windows, samples, outputs, candidates) and slopes
+            of the model by its free parameters, then by its initial states.
+        data, base, found: arguments of `along`.
     """
     system = base.compiled.system
     if system.model.states or len(data.train.parts) < 2:
         return along(data, base, found)
     if system.states:
         return _apart(along, data, base, found)
-    # Time runs on for what needs no memory, as it does in a fit.
+    # Effects without states keep continuous time across recordings, as in a fit.
     moved, slopes = along(data, base, found)
     keen = [index for index, candidate in enumerate(found) if candidate.effect.states]
     if keen:
@@ -46,7 +46,7 @@ def part_by_part(
 def _apart(
     along: Along, data: Data, base: Fitted, found: Sequence[Candidate]
 ) -> tuple[FloatArray, FloatArray]:
-    """The same of each recording by itself; slopes by each one's own initial states."""
+    """`along` for each recording separately; each has initial states of its own."""
     system, parts = base.compiled.system, data.train.parts
     pieces = zip(_pieces(data.train), _fits(base, len(parts)), strict=True)
     made = [along(replace(data, train=train), fitted, found) for train, fitted in pieces]
@@ -64,10 +64,10 @@ def _apart(
 
 
 def check_ports(study: Study) -> None:
-    """Refuse to rank effects in a model that they cannot enter.
+    """Check that effects can enter the model.
 
     Raises:
-        ModelError: it has no port.
+        ModelError: the model has no port.
     """
     if not study.model.ports:
         raise ModelError(
@@ -82,7 +82,7 @@ def _pieces(recording: Recording) -> list[Recording]:
 
 
 def _fits(base: Fitted, parts: int) -> list[Fitted]:
-    """The fit with the initial state of each recording alone."""
+    """One fit per recording, each with that recording's initial state."""
     initial = base.train.initial
     if len(initial) != parts:
         return [base] * parts

@@ -1,16 +1,16 @@
-"""Which effects are worth a fit: the best of each class that the residual looks like."""
+"""Selects the effects to fit: the best of each class that matches the residual."""
 
 from collections.abc import Sequence
 
 from rigwatch.workbench.ranking.ranked import Ranked
 
 LEVEL = 0.01
-"""Corrected p-value below which an effect is worth a fit."""
+"""Corrected p-value below which an effect is fitted."""
 MOST_FITS = {"static": 24, "dynamic": 6}
 
 
 def worth_a_fit(rows: Sequence[Ranked], kind: str) -> list[Ranked]:
-    """The best, and the best of each kind of port, that the residual looks like beyond chance."""
+    """The best significant effects, including the best of each kind of port."""
     likely = [row for row in rows if row.p_value < LEVEL]
     told: dict[str, Ranked] = {}
     for row in likely:
@@ -29,7 +29,7 @@ def worth_a_fit(rows: Sequence[Ranked], kind: str) -> list[Ranked]:
 
 
 def _told_by(row: Ranked, told: dict[str, Ranked], likely: Sequence[Ranked]) -> str | None:
-    """What is fitted in the row's place: a double of no more parameters, or of lower order."""
+    """Label of the similar effect fitted instead: of lower order, or with no more parameters."""
     lower = f"{row.placement.effect.refines}@{row.port}"
     if lower in row.alike and any(other.label == lower for other in likely):
         return lower

@@ -1,4 +1,4 @@
-"""The report's pictures: each takes numbers of a study and gives one <svg>."""
+"""The report's charts: each function takes results of a study and returns one <svg>."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from rigwatch.workbench.steps import Signals, Stage
 
 CELLS = 22
 NARROW = 6
-"""Bars that have room in half the page's width."""
+"""Number of bars that fit into half the page's width."""
 CROSSINGS = 8
-"""Crossings of its mean that a measured signal makes in the stretch that is shown."""
+"""Number of mean crossings of the measured signal in the section shown."""
 
 
 @dataclass(frozen=True)
 class Refused:
-    """An effect that was tried and not taken.
+    """An effect that was tried and refused.
 
     Attributes:
         label: "effect@port".
-        after: number of effects that stood already.
-        held_out_error: with it.
+        after: number of effects in the model at that time.
+        held_out_error: with the effect.
     """
 
     label: str
@@ -62,7 +62,7 @@ def error_chart(stages: Sequence[Stage], refused: Sequence[Refused]) -> str:
 
 
 def _beside(refused: Sequence[Refused]) -> list[tuple[float, Refused]]:
-    """Places right of the step that stood when each was refused."""
+    """Horizontal positions of refused effects, right of the step at which each was tried."""
     seen: dict[int, int] = {}
     placed = []
     for entry in refused:
@@ -72,7 +72,7 @@ def _beside(refused: Sequence[Refused]) -> list[tuple[float, Refused]]:
 
 
 def stretch(first: Signals, last: Signals, channel: int) -> slice:
-    """The part that shows best what the effects did: where the error fell most."""
+    """The section that shows the effects best: where the error fell most."""
     measured = np.nan_to_num(first.measured[:, channel] - np.nanmean(first.measured[:, channel]))
     crossings = max(int(np.sum(np.diff(np.sign(measured)) != 0)), 1)
     width = int(np.clip(len(measured) * CROSSINGS / crossings, 60, len(measured)))
@@ -87,7 +87,7 @@ def stretch(first: Signals, last: Signals, channel: int) -> slice:
 def signal_chart(
     found: Signals, channel: int, part: slice, axis: str, ends: tuple[float, float]
 ) -> str:
-    """Measured against modelled over a stretch."""
+    """Measured and modelled output over a section."""
     time = found.time[part]
     plot = Plot(
         "measured and modelled", (float(time[0]), float(time[-1])), ends, "",
@@ -101,7 +101,7 @@ def signal_chart(
 def residual_chart(
     found: Signals, channel: int, part: slice, unit: str, ends: tuple[float, float]
 ) -> str:
-    """Measured less modelled over the same stretch, on its own axis."""
+    """Residual over the same section, on its own axis."""
     time = found.time[part]
     plot = Plot(
         "residual", (float(time[0]), float(time[-1])), ends, "time [s]", f"residual [{unit}]",
@@ -114,7 +114,7 @@ def residual_chart(
 
 
 def surface_chart(stage: Stage, channel: int, most: float, unit: str) -> str | None:
-    """Mean residual over position × velocity; None where the model has no motion."""
+    """Mean residual over position × velocity; None if the model has no motion."""
     grid = _surface(stage, channel)
     if grid is None:
         return None
@@ -134,7 +134,7 @@ def surface_chart(stage: Stage, channel: int, most: float, unit: str) -> str | N
 
 
 def _motion_units(stage: Stage) -> tuple[str, str]:
-    """Units of what `locate.motion` gives: of two inputs, else of two states."""
+    """Units of the pair returned by `locate.motion`: of two inputs, otherwise of two states."""
     model = stage.bench.study.model
     if "position" in model.inputs and "velocity" in model.inputs:
         return model.inputs["position"].unit, model.inputs["velocity"].unit
@@ -142,7 +142,7 @@ def _motion_units(stage: Stage) -> tuple[str, str]:
 
 
 def surface_peak(stage: Stage, channel: int) -> float:
-    """Largest mean residual of a well visited cell, which gets the full colour."""
+    """Largest mean residual of a cell with enough samples, drawn in full colour."""
     grid = _surface(stage, channel)
     if grid is None:
         return 1.0
@@ -169,7 +169,7 @@ def _surface(
 def bars_chart(
     before: Sequence[Region], now: Sequence[Region], floor: float, words: str, unit: str
 ) -> str:
-    """Residual by region, in pairs: the model alone and the model as it is."""
+    """Residual by region, in pairs: the model alone and the current model."""
     names = [region.name for region in before]
     by_name = {region.name: region for region in now}
     values = np.array([r.rms for r in (*before, *now)])
@@ -200,7 +200,7 @@ def _short(name: str) -> str:
 
 
 def spectrum_chart(first: Stage, last: Stage, channel: int, unit: str) -> str:
-    """Density of the residual in training, the model alone and the model as it is."""
+    """Spectral density of the training residual: the model alone and the current model."""
     curves = [_density(stage, channel) for stage in (first, last)]
     rate = curves[0][0]
     ends = limits(*[np.log10(np.maximum(d, 1e-300)) for _, d in curves])
@@ -211,7 +211,7 @@ def spectrum_chart(first: Stage, last: Stage, channel: int, unit: str) -> str:
     )  # fmt: skip
     plot.line(*curves[0], "before", width=2, name="model alone")
     if last is not first:
-        plot.line(*curves[1], "held", width=2, name="model as it is")
+        plot.line(*curves[1], "held", width=2, name="current model")
     return plot.drawn()
 
 

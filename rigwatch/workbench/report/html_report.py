@@ -1,10 +1,10 @@
-"""The report of a study: one HTML page that holds everything and asks the network for nothing.
+"""The report of a study: one self-contained HTML page without network access.
 
 write_report(open_study("emps"), Path("emps.html"))
 
-Pictures are inline SVG in the page's own colours, light or dark as the reader's system is; numbers
-carry all their digits in `<data value="…">`, so that a program reads what `rigwatch compare --json`
-prints.
+Charts are inline SVG in the page's colours and follow the system's light or dark theme. Numbers are
+stored in full precision in `<data value="…">`, so a program reads the same values as from
+`rigwatch compare --json`.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from rigwatch.workbench.study import ledger as book
 
 
 def gather(study: Study, progress: Callable[[str], None] = lambda _: None) -> sections.Material:
-    """Everything that the report shows.
+    """Collect everything that the report shows.
 
     Raises:
         ModelError: data have changed, or do not suit the model.
@@ -30,7 +30,7 @@ def gather(study: Study, progress: Callable[[str], None] = lambda _: None) -> se
     found = stages(study)
     progress("simulating")
     shown = [signals(stage) for stage in found]
-    progress("ranking what may be missing")
+    progress("ranking effects")
     last = found[-1].bench
     rows, verdict = ranking(last, progress)
     told = explanation(last, rows, verdict)
@@ -49,7 +49,7 @@ def report_html(m: sections.Material) -> str:
 def write_report(
     study: Study, path: Path, progress: Callable[[str], None] = lambda _: None
 ) -> sections.Material:
-    """Write the report of a study; what it shows.
+    """Write the report of a study; return its content.
 
     Raises:
         ModelError: data have changed or do not suit the model, or the file cannot be written.

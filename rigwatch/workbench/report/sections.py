@@ -1,4 +1,4 @@
-"""The report's sections: what `templates/study.html` shows of a study, in words and drawings."""
+"""The report's sections: texts and charts for `templates/study.html`."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -25,14 +25,14 @@ VIEWS = {
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """All that a report is made from.
+    """Content of a report.
 
     Attributes:
-        study: what it is about.
-        stages: the model with no effect, with the first, …, as it is.
-        signals: measured and modelled on the recordings held out, of each stage.
-        explanation: ranking and verdict for the model as it is.
-        before, now: where the model alone and the model as it is fail, in training.
+        study: the study.
+        stages: the model without effects, with the first, …, the current model.
+        signals: measured and modelled held-out outputs of each stage.
+        explanation: ranking and verdict for the current model.
+        before, now: training residual by region, for the model alone and the current model.
         ledger: the steps so far.
     """
 
@@ -46,7 +46,7 @@ class Material:
 
     @property
     def refused(self) -> list[charts.Refused]:
-        """Effects that held-out data spoke against, where what stood then stands still."""
+        """Effects refused by held-out data while the model had effects that it still has."""
         labels = [stage.added for stage in self.stages[1:]]
         found: dict[tuple[str, int], charts.Refused] = {}
         for line in self.ledger:
@@ -58,7 +58,7 @@ class Material:
 
 
 def headline(m: Material) -> str:
-    """What a reader takes along: how far the error fell, and what is missing still."""
+    """The heading: how far the error fell, and what is still missing."""
     first, last = m.stages[0].comparison, m.stages[-1].comparison
     best = m.explanation.ranking[0] if m.explanation.ranking else None
     name = f"{_plain(best.effect)} at {best.port}" if best else ""
@@ -78,7 +78,7 @@ def headline(m: Material) -> str:
 
 
 def doubt(m: Material) -> str:
-    """How sure the verdict is, as a sentence."""
+    """The reliability of the verdict, in a sentence."""
     text = doubt_of(m.explanation)
     return f"{text[0].upper()}{text[1:]}."
 
@@ -93,19 +93,19 @@ def _listed(m: Material) -> str:
 
 
 def story(m: Material) -> str:
-    """What was done and what came of it."""
+    """The steps taken and their result, in words."""
     first, last = m.stages[0].comparison, m.stages[-1].comparison
-    verdict = f"Verdict on the model as it is: {m.explanation.text}."
+    verdict = f"Verdict on the current model: {m.explanation.text}."
     if len(m.stages) == 1:
         return verdict
     return (
-        f"The error on recordings that no fit has seen fell from {first.held_out_error:.3g} to"
-        f" {last.held_out_error:.3g} {last.unit} as {_listed(m)} came into the model. {verdict}"
+        f"The error on held-out recordings fell from {first.held_out_error:.3g} to"
+        f" {last.held_out_error:.3g} {last.unit} as {_listed(m)} was added. {verdict}"
     )
 
 
 def measured(m: Material) -> Iterator[tuple[str, str, str]]:
-    """Of each channel and step: heading, drawn signals, drawn residual."""
+    """For each channel and step: heading, chart of the signals, chart of the residual."""
     for channel, (name, output) in enumerate(m.study.model.outputs.items()):
         axis = f"{name} [{output.unit}]"
         part = charts.stretch(m.signals[0], m.signals[-1], channel)
@@ -123,20 +123,20 @@ def measured(m: Material) -> Iterator[tuple[str, str, str]]:
 
 
 def _without_spikes(residuals: Sequence[FloatArray]) -> tuple[float, float]:
-    """Ends of the axis that all steps share; a few spikes may stand out of it."""
+    """Limits of the axis shared by all steps; a few spikes may exceed it."""
     usual = [np.nanquantile(r, [0.01, 0.99]) for r in residuals if np.isfinite(r).any()]
     return limits(*usual, room=0.25)
 
 
 @dataclass(frozen=True)
 class Where:
-    """Where the model fails in one channel: drawings by their captions.
+    """Where the model fails in one channel: charts by caption.
 
     Attributes:
         channel: its name.
-        maps: mean residual by position and velocity, empty where the model has no motion.
-        peak: mean residual of full colour, in the channel's unit.
-        narrow, wide: bars, two beside each other and one by one.
+        maps: mean residual by position and velocity, empty if the model has no motion.
+        peak: mean residual drawn in full colour, in the channel's unit.
+        narrow, wide: bar charts of half and of full page width.
     """
 
     channel: str
@@ -147,13 +147,13 @@ class Where:
 
 
 def where(m: Material) -> Iterator[Where]:
-    """Where-maps of each channel: motion, direction, amplitude, time, frequency."""
+    """Charts of each channel by motion, direction, amplitude, time and frequency."""
     first, last = m.stages[0], m.stages[-1]
     for channel, (name, output) in enumerate(m.study.model.outputs.items()):
         peak = charts.surface_peak(first, channel)
         drawn = {
             words: charts.surface_chart(stage, channel, peak, output.unit)
-            for words, stage in (("model alone", first), ("model as it is", last))
+            for words, stage in (("model alone", first), ("current model", last))
         }
         maps = {words: drawing for words, drawing in drawn.items() if drawing}
         bars = {wide: _bars(m, name, output.unit, wide=wide) for wide in (False, True)}
@@ -163,7 +163,7 @@ def where(m: Material) -> Iterator[Where]:
 
 
 def _bars(m: Material, channel: str, unit: str, *, wide: bool) -> dict[str, str]:
-    """Bars of the views that need the page's whole width, or of those that do not."""
+    """Bar charts of the views that need the full page width, or of the others."""
     floor = m.stages[-1].comparison.channels[channel].noise_floor
     drawn = {}
     for view, words in VIEWS.items():
@@ -181,7 +181,7 @@ def _order(region: Region) -> tuple[float, str]:
 
 
 def relative(value: Value) -> tuple[float, float] | None:
-    """Ends of a parameter's interval, from its value and as a share of it; None without one."""
+    """Ends of a parameter's interval relative to its value; None without an interval."""
     if value.interval is None or value.value == 0:
         return None
     low, high = ((end - value.value) / abs(value.value) for end in value.interval)
@@ -189,7 +189,7 @@ def relative(value: Value) -> tuple[float, float] | None:
 
 
 def hashes(m: Material) -> dict[str, str]:
-    """SHA-256 of all that the ledger's last step stood on, by file."""
+    """SHA-256 of all inputs of the ledger's last step, by file."""
     if not m.ledger:
         return {}
     return {**m.ledger[-1].get("data", {}), "model and effects": m.ledger[-1]["model"]}

@@ -1,4 +1,4 @@
-"""Results of the workbench as plain text: tables, and a sentence where a sentence does."""
+"""Results of the workbench as plain text: tables and sentences."""
 
 from collections.abc import Sequence
 
@@ -13,12 +13,12 @@ VERDICTS = {
     "missing_effect": "an effect is missing",
     "undetermined": "undetermined: this recording cannot tell rivals apart",
     "unknown_effect": "something is missing that no known effect explains",
-    "model_inadequate": "the model cannot judge this recording: no effect is named",
+    "model_inadequate": "the model is inadequate for this recording: no effect is named",
 }
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines with columns of equal width; numbers to the right."""
+    """Lines of aligned columns; numbers are right-aligned."""
     whole = [list(head), *map(list, rows)]
     wide = [max(len(row[i]) for row in whole) for i in range(len(head))]
     right = [all(_numeric(row[i]) for row in rows) for i in range(len(head))]
@@ -37,7 +37,7 @@ def _numeric(text: str) -> bool:
 
 
 def number(value: float | None) -> str:
-    """Four digits."""
+    """A number with four significant digits."""
     return "-" if value is None else f"{value:.4g}"
 
 
@@ -54,7 +54,7 @@ def comparison_lines(found: Comparison) -> list[str]:
     lines = [heading, "", "error (root mean square)"]
     lines += table(["channel", "unit", "training", "held out", "noise floor"], rows)
     lines += [
-        f"  one free run over all that is held out: {name} {number(c.free_run_error)} {c.unit}"
+        f"  one free run over all held-out data: {name} {number(c.free_run_error)} {c.unit}"
         for name, c in found.channels.items()
         if c.free_run_error is not None
     ]
@@ -65,7 +65,7 @@ def comparison_lines(found: Comparison) -> list[str]:
 
 
 def fit_lines(found: Comparison) -> list[str]:
-    """How the fit ended, and what inputs do between samples."""
+    """Holds of the inputs and convergence of the fit."""
     lines = [f"  input {name}: {_held(held)}" for name, held in found.hold.items()]
     ended = found.convergence
     if ended is None:
@@ -81,13 +81,13 @@ def fit_lines(found: Comparison) -> list[str]:
 
 
 def _held(held: Held) -> str:
-    """What an input does between samples, in words."""
-    what = "held from sample to sample" if held.hold == "zero" else "a line between samples"
+    """An input's hold between samples, in words."""
+    what = "held from sample to sample" if held.hold == "zero" else "linear between samples"
     if held.late:
         time = f" ({1e3 * held.seconds:.3g} ms)" if held.seconds else ""
         what += f", {held.late:.2g} of a sample late{time}"
     if held.source in GIVEN:
-        return f"{what}, as {held.source} says"
+        return f"{what}, given by {held.source}"
     return f"{what}, chosen from {held.source}"
 
 
@@ -124,18 +124,18 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
 
 
 def doubt_of(found: Explanation) -> str:
-    """How often a verdict like this one was wrong where the truth was known, in a sentence."""
+    """How often similar verdicts were wrong on simulated cases, in a sentence."""
     cases, wrong = found.like_this
     if found.wrong_probability is None:
         return (
-            "how often such a verdict is wrong is not calibrated for models along the measured"
+            "the probability of being wrong is not calibrated for models along the measured"
             " motion: the simulated cases are free runs"
         )
     if not cases:
-        return "no simulated case looked like this one: how often that is wrong is not known"
+        return "the probability of being wrong is unknown: no simulated case is similar to this one"
     return (
-        f"probability of being wrong {found.wrong_probability:.1%}: of {cases} simulated cases"
-        f" with such a verdict {wrong} were wrong"
+        f"probability of being wrong {found.wrong_probability:.1%}: of {cases} similar simulated"
+        f" cases {wrong} were wrong"
     )
 
 
@@ -169,25 +169,25 @@ def base_lines(found: Bases, most: int = 12) -> list[str]:
     head = ["variants", "training", "held out", "over noise", "parameters"]
     rows = [
         [
-            ", ".join(base.variants) or "as written",
+            ", ".join(base.variants) or "none",
             *map(number, (base.train_error, base.held_out_error, base.over_noise)),
             str(base.parameters),
         ]
         for base in found.ranking[:most]
     ]
     enough = found.enough
-    lines = [f"healthy recordings, error in deviations of noise ({len(found.ranking)} bases)"]
+    lines = [f"healthy recordings, error in noise standard deviations ({len(found.ranking)} bases)"]
     lines += [*table(head, rows), ""]
     lines += [
-        f"enough: {', '.join(enough.variants) or 'the model as it was written'}, which leaves"
-        f" {enough.over_noise:.3g} times the noise of what is held out"
+        f"enough: {', '.join(enough.variants) or 'the unmodified model'}, with a held-out error of"
+        f" {enough.over_noise:.3g} times the noise"
     ]
     lines += [f"  {enough.reason}"] if enough.variants else []
     return lines + [f"note: {remark}" for remark in found.remarks]
 
 
 def region_lines(found: Sequence[Region], most: int) -> list[str]:
-    """What `rigwatch locate` prints: of each view the regions with most of the energy."""
+    """What `rigwatch locate` prints: for each view the regions with the most energy."""
     lines = []
     for channel, view in dict.fromkeys((r.channel, r.view) for r in found):
         regions = [r for r in found if (r.channel, r.view) == (channel, view)][:most]

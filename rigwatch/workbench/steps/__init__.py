@@ -1,4 +1,4 @@
-"""Steps on a study: its base, effects added and undone, the ledger again, a model for a monitor."""
+"""Steps of a study: choose a base, add and undo effects, replay the ledger, promote the model."""
 
 from rigwatch.workbench.steps import change
 from rigwatch.workbench.steps.base import Base, Bases, find_base, take_base

@@ -1,9 +1,9 @@
-"""Which variants of a study's model its healthy recordings speak for, and taking them.
+"""Selects the variants of a study's model that its healthy recordings support.
 
-A verdict is worth as much as the model that it stands on. The model is fitted to the first part of
-what was recorded with nothing wrong, and judged on the rest. Then variants are added one at a time,
-the best first, for as long as the error of the rest falls block by block beyond chance; one with
-fewer parameters also where it does as well. Of a group one may take another's place.
+A verdict is only as good as the base model. The model is fitted to the first part of the healthy
+recordings and judged on the rest. Variants are then added one at a time, best first, as long as the
+error on the rest falls, over blocks, by more than chance. A variant with fewer parameters is taken
+if it does equally well. A variant may replace those of its group that it excludes.
 """
 
 from collections.abc import Container, Mapping, Sequence
@@ -28,15 +28,15 @@ from rigwatch.workbench.ranking import STEP, Progress, difference, unheard
 from rigwatch.workbench.study import Study, check_data, commit, use_variants, varied
 
 FIT_SHARE = 0.6
-"""Share of a single healthy recording that is fitted; the rest decides."""
+"""Share of a single healthy recording used for fitting; the rest decides."""
 WORTH = 0.02
-"""Share by which it must fall for more parameters."""
+"""Smallest relative fall of the held-out error that justifies more parameters."""
 AS_WELL = 0.002
-"""Share by which it may rise for fewer."""
+"""Largest relative rise of the held-out error accepted for fewer parameters."""
 HOPELESS = 1.1
-"""Error over that without it from which a variant is not tried beside others."""
+"""Ratio of errors with and without a variant above which it is not combined with others."""
 ROUNDS = 4
-"""Variants that are added at most."""
+"""Largest number of variants added."""
 
 NO_HEALTHY = (
     "found no healthy recording, expected one: record a run with nothing wrong and list it under"
@@ -46,14 +46,15 @@ NO_HEALTHY = (
 
 @dataclass(frozen=True)
 class Base:
-    """The study's model with some variants, on the healthy recordings.
+    """The study's model with some variants, fitted to the healthy recordings.
 
     Attributes:
-        variants: their names; none is the model as it was written.
-        train_error, held_out_error: over all channels, in deviations of the sensors' noise.
-        over_noise: the held-out error over what noise leaves there.
-        parameters: how many were fitted.
-        reason: in words.
+        variants: their names; none is the unmodified model.
+        train_error, held_out_error: rms over all channels, in standard deviations of the sensor
+            noise.
+        over_noise: the held-out error over its noise floor.
+        parameters: number of fitted parameters.
+        reason: the physics of the variants, in words.
     """
 
     variants: tuple[str, ...]
@@ -66,12 +67,12 @@ class Base:
 
 @dataclass(frozen=True)
 class Bases:
-    """What the healthy recordings say of the variants.
+    """Result of the search for a base.
 
     Attributes:
-        enough: the base with which nothing better was found, and the simplest of equals.
-        ranking: all that were tried, the best first.
-        remarks: what was noticed, for people.
+        enough: the simplest base that no other tried beats.
+        ranking: all bases tried, best first.
+        remarks: notes for the user.
     """
 
     enough: Base
@@ -87,11 +88,11 @@ class _Tried:
 
 
 def find_base(study: Study, progress: Progress = unheard) -> Bases:
-    """Variants of the study's model that its healthy recordings speak for.
+    """Search for the variants of the study's model that its healthy recordings support.
 
     Args:
-        study: the study; what it has accepted so far plays no part.
-        progress: told which fit begins.
+        study: the study; its accepted effects are ignored.
+        progress: called with a line of text as each fit begins.
 
     Raises:
         ModelError: there is no healthy recording, the model has no variants, or cannot be fitted.
@@ -104,7 +105,7 @@ def find_base(study: Study, progress: Progress = unheard) -> Bases:
     if data.healthy is None:
         raise ModelError(f"{study.folder}: {NO_HEALTHY}")
     search = _Search(varied(study, ()).with_effects(()), _apart(data.healthy, data.horizon))
-    progress("fitting the model as it was written")
+    progress("fitting the unmodified model")
     best = search.first()
     tried = [best]
     for _ in range(ROUNDS):
@@ -121,7 +122,7 @@ def find_base(study: Study, progress: Progress = unheard) -> Bases:
 
 
 def take_base(study: Study, variants: Sequence[str]) -> Study:
-    """The study with these variants in its file and a line in its ledger.
+    """Write these variants to the study's file and its ledger; return the changed study.
 
     Raises:
         ModelError: effects have been accepted on another base, or variants exclude each other.
@@ -129,8 +130,8 @@ def take_base(study: Study, variants: Sequence[str]) -> Study:
     if study.file.effects:
         label = f"{study.file.effects[-1].effect}@{study.file.effects[-1].port}"
         raise ModelError(
-            f"{study.folder}: found {label} accepted on the base as it is, expected a study without"
-            " effects; `rigwatch undo` takes them away"
+            f"{study.folder}: found {label} accepted on the current base, expected a study without"
+            " effects; `rigwatch undo` removes them"
         )
     varied(study, variants)
     changed = use_variants(study, variants)
@@ -139,7 +140,7 @@ def take_base(study: Study, variants: Sequence[str]) -> Study:
 
 
 def _next(model: Model, at: _Tried, hopeless: Container[str]) -> list[tuple[str, ...]]:
-    """What may be tried from a base: one variant more, or in the place of those it excludes."""
+    """Bases to try next: each further variant added, replacing those that it excludes."""
     own = at.base.variants
     return [
         (*(n for n in own if not excludes(model, name, n)), name)
@@ -149,7 +150,7 @@ def _next(model: Model, at: _Tried, hopeless: Container[str]) -> list[tuple[str,
 
 
 def _improves(best: _Tried, one: _Tried) -> bool:
-    """Whether a base does better beyond chance, or as well with fewer parameters."""
+    """Whether a base is better by more than chance, or equal with fewer parameters."""
     found = difference(best.fitted.held_out, one.fitted.held_out)
     if one.base.parameters < best.base.parameters and found.relative > -AS_WELL:
         return True
@@ -166,18 +167,18 @@ class _Search:
         self.hopeless: set[str] = set()
 
     def first(self) -> _Tried:
-        """The model as it was written."""
-        return self._fitted((), self._study.file.start, "the model as it was written")
+        """The unmodified model."""
+        return self._fitted((), self._study.file.start, "the unmodified model")
 
     def attempt(self, at: _Tried, names: tuple[str, ...], progress: Progress) -> _Tried | None:
-        """The model with these variants, from where another base ended; None where it diverges.
+        """The model with these variants, started from another base's fit.
 
-        Each set of variants is fitted once.
+        None if the fit fails or the set has been tried already; each set is fitted once.
         """
         key = frozenset(names)
         if key in self._known:
             return None
-        progress(f"fitting it with {' and '.join(names)}")
+        progress(f"fitting the model with {' and '.join(names)}")
         own = varied(self._study, names).model.parameters
         before, values = at.model.parameters, at.fitted.train.values()
         start = {n: values[n] for n, p in own.items() if n in values and before.get(n) == p}
@@ -214,7 +215,7 @@ class _Search:
 
 
 def _physics(model: Model, names: Sequence[str]) -> str:
-    """What variants say of the rig."""
+    """The physics of variants, in words."""
     return " ".join(model.variants[name].physics for name in names)
 
 
@@ -223,7 +224,7 @@ def _overall(rms: FloatArray, scale: FloatArray) -> float:
 
 
 def _apart(healthy: Recording, horizon: int) -> Data:
-    """What is fitted and what decides: the last of several recordings, else the end of the one."""
+    """Splits the healthy data: the last of several recordings, or the end of one, is held out."""
     parts = healthy.parts or (len(healthy),)
     if len(parts) > 1:
         cut, first, rest = sum(parts[:-1]), parts[:-1], parts[-1:]

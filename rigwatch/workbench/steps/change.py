@@ -1,6 +1,6 @@
-"""Changes a study: adds an effect, takes the last one away, takes own effects in.
+"""Changes a study: adds an effect, removes the last one, loads a user's effect file.
 
-Each change of the model is a trial (`trial.py`) and its commit; the ledger keeps all of them.
+Each change of the model is a trial (`trial.py`) and its commit; the ledger records all of them.
 """
 
 from pathlib import Path
@@ -20,14 +20,14 @@ def add(
     anyway: bool = False,
     progress: Progress = unheard,
 ) -> Change:
-    """Put an effect into the model, if the recordings held out speak for it.
+    """Add an effect to the model if the held-out error supports it.
 
     Args:
         study: the study.
         effect: its name.
-        port: where; may be left out where only one port takes it.
-        anyway: add it even though the held-out error does not fall.
-        progress: told what begins.
+        port: name of the port; optional if only one port is compatible.
+        anyway: add it even if the held-out error does not fall.
+        progress: called with a line of text as each part begins.
 
     Raises:
         ModelError: effect or port is unknown or already there, the fit fails, or the study has been
@@ -37,7 +37,7 @@ def add(
 
 
 def undo(study: Study, progress: Progress = unheard) -> Change:
-    """Take the last effect away or, where there is none, the variants of the model.
+    """Remove the last effect or, if there is none, the variants of the model.
 
     Raises:
         ModelError: there is nothing to undo, or the study has been changed since it was opened.
@@ -46,10 +46,10 @@ def undo(study: Study, progress: Progress = unheard) -> Change:
 
 
 def learn(study: Study, path: Path) -> tuple[Study, list[str]]:
-    """Take the user's effect file into the study; its effects' names.
+    """Load a user's effect file into the study; the changed study and the effects' names.
 
     Raises:
-        ConfigError: the file does not fit.
+        ConfigError: the file is invalid.
         ModelError: an effect fits none of the model's ports.
     """
     found = load_effects(path)

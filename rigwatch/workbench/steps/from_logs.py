@@ -1,7 +1,7 @@
-"""A study from the logs of a machine and the name of a model.
+"""Creates a study from a machine's logs and the name of a model.
 
-Logs become sessions in the study's folder, columns become the model's signals, and the file that is
-written says what was chosen: parts to fit to and parts that decide, rate, low-pass.
+Logs are imported as sessions in the study's folder and columns are matched to the model's signals.
+The study file records the choices: training and held-out parts, sample rate, low-pass.
 """
 
 import shutil
@@ -28,14 +28,14 @@ from rigwatch.workbench.study import FILE, Span, Study, open_study
 
 @dataclass(frozen=True)
 class Logs:
-    """What a user has.
+    """Input of a new study.
 
     Attributes:
         data: log files: CSV, MAT, Parquet, JSON; or sessions.
         model: a shipped model's name, or a model file.
-        healthy: logs with nothing wrong.
-        mapping: how logs are read, where their headers do not tell.
-        start: values of the model's parameters that are known, in their units.
+        healthy: logs of the healthy machine.
+        mapping: how logs are read where their headers are not sufficient.
+        start: known values of the model's parameters, in their units.
     """
 
     data: tuple[Path, ...]
@@ -46,16 +46,16 @@ class Logs:
 
 
 def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
-    """A new study, and what was chosen or taken for granted.
+    """Create a study; return it with remarks on choices and assumptions.
 
     Args:
-        folder: is made where there is none.
+        folder: created if it does not exist.
         logs: recordings and model.
 
     Raises:
         ConfigError: the folder holds a study already.
         ImportDataError: a log cannot be read.
-        ModelError: the model is unknown, or its signals are not told by the columns.
+        ModelError: the model is unknown, or columns cannot be matched to its signals.
     """
     if (folder / FILE).exists():
         raise ConfigError(folder / FILE, "", "a study", "a folder without one")
@@ -79,7 +79,7 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
 def _imported(
     folder: Path, logs: Logs, model: Model, written: list[Path]
 ) -> tuple[Matched, list[str]]:
-    """Logs as sessions of one name each beside the study's file."""
+    """Imports logs as sessions beside the study's file; `written` collects their paths."""
     names = [path.stem for path in (*logs.data, *logs.healthy)]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ModelError(f"--data: found {min(twice)} twice, expected files of different names")
@@ -106,7 +106,7 @@ def _imported(
 
 
 def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str, list[str]]:
-    """The study's file, and what was chosen for it in words."""
+    """The text of the study's file, and remarks on its choices."""
     spans = [Span(session=f"{path.stem}.mcap") for path in logs.data]
     tables = [read_columns(folder, span) for span in spans]
     driving = [n for n in _channels(model.inputs) if n in tables[0].values]
@@ -138,7 +138,7 @@ def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str
     known = [n for n, p in model.parameters.items() if p.fixed and n not in logs.start]
     if known:
         said.append(
-            f"{', '.join(known)}: not fitted, taken from the model file; say what you know with"
+            f"{', '.join(known)}: not fitted, taken from the model file; set known values with"
             f" --set {known[0]}=VALUE"
         )
     return "\n".join(lines) + "\n", said
@@ -149,7 +149,7 @@ def _channels(signals: Mapping[str, Input] | Mapping[str, Output]) -> list[str]:
 
 
 def _named(folder: Path, model: str) -> str:
-    """A model by its name, or its file copied into the study."""
+    """The model's name, or its file name after copying it into the study."""
     if not model.endswith(".toml"):
         return model
     shutil.copyfile(model, folder / Path(model).name)

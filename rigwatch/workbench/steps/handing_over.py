@@ -1,7 +1,7 @@
-"""Hands a promoted model to the monitor of a rig: to the running one, else into its file.
+"""Hands a promoted model to a rig's monitor: live if it runs, otherwise by its model file.
 
-Before a model goes live it can be rehearsed on what the rig did last: the monitor with it and the
-one without run over the same samples.
+Before a model goes live it can be rehearsed on the latest samples of the rig: the monitor runs over
+them with the new model and with the model in force.
 """
 
 import time
@@ -26,12 +26,12 @@ LINK_TIMEOUT = 3.0
 
 @dataclass(frozen=True)
 class HandedOver:
-    """What became of it.
+    """Outcome of a model change.
 
     Attributes:
-        granted: what the monitor says.
-        live: whether one runs.
-        found: what was handed over; None for a rollback.
+        granted: the monitor's answer.
+        live: whether a monitor is running.
+        found: the promoted model; None for a rollback.
     """
 
     granted: Granted
@@ -41,12 +41,12 @@ class HandedOver:
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """A model on what the rig did last.
+    """Comparison of a new model with the model in force on the same samples.
 
     Attributes:
-        seconds: length of it [s].
+        seconds: length of the samples [s].
         before, after: the monitor's residual with the model in force and with the new one, rms.
-        alarms: names that the new one raises there.
+        alarms: names of the alarms that the new model raises.
     """
 
     seconds: float
@@ -63,17 +63,17 @@ def hand_over(
     rollback: bool = False,
     say: Callable[[str], None] = lambda _: None,
 ) -> HandedOver:
-    """Promote a study's model to a rig's monitor, or take the one before again.
+    """Promote a study's model to a rig's monitor, or restore the previous model.
 
     Args:
-        study: whose accepted effects are promoted.
+        study: the study whose accepted effects are promoted.
         rig: the rig's configuration.
-        user: who asks.
-        rollback: the model before again.
-        say: takes remarks for people.
+        user: who makes the request.
+        rollback: restore the previous model instead.
+        say: called with remarks for the user.
 
     Raises:
-        ModelError: an effect has no place in the monitor's model, or the residual does not fall.
+        ModelError: the monitor's model does not support an effect, or the residual does not fall.
         ConfigError: the rig's configuration or model cannot be read.
     """
     path = model_path(rig)
@@ -91,12 +91,12 @@ def hand_over(
 
 
 def model_path(rig: Path) -> Path:
-    """The file of the model that a rig's monitor runs with."""
+    """Path of the model file that a rig's monitor uses."""
     return Path(monitor_section(load_rig(rig), rig).model)
 
 
 def rehearse(new: RigModel, old: RigModel, blocks: Sequence[SampleBlock]) -> Rehearsal:
-    """Both models over the same samples; the first second, in which filters settle, not counted."""
+    """Run both models over the same samples; the settling time of the filters is skipped."""
     seconds = (blocks[-1].t_ns[-1] - blocks[0].t_ns[0]) / 1e9 if blocks else 0.0
     (before, _), (after, alarms) = (_run(model, blocks) for model in (old, new))
     return Rehearsal(float(seconds), before, after, alarms)
@@ -115,7 +115,7 @@ def _run(model: RigModel, blocks: Sequence[SampleBlock]) -> tuple[float, tuple[s
 
 
 def _send(rig: Path, path: Path, wish: Wish, say: Callable[[str], None]) -> tuple[Granted, bool]:
-    """The monitor's answer; where none runs, the file is changed for its next start."""
+    """The monitor's answer and True; if none runs, the file is changed, and False."""
     try:
         bus = connect(load_rig(rig), unique_process("promote"), LINK_TIMEOUT)
         try:
@@ -123,7 +123,7 @@ def _send(rig: Path, path: Path, wish: Wish, say: Callable[[str], None]) -> tupl
         finally:
             bus.close()
     except BusError as error:
-        say(f"{error}; the file is changed for its next start")
+        say(f"{error}; the model file is changed for the monitor's next start")
         return _in_file(path, wish), False
 
 

@@ -1,4 +1,4 @@
-"""Replays a ledger: every model that was ever compared is fitted again and its error compared."""
+"""Replays a ledger: refits every recorded model and compares its error with the recorded one."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from rigwatch.workbench.compare import comparison, open_bench
 from rigwatch.workbench.study import Accepted, Study, lines, varied
 
 SAME = 1e-6
-"""Share by which errors may differ between machines."""
+"""Relative difference of errors allowed between machines."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One step, done again."""
+    """One step, repeated."""
 
     step: str
     effects: list[str]
@@ -26,10 +26,10 @@ class Check:
 
 
 def replay(study: Study, progress: Callable[[str], None] = lambda _: None) -> list[Check]:
-    """Fit the models of all steps that changed the effects; the file itself is left alone."""
+    """Refit the models of all steps that changed the effects; the study's file is not changed."""
     checks = []
     accepted: dict[str, Accepted] = {}
-    # The variants that the first step stood on: what the first change of them took away.
+    # The variants in force at the first step: those that the first change of base replaced.
     first = next((line for line in lines(study) if line["step"] == "base"), None)
     study = varied(study, first["before"] if first else study.file.variants)
     for line in lines(study):

@@ -1,4 +1,4 @@
-"""Which columns of a log are a model's signals: by name, else by the only unit that fits."""
+"""Matches columns of a log to a model's signals: by name, otherwise by the only matching unit."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,18 +9,18 @@ from rigwatch.wire.exchange import Header, read_header
 from rigwatch.wire.units import unit_of
 
 TIMES = ("time", "t", "timestamp", "time_stamp", "seconds", "sec")
-"""Names of the column of the time."""
+"""Names of a time column."""
 
 
 @dataclass(frozen=True)
 class Matched:
-    """How a log is read.
+    """Column mapping of a log.
 
     Attributes:
         channels: channel = "column[unit]".
-        time: "column[unit]", empty where the log has none.
-        rates: channels that are made from others: how often those are differentiated.
-        remarks: what was taken for granted, for people.
+        time: "column[unit]", empty if the log has none.
+        rates: derived channels: source channel and number of differentiations.
+        remarks: assumptions made, for the user.
     """
 
     channels: dict[str, str]
@@ -34,11 +34,11 @@ def matched(columns: Sequence[str], model: Model, given: Mapping[str, str]) -> M
 
     Args:
         columns: of the log.
-        model: whose signals are looked for.
-        given: what the user said, channel = "column[unit]".
+        model: the model whose signals are matched.
+        given: mapping given by the user, channel = "column[unit]".
 
     Raises:
-        ModelError: no column, or more than one, may be a signal; what to type is said.
+        ModelError: no column, or more than one, matches a signal; the text says what to type.
     """
     headers = [read_header(column) for column in columns]
     time = next((header for header in headers if header.name in TIMES), None)
@@ -55,13 +55,13 @@ def matched(columns: Sequence[str], model: Model, given: Mapping[str, str]) -> M
             found[channel] = f"{column.column}[{unit}]"
             free.remove(column)
             if not column.units:
-                remarks.append(f"{column.column}: no unit in its header, taken for {unit}")
+                remarks.append(f"{column.column}: no unit in its header, assumed {unit}")
         elif made := _rate(signal, signals):
             rates[channel] = made
         else:
             raise ModelError(_unknown(name, channel, signal, columns))
     if time is not None and not time.units:
-        remarks.append(f"{time.column}: no unit in its header, taken for s")
+        remarks.append(f"{time.column}: no unit in its header, assumed s")
     told = f"{time.column}[{_time_unit(time)}]" if time else ""
     return Matched(found, told, rates, tuple(remarks))
 
@@ -73,7 +73,7 @@ def _time_unit(time: Header) -> str:
 def _column(
     name: str, channel: str, signal: Input | Output, headers: Sequence[Header]
 ) -> Header | None:
-    """The column of a signal: of its name, else the only one whose unit fits."""
+    """The column of a signal: by name, otherwise the only one with a matching unit."""
     suiting = [header for header in headers if not header.units or _fits(header, signal)]
     wanted = {name.lower(), channel.lower()}
     named = [header for header in suiting if header.name in wanted]
@@ -95,14 +95,14 @@ def _fits(header: Header, signal: Input | Output) -> bool:
 
 
 def _unit(header: Header, signal: Input | Output) -> str:
-    """The unit that a header means: of those that it may, the one that suits the signal."""
+    """The unit of a header: of its possible readings, the one that matches the signal."""
     wanted = unit_of(signal.shown or signal.unit).dimension
     fitting = (unit for unit in header.units if unit_of(unit).dimension == wanted)
     return next(fitting, signal.shown or signal.unit)
 
 
 def _rate(signal: Input | Output, signals: Mapping[str, Input | Output]) -> tuple[str, int] | None:
-    """The channel that a signal is the rate of, and how often that is differentiated."""
+    """The channel whose derivative a signal is, and the order of the derivative."""
     own = unit_of(signal.shown or signal.unit).dimension
     for order in (1, 2):
         for name, other in signals.items():
@@ -115,6 +115,6 @@ def _rate(signal: Input | Output, signals: Mapping[str, Input | Output]) -> tupl
 def _unknown(name: str, channel: str, signal: Input | Output, columns: Sequence[str]) -> str:
     unit = signal.shown or signal.unit
     return (
-        f"found no column that must be {name} [{unit}] among {', '.join(columns)};"
-        f" say which: --map {channel}=COLUMN[{unit}]"
+        f"found no unique column for {name} [{unit}] among {', '.join(columns)};"
+        f" expected --map {channel}=COLUMN[{unit}]"
     )

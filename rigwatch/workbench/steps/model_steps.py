@@ -1,6 +1,6 @@
-"""A study step by step: its model with no effect accepted, with the first, with the first two, …
+"""A study step by step: its model without effects, with the first, with the first two, …
 
-Report and view show the same stages, each fitted to the same data.
+Report and browser show the same stages, each fitted to the same data.
 """
 
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ class Stage:
     """The model with the first effects of the study.
 
     Attributes:
-        added: the effect that came last, as "effect@port"; empty for the model alone.
-        bench: the model, fitted.
-        comparison: its errors, as `compare` gives them.
+        added: the effect added last, as "effect@port"; empty for the model alone.
+        bench: the fitted model with its data.
+        comparison: its errors, as returned by `compare`.
     """
 
     added: str
@@ -29,7 +29,7 @@ class Stage:
 
     @property
     def label(self) -> str:
-        """What people call it."""
+        """Name shown to users."""
         return f"+ {self.added.split('@')[0].replace('_', ' ')}" if self.added else "model alone"
 
 
@@ -39,7 +39,7 @@ class Signals:
 
     Attributes:
         time: from the recording's first sample [s], shape (n,).
-        measured, modelled: shape (n, outputs); NaN where nothing valid was measured.
+        measured, modelled: shape (n, outputs); NaN where no valid sample was measured.
     """
 
     time: FloatArray
@@ -48,12 +48,12 @@ class Signals:
 
     @property
     def residual(self) -> FloatArray:
-        """Measured less modelled, shape (n, outputs)."""
+        """Measured minus modelled, shape (n, outputs)."""
         return self.measured - self.modelled
 
 
 def stages(study: Study) -> list[Stage]:
-    """Every stage, the model alone first, the study's model as it is last.
+    """Every stage, from the model alone to the study's current model.
 
     Raises:
         ModelError: data have changed, or do not suit the model.
@@ -68,7 +68,7 @@ def stages(study: Study) -> list[Stage]:
 
 
 def signals(stage: Stage, *, held_out: bool = True) -> Signals:
-    """Outputs at every sample: of the recordings held out, or of those fitted to."""
+    """Measured and modelled outputs at every sample of the held-out or training recordings."""
     data, base = stage.bench.data, stage.bench.base
     whole = data.held_out if held_out else data.train
     recording = Recording(whole.dt, whole.inputs, whole.outputs, parts=whole.parts)

@@ -1,9 +1,9 @@
-"""Hands what a study has learnt to the monitor: its accepted friction as part of the rig's model.
+"""Converts a study's accepted friction to a model for the monitor.
 
-For a rig that is an inertia the study's own numbers go over: mass, constant force and friction. For
-a rig with a transfer function, friction reaches the acceleration through the filter Ge only; its
-sizes are fitted through that filter on the training recordings. Either way the recordings held out
-decide: a model under which the monitor's residual does not fall there is not handed over.
+For an inertia the study's own values are used: mass, constant force and friction. For a rig with a
+transfer function, friction acts on the acceleration through the filter Ge, so its coefficients are
+fitted through that filter on the training recordings. In both cases the monitor's residual on the
+held-out recordings must fall; otherwise the model is refused.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,11 +41,11 @@ TERMS = {
     "viscous_by_direction": ("dd", "viscous_by_direction"),
     "constant_force": ("F0", "offset"),
 }
-"""Effects that a monitor's model has a place for: the effect's parameter and that place."""
+"""Effects that a monitor's model supports: the effect's parameter and the field for it."""
 SMOOTH = 0.2
-"""Speed over which the promoted friction's sign turns, over the velocity's rms."""
+"""Width of the promoted friction's sign transition, as a share of the velocity's rms."""
 BASES = {"emps-force": ("M", "Fv"), "emps": ("M", "Fv")}
-"""Models that are an inertia: their mass and their own viscous friction."""
+"""Inertia models: names of their mass and of their own viscous friction."""
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,10 @@ class Promotion:
     """A model for the monitor.
 
     Attributes:
-        model: what is to be in force.
+        model: the new model.
         text: the model file's text.
         before, after: the monitor's residual on the recordings held out, rms [m/s^2].
-        learnt: what was handed over, by name.
+        learnt: promoted values, by name.
     """
 
     model: RigModel
@@ -67,10 +67,10 @@ class Promotion:
 
 
 def promotion(study: Study, model: RigModel) -> Promotion:
-    """The monitor's model with what the study has learnt.
+    """The monitor's model with the study's results.
 
     Raises:
-        ModelError: an effect has no place in the monitor's model, or the residual does not fall.
+        ModelError: the monitor's model does not support an effect, or the residual does not fall.
     """
     _check_effects(study)
     bare = structs.replace(model, promoted=None)
@@ -94,7 +94,7 @@ def _check_effects(study: Study) -> None:
     for accepted in study.file.effects:
         if accepted.effect not in TERMS or study.model.ports[accepted.port].kind != "force":
             raise ModelError(
-                f"{accepted.effect}@{accepted.port}: has no place in a monitor's model, expected"
+                f"{accepted.effect}@{accepted.port}: not supported by a monitor's model, expected"
                 f" one of {', '.join(TERMS)} at a force port"
             )
 
@@ -103,8 +103,8 @@ def _of_study(study: Study) -> dict[str, float]:
     """Mass, constant force and friction as fitted [SI units]."""
     if study.model.name not in BASES:
         raise ModelError(
-            f"{study.model.name}: found a model that is no inertia, expected one of"
-            f" {', '.join(BASES)} as the rig's model is one"
+            f"{study.model.name}: found a model that is not an inertia, expected one of"
+            f" {', '.join(BASES)}, as the rig's model is an inertia"
         )
     found = open_bench(study).base.train.values()
     mass, viscous = BASES[study.model.name]
@@ -138,7 +138,7 @@ def _section(study: Study, learnt: Mapping[str, float]) -> PromotedSection:
 
 
 def _transfer(study: Study, model: RigModel) -> tuple[RigModel, dict[str, float]]:
-    """The rig's model with the accepted friction and the noise that it leaves."""
+    """The rig's model with the accepted friction and the noise of the remaining residual."""
     whole = [_columns(study, span, model) for span in study.file.train]
     smooth = SMOOTH * _rms([columns[:, VELOCITY] for columns in whole])
     for columns in whole:
@@ -152,12 +152,12 @@ def _transfer(study: Study, model: RigModel) -> tuple[RigModel, dict[str, float]
 
 
 def _through_filter(study: Study, columns: FloatArray) -> dict[str, float]:
-    """Sizes of the accepted friction in units of θ: least squares over the training recordings."""
+    """Coefficients of the accepted friction in units of θ, by least squares on training data."""
     places = sorted({TERMS[a.effect][1] for a in study.file.effects})
     known = {"coulomb": G1, "viscous": G2}
     if strange := [place for place in places if place not in known]:
         raise ModelError(
-            f"{study.folder}: found {', '.join(strange)}, expected coulomb or viscous alone as the"
+            f"{study.folder}: found {', '.join(strange)}, expected only coulomb or viscous, as the"
             " rig's model is a transfer function"
         )
     regressors = columns[:, [known[place] for place in places]]
@@ -167,11 +167,11 @@ def _through_filter(study: Study, columns: FloatArray) -> dict[str, float]:
 
 
 def _scatter(columns: FloatArray, known: PromotedSection, sample_rate: float) -> float:
-    """What the friction leaves from period to period, as the estimates feel it: rms [m/s^2].
+    """Period-to-period scatter of the residual, as white noise of equal effect: rms [m/s^2].
 
-    The velocity's noise is slow, so that what it does to the friction hangs together over a window
-    and weighs more than white noise of its size. A few periods show it badly, hence the margin of
-    two standard errors. 0 where nothing repeats.
+    Velocity noise is slow, so the friction error that it causes is autocorrelated over a window and
+    disturbs the estimates more than white noise of the same rms. A few periods determine the
+    scatter poorly, hence the margin of two standard errors. 0 if the drive is not periodic.
     """
     drive = Recording(1 / sample_rate, columns[:, [VOLTAGE]], columns[:, [ACCELERATION]])
     period = find_period(drive)
@@ -186,14 +186,14 @@ def _scatter(columns: FloatArray, known: PromotedSection, sample_rate: float) ->
 
 
 def _felt(change: FloatArray, regressor: FloatArray, window: int) -> float:
-    """Noise that would move an estimate over a window as much if it were white."""
+    """Rms of white noise that would disturb an estimate over a window as much."""
     along = np.convolve(change * regressor, np.ones(window), "valid")
     size = np.convolve(regressor**2, np.ones(window), "valid")
     return float(np.sqrt(np.mean(along**2 / size)))
 
 
 def _columns(study: Study, span: Span, model: RigModel) -> FloatArray:
-    """What the residual stage makes of a recording's valid samples, shape (n, 7)."""
+    """Columns of the residual stage at a recording's valid samples, shape (n, 7)."""
     needed = (model.channels[0], model.channels[2])
     admission = Admission(model.channels, needed, model.decision.longest_hold)
     stage, kept = TransferResidual(model), []
@@ -220,7 +220,7 @@ def _rms(parts: Sequence[FloatArray]) -> float:
     whole = np.concatenate(parts) if parts else np.zeros(0)
     whole = whole[np.isfinite(whole)]
     if not whole.size:
-        raise ModelError("the recordings held out give the monitor no residual")
+        raise ModelError("the monitor computes no valid residual on the held-out recordings")
     return float(np.sqrt(np.mean(whole**2)))
 
 

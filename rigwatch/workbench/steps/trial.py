@@ -1,10 +1,10 @@
-"""Tries a step on a study: an effect put into its model, or the last one taken away.
+"""Tries a step on a study: adding an effect to its model, or removing the last one.
 
-A trial fits and writes nothing, so that it may be ended at any time; its commit writes the study's
+A trial fits but writes nothing, so it can be cancelled at any time. Its commit writes the study's
 file and the ledger's line, both or neither.
 
-An effect under which the held-out error does not fall is refused: that the training error falls is
-no evidence, as every further parameter lets it.
+An effect that does not lower the held-out error is refused. A lower training error is no evidence,
+since every further parameter lowers it.
 """
 
 from dataclasses import dataclass, replace
@@ -37,19 +37,19 @@ from rigwatch.workbench.study import (
 )
 
 WORSE = 1.01
-"""Held-out error over that of the accepted fit up to which a fit once more has led back to it."""
+"""Largest ratio of the refit's held-out error to the accepted fit's at which both are the same."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """What a step did.
+    """Outcome of a step.
 
     Attributes:
         step: "add", "refused" or "undo".
-        effect, port: which one.
-        before, after: the model without and with the step; the same where it was refused.
-        tried: errors that a refused effect would have led to: training, held out.
-        text: in a sentence.
+        effect, port: names of the effect and its port.
+        before, after: the model before and after the step; the same if it was refused.
+        tried: training and held-out error with the effect; None for "undo".
+        text: summary in one sentence.
     """
 
     step: str
@@ -63,14 +63,14 @@ class Change:
 
 @dataclass(frozen=True)
 class Trial:
-    """A step that has been tried, and not yet written.
+    """A step that has been tried but not yet written.
 
     Attributes:
-        before: the study as it was opened.
-        after: as it would be; as it was where the step is refused.
-        change: what the step does.
-        line: what the ledger would say.
-        step: what the ledger would call it, where it is not as the change does.
+        before: the study as opened.
+        after: the study after the step; unchanged if the step is refused.
+        change: outcome of the step.
+        line: the ledger's entry.
+        step: the ledger's name of the step, if different from that of `change`.
     """
 
     before: Study
@@ -80,7 +80,7 @@ class Trial:
     step: str = ""
 
     def commit(self) -> Change:
-        """Write study and ledger, both or neither; what was done.
+        """Write study and ledger, both or neither; return the change.
 
         Raises:
             ModelError: the study has been changed since it was opened.
@@ -98,19 +98,19 @@ def try_add(
     progress: Progress = unheard,
     warm: Warm | None = None,
 ) -> Trial:
-    """What `add` would do; nothing is written, so that it may be ended at any time.
+    """Try `add` without writing anything; can be cancelled at any time.
 
     Args:
         study, effect, port, anyway: as for `add`.
-        progress: told what begins.
-        warm: fits that are there already; those that are made stay in it.
+        progress: called with a line of text as each part begins.
+        warm: cache of fits; new fits are added to it.
 
     Raises:
         ModelError: effect or port is unknown or already there, or the fit fails.
     """
     warm = warm or Warm()
     where = _port(study, effect, port)
-    progress("fitting the model as it is")
+    progress("fitting the current model")
     bench, before = warm.bench(study), warm.comparison(study)
     row = try_effect(study, effect, where, progress, warm)
     assert row.fitted is not None
@@ -121,13 +121,13 @@ def try_add(
     if not row.accepted and not anyway:
         return _refused(study, row, before, f"{words}: {row.reason}")
     accepted = whole(row)
-    # What is chosen now stays, so that errors before and after are of the same inputs.
+    # Hold and horizon are kept, so that errors before and after refer to the same inputs.
     held = with_horizon_of(held_as(study, bench.study.holds), bench.study)
     changed = append_effect(keep_holds(held), accepted)
-    progress(f"fitting once more with {row.label}")
+    progress(f"refitting with {row.label}")
     after = warm.comparison(changed)
     if not (led_back(errors[1], after.held_out_error, after.noise_floor) or anyway):
-        reason = f"fitted once more it leaves {after.held_out_error:.4g} {after.unit}"
+        reason = f"refitted, it leaves {after.held_out_error:.4g} {after.unit}"
         row = replace(row, reason=reason)
         return _refused(study, row, before, f"{words}, but {row.reason}")
     line = {"parameters": accepted.parameters, "model_parameters": accepted.model}
@@ -136,15 +136,15 @@ def try_add(
 
 
 def led_back(accepted: float, again: float, floor: float) -> bool:
-    """Whether a fit once more leaves what the accepted fit leaves, or less than the noise floor."""
+    """Whether a refit matches the accepted fit, or ends below the noise floor."""
     return again <= max(WORSE * accepted, floor)
 
 
 def try_undo(study: Study, progress: Progress = unheard, warm: Warm | None = None) -> Trial:
-    """What `undo` would do; nothing is written.
+    """Try `undo` without writing anything.
 
     Raises:
-        ModelError: there is nothing to take away.
+        ModelError: there is nothing to undo.
     """
     warm = warm or Warm()
     if not study.file.effects and study.file.variants:
@@ -158,7 +158,7 @@ def try_undo(study: Study, progress: Progress = unheard, warm: Warm | None = Non
 
 
 def _as_written(study: Study, progress: Progress, warm: Warm) -> Trial:
-    """The study with its model as it was written."""
+    """The trial of removing all variants of the model."""
     named = ", ".join(study.file.variants)
     after = use_variants(study, ())
     change = _without(study, after, (named, ""), progress, warm)
@@ -169,14 +169,14 @@ def _as_written(study: Study, progress: Progress, warm: Warm) -> Trial:
 def _without(
     study: Study, after: Study, what: tuple[str, str], progress: Progress, warm: Warm
 ) -> Change:
-    """The step from a study to the same without something."""
+    """The undo step from `study` to `after`; `what` is effect and port."""
     label = "@".join(filter(None, what))
-    progress("fitting the model as it is")
+    progress("fitting the current model")
     before = warm.comparison(study)
     progress(f"fitting without {label}")
     found = warm.comparison(after)
     errors = f"{before.held_out_error:.4g} → {found.held_out_error:.4g} {found.unit}"
-    text = f"{label} taken away: held-out error {errors}"
+    text = f"{label} removed: held-out error {errors}"
     return Change("undo", *what, before, found, None, text)
 
 
@@ -187,7 +187,7 @@ def _which(change: Change) -> dict[str, Any]:
 def try_effect(
     study: Study, effect: str, port: str, progress: Progress = unheard, warm: Warm | None = None
 ) -> Ranked:
-    """An effect fitted at a port, and judged on the recordings held out.
+    """Fit an effect at a port and judge it by the held-out error.
 
     Raises:
         ModelError: effect or port is unknown or already there, or the fit fails.
@@ -199,7 +199,7 @@ def try_effect(
 
 
 def whole(row: Ranked) -> Accepted:
-    """The effect as a study's file lists it, with the values of the whole fit beside its own."""
+    """The effect as an entry of the study's file, with all fitted values beside its own."""
     assert row.fitted is not None
     own, fit = accepted_from(row), row.fitted.train
     free = set(fit.compiled.system.free)
@@ -244,7 +244,7 @@ def _port(study: Study, name: str, port: str | None) -> str:
         raise ModelError(f"{name}: found no port {port!r}{nearest(port, ports)}")
     if port not in fitting:
         expected = ", ".join(fitting) or "another model"
-        raise ModelError(f"{name}: cannot stand at port {port!r}, expected {expected}")
+        raise ModelError(f"{name}: not compatible with port {port!r}, expected {expected}")
     if any(a.effect == name and a.port == port for a in study.file.effects):
         raise ModelError(f"{name}@{port}: found in the model already")
     return port

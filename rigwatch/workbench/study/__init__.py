@@ -1,4 +1,4 @@
-"""A study on disk: its TOML file, its recordings, and the ledger of every step with hashes."""
+"""A study on disk: its TOML file, its recordings, and the hashed ledger of every step."""
 
 from rigwatch.workbench.study import ledger
 from rigwatch.workbench.study.edits import (

@@ -1,6 +1,7 @@
-"""Edits of a study's file: each gives the study as it would be, and leaves the file alone.
+"""Edits of a study's file: each returns the changed study and leaves the file unchanged.
 
-`commit` writes the outcome and the ledger's line. Only a user's effect file is copied at once.
+`commit` writes the result together with the ledger's line. `use_effect_file` is the exception: it
+copies the effect file into the study's folder at once.
 """
 
 import re
@@ -15,11 +16,11 @@ from rigwatch.workbench.study.study import GIVEN, Accepted, Study, converted, st
 
 _TABLE = "\n[[effects]]\n"
 CHOSEN = "  # chosen from the data, with the first effect"
-"""Behind holds that were written with the first effect, and go with it."""
+"""Comment on lines that are written with the first effect and removed with it."""
 
 
 def append_effect(study: Study, accepted: Accepted) -> Study:
-    """The study with one more effect in its file, its values in the units of its parameters."""
+    """The study with one more effect in its file, values in the parameters' units."""
     written = converted(study, accepted, "from_si")
     table = f'effect = "{accepted.effect}"\nport = "{accepted.port}"\n'
     table += f"parameters = {_inline(written.parameters)}\n"
@@ -30,15 +31,15 @@ def append_effect(study: Study, accepted: Accepted) -> Study:
 
 
 def _inline(values: Mapping[str, float]) -> str:
-    """Numbers by name as an inline table."""
+    """An inline TOML table of numbers by name."""
     return f"{{ {', '.join(f'{name} = {value!r}' for name, value in values.items())} }}"
 
 
 def drop_effect(study: Study) -> Study:
-    """The study without the effect that its file lists last.
+    """The study without the last effect in its file.
 
     Raises:
-        ModelError: there is none, or the table does not stand at the end of the file.
+        ModelError: there is no effect, or its table is not at the end of the file.
     """
     text = study.text
     at = text.rfind(_TABLE)
@@ -51,10 +52,10 @@ def drop_effect(study: Study) -> Study:
 
 
 def use_effect_file(study: Study, path: Path) -> Study:
-    """The study with a copy of the user's effect file, whose effects join the others.
+    """The study with the user's effect file, which is copied into the study's folder.
 
     Raises:
-        ConfigError: the file does not fit.
+        ConfigError: the file is invalid.
     """
     load_effects(path)
     target = study.folder / path.name
@@ -65,19 +66,19 @@ def use_effect_file(study: Study, path: Path) -> Study:
 
 
 def use_variants(study: Study, variants: Sequence[str]) -> Study:
-    """The study with these variants of its model in its file."""
+    """The study with these model variants in its file."""
     return study_of(study.folder, _with_list(study, "variants", variants))
 
 
 def _with_list(study: Study, key: str, names: Sequence[str]) -> str:
-    """The file's text with a list of names at its head; without the key where there are none."""
+    """The file's text with a list of names at its top; without the key if the list is empty."""
     quoted = ", ".join(f'"{name}"' for name in names)
     kept = [x for x in study.text.splitlines(True) if not re.match(rf"{key}\s*=", x)]
     return "".join([f"{key} = [{quoted}]\n" if names else "", *kept])
 
 
 def keep_holds(study: Study) -> Study:
-    """The study with the holds that the data have chosen in its file, so that they stay."""
+    """The study with the holds and the horizon chosen from the data written to its file."""
     chosen = {n: h for n, h in study.holds.items() if h.source not in GIVEN}
     if study.horizon_from and study_of(study.folder, study.text).file.horizon is None:
         text = f"horizon = {study.file.horizon!r}{CHOSEN}\n" + study.text

@@ -1,8 +1,8 @@
-"""A study's folder: its file and its ledger change together or not at all, whenever killed.
+"""A study's folder: file and ledger change atomically, even if the process is killed.
 
-A change is written beside the file as `study.new`, then its line is appended to the ledger, which
-names the new file's SHA-256, then `study.new` takes the file's place. Whoever opens the study after
-a kill in between ends the change where the ledger knows of it, and drops it where it does not.
+A change is written as `study.new`, then its line with the new file's SHA-256 is appended to the
+ledger, then `study.new` replaces the file. After a kill in between, the next opening completes the
+change if the ledger records it and discards it otherwise.
 """
 
 import fcntl
@@ -22,13 +22,13 @@ NEW = "study.new"
 
 
 def digest(text: str) -> str:
-    """SHA-256 of a study's file, as its ledger names it."""
+    """SHA-256 of a study's file, as recorded in its ledger."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[int]:
-    """Hold the folder alone; the ledger's file descriptor, open to append."""
+    """Lock the folder exclusively; yields the ledger's file descriptor, open for appending."""
     descriptor = os.open(folder / LEDGER, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)
@@ -38,13 +38,13 @@ def locked(folder: Path) -> Iterator[int]:
 
 
 def write_step(folder: Path, ledger: int, line: bytes, text: str | None) -> None:
-    """Append a line to the ledger, with another study's file where there is a `text`.
+    """Append a line to the ledger and, given a `text`, replace the study's file.
 
     Args:
-        folder: the study's, locked.
+        folder: the study's folder, locked.
         ledger: descriptor of its ledger.
-        line: with its newline.
-        text: what `study.toml` is to say.
+        line: the line including its newline.
+        text: new content of `study.toml`.
     """
     _drop_torn_line(ledger)
     if text is not None:
@@ -56,7 +56,7 @@ def write_step(folder: Path, ledger: int, line: bytes, text: str | None) -> None
 
 
 def settle(folder: Path) -> None:
-    """End a change that was cut off between the ledger and the study's file, or drop it."""
+    """Complete or discard a change interrupted between the ledger and the study's file."""
     new = folder / NEW
     if not new.exists():
         return
@@ -71,7 +71,7 @@ def settle(folder: Path) -> None:
 
 
 def _last_study(folder: Path) -> str:
-    """SHA-256 of the study's file as the ledger's last line names it, empty where it does not."""
+    """SHA-256 of the study's file in the ledger's last line; empty if there is none."""
     lines = (folder / LEDGER).read_bytes().splitlines()
     try:
         return str(msgspec.json.decode(lines[-1]).get("study", "")) if lines else ""
@@ -80,7 +80,7 @@ def _last_study(folder: Path) -> str:
 
 
 def _drop_torn_line(ledger: int) -> None:
-    """Cut off a last line that was never ended."""
+    """Truncate an incomplete last line."""
     size = os.fstat(ledger).st_size
     tail = os.pread(ledger, size, 0)
     whole = tail.rfind(b"\n") + 1

@@ -1,7 +1,7 @@
-"""The ledger: one line of JSON for every step of a study, with hashes of what it stood on.
+"""The ledger: one line of JSON per step of a study, with hashes of its inputs.
 
-A step can be told later, and done again: data files, model and effects are named by their SHA-256.
-Data that have changed since are refused, so that errors before and after an effect stay comparable.
+Data files, model and effects are identified by their SHA-256, so a step can be audited and
+repeated. Changed data are refused, so that errors before and after an effect stay comparable.
 """
 
 import hashlib
@@ -24,10 +24,10 @@ _PART = 1 << 22
 
 
 def data_hashes(study: Study) -> dict[str, str]:
-    """SHA-256 of every recording of the study, by the name that its file gives it.
+    """SHA-256 of every recording of the study, by its name in the study's file.
 
     Raises:
-        ModelError: a recording is not there.
+        ModelError: a recording is missing.
     """
     return {name: _hash(path) for name, path in study.sessions().items()}
 
@@ -43,13 +43,13 @@ def _hash(path: Path) -> str:
 
 
 def _state(found: os.stat_result) -> tuple[int, ...]:
-    """What tells that a file is still the one that was read."""
+    """Fingerprint of a file that changes when the file is written."""
     return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 @lru_cache(maxsize=64)
 def _of_files(files: tuple[tuple[Path, tuple[int, ...]], ...]) -> str:
-    """SHA-256 of files, read once for as long as nobody writes them."""
+    """SHA-256 of files, cached until a file changes."""
     found = hashlib.sha256()
     for path, _ in files:
         with path.open("rb") as file:
@@ -66,17 +66,17 @@ def model_hash(study: Study) -> str:
 
 
 def stands_on(study: Study) -> str:
-    """SHA-256 of all that an error of the study depends on: file, model, effects and data.
+    """SHA-256 of everything the study's errors depend on: file, model, effects and data.
 
     Raises:
-        ModelError: a recording is not there.
+        ModelError: a recording is missing.
     """
     whole = (study.file, study.model, dict(study.effects), data_hashes(study), __version__)
     return hashlib.sha256(msgspec.json.encode(whole, order="deterministic")).hexdigest()
 
 
 def append(study: Study, step: str, /, **content: Any) -> dict[str, Any]:
-    """Write one line about the study as it is; what was written.
+    """Append one line about the study's current state; return the line.
 
     Raises:
         ModelError: the study has been changed since it was opened.
@@ -85,13 +85,13 @@ def append(study: Study, step: str, /, **content: Any) -> dict[str, Any]:
 
 
 def commit(before: Study, after: Study, step: str, /, **content: Any) -> dict[str, Any]:
-    """Write the study's file as `after` has it and the line that tells it: both, or neither.
+    """Write the study's file and the ledger's line, both or neither.
 
     Args:
-        before: the study as it was opened.
-        after: as it is to be.
-        step: what was done.
-        content: what else the line says.
+        before: the study as opened.
+        after: the study to be written.
+        step: name of the step.
+        content: further fields of the line.
 
     Returns:
         The line.
@@ -121,7 +121,7 @@ def commit(before: Study, after: Study, step: str, /, **content: Any) -> dict[st
 
 
 def lines(study: Study) -> Iterator[dict[str, Any]]:
-    """The steps so far, the oldest first; a line that broke off is left out."""
+    """The steps so far, oldest first; an incomplete line is skipped."""
     if not study.ledger.exists():
         return
     for raw in study.ledger.read_bytes().splitlines():
@@ -132,10 +132,10 @@ def lines(study: Study) -> Iterator[dict[str, Any]]:
 
 
 def check_data(study: Study) -> None:
-    """Refuse data that are not those of the last step.
+    """Check that the data are those of the last step.
 
     Raises:
-        ModelError: a recording has changed or is gone.
+        ModelError: a recording has changed or is missing.
     """
     known: dict[str, str] = {}
     for line in lines(study):

@@ -1,7 +1,7 @@
-"""Parameters that are known of each recording, such as a load or the gain of a controller.
+"""Parameters known for each recording, for example a load or a controller gain.
 
-They differ from recording to recording and stay the same in each, as an input does that is kept;
-so that is what they become, and nothing that simulates, fits or ranks knows the difference.
+They differ between recordings and are constant within each. They are therefore treated as held
+inputs, and simulation, fit and ranking need no special case.
 """
 
 from pathlib import Path
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 
 def known_in_si(model: Model, file: "StudyFile", path: Path) -> "StudyFile":
-    """The file with what is known of each recording in SI, every such parameter of every one.
+    """The file with every recording parameter of every recording, in SI.
 
     Args:
-        model: as it was written.
-        file: its `parameters` of recordings are in the units that people write; those that a
-            recording does not give have the value of `start`, or of the model.
+        model: the unmodified model.
+        file: its recordings' `parameters` are in the units of the file; one that a recording does
+            not give takes its value from `start` or from the model.
         path: of the file, for errors.
 
     Raises:
@@ -54,7 +54,7 @@ def known_in_si(model: Model, file: "StudyFile", path: Path) -> "StudyFile":
 
 
 def known_as_inputs(model: Model, file: "StudyFile") -> Model:
-    """The model with the parameters that are known of each recording as inputs."""
+    """The model with its recording parameters turned into inputs."""
     names = _names(file)
     inputs = {n: Input(unit=model.parameters[n].unit, hold="zero") for n in names}
     left = {n: p for n, p in model.parameters.items() if n not in names}
@@ -62,6 +62,6 @@ def known_as_inputs(model: Model, file: "StudyFile") -> Model:
 
 
 def _names(file: "StudyFile") -> list[str]:
-    """Parameters that a recording gives."""
+    """Names of all parameters given by any recording."""
     spans = (*file.train, *file.held_out, *file.healthy)
     return list(dict.fromkeys(name for span in spans for name in span.parameters))

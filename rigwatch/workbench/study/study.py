@@ -1,8 +1,8 @@
-"""A study: one readable file, `study.toml`, a ledger of every step, and nothing hidden.
+"""A study: one readable file, `study.toml`, and a ledger of every step.
 
-The file names a model, recordings to fit and recordings held out, and lists the effects that have
-been accepted, one `[[effects]]` table each at its end. Adding an effect writes a table there,
-undoing takes the last one away; the rest of the file, with its comments, stays as it was written.
+The file names a model, training and held-out recordings, and lists the accepted effects, one
+`[[effects]]` table each at its end. Adding an effect appends a table, undoing removes the last one;
+the rest of the file, including comments, is left unchanged.
 """
 
 import os
@@ -37,7 +37,7 @@ from rigwatch.workbench.study.folder import FILE, LEDGER, settle
 from rigwatch.workbench.study.recording_parameters import known_as_inputs, known_in_si
 
 GIVEN = ("the study", "the model file")
-"""Sources of holds that nothing was chosen for."""
+"""Sources of holds that were given rather than chosen from data."""
 
 Lateness = Annotated[float, Meta(ge=0, le=1)]
 
@@ -45,61 +45,61 @@ Lateness = Annotated[float, Meta(ge=0, le=1)]
 class Span(Section, frozen=True, kw_only=True):
     """A recording, or a part of one."""
 
-    session: Annotated[str, Meta(description="session file, from the study's folder")]
-    start: Annotated[float, Meta(ge=0, description="seconds into it where the part begins")] = 0.0
-    end: Annotated[float, Meta(description="seconds into it where the part ends")] = float("inf")
+    session: Annotated[str, Meta(description="session file, relative to the study's folder")]
+    start: Annotated[float, Meta(ge=0, description="start of the part in the session [s]")] = 0.0
+    end: Annotated[float, Meta(description="end of the part in the session [s]")] = float("inf")
     parameters: Annotated[
         dict[str, float],
-        Meta(description="the model's parameters that are known of this recording, in their units"),
+        Meta(description="model parameters known for this recording, in their units"),
     ] = field(default_factory=dict)
 
 
 class Derived(Section, frozen=True, kw_only=True):
-    """A signal that is made from a channel: low-passed and differentiated."""
+    """A signal derived from a channel: low-passed and differentiated."""
 
-    channel: Annotated[str, Meta(description="channel it is made from")]
-    order: Annotated[int, Meta(ge=0, le=2, description="how often it is differentiated")] = 0
+    channel: Annotated[str, Meta(description="source channel")]
+    order: Annotated[int, Meta(ge=0, le=2, description="number of differentiations")] = 0
 
 
 class Derive(Section, frozen=True, kw_only=True):
-    """How signals are made from channels."""
+    """Signals derived from channels."""
 
     low_pass: Annotated[float, Meta(gt=0, description="zero-phase Butterworth of order 4 [Hz]")]
     signals: Annotated[dict[str, Derived], Meta(description="the signals, by name")]
 
 
 class Thin(Section, frozen=True, kw_only=True):
-    """Residuals are low-passed and thinned before they are counted."""
+    """Decimation of residuals: low-pass, then every n-th sample."""
 
-    factor: Annotated[int, Meta(ge=1, description="samples for one that stays")] = 1
-    edge: Annotated[int, Meta(ge=0, description="samples left out at both ends, after it")] = 0
+    factor: Annotated[int, Meta(ge=1, description="decimation factor")] = 1
+    edge: Annotated[int, Meta(ge=0, description="samples dropped at both ends after it")] = 0
 
 
 class Accepted(Section, frozen=True, kw_only=True):
-    """An effect that has been added."""
+    """An accepted effect."""
 
     effect: Annotated[str, Meta(description="its name")]
     port: Annotated[str, Meta(description="where it enters")]
     parameters: Annotated[
-        dict[str, float], Meta(description="where its fit starts, in the units that are shown")
+        dict[str, float], Meta(description="initial values of its fit, in the parameters' units")
     ] = field(default_factory=dict)
     model: Annotated[
         dict[str, float],
-        Meta(description="where the rest of the model starts: the fit that it was accepted with"),
+        Meta(description="initial values of the rest of the model, from its accepted fit"),
     ] = field(default_factory=dict)
 
 
 class StudyFile(Section, frozen=True, kw_only=True):
     """The file `study.toml`."""
 
-    model: Annotated[str, Meta(description="a shipped model's name, or a model file")]
+    model: Annotated[str, Meta(description="name of a shipped model, or a model file")]
     variants: Annotated[
-        tuple[str, ...], Meta(description="variants of the model, see `rigwatch study base`")
+        tuple[str, ...], Meta(description="model variants in use, see `rigwatch study base`")
     ] = ()
     train: Annotated[tuple[Span, ...], Meta(min_length=1, description="what is fitted to")]
     held_out: Annotated[tuple[Span, ...], Meta(min_length=1, description="what decides")]
     healthy: Annotated[
-        tuple[Span, ...], Meta(description="recordings with nothing wrong, for the noise floor")
+        tuple[Span, ...], Meta(description="recordings of the healthy rig, for the noise floor")
     ] = ()
     horizon: Annotated[
         Annotated[float, Meta(gt=0)] | None,
@@ -117,44 +117,44 @@ class StudyFile(Section, frozen=True, kw_only=True):
     ] = "auto"
     rate: Annotated[
         Annotated[float, Meta(gt=0)] | None,
-        Meta(description="rate that all recordings are put on [Hz]; their own if not given"),
+        Meta(description="common sample rate of all recordings [Hz]; their own if not given"),
     ] = None
-    substeps: Annotated[int, Meta(ge=1, description="integration steps a sample")] = 2
-    period: Annotated[float, Meta(ge=0, description="period of the excitation [s], 0: look")] = 0.0
+    substeps: Annotated[int, Meta(ge=1, description="integration steps per sample")] = 2
+    period: Annotated[float, Meta(ge=0, description="period of the excitation [s]; 0: find")] = 0.0
     channels: Annotated[
-        dict[str, str], Meta(description="channel of a model's signal, where named otherwise")
+        dict[str, str], Meta(description="channel of a model's signal, if its name differs")
     ] = field(default_factory=dict)
     start: Annotated[
         dict[str, float],
-        Meta(description="values of the model's parameters to start from, in their units"),
+        Meta(description="initial values of model parameters, in their units"),
     ] = field(default_factory=dict)
     hold: Annotated[
         dict[str, Hold],
-        Meta(description="what inputs do between samples; the data choose where nothing says"),
+        Meta(description="inputs between samples; chosen from the data if not given"),
     ] = field(default_factory=dict)
     late: Annotated[
         dict[str, Lateness],
-        Meta(description="shares of a sample by which inputs that are kept are late"),
+        Meta(description="delay of held inputs, as a share of the sample period"),
     ] = field(default_factory=dict)
     derive: Derive | None = None
     thin: Thin | None = None
     effect_files: Annotated[
-        tuple[str, ...], Meta(description="own effects, TOML files from the study's folder")
+        tuple[str, ...], Meta(description="own effects: TOML files, relative to the study's folder")
     ] = ()
     whole_library: Annotated[
-        bool, Meta(description="rank the elective effects of the library as well")
+        bool, Meta(description="also rank the elective effects of the library")
     ] = False
-    effects: Annotated[tuple[Accepted, ...], Meta(description="accepted so far, in order")] = ()
+    effects: Annotated[tuple[Accepted, ...], Meta(description="accepted effects, in order")] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """Parameters that the healthy recording told.
+    """Parameters estimated from the healthy recording.
 
     Attributes:
-        names: of the model's parameters.
+        names: names of the parameters.
         covariance: of their values, shape (names, names).
-        convergence: how the fit ended that told them; None where it was not asked.
+        convergence: how the fit ended; None if not checked.
     """
 
     names: tuple[str, ...]
@@ -164,14 +164,14 @@ class Kept:
 
 @dataclass(frozen=True)
 class Held:
-    """What an input does between samples, and how that is known.
+    """Hold of an input between samples, and its source.
 
     Attributes:
-        hold: "linear" for a line, "zero" where it is kept.
-        late: share of a sample by which it changes late, where it is kept.
-        seconds: the same [s]; 0 where the time between samples is not known yet.
-        source: who says so.
-        error_ratio: error with it over that with a line, None where nothing was compared.
+        hold: "linear" (first-order) or "zero" (zero-order hold).
+        late: delay of a zero-order hold, as a share of the sample period.
+        seconds: the same [s]; 0 while the sample period is unknown.
+        source: where the hold comes from, in words.
+        error_ratio: error with this hold over that with a linear one; None if not compared.
     """
 
     hold: Hold
@@ -183,18 +183,18 @@ class Held:
 
 @dataclass(frozen=True)
 class Study:
-    """A study that has been opened; values of parameters are SI, whatever its file says.
+    """An open study; parameter values are in SI, in whatever units its file gives them.
 
     Attributes:
-        folder: where it is.
-        file: what its file says.
+        folder: the study's folder.
+        file: the parsed file.
         model: the base model.
-        effects: every effect that may be tried: shipped, from entry points, own; by name.
+        effects: all available effects by name: shipped, from entry points, own.
         own: names of those that are not shipped.
-        kept: what the healthy recording told, None before it was asked.
-        holds: what inputs do between samples, by name, where that is known.
-        text: what its file said when it was opened.
-        horizon_from: what the horizon was chosen from, in words; empty where it is given.
+        kept: parameters from the healthy recording, None before they are estimated.
+        holds: holds of inputs by name, as far as known.
+        text: content of the file when opened.
+        horizon_from: what the horizon was chosen from, in words; empty if given.
     """
 
     folder: Path
@@ -213,29 +213,29 @@ class Study:
         return self.folder / LEDGER
 
     def sessions(self) -> dict[str, Path]:
-        """The recordings, by the name that the file gives them."""
+        """Paths of the recordings, by their names in the file."""
         spans = (*self.file.train, *self.file.held_out, *self.file.healthy)
         return {span.session: self.folder / span.session for span in spans}
 
     def with_effects(self, effects: Sequence[Accepted]) -> "Study":
-        """The same with these effects in its model, in memory alone."""
+        """The study with these effects in its model, in memory only."""
         return replace(self, file=structs.replace(self.file, effects=tuple(effects)))
 
     def effect(self, name: str) -> Effect:
-        """The effect called `name`.
+        """The effect named `name`.
 
         Raises:
-            ModelError: there is none; near matches are named.
+            ModelError: there is none; the message suggests near matches.
         """
         if name not in self.effects:
             raise ModelError(f"found no effect {name!r}{nearest(name, self.effects)}")
         return self.effects[name]
 
     def effect_at(self, name: str, port: str) -> Effect:
-        """The effect called `name` with the units of a port, its numbers in SI.
+        """The effect named `name` with the units of a port, values in SI.
 
         Raises:
-            ModelError: it is unknown, or the port does not offer what its units name.
+            ModelError: it is unknown, or the port lacks a variable that its units refer to.
         """
         effect = self.effect(name)
         if port not in self.model.ports:
@@ -247,7 +247,7 @@ def open_study(folder: Path | str) -> Study:
     """The study in `folder`.
 
     Raises:
-        ConfigError: there is none, or its file does not fit.
+        ConfigError: there is none, or its file is invalid.
         ModelError: its model or one of its effects is unknown.
     """
     folder = Path(folder)
@@ -259,10 +259,10 @@ def open_study(folder: Path | str) -> Study:
 
 
 def study_of(folder: Path, text: str) -> Study:
-    """The study that `folder` would hold if its file said `text`; nothing is written.
+    """The study that `text` describes in `folder`; nothing is written.
 
     Raises:
-        ConfigError: the text does not fit.
+        ConfigError: the text is invalid.
         ModelError: its model or one of its effects is unknown.
     """
     file = parse(text, StudyFile, folder / FILE)
@@ -278,7 +278,7 @@ def study_of(folder: Path, text: str) -> Study:
 
 
 def _in_si(study: Study) -> Study:
-    """The study with the values of its file in SI; there they stand in the parameters' units."""
+    """The study with the values of its file converted from the parameters' units to SI."""
     start = {
         name: _unit(study.model.parameters.get(name)).to_si(value)
         for name, value in study.file.start.items()
@@ -288,7 +288,7 @@ def _in_si(study: Study) -> Study:
 
 
 def converted(study: Study, accepted: Accepted, way: Literal["to_si", "from_si"]) -> Accepted:
-    """The values of an accepted effect, from the units that people write to SI or back."""
+    """An accepted effect with its values converted from the parameters' units to SI or back."""
     known = study.effect_at(accepted.effect, accepted.port).parameters
     values = {
         name: float(getattr(_unit(known.get(name)), way)(value))
@@ -302,7 +302,7 @@ def converted(study: Study, accepted: Accepted, way: Literal["to_si", "from_si"]
 
 
 def _named(study: Study, name: str) -> Parameter | EffectParameter | None:
-    """The parameter that a system calls `name`: the model's, or one of an accepted effect."""
+    """The parameter named `name` in the system: the model's, or one of an accepted effect."""
     for accepted in study.file.effects:
         prefix = f"{accepted.port}_{accepted.effect}_"
         own = study.effect_at(accepted.effect, accepted.port).parameters
@@ -312,12 +312,12 @@ def _named(study: Study, name: str) -> Parameter | EffectParameter | None:
 
 
 def _unit(parameter: Parameter | EffectParameter | None) -> Unit:
-    """The unit in which people write a parameter's values."""
+    """The unit in which a parameter's values are written."""
     return unit_of((parameter.shown or parameter.unit) if parameter else "")
 
 
 def _written(folder: Path, file: StudyFile) -> Model:
-    """The study's model with its variants, as its file describes it."""
+    """The study's model with its variants, without holds."""
     model = model_named(file.model, folder)
     if file.model.endswith(".toml"):
         check_model(model, str(folder / file.model))
@@ -325,7 +325,7 @@ def _written(folder: Path, file: StudyFile) -> Model:
 
 
 def varied(study: Study, variants: Sequence[str]) -> Study:
-    """The study with these variants of its model, in memory alone.
+    """The study with these model variants, in memory only.
 
     Raises:
         ModelError: a variant is unknown, or two of them exclude each other.
@@ -336,7 +336,7 @@ def varied(study: Study, variants: Sequence[str]) -> Study:
 
 
 def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
-    """The model with the holds that the study gives it, and all that are given.
+    """The model with the holds given in the study, and all holds given in either.
 
     Raises:
         ModelError: the study names an input that the model does not have.
@@ -359,16 +359,16 @@ def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
 
 
 def create(folder: Path | str, template: Path | str, sessions: Path | str | None = None) -> Study:
-    """A new study in `folder` after the study file `template`.
+    """Create a study in `folder` from the study file `template`.
 
     Args:
-        folder: is made where there is none.
+        folder: created if it does not exist.
         template: its comments are kept.
         sessions: folder of the template's sessions; the template's own folder if None.
 
     Raises:
-        ConfigError: the folder holds a study already, the template does not fit, or a session or
-            effect file that it names is not there.
+        ConfigError: the folder holds a study already, the template is invalid, or a session or
+            effect file that it names is missing.
     """
     folder, template = Path(folder), Path(template)
     if (folder / FILE).exists():

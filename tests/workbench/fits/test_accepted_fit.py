@@ -73,7 +73,7 @@ def test_a_step_that_gets_worse_when_it_is_fitted_again_is_refused(
     before = (study.folder / "study.toml").read_bytes()
     change = add(study, "constant_force")
     assert change.step == "refused"
-    assert "fitted once more it leaves 1.9" in change.text
+    assert "refitted, it leaves 1.9" in change.text
     assert (study.folder / "study.toml").read_bytes() == before
 
 

@@ -130,7 +130,10 @@ parameters.w = { unit = "{v}", role = "constant", value = 1e-3, scale = "v" }
 MISTAKES = [
     (["strebeck"], "did you mean 'stribeck'?"),
     (["coulomb", "--port", "lod"], "did you mean 'load'?"),
-    (["coulomb", "--port", "force_sensor"], "cannot stand at port 'force_sensor', expected load"),
+    (
+        ["coulomb", "--port", "force_sensor"],
+        "not compatible with port 'force_sensor', expected load",
+    ),
     (["gap_of_doom"], "found no effect 'gap_of_doom'"),
 ]
 

@@ -108,7 +108,7 @@ TIED = effect(
 def test_a_strength_that_may_as_well_be_neutral_is_not_accepted(tmp_path: Path) -> None:
     change = add(damper(tmp_path, rubbing, TIED), "tied")
     assert change.step == "refused"
-    assert "the training does not tell its strength" in change.text
+    assert "the training does not determine its strength" in change.text
     assert change.tried is not None
     assert change.tried[1] < 0.5 * change.before.held_out_error
 
@@ -116,5 +116,5 @@ def test_a_strength_that_may_as_well_be_neutral_is_not_accepted(tmp_path: Path) 
 def test_what_helps_a_little_is_not_called_the_answer(tmp_path: Path) -> None:
     found = explain(damper(tmp_path, wavy))
     assert found.verdict == "unknown_effect"
-    assert "% of the error's energy stays, 14 times the noise floor" in found.text
-    assert "accepted as well: stribeck@load" in found.text
+    assert "% of the error's energy remains, 14 times the noise floor" in found.text
+    assert "also accepted: stribeck@load" in found.text

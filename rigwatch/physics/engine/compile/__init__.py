@@ -1,9 +1,9 @@
-"""From equations to machine code: exact derivatives, LLVM kernels, integration steps.
+"""Compiles equations to machine code: exact derivatives, LLVM kernels, integration steps.
 
     System ──derivatives──▶ llvm ──▶ kernel: simulate, linearise (integrator)
 
-`CompiledSystem` is what the rest of the engine calls; `step_size` says how fine each interval
-is stepped.
+The rest of the engine calls `CompiledSystem`; `step_size` gives the integration step of each
+interval.
 """
 
 from rigwatch.physics.engine.compile.compiled_system import (

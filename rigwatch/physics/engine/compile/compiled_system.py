@@ -16,12 +16,12 @@ from rigwatch.wire.errors import ModelError
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """Outputs over windows of one length.
+    """Simulated outputs over windows of equal length.
 
     Attributes:
         outputs: shape (windows, samples, outputs), in the outputs' units.
-        slopes: shape (windows, samples, outputs, free parameters + states): ∂outputs by the free
-            parameters, then by the window's initial states.
+        slopes: shape (windows, samples, outputs, free parameters + states): derivatives of the
+            outputs by the free parameters, then by the window's initial states.
         last: states at each window's last sample, shape (windows, states).
     """
 
@@ -32,19 +32,19 @@ class Simulation:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """A trajectory with the Jacobians along it, at the nodes of the integration.
+    """A trajectory with its Jacobians at the nodes of the integration.
 
     With m free parameters, n states and q probes, the last axis of the slopes is (m, n, q).
 
     Attributes:
         spacing: time between nodes [s].
-        substeps: nodes from one sample to the next.
+        substeps: nodes per sample.
         states: shape (windows, nodes, n).
         rate_slopes: shape (windows, nodes, n, m + n + q): ∂rates.
         read_slopes: at the samples, shape (windows, samples, outputs, m + n + q): ∂outputs.
         outputs: at the samples, shape (windows, samples, outputs).
-        update_slopes: at the samples, shape (windows, samples, n, m + n + q): ∂states from there on
-            by those before; shape (windows, 0, …) where no state changes at samples.
+        update_slopes: at the samples, shape (windows, samples, n, m + n + q): derivatives of the
+            states after an update by those before; shape (windows, 0, …) without sampled states.
     """
 
     spacing: float
@@ -65,7 +65,7 @@ class CompiledSystem:
 
     @property
     def parameters(self) -> FloatArray:
-        """Values of all parameters as the model gives them, shape (n_p,)."""
+        """Values of all parameters in the model, shape (n_p,)."""
         return np.array([p.value for p in self.system.parameters.values()])
 
     def simulate(
@@ -91,11 +91,11 @@ class CompiledSystem:
             initial: shape (windows, states).
             parameters: all of them, shape (n_p,).
             substeps: Runge-Kutta steps between samples.
-            finest: steps at most between two samples, where effects are stiff, see `pace`.
-            rows: of the inputs, after which those that are kept change; for inputs at finer nodes.
+            finest: most steps between samples for stiff effects, see `step_size.pace`.
+            rows: number of input rows per change of a held input, for inputs at finer nodes.
 
         Raises:
-            ModelError: a window reaches beyond the inputs, or a shape does not fit.
+            ModelError: a window extends beyond the inputs, or a shape is wrong.
         """
         outputs = np.empty((len(starts), length, len(self.system.outputs)))
         slopes = np.empty((*outputs.shape, self.columns))
@@ -106,7 +106,7 @@ class CompiledSystem:
 
     @property
     def hold(self) -> FloatArray:
-        """1 for an input that runs straight between samples, else less its lateness; (inputs,)."""
+        """1 for a linear hold, minus its delay for a zero-order hold; shape (inputs,)."""
         model = self.system.model
         return np.array([
             1.0 if model.held(name) == "linear" else -own.late
@@ -115,7 +115,7 @@ class CompiledSystem:
 
     @property
     def columns(self) -> int:
-        """Free parameters and states: what outputs are differentiated by."""
+        """Number of free parameters and states, by which outputs are differentiated."""
         return len(self.system.free) + len(self.system.states)
 
     def linearise(
@@ -129,7 +129,7 @@ class CompiledSystem:
         parameters: FloatArray,
         substeps: int = 4,
     ) -> Linearisation:
-        """The trajectory of `simulate` with its Jacobians; arguments and errors are the same."""
+        """The trajectory of `simulate` with its Jacobians; same arguments and errors."""
         arguments = self._arguments(inputs, dt, starts, length, initial, parameters, substeps)
         n, wide = len(self.system.states), self.columns + len(self.system.probes)
         nodes = (len(starts), (length - 1) * substeps + 1)
@@ -165,10 +165,10 @@ class CompiledSystem:
         return (driven, dt, substeps, self.hold, starts, first, values)
 
     def vector(self, values: Mapping[str, float]) -> FloatArray:
-        """All parameters, those in `values` replaced; shape (n_p,).
+        """All parameters, with those in `values` replaced; shape (n_p,).
 
         Raises:
-            ModelError: a name is no parameter of the system.
+            ModelError: a name is not a parameter of the system.
         """
         names = list(self.system.parameters)
         vector = self.parameters

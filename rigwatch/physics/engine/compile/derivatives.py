@@ -1,6 +1,6 @@
 """Differentiates the equations of a system exactly, with SymPy.
 
-A jump counts as having no derivative.
+The derivative of a discontinuity is taken as zero.
 """
 
 from collections.abc import Iterable, Sequence
@@ -14,7 +14,7 @@ from rigwatch.physics.engine.equations import symbol
 
 @dataclass(frozen=True)
 class Differentiated:
-    """Expressions with their derivatives: each row belongs to one expression.
+    """Expressions with their derivatives, one row per expression.
 
     Attributes:
         values: the expressions, k of them.
@@ -49,9 +49,9 @@ def differentiated(
 
 @lru_cache(maxsize=1 << 14)
 def derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
-    """∂expression/∂by, with jumps counted as having none.
+    """∂expression/∂by, with zero derivative at discontinuities.
 
-    Sums and products go term by term, as systems of one model share most of their terms.
+    Sums and products are differentiated term by term, as systems of one model share most terms.
     """
     if by not in expression.free_symbols:
         return sympy.Integer(0)

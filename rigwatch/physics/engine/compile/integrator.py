@@ -1,12 +1,12 @@
-"""Integrates any system, with exact sensitivities: the loops around the equations' machine code.
+"""Integrates any system with exact sensitivities: the loops around the equations' machine code.
 
 The state is z = [x | S], the states followed by the rows of their sensitivities, and
 
     dz/dt = rates(t, z, u, p)
 
-is integrated by the classical fourth-order Runge-Kutta method with fixed steps. The equations come
-as addresses of functions void(double t, double* a, u, p, out, slopes), so that these loops are
-compiled once and kept, whatever the system.
+is integrated by the classical fourth-order Runge-Kutta method with fixed steps. The equations are
+passed as addresses of functions void(double t, double* a, u, p, out, slopes), so these loops are
+compiled once for all systems.
 """
 
 import math
@@ -22,9 +22,9 @@ from rigwatch.wire.kernel import kernel
 
 _DOUBLE = ir.DoubleType()
 TINY = 1e-200
-"""Size below which what a sampled state holds is nothing."""
+"""Magnitude below which a sampled state is set to zero."""
 WIDE = 1.5
-"""How far a state may go in an interval, over what a step of Euler's says."""
+"""Allowed change of a state in an interval, relative to an Euler step."""
 
 
 def _call(  # noqa: PLR0917 -- numba wants them by name
@@ -50,10 +50,10 @@ def place(  # noqa: PLR0917 -- a kernel
     u: FloatArray, row: int, at: float, inside: float, hold: FloatArray, rows: int, dt: float,
     us: FloatArray,
 ) -> None:  # fmt: skip
-    """Inputs between one sample and the next, and the time until those that are kept change.
+    """Inputs between two samples, and the time until held inputs change.
 
-    An input whose `hold` is 1 continues along a line, one whose `hold` is 0 is kept; where `hold`
-    is -d it changes d of a sample late. A step that ends at a change is `inside` what was before.
+    `hold` is 1 for a linear input, 0 for a zero-order hold, and -d for a zero-order hold delayed by
+    a share d of a sample. `inside`: a step ending at a change uses the value before it.
     """
     us[u.shape[1]] = 0.0
     for j in range(u.shape[1]):
@@ -73,7 +73,7 @@ def advance(  # noqa: PLR0917 -- a kernel
     dt: float, pp: int,
     z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
 ) -> None:  # fmt: skip
-    """One step of the integration, between shares of a sample; z moves on."""
+    """One Runge-Kutta step between two fractions of a sample; updates z in place."""
     h, middle = dt * (end - start), 0.5 * (start + end)
     zp, dp, up, size = zs.ctypes.data, dz.ctypes.data, us.ctypes.data, z.size
     place(u, row, start, middle, hold, rows, dt, us)
@@ -98,7 +98,7 @@ def advance(  # noqa: PLR0917 -- a kernel
 
 @kernel(error_model="numpy")
 def lateness(hold: FloatArray) -> float:
-    """Share of a sample after which inputs that are kept change."""
+    """Fraction of a sample after which held inputs change."""
     late = 0.0
     for held in hold:
         late = max(late, -held)
@@ -111,7 +111,7 @@ def across(  # noqa: PLR0917 -- a kernel
     dt: float, pp: int,
     z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
 ) -> None:  # fmt: skip
-    """From one sample to the next, in steps that end where an input changes."""
+    """Integrate from one sample to the next, in steps that end where an input changes."""
     first = math.ceil(steps * late) if late < 1.0 else steps
     for step in range(first):
         start, end = late * step / first, late * (step + 1) / first
@@ -128,17 +128,17 @@ def renew(  # noqa: PLR0917 -- a kernel
     update: int, u: FloatArray, row: int, hold: FloatArray, rows: int, dt: float, pp: int,
     z: FloatArray, dz: FloatArray, us: FloatArray,
 ) -> None:  # fmt: skip
-    """States that change at samples take what they are from this one on."""
+    """Update the states that change at samples."""
     place(u, row, 0.0, 0.0, hold, rows, dt, us)
     call(update, row * dt, z.ctypes.data, us.ctypes.data, pp, dz.ctypes.data, dz.ctypes.data)
     for i in range(z.size):
-        # What has been forgotten is zero: numbers below the normal ones are slow.
+        # Decayed states are set to zero: denormal numbers are slow.
         z[i] = dz[i] if abs(dz[i]) > TINY else 0.0
 
 
 @kernel(error_model="numpy")
 def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
-    """States as given for window w; each moves with its own initial value alone."""
+    """Initial states of window w; the sensitivity to the initial states is the identity."""
     n = x0.shape[1]
     # Loops, here and below: numba takes seconds to compile assignments of whole slices.
     for i in range(z.size):
@@ -154,10 +154,10 @@ def needed(  # noqa: PLR0917 -- a kernel
     rows: int, dt: float, pp: int, z: FloatArray, dx: FloatArray, end: FloatArray,
     near: FloatArray, asked: FloatArray, us: FloatArray,
 ) -> float:  # fmt: skip
-    """Steps that the next interval needs: what `pace` asks for, on the way that it will go.
+    """Number of steps that `pace` requires in the next interval.
 
-    Looked at are its beginning, its end after one step of Euler's, and where the states `crossing`
-    come closest to zero.
+    Evaluated at its start, at its end after one Euler step, and where the states in `crossing` come
+    closest to zero.
     """
     n, up, ap = dx.size, us.ctypes.data, asked.ctypes.data
     place(u, row, 0.0, 0.0, hold, rows, dt, us)
@@ -187,8 +187,8 @@ def simulate(  # noqa: PLR0917 -- a kernel
 ) -> None:  # fmt: skip
     """Fill outputs y (windows, samples, outputs), slopes dy (…, m) and last states of each window.
 
-    Inputs that are kept change after every `rows` of them. Each interval takes `substeps`, or as
-    many up to `finest` as the `asked` rates of `pace` need.
+    Held inputs change every `rows` rows. Each interval uses `substeps` steps, or as many up to
+    `finest` as the `asked` rates of `pace` require.
     """
     n, size = x0.shape[1], x0.shape[1] * (1 + m)
     dx, end, near, rate = np.empty(n), np.empty(n), np.empty(n), np.empty(asked)

@@ -1,16 +1,16 @@
-"""The machine code of one system, and its kernel: the equations with the loops of `driver`.
+"""The machine code of one system, and its kernel: the equations with the loops of `integrator`.
 
 Functions of a system, each void(double t, double* a, u, p, out, slopes), with n states, m columns
-of sensitivities and q probes; behind the inputs in u is the time until they change, where kept:
+of sensitivities and q probes; u holds the inputs followed by the time until each changes, if held:
 
     rates        a = [x | S], out = [dx/dt | dS/dt]
     read         a = [x | S], out = y, slopes = ∂y of shape (outputs, m)
     plain        a = x, out = dx/dt
-    pace         a = x, out = steps a second that are needed
+    pace         a = x, out = required steps per second
     rate_slopes  a = x, out = dx/dt, slopes = ∂(dx/dt) by parameters, states, probes: (n, m + q)
     read_slopes  a = x, out = y, slopes = ∂y of shape (outputs, m + q)
-    update       a = [x | S] before a sample, out = [x | S] from there on
-    update_slopes  a = x, out = x from there on, slopes = ∂ of it, of shape (n, m + q)
+    update       a = [x | S] before a sample, out = [x | S] after it
+    update_slopes  a = x, out = x after the sample, slopes = ∂ of it, of shape (n, m + q)
 """
 
 import os
@@ -30,24 +30,24 @@ from rigwatch.physics.engine.compile.step_size import Pace, pace
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
 
 LARGE = 5_000_000
-"""Steps times numbers that are integrated, from where all cores share a simulation."""
+"""Steps times integrated numbers above which a simulation is distributed over all cores."""
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Number of cores available to this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
 
 
 @dataclass(frozen=True)
 class Equations:
-    """What a kernel depends on: no values, bounds or units.
+    """The inputs of a kernel: equations without values, bounds or units.
 
     Attributes:
         states, inputs, parameters, free, probes: names; `free` are those of the parameters by which
             outputs are differentiated.
         rates, reads: of the states, and of the outputs.
-        pace: what the steps must follow.
-        updates: all states from a sample on; none where no state changes there.
+        pace: rates that determine the step size.
+        updates: all states after a sample; none without sampled states.
     """
 
     states: tuple[str, ...]
@@ -62,9 +62,7 @@ class Equations:
 
 
 class Jacobians(NamedTuple):
-    """Addresses of a system's functions: rates alone, and with their Jacobians the outputs, the
-    rates and what states become at samples.
-    """
+    """Addresses of a system's functions: rates alone; outputs, rates and updates with Jacobians."""
 
     plain: int
     reads: int
@@ -73,7 +71,7 @@ class Jacobians(NamedTuple):
 
 
 def native_kernel(system: System) -> "NativeKernel":
-    """The kernel of `system`; one for all systems of the same equations."""
+    """The kernel of `system`, shared by all systems with the same equations."""
     return _kernel(
         Equations(
             tuple(system.states), tuple(system.model.inputs), tuple(system.parameters),
@@ -95,7 +93,7 @@ def _kernel(equations: Equations) -> "NativeKernel":
 
 
 class NativeKernel:
-    """A system's equations in machine code; the linearisation's only once it is asked for."""
+    """A system's equations in machine code; the linearisation is compiled on first use."""
 
     def __init__(self, system: Equations) -> None:
         self._system, self._columns = system, len(system.free) + len(system.states)
@@ -140,7 +138,7 @@ class NativeKernel:
             return
         parts = np.array_split(np.arange(starts.size), min(cores(), starts.size))
         cuts = [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
-        # Windows know nothing of each other, so that every cut gives the same numbers.
+        # Windows are independent, so every distribution over cores gives the same numbers.
         with ThreadPoolExecutor(len(cuts)) as pool:
             running = [pool.submit(kernel, starts[c], x0[c], p, y[c], dy[c], last[c]) for c in cuts]
             for each in running:
@@ -153,9 +151,9 @@ class NativeKernel:
         )
 
     def with_sensitivities(self, columns: int) -> tuple[int, int]:
-        """Addresses of `rates` and `read` for so many columns of S; the first are free parameters.
+        """Addresses of `rates` and `read` for a number of columns of S, free parameters first.
 
-        For loops of one's own; they are called by `integrator.call`.
+        For custom loops; they are called through `integrator.call`.
         """
         if columns not in self._sweeps:
             address = self._compiled(self._sensitive(columns))
@@ -185,7 +183,7 @@ class NativeKernel:
     ) -> None:  # fmt: skip
         """Fill the states at the nodes, the slopes of rates there, outputs and their slopes.
 
-        `jumps` takes the slopes of the states across each sample, where they change there.
+        `jumps` receives the Jacobian of the states across each sample, if states change there.
         """
         driver.linearise(
             *self.jacobians(), u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy, jumps
@@ -205,7 +203,7 @@ def _function(system: Equations, name: str) -> Function:
 
 
 def _values(function: Function, expressions: Sequence[sympy.Expr]) -> Iterator[str | None]:
-    """Registers of the expressions, what they share computed once; None for zero."""
+    """Registers of the expressions, with common subexpressions computed once; None for zero."""
     shared, reduced = sympy.cse(expressions, symbols=sympy.numbered_symbols("cse_"), order="none")
     for name, expression in shared:
         function.let(name, expression)
@@ -215,7 +213,7 @@ def _values(function: Function, expressions: Sequence[sympy.Expr]) -> Iterator[s
 def _with_sensitivities(
     system: Equations, name: str, found: Differentiated, m: int, *, behind: bool
 ) -> Function:
-    """Values, and J·S + ∂/∂p in m columns, the latter behind the values or in `slopes`."""
+    """Values, and J·S + ∂/∂p in m columns, stored after the values or in `slopes`."""
     function, n, k = _function(system, name), len(system.states), len(found.values)
     if not k:
         return function

@@ -1,7 +1,7 @@
-"""Prints expressions as LLVM code and makes machine code of it, in milliseconds.
+"""Translates expressions to LLVM code and compiles it to machine code in milliseconds.
 
-numba infers types and compiles loops, which takes seconds for what is here straight-line code in
-double precision. The loops around it (`driver`) are numba's and compiled once for all systems.
+The equations are straight-line code in double precision, for which numba's type inference would
+take seconds. The loops around them (`integrator`) use numba and are compiled once for all systems.
 
 Each function has the signature void(double t, double* a, u, p, out, slopes).
 """
@@ -17,7 +17,7 @@ import sympy
 from rigwatch.wire.errors import ModelError
 
 FUNCTIONS = ("tanh", "exp", "log", "sin", "cos", "atan", "pow")
-"""Called from the C library of mathematics."""
+"""Functions called from the C mathematics library."""
 _RELATIONS: dict[type[sympy.Basic], str] = {
     sympy.StrictGreaterThan: "ogt",
     sympy.GreaterThan: "oge",
@@ -39,12 +39,12 @@ _ARGUMENTS = "double %t, " + ", ".join(
 
 
 class Function:
-    """The code of one function as it is being written.
+    """The code of one function under construction.
 
     Args:
         name: of the function.
         places: array and index from which each symbol is loaded; None for the time.
-        known: symbols that are numbers.
+        known: symbols with constant values.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Function:
         return f"define void @{self._name}({_ARGUMENTS}) {{\n{body}\n  ret void\n}}\n"
 
     def let(self, name: sympy.Symbol, expression: sympy.Expr) -> None:
-        """Give a name to a value that is used again."""
+        """Name a value for reuse."""
         truth = isinstance(expression, sympy.logic.boolalg.Boolean)
         self._values[name] = self._condition(expression) if truth else self.value(expression)
 
@@ -71,16 +71,16 @@ class Function:
         self._lines.append(f"store double {value}, ptr {self._at(array, index)}")
 
     def load_row(self, array: str, first: int, width: int) -> str:
-        """Neighbouring elements as one vector."""
+        """Load adjacent elements as one vector."""
         return self._do(f"load <{width} x double>, ptr {self._at(array, first)}, align 8")
 
     def store_row(self, array: str, first: int, row: str, width: int) -> None:
-        """Write a vector to neighbouring elements."""
+        """Store a vector to adjacent elements."""
         place = self._at(array, first)
         self._lines.append(f"store <{width} x double> {row}, ptr {place}, align 8")
 
     def row(self, values: Sequence[str | None], width: int) -> str:
-        """A vector that begins with `values`, zero where there is none."""
+        """A vector that starts with `values`, padded with zeros."""
         row = "zeroinitializer"
         for index, value in enumerate(values):
             if value is not None:
@@ -107,7 +107,7 @@ class Function:
         """The register that holds the value of an expression.
 
         Raises:
-            ModelError: it has no meaning in numbers.
+            ModelError: it cannot be computed numerically.
         """
         found = self._values.get(expression)
         if found is None:
@@ -233,13 +233,13 @@ def _target() -> tuple[Any, str, str]:
 
 
 def _machine() -> Any:
-    """For this processor; an engine owns the one that it is given."""
+    """Target machine for this processor; an engine takes ownership of the one it is given."""
     target, processor, features = _target()
     return target.create_target_machine(cpu=processor, features=features, opt=2, jit=True)
 
 
 def machine_code(functions: Sequence[Function]) -> tuple[Any, Callable[[str], int]]:
-    """What keeps the code alive, and the address of each function by its name."""
+    """The object that keeps the code alive, and the address of each function by name."""
     text = _DECLARED + "".join(function.text() for function in functions)
     module = llvm.parse_assembly(text)
     builder = llvm.create_pass_builder(

@@ -1,4 +1,4 @@
-"""How fine steps must be that are the same everywhere, as those of a linearisation are."""
+"""Step size of a linearisation, whose steps are equal for all samples."""
 
 import numpy as np
 
@@ -9,9 +9,11 @@ from rigwatch.wire.arrays import FloatArray
 
 MOST_SUBSTEPS = 64
 FINER = 2.0
-"""Steps over those that keep a memory stable: directions go by Heun's method, which must follow."""
+"""Steps relative to the stability limit of effect states: sensitivities use Heun's method, which
+must be accurate.
+"""
 COARSER = 3.0
-"""Steps about standstill over these: directions need no more than to see that it is steep."""
+"""Steps near standstill relative to these: sensitivities only need to resolve that it is steep."""
 
 
 def even_substeps(

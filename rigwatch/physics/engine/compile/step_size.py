@@ -1,12 +1,12 @@
-"""How fine the steps must be where an effect is stiff: its memory, or friction about standstill.
+"""Step size for stiff effects: effect states, or friction near standstill.
 
-The fourth-order Runge-Kutta method bears |∂(dz/dt)/∂z|·h up to 2.78. A contact that slips after ten
-micrometres has 1e5 1/m times its speed there, far above the rates of the rig that it sits in; dry
-friction is as steep, but only about standstill. So each interval between two samples is cut as
-finely as it needs:
+The fourth-order Runge-Kutta method is stable for |∂(dz/dt)/∂z|·h up to 2.78. A contact that slips
+after ten micrometres has a rate of 1e5 1/m times its speed, far above the rig's own rates; dry
+friction is as steep, but only near standstill. Each interval between two samples is therefore
+divided into as many steps as it needs:
 
-    steps a second = max(|∂(dz/dt)/∂z| / 1.0 of what effects remember,
-                         |∂(effect's share of dx/dt)/∂x| / 0.1 of what passes through zero)
+    steps per second = max(|∂(dz/dt)/∂z| / 1.0 of effect states,
+                           |∂(effect's share of dx/dt)/∂x| / 0.1 of states that cross zero)
 """
 
 from collections.abc import Sequence
@@ -18,24 +18,24 @@ from rigwatch.physics.engine.compile.derivatives import derivative
 from rigwatch.physics.engine.equations import System, compose, symbol
 
 STABLE = 1.0
-"""Rate times step that is allowed, with a margin."""
+"""Largest rate times step, with a margin."""
 ACCURATE = 0.1
-"""The same where a state passes through zero, as speed does: there accuracy asks for more."""
+"""The same where a state crosses zero, as speed does: accuracy requires smaller steps there."""
 ALONE = 2.0
-"""The same of a memory that signals drive and that drives nothing itself."""
+"""The same for an effect state that is driven by signals and drives nothing itself."""
 FINEST = 256
-"""Steps between two samples at most."""
+"""Most steps between two samples."""
 FILLED = 1
-"""Value of a memory at which its rate is looked at, on both sides."""
+"""Value of an effect state, with both signs, at which its rate is evaluated."""
 
 
 @dataclass(frozen=True)
 class Pace:
-    """What a system's steps must follow.
+    """Rates that determine the step size.
 
     Attributes:
-        crossing: states of the model that effects make steep about zero, by their place.
-        asked: expressions whose sizes are the steps a second that are needed [1/s].
+        crossing: indices of model states near whose zero effects are steep.
+        asked: expressions whose magnitudes are the required steps per second [1/s].
     """
 
     crossing: tuple[int, ...] = ()
@@ -43,7 +43,7 @@ class Pace:
 
 
 def pace(system: System) -> Pace:
-    """What the steps must follow; nothing where no effect is stiff."""
+    """Rates that determine the step size; none without stiff effects."""
     if not system.states or (system.model.states and not system.placements):
         return Pace()
     steep = _steep(system)
@@ -55,7 +55,7 @@ def pace(system: System) -> Pace:
 
 
 def _steep(system: System) -> dict[str, sympy.Expr]:
-    """How what effects add to the rate of a state changes with the state itself, by name."""
+    """Derivative of the effects' contribution to a state's rate by that state, by name."""
     if not system.model.states:
         return {}
     bare = compose(system.model).derivatives
@@ -69,7 +69,7 @@ def _steep(system: System) -> dict[str, sympy.Expr]:
 
 
 def _of_memory(system: System) -> Sequence[sympy.Expr]:
-    """How the rate of each state of an effect changes with the state itself, where it is full."""
+    """Derivative of each effect state's rate by that state, at saturation."""
     memory = [name for name in system.states if name not in system.model.states]
     slopes = [derivative(system.derivatives[name], symbol(name)) for name in memory]
     sides = [{symbol(name): side for name in memory} for side in (FILLED, -FILLED)]

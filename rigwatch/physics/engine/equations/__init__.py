@@ -3,7 +3,7 @@
     model.toml + effects at ports ──compose──▶ System: states, parameters, derivatives, outputs
 
 `expression` parses, `dimension` checks units, `scope` holds the names that an equation may use,
-`plugins` finds the effects that other packages offer.
+`plugins` finds the effects of other packages.
 """
 
 from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, library, load_effects

@@ -1,4 +1,4 @@
-"""Physical dimensions of units, so that an equation that adds metres to volts is refused.
+"""Physical dimensions of units, to refuse equations such as metres plus volts.
 
 A dimension is the tuple of exponents of (kg, m, s, A, K); volts are kg m² s⁻³ A⁻¹, so that kt²/R of
 a motor has the unit of a damping. The table of units is that of `rigwatch.wire.units`.

@@ -1,14 +1,14 @@
 """An effect: physics that a model may be missing, as an expression at a port.
 
-Each is a short declaration in a TOML file. At a force port the expression is the force that is
-added, in the port's `x` and `v`; at an actuator or sensor it is the signal that leaves, in the
-signal `u` that arrives. The parameter with role "strength" makes the effect vanish at its neutral
-value.
+Each effect is a short declaration in a TOML file. At a force port the expression is the added force
+as a function of the port's `x` and `v`; at an actuator or sensor it is the output signal as a
+function of the input signal `u`. The effect vanishes when the parameter with role "strength" is at
+its neutral value.
 
-Values are numbers, or shares of the `scale` that a signal has in the recording at hand. Units are
-written with the port's own: `{F}`, `{x}`, `{v}` at a force, `{u}` at a signal, so that
-one declaration serves a mass on a table and an electronic oscillator. Numbers stand in the unit
-beside them and become SI: at once where the unit is fixed, by `Effect.at` where it is the port's.
+Values are numbers, or multiples of the `scale` of a signal in the recording. Units may refer to the
+port's own: `{F}`, `{x}`, `{v}` at a force, `{u}` at a signal, so one declaration serves a mass on a
+table and an electronic oscillator. Numbers are given in the unit next to them and converted to SI:
+immediately if the unit is fixed, by `Effect.at` if it refers to the port's.
 """
 
 from collections.abc import Mapping
@@ -30,14 +30,14 @@ from rigwatch.wire.units import UnitError
 Text = Annotated[str, Meta(min_length=1)]
 
 _VALUES = ("value", "low", "high", "tried", "neutral")
-"""Numbers of a parameter that has no scale; those that are shares of one are SI with it."""
+"""Number fields of a parameter without scale; with a scale they are relative to it, in SI."""
 
 
 class EffectParameter(Section, frozen=True, kw_only=True):
     """A number of an effect."""
 
-    unit: Annotated[str, Meta(description="its unit, may name the port's units in braces")]
-    value: Annotated[float, Meta(description="where a fit starts, as a share of `scale`")] = 0.0
+    unit: Annotated[str, Meta(description="its unit; may refer to the port's units in braces")]
+    value: Annotated[float, Meta(description="initial value in a fit, relative to `scale`")] = 0.0
     low: Annotated[float, Meta(description="lower bound")] = float("-inf")
     high: Annotated[float, Meta(description="upper bound")] = float("inf")
     role: Annotated[
@@ -49,11 +49,11 @@ class EffectParameter(Section, frozen=True, kw_only=True):
     ] = "shape"
     neutral: Annotated[float, Meta(description="strength at which the effect is absent")] = 0.0
     tried: Annotated[
-        tuple[float, ...], Meta(description="shape values that the score test tries")
+        tuple[float, ...], Meta(description="shape values tried by the score test")
     ] = ()
     scale: Annotated[
         str,
-        Meta(description="what values and bounds are shares of: x, v, u, dt or a ratio of them"),
+        Meta(description="unit of values and bounds: x, v, u, dt or a ratio of them"),
     ] = ""
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
@@ -62,12 +62,12 @@ class EffectParameter(Section, frozen=True, kw_only=True):
 
 
 class EffectState(Section, frozen=True, kw_only=True):
-    """Memory of an effect: it has a rate of change, or is updated at each sample."""
+    """State of an effect: it has a rate of change, or is updated at each sample."""
 
     unit: Annotated[str, Meta(description="its unit")]
     derivative: Annotated[str, Meta(description="its rate of change")] = ""
     update: Annotated[
-        str, Meta(description="value from each sample on, of what was held and what arrives")
+        str, Meta(description="value after each sample, from its last value and the input")
     ] = ""
     start: Annotated[float, Meta(description="value to start from")] = 0.0
     low: Annotated[float, Meta(description="least that it can hold")] = float("-inf")
@@ -82,21 +82,21 @@ class Effect(Section, frozen=True, kw_only=True):
     """One effect of the library."""
 
     port: Annotated[Literal["force", "actuator", "sensor", "signal"], Meta(description="where")]
-    expression: Annotated[Text, Meta(description="force added, or signal that leaves")]
+    expression: Annotated[Text, Meta(description="added force, or output signal")]
     direction: Annotated[
-        str, Meta(description="derivative by the strength at neutral, where it is no expression")
+        str, Meta(description="derivative by the strength at neutral, if not computable")
     ] = ""
     physics: Annotated[Text, Meta(description="the physics in a sentence")]
     source: Annotated[Text, Meta(description="where it is from")]
     family: Annotated[
         str,
-        Meta(description="effects of one family say the same in other words; its name if empty"),
+        Meta(description="effects of one family are equivalent descriptions; its name if empty"),
     ] = ""
     confused_with: Annotated[
-        tuple[str, ...], Meta(description="effects that look like it on many recordings")
+        tuple[str, ...], Meta(description="effects that are similar on many recordings")
     ] = ()
     refines: Annotated[
-        str, Meta(description="effect of lower order, tried first where it does most of the same")
+        str, Meta(description="effect of lower order, tried first if it explains most of the same")
     ] = ""
     elective: Annotated[
         bool, Meta(description="ranked only in studies that say whole_library = true")
@@ -105,41 +105,41 @@ class Effect(Section, frozen=True, kw_only=True):
     states: dict[str, EffectState] = field(default_factory=dict)
 
     def fits(self, kind: str) -> bool:
-        """Whether it may stand at a port of this kind."""
+        """Whether it is compatible with a port of this kind."""
         return self.port == kind or (self.port == "signal" and kind in ("actuator", "sensor"))
 
     @property
     def strength(self) -> str:
-        """Name of the strength."""
+        """Name of the strength parameter."""
         roles = ("strength", "switch")
         return next(name for name, p in self.parameters.items() if p.role in roles)
 
     @property
     def sampled(self) -> bool:
-        """Whether it works on samples, as a filter in a computer does."""
+        """Whether it acts on samples, like a digital filter."""
         return any(state.update for state in self.states.values())
 
     @property
     def free(self) -> int:
-        """Parameters that a fit moves."""
+        """Number of parameters that a fit estimates."""
         return sum(p.role in ("strength", "shape") for p in self.parameters.values())
 
     def at(self, units: Mapping[str, str], where: str) -> "Effect":
-        """The effect at a port: braces in its units filled in, its numbers in SI.
+        """The effect at a port: references in its units resolved, its numbers in SI.
 
         Args:
-            units: the port's own units as people write them, by what stands in braces.
-            where: what is being placed, for errors.
+            units: the port's own units as written, by the name used in braces.
+            where: description for error messages.
 
         Raises:
-            ModelError: a unit is unknown, or the port does not offer what stands in braces.
+            ModelError: a unit is unknown, or the port lacks a unit named in braces.
         """
         parameters = {name: _filled(p, units, where) for name, p in self.parameters.items()}
         states = {name: _filled(s, units, where) for name, s in self.states.items()}
         return replace(self, parameters=parameters, states=states)
 
     def scaled(self, sizes: Mapping[str, float]) -> "Effect":
-        """The effect with its shares turned into numbers for signals of these sizes.
+        """The effect with its scaled values converted to numbers for signals of these sizes.
 
         Raises:
             ModelError: a scale names a size that is not given.
@@ -158,14 +158,14 @@ def _filled(item: Numbers, units: Mapping[str, str], where: str) -> Numbers:
         return replace(item, unit=resolved(item.unit, units), shown=resolved(item.shown, units))
     except KeyError as missing:
         raise ModelError(
-            f"{where}: found a need for {missing}, which this port does not offer"
+            f"{where}: found {missing} in its units, which this port does not have"
         ) from None
     except UnitError as error:
         raise ModelError(f"{where}: {error}") from None
 
 
 def resolved(unit: str, units: Mapping[str, str]) -> str:
-    """A unit of an effect with the port's own units in place of braces."""
+    """A unit of an effect with references in braces replaced by the port's units."""
     return unit.format_map({name: _bracketed(value) for name, value in units.items()})
 
 
@@ -191,11 +191,10 @@ class EffectFile(Section, frozen=True, kw_only=True):
 
 
 def usable(name: str, effect: Effect, file: Path | str) -> Effect:
-    """The effect, if its declaration makes sense.
+    """The effect, if its declaration is valid.
 
     Raises:
-        ConfigError: it has no strength, or more than one, or a state that does not say how it
-            changes.
+        ConfigError: it has no strength or more than one, or a state without an equation.
     """
     strengths = [key for key, p in effect.parameters.items() if p.role in ("strength", "switch")]
     if len(strengths) != 1:
@@ -212,7 +211,7 @@ def load_effects(path: Path | str) -> dict[str, Effect]:
     """The effects of the file at `path`, by name.
 
     Raises:
-        ConfigError: the file does not fit.
+        ConfigError: the file is invalid.
     """
     found = load(path, EffectFile).effects
     return {name: usable(name, effect, path) for name, effect in found.items()}

@@ -1,7 +1,7 @@
-"""Expressions as users write them, read safely into SymPy and checked for their units.
+"""User expressions, parsed safely into SymPy and checked for units.
 
 The language is Python's arithmetic with the functions of `FUNCTIONS`; `where(condition, a, b)`
-chooses. Nothing else of Python is understood, so a file of equations cannot run code.
+selects. No other Python is accepted, so an equation file cannot execute code.
 """
 
 import ast
@@ -48,32 +48,32 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 
 
 LONGEST = 20_000
-"""Characters of one expression."""
+"""Largest length of an expression in characters."""
 DEEPEST, DEEPEST_CALLS = 400, 24
-"""Operations and functions within one another: SymPy works through them by recursion."""
+"""Largest nesting depth of operations and functions, which SymPy processes recursively."""
 LARGEST_EXPONENT = 64.0
-"""Of any power whose exponent is a number."""
+"""Largest numeric exponent of a power."""
 MOST_BITS = 4096
-"""Of a whole number that is worked out while reading: 9**9**9 would have 370 million digits."""
+"""Most digits of an integer evaluated while parsing: 9**9**9 would have 370 million."""
 
 
 def parse(text: str, names: Mapping[str, sympy.Expr], where: str) -> sympy.Expr:
     """The expression `text` in the symbols `names`.
 
     Args:
-        text: what the user wrote.
-        names: the symbols that may stand in it, by name.
-        where: what is being defined, for errors.
+        text: the user's text.
+        names: the allowed symbols, by name.
+        where: what is being defined, for error messages.
 
     Raises:
-        ModelError: it does not parse, or names something unknown.
+        ModelError: it does not parse, or uses an unknown name.
     """
     return _parsed(text, tuple(names.items()), where)
 
 
 @lru_cache(maxsize=4096)
 def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) -> sympy.Expr:
-    """The same, kept: SymPy takes milliseconds to simplify choices and extremes."""
+    """`parse` with a cache: SymPy takes milliseconds to simplify `where`, `min` and `max`."""
     try:
         value = sympy.sympify(_Reader(dict(names), where).value(_tree(text, where)))
     except RecursionError:
@@ -84,7 +84,7 @@ def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) ->
 
 
 def check_size(text: str, where: str) -> None:
-    """Refuse an expression that is too long or too deep to work with.
+    """Check that an expression is not too long or too deeply nested.
 
     Raises:
         ModelError: it is, or it does not parse.
@@ -93,7 +93,7 @@ def check_size(text: str, where: str) -> None:
 
 
 def names_in(text: str, where: str) -> frozenset[str]:
-    """Every name in the expression `text` that is no function.
+    """All names in the expression `text` except functions.
 
     Raises:
         ModelError: it does not parse.
@@ -106,7 +106,7 @@ def names_in(text: str, where: str) -> frozenset[str]:
 
 
 def _tree(text: str, where: str) -> ast.expr:
-    """Python's syntax tree of an expression that is neither too long nor too deep to work with."""
+    """Python's syntax tree of an expression, after checking its length and depth."""
     if len(text) > LONGEST:
         found = f"found {len(text)} characters"
         raise ModelError(f"{where}: {found}, expected an expression of at most {LONGEST}")
@@ -125,7 +125,7 @@ def _tree(text: str, where: str) -> ast.expr:
 
 
 def _is_deep(tree: ast.AST) -> bool:
-    """Whether operations or functions stand too deep within one another."""
+    """Whether operations or functions are nested too deeply."""
     level = [(tree, 0)]
     for _ in range(DEEPEST):
         if any(calls > DEEPEST_CALLS for _, calls in level):
@@ -190,7 +190,7 @@ class _Reader:
 
 
 def _excess(base: sympy.Expr, exponent: Any) -> str:
-    """What makes a power too large to be worked out, as SymPy does where it is one of numbers."""
+    """Why a power is too large for SymPy to evaluate; empty if it is not."""
     if not isinstance(exponent, sympy.Rational | sympy.Float):
         return ""
     if abs(exponent) > LARGEST_EXPONENT:
@@ -200,10 +200,10 @@ def _excess(base: sympy.Expr, exponent: Any) -> str:
 
 
 def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> Dimension | None:
-    """The dimension of the expression `text`; None for zero, which fits every unit.
+    """The dimension of the expression `text`; None for zero, which is valid in every unit.
 
     Raises:
-        ModelError: it adds, compares or feeds to a function what does not have fitting units.
+        ModelError: it adds or compares different dimensions, or passes one to a function.
     """
     try:
         return _Measurer(dimensions, where).dim(_tree(text, where))
@@ -216,7 +216,7 @@ def _is_caret(node: ast.AST) -> bool:
 
 
 class _Measurer:
-    """Walks the same tree and computes dimensions."""
+    """Walks the syntax tree and computes dimensions."""
 
     def __init__(self, dimensions: Mapping[str, Dimension], where: str) -> None:
         self._dimensions, self._where = dimensions, where

@@ -1,8 +1,8 @@
-"""Numbers of models and effects become SI where they are made, from a file or in Python.
+"""Converts numbers of models and effects to SI on creation, from a file or in Python.
 
-A value is given in the unit that stands beside it. From then on `unit` is SI, as the numbers are,
-and `shown` keeps the unit as it was written, for everything that people read. What is SI already
-stays untouched, to the bit, so that a copy of a section changes nothing.
+A value is given in the unit next to it. After conversion numbers and `unit` are SI, and `shown`
+keeps the original unit for display. Values already in SI are left unchanged to the bit, so copying
+a section changes nothing.
 """
 
 import re
@@ -16,16 +16,16 @@ from rigwatch.wire.units import UnitError, describe, unit_of
 
 
 def into_si(section: Section, *numbers: str) -> None:
-    """Turn the numbers and the unit of a section that is being made into SI.
+    """Convert the numbers and the unit of a new section to SI.
 
-    A unit that names a port's in braces waits until they are filled in; see `Effect.at`.
+    A unit with references in braces is converted later, see `Effect.at`.
 
     Args:
         section: has `unit` and `shown`.
         numbers: fields that are given in `unit`.
 
     Raises:
-        UnitError: a unit is unknown, or `shown` measures something else than `unit`.
+        UnitError: a unit is unknown, or `shown` has another dimension than `unit`.
     """
     one: Any = section
     if "{" in one.unit:

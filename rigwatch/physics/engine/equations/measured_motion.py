@@ -1,25 +1,25 @@
-"""Prediction along the measured motion: what sensors show drives the rest of a model.
+"""Prediction along the measured motion: measured states drive the rest of a model.
 
-A model's states are split into those that a channel shows (`measured`, `rate_of`) and those that
-are hidden,
+A model's states are split into those measured by a channel (`measured`, `rate_of`) and hidden ones,
 
     x = (x_m, x_h),   dx_h/dt = f_h(t, x_m, x_h, u, p),   y = g(t, x_m, x_h, u, p)
 
-and x_m is taken from the data. The transformed model simulates the hidden states alone, with x_m
-among its inputs, and predicts the outputs that are balances: an acceleration, a current, a flow.
-Hidden states that forget their start need no windows: a whole recording is one stable run, and the
-output's residual shows the missing force at every sample. The field calls it the series-parallel
-form, or teacher forcing (K. S. Narendra, K. Parthasarathy, IEEE Trans. Neural Networks 1, 1990).
+and x_m is taken from the data. The transformed model simulates only the hidden states, with x_m
+among its inputs, and predicts the outputs that are balances: an acceleration, a current, a flow. If
+the hidden states converge from any initial value, no windows are needed: a whole recording is one
+stable run, and the output's residual shows the missing force at every sample. This is the
+series-parallel form, or teacher forcing (K. S. Narendra, K. Parthasarathy, IEEE Trans. Neural
+Networks 1, 1990).
 
-Where every output merely shows a measured state, the balance itself is predicted: the equation of
-a measured state's rate, held against the rate of the channel (see `measured_recording.py`),
+If every output is itself a measured state, the balance is predicted instead: the equation of a
+measured state's rate, compared with the rate of the channel (see `measured_recording.py`),
 
     dv/dt = (drive - k·x - c·v + load)/m   →   output v_rate, measured as d²(position)/dt²
 
-Two weaknesses: noise of the measured motion enters as an input and biases what multiplies v, or
-its sign near standstill; and an effect at the sensor of a measured state enters the equations
-wherever the state does, so that the transformed model has no port for it.
-The workbench takes such an effect out of the recording instead.
+Two limitations. Noise of the measured motion enters as an input and biases the coefficients of v,
+and of its sign near standstill. An effect at the sensor of a measured state enters the equations
+wherever the state does, so the transformed model has no port for it; the workbench removes such an
+effect from the recording instead.
 """
 
 from collections.abc import Iterable
@@ -33,17 +33,17 @@ from rigwatch.physics.engine.equations.quantities import spelt_out
 from rigwatch.wire.errors import ModelError
 
 RATE_SUFFIX = "_rate"
-"""What the output that is the balance of a state is called, behind the state's name."""
+"""Suffix of the output that is the balance of a state, after the state's name."""
 
 
 @dataclass(frozen=True)
 class MeasuredState:
-    """A state that a channel shows, and an input of the transformed model.
+    """A measured state, which is an input of the transformed model.
 
     Attributes:
         name: of the state.
-        channel: that shows it.
-        order: 0 where the channel shows the state, 1 where the state is the channel's rate.
+        channel: that measures it.
+        order: 0 if the channel measures the state, 1 if the state is the channel's rate.
     """
 
     name: str
@@ -52,7 +52,7 @@ class MeasuredState:
 
 
 def measured_states(model: Model) -> tuple[MeasuredState, ...]:
-    """The states that channels of the model's outputs show, in the model's order."""
+    """The states measured by channels of the model's outputs, in the model's order."""
     shown = {output.channel or name for name, output in model.outputs.items()}
     found = []
     for name, state in model.states.items():
@@ -64,29 +64,29 @@ def measured_states(model: Model) -> tuple[MeasuredState, ...]:
 
 
 def has_hidden_states(model: Model) -> bool:
-    """Whether channels show some of a model's states, and not all."""
+    """Whether channels measure some but not all of a model's states."""
     return 0 < len(measured_states(model)) < len(model.states)
 
 
 def balanced_states(model: Model) -> tuple[MeasuredState, ...]:
-    """Measured states whose rate says more than that it is another measured state."""
+    """Measured states whose rate is not simply another measured state."""
     measured, states = measured_states(model), spelt_out(model).states
     names = {state.name for state in measured}
     return tuple(s for s in measured if not _named(states[s.name].derivative) <= names)
 
 
 def predicted_outputs(model: Model) -> tuple[str, ...]:
-    """Outputs that are more than a measured state, by name."""
+    """Outputs that are not simply a measured state, by name."""
     given = {state.name for state in measured_states(model)} | set(model.parameters)
     outputs = spelt_out(model).outputs
     return tuple(n for n, output in outputs.items() if not _named(output.expression) <= given)
 
 
 def along_measured_motion(model: Model) -> Model:
-    """The model with its measured states as inputs; ports and effects work as before.
+    """The model with its measured states as inputs; ports and effects are unchanged.
 
     Raises:
-        ModelError: no channel shows any of its states, or nothing is left to predict.
+        ModelError: no channel measures any of its states, or no output is left to predict.
     """
     model = spelt_out(model)
     motion = {state.name for state in measured_states(model)}
@@ -111,7 +111,7 @@ def along_measured_motion(model: Model) -> Model:
 
 
 def _outputs(model: Model) -> dict[str, Output]:
-    """What is predicted: the outputs that remain or, where none does, the balances."""
+    """The predicted outputs: those that remain or, if none does, the balances."""
     kept = predicted_outputs(model)
     if kept:
         return {name: model.outputs[name] for name in kept}
@@ -123,7 +123,7 @@ def _outputs(model: Model) -> dict[str, Output]:
 
 
 def _with_unused_fixed(model: Model) -> Model:
-    """A parameter that stands in no equation any more cannot be fitted."""
+    """Fix the parameters that are no longer used in any equation."""
     used = _all_named(
         [
             *(state.derivative for state in model.states.values()),

@@ -10,10 +10,10 @@
     variables.x = { expression = "x", unit = "m" }
     variables.v = { expression = "v", unit = "m/s" }
 
-Numbers stand in the unit beside them (mm, bar, kN/mm) and are SI once they are read; equations
-compute in SI. `[quantities]` gives names to what equations share. A port's name stands in the
-equations. A force port is a sum that is 0 until an effect is put there; an actuator port is its
-input as it arrives, and a sensor port is an output as it is read.
+Numbers are given in the unit next to them (mm, bar, kN/mm) and converted to SI when read; equations
+compute in SI. `[quantities]` names expressions shared by equations. Equations refer to ports by
+name. A force port is a sum of effects, 0 without effects; an actuator port is its input as applied
+to the plant, and a sensor port is an output as read.
 """
 
 import math
@@ -40,13 +40,13 @@ class Input(Section, frozen=True, kw_only=True):
     """A signal that drives the model."""
 
     unit: Annotated[str, Meta(description="its unit")]
-    channel: Annotated[str, Meta(description="channel it is read from, its own name if empty")] = ""
+    channel: Annotated[str, Meta(description="channel of the input, its own name if empty")] = ""
     hold: Annotated[
-        Hold | None, Meta(description="between samples, as the model's if not given")
+        Hold | None, Meta(description="hold between samples, that of the model if not given")
     ] = None
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
     late: Annotated[
-        float, Meta(ge=0, le=1, description="share of a sample by which one that is kept is late")
+        float, Meta(ge=0, le=1, description="delay of a held input, as a share of a sample")
     ] = 0.0
 
     def __post_init__(self) -> None:
@@ -58,7 +58,7 @@ class State(Section, frozen=True, kw_only=True):
 
     unit: Annotated[str, Meta(description="its unit")]
     derivative: Annotated[Text, Meta(description="its rate of change")]
-    start: Annotated[float, Meta(description="value to start from where nothing measures it")] = 0.0
+    start: Annotated[float, Meta(description="initial value if no channel measures it")] = 0.0
     measured: Annotated[str, Meta(description="channel that shows it")] = ""
     rate_of: Annotated[str, Meta(description="channel whose rate of change it is")] = ""
     low: Annotated[float, Meta(description="least initial value of a fit")] = float("-inf")
@@ -70,22 +70,22 @@ class State(Section, frozen=True, kw_only=True):
 
 
 class Parameter(Section, frozen=True, kw_only=True):
-    """A number of the model, fitted unless it is fixed."""
+    """A parameter of the model, fitted unless it is fixed."""
 
     value: Annotated[
         float,
-        Meta(description="value, or where a fit starts: within its bounds if not given"),
+        Meta(description="value, or initial value of a fit; chosen within the bounds if not given"),
     ] = math.nan
     unit: Annotated[str, Meta(description="its unit")]
     low: Annotated[float, Meta(description="lower bound of a fit")] = float("-inf")
     high: Annotated[float, Meta(description="upper bound of a fit")] = float("inf")
     fixed: Annotated[bool, Meta(description="whether it is known")] = False
     kept: Annotated[
-        bool, Meta(description="fitted to a healthy recording where there is one, then fixed")
+        bool, Meta(description="fitted to a healthy recording if there is one, then fixed")
     ] = False
     deviation: Annotated[
         float,
-        Meta(ge=0, description="standard deviation of what is known of it, where it is fixed"),
+        Meta(ge=0, description="standard deviation of a fixed value"),
     ] = 0.0
     meaning: Annotated[str, Meta(description="what it is, in words")] = ""
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
@@ -103,7 +103,7 @@ class Parameter(Section, frozen=True, kw_only=True):
 
 
 def _within(low: float, high: float) -> float:
-    """A value to start from: between two bounds, else 1 of its unit or one beyond the bound."""
+    """An initial value: between two bounds, otherwise 1 of its unit or one beyond the bound."""
     if math.isfinite(low) and math.isfinite(high):
         return math.sqrt(low * high) if low > 0 else (low + high) / 2
     if low >= 1:
@@ -118,7 +118,7 @@ class Output(Section, frozen=True, kw_only=True):
     expression: Annotated[
         Text, Meta(description="what it is, in states, inputs, parameters and quantities")
     ]
-    channel: Annotated[str, Meta(description="channel it is held against, its name if empty")] = ""
+    channel: Annotated[str, Meta(description="channel it is compared with, its name if empty")] = ""
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
     def __post_init__(self) -> None:
@@ -126,7 +126,7 @@ class Output(Section, frozen=True, kw_only=True):
 
 
 class Quantity(Section, frozen=True, kw_only=True):
-    """An expression with a name, for equations that share it or to be read."""
+    """A named expression, shared by equations or for readability."""
 
     expression: Annotated[
         Text, Meta(description="what it is, in states, inputs, parameters and quantities")
@@ -139,7 +139,7 @@ class Quantity(Section, frozen=True, kw_only=True):
 
 
 class Variable(Quantity, frozen=True, kw_only=True):
-    """A quantity that effects at a port may use."""
+    """A variable that effects at a port may use."""
 
 
 class Port(Section, frozen=True, kw_only=True):
@@ -147,18 +147,16 @@ class Port(Section, frozen=True, kw_only=True):
 
     kind: Annotated[Literal["force", "actuator", "sensor"], Meta(description="how it enters")]
     unit: Annotated[str, Meta(description="unit of what effects add or change here")] = ""
-    signal: Annotated[str, Meta(description="input or output that an actuator or sensor is at")] = (
-        ""
-    )
+    signal: Annotated[str, Meta(description="input or output of an actuator or sensor port")] = ""
     passive: Annotated[
-        bool, Meta(description="nothing enters but what its variables drive, as through a leak")
+        bool, Meta(description="only effects driven by its variables enter, as through a leak")
     ] = False
     described: Annotated[
         tuple[str, ...],
-        Meta(description="families of effects that the equations hold here already: no candidates"),
+        Meta(description="families of effects already in the equations here: no candidates"),
     ] = ()
     variables: Annotated[
-        dict[str, Variable], Meta(description="what effects here call x, v and so on")
+        dict[str, Variable], Meta(description="variables of effects here, such as x and v")
     ] = field(default_factory=dict)
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
@@ -167,9 +165,9 @@ class Port(Section, frozen=True, kw_only=True):
 
 
 class Variant(Section, frozen=True, kw_only=True):
-    """Another law for a part of the model, see `variants.py`."""
+    """An alternative law for a part of the model, see `variants.py`."""
 
-    physics: Annotated[Text, Meta(description="what it says of the rig, in a sentence")]
+    physics: Annotated[Text, Meta(description="its physics, in a sentence")]
     source: Annotated[str, Meta(description="where it comes from")] = ""
     group: Annotated[str, Meta(description="at most one variant of a group is taken")] = ""
     parameters: dict[str, Parameter] = field(default_factory=dict)
@@ -177,49 +175,49 @@ class Variant(Section, frozen=True, kw_only=True):
     states: dict[str, State] = field(default_factory=dict)
     outputs: dict[str, Output] = field(default_factory=dict)
     without: Annotated[
-        tuple[str, ...], Meta(description="states, quantities and parameters that fall away")
+        tuple[str, ...], Meta(description="states, quantities and parameters that are removed")
     ] = ()
 
 
 class Model(Section, frozen=True, kw_only=True):
-    """The whole file."""
+    """The model file."""
 
     name: Text
     summary: Annotated[Text, Meta(description="what it describes, in a sentence")]
     source: Annotated[str, Meta(description="where its equations come from")] = ""
     hold: Annotated[
         Hold | None,
-        Meta(description="input between samples: a line, or kept; the data choose if not given"),
+        Meta(description="hold of inputs between samples; chosen from the data if not given"),
     ] = None
     rough: Annotated[
-        bool, Meta(description="leaves much unexplained on a healthy rig, too; see the workbench")
+        bool, Meta(description="has a large residual even on a healthy rig; see the workbench")
     ] = False
     inputs: dict[str, Input]
     states: dict[str, State] = field(default_factory=dict)
     parameters: dict[str, Parameter]
     quantities: Annotated[
-        dict[str, Quantity], Meta(description="expressions with names, for equations and ports")
+        dict[str, Quantity], Meta(description="named expressions, for equations and ports")
     ] = field(default_factory=dict)
     outputs: Annotated[dict[str, Output], Meta(min_length=1)]
     ports: dict[str, Port] = field(default_factory=dict)
     variants: Annotated[
-        dict[str, Variant], Meta(description="other laws for parts of it, for `study base`")
+        dict[str, Variant], Meta(description="alternative laws for parts of it, for `study base`")
     ] = field(default_factory=dict)
 
     def held(self, name: str) -> Hold:
-        """What an input does between samples: a line where nothing is said."""
+        """The hold of an input between samples; linear by default."""
         return self.inputs[name].hold or self.hold or "linear"
 
     def unheld(self) -> tuple[str, ...]:
-        """Inputs of which the model does not say what they do between samples."""
+        """Inputs without a hold in the model."""
         return tuple(n for n, own in self.inputs.items() if not (own.hold or self.hold))
 
 
 def load_model(path: Path | str) -> Model:
-    """The model file at `path`, its numbers in SI.
+    """The model file at `path`, numbers in SI.
 
     Raises:
-        ConfigError: the file does not fit, or a unit is unknown.
+        ConfigError: the file is invalid, or a unit is unknown.
     """
     return load(path, Model)
 
@@ -232,7 +230,7 @@ def shipped_models() -> dict[str, Model]:
 
 @cache
 def _shipped_texts() -> dict[str, str]:
-    """The files of the models that ship, by the models' names."""
+    """The texts of the shipped model files, by model name."""
     folder = resources.files("rigwatch.physics") / "models"
     files = sorted(folder.iterdir(), key=lambda entry: entry.name)
     texts = [(file.name, file.read_text("utf-8")) for file in files if file.name.endswith(".toml")]
@@ -240,22 +238,22 @@ def _shipped_texts() -> dict[str, str]:
 
 
 def model_text(name: str) -> str:
-    """The file of a model that ships, or of one's own.
+    """The text of a shipped model's file, or of the user's own.
 
     Raises:
         ConfigError: it cannot be read.
-        ModelError: nothing has this name.
+        ModelError: there is no model of this name.
     """
     model_named(name)
     return Path(name).read_text("utf-8") if name.endswith(".toml") else _shipped_texts()[name]
 
 
 def model_named(name: str, folder: Path | None = None) -> Model:
-    """A model that ships, by its name, or a file of one's own, in `folder` if one is given.
+    """A shipped model by name, or the user's own file, in `folder` if one is given.
 
     Raises:
-        ConfigError: the file does not fit.
-        ModelError: nothing has this name.
+        ConfigError: the file is invalid.
+        ModelError: there is no model of this name.
     """
     if name.endswith(".toml"):
         return load_model((folder or Path()) / name)

@@ -1,6 +1,6 @@
-"""Whether a model file makes sense as a whole: its equations parse, units fit, ports are used.
+"""Checks a model file as a whole: equations parse, units agree, ports are used.
 
-A model is checked when a study opens, so that a slip of the pen is one line and not a verdict.
+A model is checked when a study opens, so that a typing error gives one line and not a verdict.
 """
 
 import keyword
@@ -18,15 +18,15 @@ _TABLES = ("inputs", "states", "parameters", "quantities", "ports")
 
 
 def check_model(model: Model, where: str = "") -> System:
-    """The model's equations, alone.
+    """Check a model and return its equations without effects.
 
     Args:
-        model: as it was read.
-        where: its file, for errors.
+        model: the model.
+        where: its file, for error messages.
 
     Raises:
-        ModelError: a name is taken or used twice, an equation does not parse or has other units, a
-            channel is shown by nothing, or a port stands in no equation.
+        ModelError: a name is reserved or used twice, an equation does not parse or has wrong
+            units, a state names an unknown channel, or a port is used in no equation.
     """
     try:
         _check_names(model)
@@ -42,17 +42,17 @@ def check_model(model: Model, where: str = "") -> System:
         meant = f"its signal's place taken by {name!r}" if kind == "actuator" else f"'… + {name}'"
         begin = f"{where}: " if where else ""
         raise ModelError(
-            f"{begin}ports.{name}: found in no equation, so that no effect there could do anything;"
+            f"{begin}ports.{name}: found in no equation, so effects there would have no influence;"
             f" expected {meant} in a derivative or an output"
         )
     return system
 
 
 def check_variants(model: Model, where: str = "") -> None:
-    """Each variant, by itself, makes a model that holds together.
+    """Check the model with each variant by itself.
 
     Raises:
-        ModelError: one does not; see `check_model`.
+        ModelError: one is invalid; see `check_model`.
     """
     for name in model.variants:
         alone = replace(with_variants(model, (name,)), variants={})
@@ -60,7 +60,7 @@ def check_variants(model: Model, where: str = "") -> None:
 
 
 def unused_ports(system: System) -> tuple[str, ...]:
-    """Force and actuator ports that stand in no equation, by name."""
+    """Force and actuator ports used in no equation, by name."""
     equations = (*system.derivatives.values(), *system.outputs.values())
     used = {s for equation in equations for s in equation.free_symbols}
     return tuple(p.removeprefix(PROBE) for p in system.probes if symbol(p) not in used)
@@ -85,7 +85,7 @@ def _check_names(model: Model) -> None:
 
 
 def _check_channels(model: Model) -> None:
-    """A state names a channel of the model; another name shows it nowhere."""
+    """Check that the channels named by states are channels of the model."""
     known = {own.channel or name for name, own in model.inputs.items()}
     known |= {own.channel or name for name, own in model.outputs.items()}
     known |= {*model.inputs, *model.outputs}
@@ -100,7 +100,7 @@ def _check_channels(model: Model) -> None:
 
 
 def _check_quantities(model: Model) -> None:
-    """Each names what there is; which of them may use which port is found as they are composed."""
+    """Check the names that quantities use; their use of ports is checked when composed."""
     ports = [name for name, port in model.ports.items() if port.kind != "sensor"]
     tables = (model.inputs, model.states, model.parameters, model.quantities, ports, [TIME])
     known = {name: symbol(name) for table in tables for name in table}

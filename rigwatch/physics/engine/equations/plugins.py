@@ -1,4 +1,4 @@
-"""Effects beside those that ship: of installed packages, and of the user's own files."""
+"""Additional effects: from installed packages and the user's own files."""
 
 from collections.abc import Iterable
 from importlib.metadata import entry_points
@@ -7,14 +7,14 @@ from pathlib import Path
 from rigwatch.physics.engine.equations.effect import Effect, load_effects
 
 GROUP = "rigwatch.effects"
-"""Entry points of this group give a mapping of effects by name, or a function that returns one."""
+"""Entry point group: each is a mapping of effects by name, or a function that returns one."""
 
 
 def offered(files: Iterable[Path | str]) -> dict[str, Effect]:
-    """Effects of installed packages and of `files`, by name; the latter take the place of others.
+    """Effects of installed packages and of `files`, by name; the latter take precedence.
 
     Raises:
-        ConfigError: a file does not fit.
+        ConfigError: a file is invalid.
     """
     found: dict[str, Effect] = {}
     for entry in entry_points(group=GROUP):

@@ -1,11 +1,11 @@
-"""Named intermediate quantities of a model: a balance is written once and used by its name.
+"""Named intermediate quantities of a model: an expression written once and used by name.
 
     [quantities]
     push = { expression = "A1*(P1 - Pe) - A2*(P2 - Pe)", unit = "N" }
     acceleration = { expression = "(push - c*v + load)/m", unit = "m/s^2" }
 
-They are no states: a quantity means its expression wherever it stands, and kernels compute what
-equations share once.
+They are not states: a quantity is replaced by its expression, and kernels compute common
+subexpressions once.
 """
 
 import re
@@ -20,10 +20,10 @@ from rigwatch.wire.errors import ModelError
 
 
 def in_order(model: Model) -> tuple[str, ...]:
-    """Names of the quantities, each behind those that it uses.
+    """Names of the quantities in order of dependence.
 
     Raises:
-        ModelError: one uses itself, also through others.
+        ModelError: one uses itself, directly or through others.
     """
     known = model.quantities
     uses = {n: names_in(q.expression, f"quantity {n}") & known.keys() for n, q in known.items()}
@@ -32,15 +32,15 @@ def in_order(model: Model) -> tuple[str, ...]:
     except CycleError as error:
         circle = " uses ".join(reversed(error.args[1]))
         raise ModelError(
-            f"quantities: found the circle {circle}, expected each to use others alone"
+            f"quantities: found the circular definition {circle}, expected none"
         ) from None
 
 
 def spelt_out(model: Model) -> Model:
-    """The model with the expressions of its quantities in place of their names.
+    """The model with its quantities replaced by their expressions.
 
     Raises:
-        ModelError: they use each other in a circle, or are too long once they are spelt out.
+        ModelError: their definitions are circular, or the expanded text is too long.
     """
     if not model.quantities:
         return model
@@ -69,7 +69,7 @@ def spelt_out(model: Model) -> Model:
 
 
 def _spelt(text: str, texts: Mapping[str, str], where: str) -> str:
-    """An expression with texts in place of names; a name alone needs no brackets."""
+    """An expression with names replaced by texts; a single name needs no brackets."""
     if text.strip() in texts:
         return texts[text.strip()][1:-1]
     words = re.findall(r"\b[A-Za-z_]\w*", text)

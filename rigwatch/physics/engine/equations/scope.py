@@ -18,40 +18,40 @@ from rigwatch.wire.errors import ModelError
 
 
 def symbol(name: str) -> sympy.Symbol:
-    """The real symbol called `name`."""
+    """The real symbol named `name`."""
     return sympy.Symbol(name, real=True)
 
 
 @dataclass
 class Scope:
-    """Meanings and dimensions by name; an expression is read in a scope."""
+    """Meanings and dimensions by name, in which an expression is read."""
 
     meanings: dict[str, sympy.Expr] = field(default_factory=dict)
     dimensions: dict[str, Dimension] = field(default_factory=dict)
     grams: set[str] = field(default_factory=set)
-    """Names whose unit is written with g, which may be meant as standard gravity."""
+    """Names whose unit is written with g, possibly meant as standard gravity."""
 
     def define(self, name: str, meaning: sympy.Expr, unit: str | Dimension) -> None:
-        """Let `name` stand for `meaning`, with its unit or dimension."""
+        """Define `name` as `meaning`, with its unit or dimension."""
         self.meanings[name] = meaning
         self.dimensions[name] = dimension(unit) if isinstance(unit, str) else unit
         if isinstance(unit, str) and names_gram(unit):
             self.grams.add(name)
 
     def define_all(self, units: Mapping[str, str], prefix: str = "") -> None:
-        """Let each name stand for a symbol of its own, called with `prefix` in front."""
+        """Define each name as a symbol of its own, named with `prefix`."""
         for name, unit in units.items():
             self.define(name, symbol(prefix + name), unit)
 
     def copy(self) -> "Scope":
-        """A scope that can be added to without changing this one."""
+        """An independent copy of this scope."""
         return Scope(dict(self.meanings), dict(self.dimensions), set(self.grams))
 
     def read(self, text: str, unit: str | Dimension, where: str) -> sympy.Expr:
         """The expression `text`, which must have the given unit or dimension.
 
         Raises:
-            ModelError: it does not parse, names something unknown or has another unit.
+            ModelError: it does not parse, uses an unknown name or has another dimension.
         """
         expression = parse(text, self.meanings, where)
         try:
@@ -67,6 +67,6 @@ class Scope:
         return expression
 
     def _hint(self, text: str, unit: str | Dimension = "") -> str:
-        """What may be behind units that do not fit: gravity that was written as the gram."""
+        """A hint for a wrong unit: standard gravity may have been written as the gram."""
         used = self.grams.intersection(re.findall(r"\w+", text))
         return f" ({GRAM})" if used or (isinstance(unit, str) and names_gram(unit)) else ""

@@ -1,8 +1,8 @@
-"""A model with the effects that were put on its ports: equations ready for a kernel.
+"""A model with effects at its ports: equations ready for a kernel.
 
-Parameters and states of an effect carry its port and name, such as `load_coulomb_Fc`, so that the
-same effect may stand at two ports. Effects on one force port add up; on a signal they follow one
-another in the order in which they were placed.
+Parameters and states of an effect are prefixed by its port and name, such as `load_coulomb_Fc`, so
+the same effect can be at two ports. Effects at a force port are added; effects at a signal port are
+applied in sequence, in the order of placement.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,20 +20,20 @@ from rigwatch.wire.errors import ModelError
 TIME = "t"
 PROBE = "probe_"
 RATE = "rate"
-"""What an effect at a signal may call the signal's own rate of change."""
+"""Name, for effects at a signal port, of the signal's rate of change."""
 STEP = "step"
-"""What the direction of an effect at a signal may call the signal's change over a sample."""
+"""Name, for directions of effects at a signal port, of the signal's change over a sample."""
 UNTIL = "until_"
 LEFT = "left"
-"""What an effect at a signal may call the time until an input that is kept changes; 0 elsewhere.
+"""Name, for effects at a signal port, of the time until a held input changes; 0 otherwise.
 
-Its symbol in a system is `UNTIL`, so that a model may call something of its own `left`.
+Its symbol in a system is `UNTIL`, so a model can use the name `left` itself.
 """
 
 
 @dataclass(frozen=True)
 class Placement:
-    """The effect called `name`, at a port."""
+    """The effect named `name`, at a port."""
 
     name: str
     effect: Effect
@@ -41,7 +41,7 @@ class Placement:
 
     @property
     def prefix(self) -> str:
-        """What its parameters and states are called with in front."""
+        """Prefix of the names of its parameters and states."""
         return f"{self.port}_{self.name}_"
 
     def __str__(self) -> str:
@@ -53,16 +53,16 @@ class System:
     """Equations of a model with its effects.
 
     Attributes:
-        model: the model with its quantities spelt out.
+        model: the model with its quantities expanded.
         placements: the effects, in order.
         states: by name, those of the model first.
         parameters: by name, those of the model first.
         derivatives: rates of the states, by name.
         outputs: by name, as the sensors read them.
-        ports: what each port is: the force that is added, the signal that leaves.
-        probes: one a force or actuator port, added to what it is and always 0: derivatives by them
-            say what any further effect there would do.
-        updates: values from each sample on of states that change there, by name; their rates are 0.
+        ports: expression of each port: the added force, or the output signal.
+        probes: one symbol per force or actuator port, added to its expression and always 0; the
+            derivatives by them give the influence of any further effect there.
+        updates: values after each sample of the sampled states, by name; their rates are 0.
     """
 
     model: Model
@@ -77,12 +77,12 @@ class System:
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Names of the parameters that a fit moves."""
+        """Names of the free parameters."""
         return tuple(name for name, p in self.parameters.items() if not p.fixed)
 
 
 def compose(model: Model, placements: Sequence[Placement] = ()) -> System:
-    """The equations of `model` with `placements` on its ports.
+    """The equations of `model` with `placements` at its ports.
 
     Raises:
         ModelError: a port is unknown or of another kind, an expression does not parse or has wrong
@@ -108,11 +108,11 @@ def _check_port(model: Model, placement: Placement) -> None:
 
 
 class _Composer:
-    """Builds the scope in the order in which things depend on each other.
+    """Builds the scope in order of dependence.
 
-    Inputs and states come first, then actuators, then forces, then the equations and outputs, then
-    the sensors: each is read in a scope where all that it may use is already known. A quantity
-    joins as soon as all that it uses has.
+    Inputs and states come first, then actuators, forces, equations and outputs, and finally
+    sensors. Each is read in a scope that contains everything it may use. A quantity is added as
+    soon as everything that it uses is defined.
     """
 
     def __init__(self, model: Model, placements: tuple[Placement, ...]) -> None:
@@ -158,7 +158,7 @@ class _Composer:
         )
 
     def _known(self) -> list[str]:
-        """Quantities that wait for nothing any more, in the order in which they use each other."""
+        """Quantities whose dependencies are all defined, in order of dependence."""
         known, found = set(self._scope.meanings), []
         for name in self._waiting:
             if names_in(self._model.quantities[name].expression, f"quantity {name}") <= known:
@@ -167,7 +167,7 @@ class _Composer:
         return found
 
     def _join(self, names: list[str]) -> None:
-        """Let quantities stand for their expressions."""
+        """Define quantities by their expressions."""
         for name in names:
             own = self._model.quantities[name]
             meaning = self._scope.read(own.expression, own.unit, f"quantity {name}")
@@ -175,7 +175,7 @@ class _Composer:
         self._waiting = [name for name in self._waiting if name not in names]
 
     def _entered(self, kind: str) -> dict[str, sympy.Expr]:
-        """The ports of one kind with their effects; each is known to the scope from then on."""
+        """The ports of one kind with their effects; each is added to the scope."""
         values = {}
         for name, port in self._model.ports.items():
             if port.kind == kind:
@@ -209,7 +209,7 @@ class _Composer:
     def _effect_value(
         self, placement: Placement, port: Port, arriving: sympy.Expr, unit: str
     ) -> sympy.Expr:
-        """What one effect adds to a force port, or makes of the arriving signal."""
+        """An effect's force at a force port, or its output signal at a signal port."""
         scope = self._local_scope(placement, port, arriving, unit)
         for name, state in placement.effect.states.items():
             label, where = placement.prefix + name, f"{placement}: state {name}"
@@ -224,7 +224,7 @@ class _Composer:
     def _local_scope(
         self, placement: Placement, port: Port, arriving: sympy.Expr, unit: str
     ) -> Scope:
-        """Names as the effect sees them; its own parameters and states join the system."""
+        """The effect's own scope; its parameters and states are added to the system."""
         scope = Scope()
         scope.define(TIME, symbol(TIME), "s")
         for name, meaning in self._variables[placement.port].items():
@@ -240,7 +240,7 @@ class _Composer:
         return scope
 
     def _port_variables(self, name: str, port: Port) -> dict[str, sympy.Expr]:
-        """What effects at a port may use; it is known before any of them."""
+        """Variables that effects at a port may use, defined before the effects."""
         found = {}
         for key, own in port.variables.items():
             where = f"port {name}: variable {key}"
@@ -272,14 +272,14 @@ class _Composer:
 
 
 def units_at(model: Model, name: str) -> dict[str, str]:
-    """Units of a port as people write them, by what effects there call them in braces."""
+    """Units of a port as written, by the names that effects use in braces."""
     port = model.ports[name]
     own: Port | Input | Output = port
     if port.kind != "force":
         own = model.inputs[port.signal] if port.kind == "actuator" else model.outputs[port.signal]
     units = {"F" if port.kind == "force" else "u": own.shown or own.unit}
     units |= {name: v.shown or v.unit for name, v in port.variables.items()}
-    # A distance is a speed over a time, also where no equation has a use for it.
+    # A distance is a speed times a time, even if no equation uses it.
     if "v" in units:
         units.setdefault("x", f"({units['v']})*s")
     return units

@@ -1,12 +1,12 @@
-"""Variants of a model: other laws for a part of it, as tables that replace some of its own.
+"""Variants of a model: alternative laws for a part of it, as tables that replace its own.
 
     [variants.isothermal]
     physics = "The chambers' walls keep the air at room temperature."
     group = "heat"
     parameters.n = { value = 1.0, unit = "1", fixed = true }
 
-What a variant names takes the place of what the model calls so, or joins it; `without` takes states
-and parameters away. Of a group at most one is taken, and two never change the same thing.
+An entry of a variant replaces the model's entry of the same name, or is added; `without` removes
+states and parameters. At most one variant of a group is used, and no two change the same entry.
 """
 
 from collections.abc import Iterable, Sequence
@@ -24,7 +24,7 @@ def with_variants(model: Model, names: Sequence[str]) -> Model:
     """The model with some of its variants.
 
     Args:
-        model: as it was written.
+        model: the unmodified model.
         names: of variants, in any order.
 
     Raises:
@@ -46,7 +46,7 @@ def with_variants(model: Model, names: Sequence[str]) -> Model:
 
 
 def excludes(model: Model, one: str, other: str) -> bool:
-    """Whether two variants cannot stand together: of one group, or changing the same."""
+    """Whether two variants exclude each other: same group, or a change of the same entry."""
     a, b = model.variants[one], model.variants[other]
     return one == other or (a.group != "" and a.group == b.group) or bool(_touched(a) & _touched(b))
 

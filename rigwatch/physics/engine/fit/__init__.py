@@ -1,4 +1,4 @@
-"""Fits over short horizons, each window with an unknown initial state.
+"""Fits over short horizons; the initial state of each window is unknown.
 
 Recording ──windows──▶ Problem (initial states projected out) ──▶ fit, evaluate ──▶ Fit
 """

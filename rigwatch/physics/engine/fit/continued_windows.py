@@ -1,14 +1,14 @@
-"""Windows of a recording that judges: what no channel shows there goes on from the window before.
+"""Windows of a held-out recording: hidden states are continued from the previous window.
 
-A window that may choose its own hidden states turns whatever has memory into a free constant of
-each window. So samples that count tell only the states that channels show, which are measured at
-the window's beginning anyway. The others come from samples that do not count in that window:
+If a window could fit its own hidden states, every state would act as a free constant per window.
+Counted samples therefore determine only the states that channels measure, which are known at the
+start of the window anyway. Hidden states come from samples that do not count in that window:
 
-* states of the model are what the window before has led to, with its own best beginning;
-* states of effects run on through all windows, as a new beginning each time would be a constant.
+* states of the model continue from the end of the previous window's best fit;
+* states of effects run through all windows, as a restart in each would be a free constant.
 
-The first window of a recording tells its own hidden states and does not count. Where a recording is
-one window, its beginning tells them, and does not count either.
+The first window of a recording determines its own hidden states and does not count. If a recording
+is one window, its first part determines them and does not count.
 """
 
 import numpy as np
@@ -18,11 +18,11 @@ from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
 LEAD = 0.1
-"""Share of a recording that tells its hidden states, where the recording is one window."""
+"""Share of a single-window recording used to determine its hidden states."""
 
 
 def continued(problem: Problem, parameters: FloatArray) -> Started:
-    """Windows at given parameters, their hidden states told by samples that do not count.
+    """Windows at given parameters, with hidden states determined by samples that do not count.
 
     Raises:
         ModelError: the simulation diverged.
@@ -46,7 +46,7 @@ def continued(problem: Problem, parameters: FloatArray) -> Started:
 
 
 def _told_by_the_window_before(problem: Problem, parameters: FloatArray) -> FloatArray:
-    """Hidden states in which each window begins, shape (windows, hidden)."""
+    """Initial hidden states of each window, shape (windows, hidden)."""
     own = set(problem.hidden[problem.hidden < len(problem.system.model.states)].tolist())
     memory = np.array([column for column in problem.hidden if column not in own], np.int64)
     told = problem.initial.copy()
@@ -55,13 +55,13 @@ def _told_by_the_window_before(problem: Problem, parameters: FloatArray) -> Floa
     for rows in order:
         ended = problem.ends_before(parameters, rows)
         told[rows] = ended
-        # What effects remember goes on; the model's own states begin anew in the next window.
+        # Effect states continue; the model's own states are re-initialised in the next window.
         problem.begin_at(rows, memory, ended[:, memory])
     return told[:, problem.hidden]
 
 
 def _in_turn(problem: Problem) -> list[IntArray]:
-    """Windows but the first of each recording; all second ones, then all third ones, …"""
+    """Windows except the first of each recording: all second ones, then all third ones, …"""
     windows = np.arange(len(problem.starts))
     since = (
         windows
@@ -71,7 +71,7 @@ def _in_turn(problem: Problem) -> list[IntArray]:
 
 
 def _by_their_beginning(problem: Problem, parameters: FloatArray) -> Started:
-    """Windows that are whole recordings, each told by its own first samples."""
+    """Windows that are whole recordings, with hidden states from their own first samples."""
     leads = np.maximum(np.round(LEAD * np.array(problem.lengths)), 2)
     beginning = np.arange(problem.length) < leads[:, None]
     whole = problem.measured.copy()
@@ -87,7 +87,7 @@ def _by_their_beginning(problem: Problem, parameters: FloatArray) -> Started:
 def _counted(
     problem: Problem, parameters: FloatArray, began: FloatArray, telling: BoolArray
 ) -> Started:
-    """Windows that begin there in what is hidden; samples that tell it do not count."""
+    """Windows with these initial hidden states; the samples that determine them do not count."""
     problem.hold(began, problem.hidden)
     problem.measured[telling] = np.nan
     error, slopes = problem.settle(parameters)

@@ -1,8 +1,8 @@
-"""Filters residuals and sensitivities alike, and takes every q-th sample of them.
+"""Filters residuals and sensitivities with the same filter and decimates them by q.
 
-A model that reads force from measured motion differentiates twice, and its residual is mostly noise
-of high frequency. Low-passing the residual and every column of the Jacobian with one filter leaves
-the least squares unbiased ("parallel filtering": M. Gautier, IEEE ICRA 1997).
+A model that computes force from measured motion differentiates twice, and its residual is mostly
+high-frequency noise. Low-passing the residual and every column of the Jacobian with the same filter
+keeps the least-squares estimate unbiased ("parallel filtering": M. Gautier, IEEE ICRA 1997).
 """
 
 from dataclasses import dataclass, replace
@@ -16,13 +16,13 @@ from rigwatch.wire.errors import ModelError
 
 @dataclass(frozen=True)
 class Thinning:
-    """One sample in `factor`, without `edge` of them at both ends of each part.
+    """Decimation by `factor`, dropping `edge` samples at both ends of each part.
 
     Attributes:
-        factor: samples for one that stays.
-        edge: samples that are left out at both ends, counted after thinning.
-        parts: lengths of the recordings that lie one behind the other.
-        high_pass: numerator and denominator of a filter before that, which takes away what is slow.
+        factor: decimation factor.
+        edge: samples dropped at both ends, counted after decimation.
+        parts: lengths of the concatenated recordings.
+        high_pass: numerator and denominator of a high-pass applied first.
     """
 
     factor: int
@@ -31,7 +31,7 @@ class Thinning:
     high_pass: tuple[FloatArray, FloatArray] | None = None
 
     def apply(self, signals: FloatArray) -> FloatArray:
-        """Thin along axis 1 of shape (windows, samples, …).
+        """Filter and decimate along axis 1 of shape (windows, samples, …).
 
         Raises:
             ModelError: a part is too short.
@@ -41,7 +41,7 @@ class Thinning:
         return np.concatenate(cut, axis=1)
 
     def of_part(self, samples: int) -> "Thinning":
-        """The same for one recording of so many samples."""
+        """The decimation for one recording of a given length."""
         return replace(self, parts=(samples,))
 
     def _part(self, part: FloatArray) -> FloatArray:

@@ -1,9 +1,9 @@
-"""The memory of effects, run along signals that are known: what it holds at any instant.
+"""States of effects, simulated along known signals.
 
-A contact that is bent or a valve in its play holds something at the first sample of a window that
-no channel shows and that the window itself may never tell. The signals at the effect's port lead
-there from the start of the recording: at an actuator exactly, since inputs are known; elsewhere as
-well as the channels show them.
+The deflection of a contact or the position of a valve within its play is unknown at the first
+sample of a window, and the window may not determine it. It is computed from the signals at the
+effect's port since the start of the recording: exactly at an actuator, whose input is known;
+elsewhere as accurately as the channels measure the signals.
 """
 
 from collections.abc import Mapping
@@ -35,15 +35,15 @@ Signals = dict[str, FloatArray]
 
 
 class Memory:
-    """The states of one effect, driven by what is at its port.
+    """The states of one effect, driven by the signals at its port.
 
     Args:
-        effect: with states; its parameters stay parameters of the kernel, which is compiled once.
-        signals: what the effect may name, by name, each of shape (nodes,); time may be among them.
+        effect: with states; its parameters remain parameters of the kernel, compiled once.
+        signals: signals the effect may use, by name, each of shape (nodes,); may include time.
         spacing: between the nodes [s].
-        hold: what signals do between the nodes, see `held_at`.
-        rows: nodes after which signals that are kept change.
-        late: share of the spacing by which they change late.
+        hold: hold of the signals between nodes, see `held_at`.
+        rows: number of nodes per change of a held signal.
+        late: delay of held signals, as a share of the spacing.
     """
 
     def __init__(  # noqa: PLR0917 -- they belong together
@@ -63,7 +63,7 @@ class Memory:
         self._spacing, self._rows = spacing, rows
 
     def run(self, values: Mapping[str, float]) -> Signals:
-        """Each state by name, shape (nodes,), for these values of the effect's parameters."""
+        """Each state by name, shape (nodes,), for given values of the effect's parameters."""
         parameters = self._compiled.vector(dict(values))
         names = list(self._system.states)
         run = self._compiled.simulate(
@@ -74,13 +74,13 @@ class Memory:
 
 
 def held_at(model: Model, port: str) -> Hold:
-    """How signals at a port go on between samples: that of an actuator as the input that it is."""
+    """Hold of the signals at a port between samples; at an actuator that of its input."""
     place = model.ports[port]
     return model.held(place.signal) if place.kind == "actuator" else "linear"
 
 
 def late_at(model: Model, port: str) -> float:
-    """Share of a sample by which signals at a port are late, where they are kept."""
+    """Delay of held signals at a port, as a share of a sample."""
     place = model.ports[port]
     return model.inputs[place.signal].late if place.kind == "actuator" else 0.0
 
@@ -110,7 +110,7 @@ def _alone(effect: Effect, inputs: list[str], hold: Hold, late: float) -> System
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """One placement's memory and the columns of its states."""
+    """The states of one placement and their columns."""
 
     placement: Placement
     memory: Memory
@@ -118,18 +118,18 @@ class _Kept:
 
 
 class Recall:
-    """The memories of all effects of a system along a recording.
+    """The states of all effects of a system along a recording.
 
     Args:
         system: a model with effects.
         inputs: shape (n, inputs).
-        states: as the channels show them, shape (n, states).
+        states: from the channels, shape (n, states).
         dt: time between samples [s].
-        parameters: all of them, for what a port's signals depend on, shape (n_p,).
+        parameters: all parameters, shape (n_p,), on which a port's signals may depend.
 
     Attributes:
-        columns: of the states that effects keep.
-        exact: those of them at actuators, whose input is known.
+        columns: of the effect states.
+        exact: those at actuators, whose input is known.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class Recall:
         ]
 
     def at(self, parameters: FloatArray) -> dict[int, FloatArray]:
-        """Each memory by its column, shape (n,)."""
+        """Each effect state by its column, shape (n,)."""
         values = dict(zip(self._names, parameters.tolist(), strict=True))
         found: dict[int, FloatArray] = {}
         for kept in self._kept:
@@ -186,13 +186,13 @@ def seen(  # noqa: PLR0917 -- they belong together
     dt: float,
     values: Mapping[str, float],
 ) -> Signals:
-    """The signals that an effect may name at its port, as the channels show them.
+    """The signals at an effect's port, computed from the channels.
 
     Args:
         system: a model with the effect.
         placement: the effect.
         inputs: shape (n, inputs).
-        states: as the channels show them, shape (n, states).
+        states: from the channels, shape (n, states).
         dt: time between samples [s].
         values: parameters by name.
     """

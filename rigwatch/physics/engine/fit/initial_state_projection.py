@@ -1,7 +1,7 @@
-"""What the initial states of windows can do to their errors, to first order.
+"""Projects the influence of the windows' initial states out of their errors, to first order.
 
-With slopes S of a window's error by its initial state, S = Q·R: a value v of the error is met best
-by the change R⁺Qᵀv of the state, and v − Q·Qᵀv of it is left, whatever the state.
+Let S = Q·R be the derivatives of a window's error by its initial state. An error v is matched best
+by the change R⁺Qᵀv of the state; the remainder is v − Q·Qᵀv.
 """
 
 from collections.abc import Sequence
@@ -11,14 +11,14 @@ import numpy as np
 from rigwatch.wire.arrays import FloatArray, IntArray
 
 NEGLIGIBLE = 1e-10
-"""Singular value over the largest below which a state shows in no output."""
+"""Singular value, relative to the largest, below which a state counts as unobservable."""
 
 
 class Tangent:
-    """The initial states of windows, as directions in their errors.
+    """The influence of the windows' initial states on their errors.
 
     Args:
-        slopes: of the errors by all states, shape (windows, k, states).
+        slopes: derivatives of the errors by all states, shape (windows, k, states).
         groups: windows and the states that are unknown in them.
     """
 
@@ -31,7 +31,7 @@ class Tangent:
         ]
 
     def solve(self, values: FloatArray) -> FloatArray:
-        """Changes of the states that come closest to values (windows, k, r): (…, states, r)."""
+        """Least-squares changes of the states for values (windows, k, r): (…, states, r)."""
         found = np.zeros((*self._shape, values.shape[-1]))
         for windows, columns, basis, inverse in self._groups:
             along = basis.swapaxes(1, 2) @ values[windows]
@@ -39,7 +39,7 @@ class Tangent:
         return found
 
     def without(self, values: FloatArray) -> FloatArray:
-        """Values (windows, k, r) less what the states can make of them."""
+        """Values (windows, k, r) minus their projection on the states."""
         left = values.copy()
         for windows, _, basis, _ in self._groups:
             left[windows] -= basis @ (basis.swapaxes(1, 2) @ values[windows])
@@ -47,6 +47,6 @@ class Tangent:
 
 
 def _split(slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Q, and the pseudo-inverse of R, of each window."""
+    """Q and the pseudo-inverse of R of each window."""
     basis, triangle = np.linalg.qr(slopes)
     return basis, np.linalg.pinv(triangle, rcond=NEGLIGIBLE)

@@ -1,12 +1,12 @@
-"""A recording for a model that is driven along its measured motion.
+"""A recording for a model along its measured motion.
 
-The motion is smoothed without phase, as wide as each channel's noise asks for, and joins the
-inputs. Samples are not counted (NaN outputs) where the smoothing has less than its whole width, as
-beside a gap, and while hidden states settle.
+The motion is smoothed with zero phase, with a width chosen from each channel's noise, and added to
+the inputs. Samples do not count (NaN outputs) where the smoothing window is incomplete, as next to
+a gap, and while hidden states settle.
 
-Where the balance of a state is predicted, the rate of the channel is its measurement. The kernel
-that differentiates also low-passes, which the prediction does not see; so both then go through one
-low-pass of their own, well inside of what the kernel lets through (`Recording.thinning`).
+If the balance of a state is predicted, it is compared with the rate of the channel. The
+differentiating kernel is also a low-pass, which the prediction is not subject to. Both are
+therefore filtered with a low-pass well within the kernel's pass band (`Recording.thinning`).
 """
 
 import math
@@ -27,7 +27,7 @@ from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 
 PASSED = 0.4
-"""Frequency over the thinned rate up to which the low-pass of thinning lets signals through."""
+"""Pass band of the decimation's low-pass, relative to the decimated rate."""
 
 
 def motion_recording(
@@ -41,14 +41,14 @@ def motion_recording(
     """A recording for `along_measured_motion(model)`, from one for the model itself.
 
     Args:
-        model: as it was written, not transformed.
+        model: the original model, not transformed.
         recording: its inputs and outputs.
-        parts: lengths of what lies one behind the other; the recording's own if empty.
-        settling: at the beginning of each part, what is not counted [s].
-        widths: of the smoothing, by channel [samples]; as the noise asks for if None.
+        parts: lengths of the concatenated parts; the recording's own if empty.
+        settling: time at the start of each part that does not count [s].
+        widths: of the smoothing, by channel [samples]; chosen from the noise if None.
 
     Raises:
-        ModelError: no channel shows any of the model's states, or one shows nothing valid.
+        ModelError: no channel measures any of the model's states, or one has no valid sample.
     """
     cut = _ends(recording, parts)
     chosen = motion_widths(model, recording, parts) if widths is None else widths
@@ -68,10 +68,10 @@ def motion_recording(
 
 
 def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ()) -> dict[str, int]:
-    """How wide each channel is smoothed for what is made of it, by channel [samples].
+    """Smoothing width of each channel for its order of differentiation, by channel [samples].
 
     Raises:
-        ModelError: a channel shows nothing valid.
+        ModelError: a channel has no valid sample.
     """
     cut, channels = _ends(recording, parts), _channels(model, recording)
     found: dict[str, int] = {}
@@ -84,7 +84,7 @@ def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ())
 
 
 def _orders(model: Model) -> dict[str, int]:
-    """How often each channel of the motion is differentiated at most."""
+    """Highest order of differentiation of each channel of the motion."""
     more = 0 if predicted_outputs(model) else 1
     balanced = balanced_states(model)
     orders: dict[str, int] = {}
@@ -97,7 +97,7 @@ def _orders(model: Model) -> dict[str, int]:
 def _measured_outputs(
     model: Model, recording: Recording, widths: Mapping[str, int], cut: Sequence[int]
 ) -> FloatArray:
-    """What the transformed model's outputs are held against, shape (n, outputs)."""
+    """Measurements of the transformed model's outputs, shape (n, outputs)."""
     kept = predicted_outputs(model)
     if kept:
         return recording.outputs[:, [list(model.outputs).index(name) for name in kept]]
@@ -114,7 +114,7 @@ def _measured_outputs(
 def _thinning(
     model: Model, recording: Recording, widths: Mapping[str, int], parts: tuple[int, ...]
 ) -> Thinning | None:
-    """The recording's own or, for balances, one within what their kernels let through."""
+    """The recording's own decimation or, for balances, one within their kernels' pass band."""
     if recording.thinning is not None or predicted_outputs(model):
         return recording.thinning
     flat = min(flat_to(widths[s.channel], s.order + 1) for s in balanced_states(model))
@@ -140,7 +140,7 @@ def _smoothed_parts(
 
 
 def _bridged(signal: FloatArray) -> FloatArray:
-    """The signal with straight lines over what is missing; zeros where nothing is there."""
+    """The signal with gaps interpolated linearly; zeros if it has no valid sample."""
     good = np.isfinite(signal)
     if good.all():
         return signal
@@ -151,14 +151,14 @@ def _bridged(signal: FloatArray) -> FloatArray:
 
 
 def _whole_kernel(signal: FloatArray, width: int, cut: Sequence[int]) -> BoolArray:
-    """Samples about which the kernel finds all that it needs, shape (n,)."""
+    """Samples with a complete smoothing window, shape (n,)."""
     kernel = np.ones(width)
     there = np.split(np.isfinite(signal).astype(np.float64), cut)
     return np.concatenate([np.convolve(piece, kernel, "same") > width - 0.5 for piece in there])
 
 
 def _settled(samples: int, cut: Sequence[int], settling: int) -> BoolArray:
-    """Samples that are not within `settling` of the beginning of a part, shape (n,)."""
+    """Samples later than `settling` after the start of their part, shape (n,)."""
     found = np.ones(samples, np.bool_)
     for begin in (0, *cut):
         found[begin : begin + settling] = False

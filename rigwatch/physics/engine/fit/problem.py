@@ -1,8 +1,8 @@
-"""One recording cut into windows, with their unknown initial states taken out of the fit.
+"""One recording divided into windows, with their unknown initial states eliminated from the fit.
 
-For given parameters the initial states of every window are found by Gauss-Newton steps of their own
-and projected out of residuals and Jacobian (variable projection with Kaufman's gradient: G. Golub
-and V. Pereyra, Inverse Problems 19, 2003), so that a solver sees the parameters alone.
+For given parameters the initial states of every window are found by separate Gauss-Newton steps and
+projected out of residuals and Jacobian (variable projection with Kaufman's gradient: G. Golub and
+V. Pereyra, Inverse Problems 19, 2003), so the solver sees only the parameters.
 """
 
 import math
@@ -19,19 +19,19 @@ from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
 
 START_STEPS = 2
-"""Simulations at most for the initial states at each evaluation; they start from the best ones."""
+"""Most simulations for the initial states per evaluation, starting from the best known ones."""
 
 ENOUGH = 1e-3
-"""Share of a window's squared error that a second one must promise."""
+"""Predicted reduction of a window's squared error that justifies a second one."""
 
 ASTRAY = 2.0
-"""Squared error of a window over the median of all from which its initial state may be wrong."""
+"""Ratio of a window's squared error to the median above which its initial state may be wrong."""
 
 BACK = 0.8
-"""Share of its squared error to which a window must fall to have come back."""
+"""Share of its squared error below which a window counts as recovered."""
 
 SETTLED = 1e-6
-"""Share of a window's squared error below which a better initial state is not looked for."""
+"""Predicted reduction of a window's squared error below which its initial state is kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Started:
         initial: shape (windows, states).
         error: scaled, shape (windows, k).
         slopes: by free parameters and initial states, shape (windows, k, free + states).
-        came_back: whether a window that went astray came back.
+        came_back: whether a diverged window recovered.
     """
 
     parameters: FloatArray
@@ -55,12 +55,12 @@ class Started:
 
 @dataclass(frozen=True, eq=False)
 class _Met:
-    """The evaluation with the smallest error that the solver has met.
+    """The evaluation with the smallest error so far.
 
     Attributes:
         size: squared error, initial states projected out.
-        parameters: all of them, shape (n_p,).
-        initial: states that windows were simulated from, shape (windows, states).
+        parameters: all parameters, shape (n_p,).
+        initial: initial states of the simulated windows, shape (windows, states).
     """
 
     size: float
@@ -69,7 +69,7 @@ class _Met:
 
 
 class Problem:
-    """One recording cut into windows, simulated at the parameters that the solver asks for."""
+    """One recording divided into windows, simulated at the solver's parameters."""
 
     def __init__(
         self,
@@ -126,7 +126,7 @@ class Problem:
 
     @property
     def lengths(self) -> tuple[int, ...]:
-        """Samples of each window that a recording has."""
+        """Number of recorded samples in each window."""
         return self._cut.parts or (self._cut.length,) * len(self._cut.starts)
 
     @cached_property
@@ -137,12 +137,12 @@ class Problem:
         return np.unique(np.searchsorted(self._cut.starts, begins))
 
     def begin_at(self, rows: IntArray, columns: IntArray, values: FloatArray) -> None:
-        """Let some windows begin with these values of some states."""
+        """Set the initial values of some states in some windows."""
         self.initial = self.initial.copy()
         self.initial[np.ix_(rows, columns)] = values
 
     def hold(self, initial: FloatArray, columns: IntArray) -> None:
-        """Let windows begin there, and no longer move some of their states."""
+        """Set the initial states of windows and fix some of the states."""
         self.initial = initial.copy()
         self._unknown = np.setdiff1d(self._unknown, columns)
         self._told = True
@@ -154,9 +154,9 @@ class Problem:
         return parameters
 
     def recall(self, parameters: FloatArray) -> None:
-        """Let the memory of effects begin where the measured signals have led it.
+        """Initialise effect states from the measured signals.
 
-        Windows begin as the channels show them or, where it is better, as they are offered.
+        Windows start from the channels' states or, if better, from the given ones.
         """
         self._remember(parameters, self._memory.columns)
         if self._offered is None or len(self._offered) != len(self.initial):
@@ -170,7 +170,7 @@ class Problem:
         self.initial = np.where((offered < shown)[:, None], other, self.initial)
 
     def _follow_inputs(self, parameters: FloatArray) -> None:
-        """Let memory at actuators begin where the inputs lead it; what came first is fitted."""
+        """Initialise effect states at actuators from the inputs; the first window's are fitted."""
         self._remember(parameters, self._memory.exact, since=1)
 
     def _remember(self, parameters: FloatArray, columns: list[int], since: int = 0) -> None:
@@ -199,7 +199,7 @@ class Problem:
         return flat, slopes.reshape(*flat.shape, slopes.shape[-1])
 
     def _thinned(self, signals: FloatArray, rows: IntArray) -> FloatArray:
-        """Filtered and thinned as the recording asks for; where windows are recordings, each."""
+        """Values filtered and decimated as the recording requires, per recording if windows are."""
         thinning = self.recording.thinning
         if thinning is None:
             return signals
@@ -214,7 +214,7 @@ class Problem:
 
     @cached_property
     def _lengths(self) -> tuple[int, ...]:
-        """Samples that are counted of each recording, where windows are recordings."""
+        """Number of counted samples of each recording, if windows are recordings."""
         thinning, parts = self.recording.thinning, self._cut.parts
         if thinning is None:
             return parts
@@ -222,11 +222,11 @@ class Problem:
         return tuple(each.shape[1] for each in alone)
 
     def whole_recording(self, windowed: FloatArray) -> FloatArray:
-        """Of all windows, (windows, samples, …), in the form that a `Fit` has."""
+        """Values of all windows, (windows, samples, …), in the layout of `Fit`."""
         return self._cut.whole(windowed, self._lengths)
 
     def start_windows(self, parameters: FloatArray) -> Started:
-        """Settle, and let windows that went astray begin where the one before has ended.
+        """Settle, and restart diverged windows from the end of the previous window.
 
         Initial states have local minima of their own.
         """
@@ -250,7 +250,7 @@ class Problem:
         return Started(parameters, self.initial, error, slopes, bool(back.any()))
 
     def ends_before(self, parameters: FloatArray, rows: IntArray) -> FloatArray:
-        """States in which the windows before some have ended, shape (rows, states)."""
+        """Final states of the windows preceding `rows`, shape (rows, states)."""
         r, before = self.recording, rows - 1
         run = self.compiled.simulate(
             r.inputs, r.dt, self._cut.starts[before], self._cut.length + 1,
@@ -267,17 +267,17 @@ class Problem:
         worth: float = SETTLED,
         rows: IntArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Move the initial states to where they fit best; scaled residuals and slopes there.
+        """Fit the initial states; return scaled residuals and slopes there.
 
-        Each window takes Gauss-Newton steps of its own until they are worth nothing. A step that
-        makes its error larger, as one that leaves the play of a valve does, is tried again at a
-        quarter of its length.
+        Each window takes its own Gauss-Newton steps until they no longer help. A step that
+        increases the error, as one that leaves the play of a valve does, is repeated with a quarter
+        of its length.
 
         Args:
-            parameters: all of them, shape (n_p,).
-            steps: simulations at most.
-            worth: share of a window's squared error that a step must promise.
-            rows: windows that are settled, all if None.
+            parameters: all parameters, shape (n_p,).
+            steps: most simulations.
+            worth: smallest predicted relative reduction of a window's squared error for a step.
+            rows: windows to settle, all if None.
         """
         self._follow_inputs(parameters)
         rows = np.arange(len(self.initial)) if rows is None else rows
@@ -314,7 +314,7 @@ class Problem:
         return error, slopes
 
     def _promise(self, step: FloatArray, slopes: FloatArray) -> FloatArray:
-        """What a step takes away of each window's squared error to first order."""
+        """Predicted reduction of each window's squared error by a step, to first order."""
         moved = slopes[..., len(self.free) :] @ step[..., None]
         return np.asarray(np.sum(moved[..., 0] ** 2, axis=1))
 
@@ -323,7 +323,7 @@ class Problem:
         return np.asarray(self._tangent(slopes, rows).solve(error[..., None])[..., 0])
 
     def _tangent(self, slopes: FloatArray, rows: IntArray) -> Tangent:
-        """What an input led to is known, but at the recording's beginning."""
+        """Projection of the unknown initial states; input-driven states are known later on."""
         if self._told:
             every = np.arange(len(rows))
             return Tangent(slopes[..., len(self.free) :], [(every, self._unknown)])
@@ -341,7 +341,7 @@ class Problem:
         return self._last[1]
 
     def tried(self, parameters: FloatArray) -> FloatArray:
-        """Residuals for the solver; NaN where the simulation blows up, and it steps back."""
+        """Residuals for the solver; NaN if the simulation diverges, and the solver steps back."""
         before = self.initial
         try:
             return self.projected(parameters)[0]
@@ -351,7 +351,7 @@ class Problem:
 
     @property
     def count(self) -> int:
-        """Residuals that the solver sees."""
+        """Number of residuals of the solver."""
         shape = (self.measured.shape[0], self.measured.shape[1], 1)
         thinned = self._thinned(np.zeros(shape), np.arange(shape[0])).shape
         return math.prod(thinned) * int(self.measured.shape[2])
@@ -366,7 +366,7 @@ class Problem:
         return found
 
     def cleaned(self, error: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residual and Jacobian without what the initial states could have made."""
+        """Residual and Jacobian with the influence of the initial states projected out."""
         m = len(self.free)
         tangent = self._tangent(slopes, np.arange(len(slopes)))
         both = tangent.without(np.concatenate([error[..., None], slopes[..., :m]], axis=-1))
@@ -374,6 +374,6 @@ class Problem:
 
 
 def _astray(error: FloatArray) -> IntArray:
-    """Windows, but the first, whose squared error is beyond that of most."""
+    """Windows, except the first, whose squared error is far above the median."""
     size = np.sum(error**2, axis=1)
     return np.nonzero(size[1:] > ASTRAY * np.median(size))[0] + 1

@@ -1,4 +1,4 @@
-"""What was measured, how it is cut into windows, and where their states seem to begin."""
+"""Recordings, their division into windows, and initial states from the channels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from rigwatch.wire.errors import ModelError
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What was measured, for one model.
+    """Measured inputs and outputs for one model.
 
     Attributes:
         dt: time between samples [s].
         inputs: in the order of the model's inputs, shape (n, n_u).
-        outputs: in the order of its outputs, shape (n, n_y); NaN where nothing valid was measured.
-        thinning: how residuals and sensitivities are filtered and thinned, None where they are not.
-        parts: lengths of the recordings that lie one behind the other; one if empty.
+        outputs: in the order of its outputs, shape (n, n_y); NaN without a valid sample.
+        thinning: filter and decimation of residuals and sensitivities, None without.
+        parts: lengths of the concatenated recordings; a single one if empty.
     """
 
     dt: float
@@ -36,12 +36,12 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """How a recording is cut.
+    """Division of a recording into windows.
 
     Attributes:
         starts: first sample of each window, shape (windows,).
         length: samples in each.
-        parts: where windows are recordings, samples of each; the shorter ones are filled up.
+        parts: samples of each recording if windows are recordings; shorter ones are padded.
     """
 
     starts: IntArray
@@ -49,10 +49,10 @@ class Windows:
     parts: tuple[int, ...] = ()
 
     def whole(self, windowed: FloatArray, lengths: Sequence[int] | None = None) -> FloatArray:
-        """Recordings (windows, samples, …) behind one another, (1, all samples, …).
+        """Concatenate recordings (windows, samples, …) to (1, all samples, …).
 
         Args:
-            windowed: over the windows; as it is where they are no recordings.
+            windowed: values by window; returned unchanged if windows are not recordings.
             lengths: samples of each recording, those of `parts` if None.
         """
         if not self.parts:
@@ -74,7 +74,7 @@ def windows(system: System, samples: int, horizon: int) -> Windows:
 
 
 def joined(recordings: Sequence[Recording]) -> Recording:
-    """Recordings of one kind, one behind the other."""
+    """Concatenates recordings of the same kind."""
     first = recordings[0]
     if len(recordings) == 1:
         return first
@@ -93,9 +93,9 @@ def beginning(recording: Recording, samples: int) -> Recording:
 
 
 def cut_for(system: System, recording: Recording, horizon: int, *, apart: bool = False) -> Windows:
-    """`windows`, but one a recording where that is asked for, or effects alone have memory.
+    """`windows`, or one per recording if requested or if only effects have states.
 
-    What an effect remembers of one recording says nothing about the next.
+    Effect states do not carry over from one recording to the next.
     """
     parts = recording.parts
     if len(parts) < 2 or not (apart or (system.states and not system.model.states)):
@@ -105,12 +105,12 @@ def cut_for(system: System, recording: Recording, horizon: int, *, apart: bool =
 
 
 def initial_states(system: System, recording: Recording, smoothed: int = 11) -> FloatArray:
-    """States as the channels show them at every sample, shape (n, states): a start for the fit.
+    """States from the channels at every sample, shape (n, states), as start of a fit.
 
     Args:
         system: its states name the channels.
         recording: the channels.
-        smoothed: samples that a rate of change is taken over, odd.
+        smoothed: odd number of samples over which a rate of change is computed.
     """
     channels = {
         output.channel or name: recording.outputs[:, index]
@@ -130,7 +130,7 @@ def initial_states(system: System, recording: Recording, smoothed: int = 11) -> 
 
 
 def shown_states(system: System) -> set[int]:
-    """Columns of the states that a channel shows, or the rate of one."""
+    """Columns of the states measured by a channel or by its rate."""
     outputs = system.model.outputs.items()
     channels = {output.channel or name for name, output in outputs}
     return {
@@ -141,7 +141,7 @@ def shown_states(system: System) -> set[int]:
 
 
 def filled(signal: FloatArray) -> FloatArray:
-    """The signal with gaps bridged by straight lines; zeros where there is nothing at all."""
+    """The signal with gaps interpolated linearly; zeros if it has no valid sample."""
     good = np.isfinite(signal)
     if not good.any():
         return np.zeros_like(signal)

@@ -1,9 +1,10 @@
-"""Ties: directions in which parameters can move together without the recording telling.
+"""Ties: parameter combinations that a recording does not determine.
 
-Where a search ends along them is an accident of its start, and so is the error elsewhere. A prior
-settles it, the same for every start: each parameter lies about the value that its model was written
-with, give or take as much. It acts along the ties alone (maximum a posteriori), so that what the
-recording does tell stays as it was. A fit without a tie is left as it is.
+Where a search ends along such a direction depends on its start, and so does the error on other
+recordings. A prior resolves this independently of the start: each parameter is near its value in
+the model file, with a standard deviation of the same size. It acts only along the ties (maximum a
+posteriori), so parameters determined by the recording are unaffected. A fit without ties is
+unchanged.
 """
 
 from collections.abc import Mapping
@@ -15,26 +16,26 @@ from rigwatch.physics.engine.fit.windowed_fit import Fit, Prior, fit
 from rigwatch.wire.arrays import FloatArray
 
 LOOSE = 0.3
-"""Deviation of a combination of parameters, over their sizes, from which it counts as a tie."""
+"""Relative standard deviation of a parameter combination above which it counts as a tie."""
 UNSEEN = 10.0
-"""The same of one parameter alone."""
+"""The same for a single parameter."""
 HEAVY = 0.3
-"""Share of a direction from which a parameter is part of it."""
+"""Share of a direction above which a parameter belongs to it."""
 ROUNDS = 12
-"""Fits at most, as ties may be bent."""
+"""Most fits, as ties may be curved."""
 CLOSE = 0.01
-"""Change over the sizes at which a further fit is not worth it."""
+"""Relative change below which no further fit is made."""
 
 
 def untied(
     found: Fit, recording: Recording, horizon: int, centre: Mapping[str, float], substeps: int
 ) -> Fit:
-    """The fit with its ties settled; itself where there is none.
+    """The fit with its ties resolved; unchanged if there are none.
 
     Args:
         found: the fit.
-        recording, horizon, substeps: what it was fitted to, see `fit`.
-        centre: where parameters probably are, by name.
+        recording, horizon, substeps: as in `fit`.
+        centre: prior means of the parameters, by name.
 
     Raises:
         ModelError: the model diverges.
@@ -48,7 +49,7 @@ def untied(
         flat = _flat(found, np.where(size > 0, size, 1.0))
         if not flat.shape[1]:
             break
-        # Of all that the recording takes for equal, the nearest to where parameters probably are.
+        # Of all equivalent parameters, those nearest to the prior means.
         basis = np.linalg.qr(flat / unit[:, None]).Q
         prior = Prior(about, _noise(found) * basis.T / unit)
         found = fit(
@@ -71,7 +72,7 @@ def _noise(found: Fit) -> float:
 
 
 def _flat(found: Fit, size: FloatArray) -> FloatArray:
-    """Directions of the parameters that are told worse than their sizes, shape (m, directions)."""
+    """Directions whose standard deviation exceeds the parameters' sizes, shape (m, directions)."""
     if not len(size):
         return np.zeros((0, 0))
     slopes = found.jacobian.reshape(-1, len(size)) * size

@@ -1,7 +1,7 @@
 """Output-error fits over short horizons, each with its own unknown initial state.
 
-A recording is cut into windows. `Problem` takes their initial states out of the fit; so SciPy's
-bounded least squares sees the parameters alone.
+A recording is divided into windows. `Problem` eliminates their initial states, so SciPy's bounded
+least squares sees only the parameters.
 """
 
 from dataclasses import dataclass, replace
@@ -18,25 +18,25 @@ from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 
 ROUNDS = 2
-"""Solutions at most, each from where the last has led, while windows that went astray come back."""
+"""Most solver runs, each started from the last result, while diverged windows recover."""
 
 FAR, CLOSE = 100.0, 0.01
-"""Deviations: where a search begins, and steps that are not worth another simulation."""
+"""Start of a search, and smallest step worth a simulation, in standard deviations."""
 
 SETTLED = 1e-10
-"""The same where a prior counts, which is next to nothing beside the recording."""
+"""The same with a prior, which is weak compared with the recording."""
 
 CONVERGED = 1e-6
-"""Fall of the squared error, over all of it, at which a fit ends; noise moves it by 1/samples."""
+"""Relative fall of the squared error at which a fit ends; noise changes it by 1/samples."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is known of the free parameters beside the recording.
+    """Prior knowledge of the free parameters.
 
     Attributes:
-        centre: where they probably are, shape (m,).
-        slopes: of scaled residuals by the distance from there, shape (k, m).
+        centre: prior means, shape (m,).
+        slopes: of scaled residuals by the distance from the means, shape (k, m).
     """
 
     centre: FloatArray
@@ -52,13 +52,13 @@ class Fit:
     """A system fitted to a recording.
 
     Attributes:
-        compiled: what was fitted.
-        parameters: all of them, shape (n_p,).
-        covariance: of the free ones, shape (m, m), for white residuals of the size found.
+        compiled: the fitted system.
+        parameters: all parameters, shape (n_p,).
+        covariance: of the free ones, shape (m, m), assuming white residuals of the rms found.
         initial: initial states of the windows, shape (windows, states).
-        residuals: measured less modelled, shape (windows, length, outputs), thinned where the
-            recording is; else NaN where nothing valid was measured.
-        scale: what each output's residuals were divided by, shape (outputs,).
+        residuals: measured minus modelled, shape (windows, length, outputs), decimated if the
+            recording is; otherwise NaN without a valid sample.
+        scale: divisor of each output's residuals, shape (outputs,).
         error: scaled residuals, initial states projected out, shape (windows, k).
         jacobian: ∂error/∂(free parameters), shape (windows, k, m).
     """
@@ -78,7 +78,7 @@ class Fit:
         return np.asarray(np.sqrt(np.nanmean(self.residuals**2, axis=(0, 1))))
 
     def rms_at(self, samples: BoolArray) -> FloatArray:
-        """The same over some samples, given as truths of shape (windows, length)."""
+        """The same over samples selected by a mask of shape (windows, length)."""
         return np.asarray(np.sqrt(np.nanmean(self.residuals[samples] ** 2, axis=0)))
 
     def values(self) -> dict[str, float]:
@@ -92,7 +92,7 @@ class Fit:
         return dict(zip(self.compiled.system.free, sd.tolist(), strict=True))
 
 
-# What blows up is looked at for being finite; it needs no warning as well.
+# Results are checked for being finite; NumPy's warnings are redundant.
 _QUIET = np.errstate(over="ignore", invalid="ignore")
 
 
@@ -108,18 +108,18 @@ def fit(
     substeps: int = 4,
     prior: Prior | None = None,
 ) -> Fit:
-    """Parameters that make the short-horizon error of `compiled` smallest.
+    """Fit: parameters that minimise the short-horizon error of `compiled`.
 
     Args:
         compiled: the system.
-        recording: what it is fitted to.
+        recording: the recording to fit.
         horizon: samples from one re-initialisation to the next.
-        start: all parameters to start from, shape (n_p,); the model's own if None.
+        start: initial values of all parameters, shape (n_p,); the model's own if None.
         scale: divisor of each output's residuals, shape (outputs,); its standard deviation if None.
-        initial: states that the search begins with, those of the model first, shape (windows, …);
-            as the channels show them if None.
-        substeps: Runge-Kutta steps between samples, where nothing is stiff.
-        prior: what pulls at the parameters beside the recording.
+        initial: initial states, those of the model first, shape (windows, …); from the channels if
+            None.
+        substeps: Runge-Kutta steps between samples for non-stiff systems.
+        prior: prior knowledge of the parameters.
 
     Raises:
         ModelError: the recording is too short, or the model diverges at the start.
@@ -142,8 +142,9 @@ def _smallest_error(
 ) -> FloatArray:
     """Free parameters at which SciPy's solver ends.
 
-    It moves them in deviations, as the data at the start tell them, and calls a step small by the
-    size of all that it moves. So it begins at `FAR`, whence a step of `CLOSE` deviations is small.
+    The solver's unknowns are scaled by the standard deviations at the start. Its step tolerance is
+    relative to the norm of the unknowns, so they are offset to `FAR`, which makes a step of `CLOSE`
+    standard deviations small.
     """
     low, high = bounds(problem.system)
     unit = _deviations(*problem.projected(problem.whole(begin, theta)), theta)
@@ -172,7 +173,7 @@ def _smallest_error(
             max_nfev=60,
         )
     except (ValueError, np.linalg.LinAlgError) as error:
-        # Slopes that are finite may still be too large to be squared.
+        # Finite slopes may still overflow when squared.
         raise ModelError(
             f"{problem.system.model.name}: the search diverged (NaN or infinite);"
             " try other starting values"
@@ -181,10 +182,10 @@ def _smallest_error(
 
 
 def _deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -> FloatArray:
-    """Each parameter's deviation while the others are known; its size where it shows nowhere."""
+    """Each parameter's standard deviation given the others; its size if it has no influence."""
     slope = np.sqrt(np.sum(jacobian**2, axis=0))
     noise = np.sqrt(np.mean(residual**2))
-    # What begins at zero has no size of its own, and moves as the data tell it.
+    # A parameter that starts at zero has no size; only its standard deviation is used.
     size = np.where(theta != 0, np.abs(theta), np.inf)
     told = slope > noise / (1e6 * size)
     return np.where(told, noise / np.where(slope > 0, slope, 1.0), np.where(theta != 0, size, 1.0))
@@ -200,12 +201,12 @@ def evaluate(
     *,
     judging: bool = False,
 ) -> Fit:
-    """The same parameters on another recording: only its windows' initial states are fitted.
+    """The same parameters on another recording; only its windows' initial states are fitted.
 
     Args:
         fitted: the parameters.
         recording, horizon, substeps, initial: as in `fit`.
-        judging: whether samples that count may tell only states that channels show.
+        judging: whether counted samples may only determine states that channels measure.
     """
     problem = Problem(
         fitted.compiled, recording, horizon, scale=fitted.scale, substeps=substeps, initial=initial
@@ -225,7 +226,7 @@ def error_at(  # noqa: PLR0917 -- they belong together
     scale: FloatArray | None,
     substeps: int = 4,
 ) -> float:
-    """Root mean square of the scaled error at given parameters; infinite where it blows up.
+    """Root mean square of the scaled error at given parameters; infinite if it diverges.
 
     Args:
         compiled, recording, horizon, substeps: as in `fit`.
@@ -249,7 +250,7 @@ def bounds(system: System) -> tuple[FloatArray, FloatArray]:
 
 
 def result_of(problem: Problem, found: Started) -> Fit:
-    """The fit at the parameters that have been found."""
+    """The fit at the parameters found."""
     error, scale = found.error, problem.scale
     residual, jacobian = problem.cleaned(error, found.slopes)
     curvature = jacobian.T @ jacobian

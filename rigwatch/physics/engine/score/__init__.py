@@ -1,8 +1,8 @@
 """Which effect is missing, to first order: the score test of candidates along a fitted model.
 
-`candidates` says which effects may stand where, `effect_sensitivities` computes what each would do,
-`score_test` how much of the residual it explains, `significance` corrects for the number of
-candidates, `ranking` orders them: best shapes, and classes that look alike.
+`candidates` lists effects at compatible ports, `effect_sensitivities` computes their influence on
+the outputs, `score_test` the share of the residual that each explains, `significance` corrects for
+the number of candidates, `ranking` selects the best shapes and forms classes of similar effects.
 """
 
 from rigwatch.physics.engine.score.candidates import (

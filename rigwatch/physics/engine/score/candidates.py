@@ -1,7 +1,7 @@
-"""Which effects may be missing where: every effect at every port, in each shape that is tried.
+"""Candidates: every effect at every compatible port, in each shape tried.
 
-The strength of a candidate is what the score test estimates; its other parameters, the shape, are
-given values. Those are shares of the signals' sizes at the port.
+The score test estimates the strength of a candidate; its other parameters, the shape, have fixed
+values, scaled to the signals at the port.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -13,7 +13,7 @@ from rigwatch.physics.engine.equations import Effect
 from rigwatch.wire.arrays import FloatArray
 
 EffectAt = Callable[[str, str], Effect | None]
-"""An effect and a port, by name: the effect with that port's sizes, None where it cannot stand."""
+"""Maps names of effect and port to the effect scaled for that port, None if not compatible."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """Effect and port in one word, the same for all its shapes."""
+        """Effect and port as "effect@port", equal for all shapes."""
         return f"{self.name}@{self.port}"
 
 
@@ -38,13 +38,13 @@ def candidates(
     *,
     elective: bool = False,
 ) -> list[Candidate]:
-    """Every effect at every port where it can stand, in each of its shapes.
+    """Every effect at every compatible port, in each of its shapes.
 
     Args:
         ports, effects: by name.
-        effect_at: which effect stands where.
-        elective: whether elective effects are among them: verdicts are calibrated without these,
-            and more candidates make larger classes.
+        effect_at: returns the scaled effect at a port, or None.
+        elective: include elective effects; verdicts are calibrated without them, and more
+            candidates make larger classes.
     """
     names = [name for name, effect in effects.items() if elective or not effect.elective]
     placed = ((name, effect_at(name, port), port) for port in ports for name in names)
@@ -57,7 +57,7 @@ def candidates(
 
 
 def shaped(name: str, effect: Effect, port: str) -> list[Candidate]:
-    """The candidates of one effect at one port: one a combination of the shapes that are tried."""
+    """The candidates of one effect at one port, one per combination of shape values."""
     grids = [
         [(key, value) for value in (p.tried or (p.value,))]
         for key, p in effect.parameters.items()
@@ -72,7 +72,7 @@ def shaped(name: str, effect: Effect, port: str) -> list[Candidate]:
 def sizes_at_port(
     variables: Mapping[str, FloatArray], signal: FloatArray | None, dt: float
 ) -> dict[str, float]:
-    """Root mean squares of what effects at a port see, for `Effect.scaled`.
+    """Root mean squares of the variables at a port, for `Effect.scaled`.
 
     Args:
         variables: the port's own, by name, each of shape (samples,).
@@ -80,7 +80,7 @@ def sizes_at_port(
         dt: time between samples [s].
 
     Returns:
-        A size a variable, with `dt` [s] and, of a signal, `u` and `rate`, that of its derivative.
+        Size of each variable, with `dt` [s] and, at a signal port, `u` and its derivative `rate`.
     """
     sizes = {"dt": dt} | {name: root_mean_square(values) for name, values in variables.items()}
     if signal is not None:
@@ -90,6 +90,6 @@ def sizes_at_port(
 
 
 def root_mean_square(signal: FloatArray) -> float:
-    """Of the samples that are no NaN; 1 of a signal that is always 0, so that it can divide."""
+    """Root mean square without NaN; 1 for a signal that is always 0, so that it can divide."""
     size = float(np.sqrt(np.nanmean(np.square(signal))))
     return size if size > 0 else 1.0

@@ -1,4 +1,4 @@
-"""Which effects can stand where, and which strengths of them make sense."""
+"""Compatibility of effects with ports, and valid signs of their strengths."""
 
 import re
 from string import Formatter
@@ -8,7 +8,7 @@ from rigwatch.physics.engine.score.candidates import Candidate
 
 
 def suits(effect: Effect, port: Port, model: Model) -> bool:
-    """Whether the effect can stand at the port and finds all that its equations name there."""
+    """Whether the effect is compatible with the port and the port has all its variables."""
     if not effect.fits(port.kind) or effect.family in port.described:
         return False
     if effect.states and port.kind != "force" and not model.states:
@@ -21,7 +21,7 @@ def suits(effect: Effect, port: Port, model: Model) -> bool:
 
 
 def knows(effect: Effect, port: Port) -> bool:
-    """Whether the effect finds all that its equations name among what the port offers."""
+    """Whether the port has all the variables that the effect's equations use."""
     own = {
         *effect.parameters,
         *effect.states,
@@ -34,13 +34,13 @@ def knows(effect: Effect, port: Port) -> bool:
 
 
 def _told_by(port: Port) -> set[str]:
-    """Quantities whose unit and size a port tells: a distance follows from a speed."""
+    """Variables whose unit and size follow from a port's: a distance follows from a speed."""
     told = {*port.variables, "F" if port.kind == "force" else "u"}
     return told | ({"x"} if "v" in told else set())
 
 
 def _units_named(effect: Effect) -> set[str]:
-    """Quantities of the port that units and scales of an effect name."""
+    """Variables of the port used in units and scales of an effect."""
     units = [p.unit for p in effect.parameters.values()]
     units += [s.unit for s in effect.states.values()]
     in_units = {field for unit in units for _, field, _, _ in Formatter().parse(unit) if field}
@@ -49,13 +49,13 @@ def _units_named(effect: Effect) -> set[str]:
 
 
 def _named(effect: Effect) -> frozenset[str]:
-    """Every name in an effect's equations that is no function."""
+    """All names in an effect's equations except functions."""
     texts = [effect.expression, *(s.derivative or s.update for s in effect.states.values())]
     return frozenset().union(*(names_in(text, "effect") for text in texts))
 
 
 def possible(candidate: Candidate, strength: float) -> bool:
-    """Whether the strength that a score suggests lies on the right side of its bounds."""
+    """Whether the strength estimated by a score has a sign that its bounds allow."""
     p = candidate.effect.parameters[candidate.effect.strength]
     if p.role == "switch":
         return strength > 0

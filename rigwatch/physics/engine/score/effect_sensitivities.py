@@ -1,12 +1,12 @@
-"""What a missing effect would do to the outputs, to first order in its strength.
+"""Influence of a missing effect on the outputs, to first order in its strength.
 
 Along the trajectory of a fitted model an effect at strength zero adds e(t) = ∂effect/∂strength to
-its port. The outputs then move by
+its port. The outputs then change by
 
     dR/dt = (∂f/∂x)·R + (∂f/∂port)·e,   ∂y/∂strength = (∂g/∂x)·R + (∂g/∂port)·e,   R(0) = 0
 
-which is one linear equation for all candidates together and needs nothing compiled for the model.
-At a sensor the effect moves its own output alone.
+which is one linear equation for all candidates and needs no further compilation for the model. At a
+sensor the effect changes only its own output.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,7 +42,7 @@ from rigwatch.wire.kernel import kernel
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A linearised run with the signals that effects at its ports see.
+    """A linearised run with the signals at its ports.
 
     Attributes:
         compiled: the model.
@@ -131,7 +131,7 @@ def _push(at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]) 
 def _push_function(
     expression: str, direction: str, strength: str, names: tuple[str, ...]
 ) -> tuple[Callable[..., Any], frozenset[str]]:
-    """∂effect/∂strength as a function of everything it may name, and what it does name."""
+    """∂effect/∂strength as a function of all available names, and the names it uses."""
     symbols = {name: symbol(name) for name in names}
     if direction:
         found = parse(direction, symbols, "direction")
@@ -142,7 +142,7 @@ def _push_function(
 
 
 def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
-    """What an effect at a port sees, at the nodes, each of shape (windows, nodes)."""
+    """Signals at an effect's port, at the nodes, each of shape (windows, nodes)."""
     system = at.compiled.system
     port = system.model.ports[port_name]
     signals = {TIME: at.time}
@@ -158,10 +158,10 @@ def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
 
 
 def _step(signal: FloatArray, substeps: int) -> FloatArray:
-    """Change of a signal since a sample before, shape (windows, nodes)."""
+    """Change of a signal over the last sample, shape (windows, nodes)."""
     changed = np.zeros_like(signal)
     changed[:, substeps:] = signal[:, substeps:] - signal[:, :-substeps]
-    # What came before a window is not known: it continues as it begins.
+    # The signal before a window is unknown: its first change is extrapolated.
     changed[:, :substeps] = changed[:, substeps : 2 * substeps][:, :substeps]
     return changed
 
@@ -172,7 +172,7 @@ def _symbols(system: System) -> dict[str, sympy.Expr]:
 
 
 def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
-    """An expression in all that a system has, along the trajectory."""
+    """An expression in the system's variables, along the trajectory."""
     system = at.compiled.system
     values: dict[str, Any] = dict(zip(system.parameters, at.parameters.tolist(), strict=True))
     values |= dict.fromkeys(system.probes, 0.0) | {TIME: at.time, UNTIL: _left(at)}
@@ -183,7 +183,7 @@ def _along(at: Trajectory, expression: sympy.Expr) -> FloatArray:
 
 
 def _left(at: Trajectory) -> FloatArray:
-    """Time until inputs that are kept change, at the nodes, shape (windows, nodes) [s]."""
+    """Time until held inputs change, at the nodes, shape (windows, nodes) [s]."""
     model = at.compiled.system.model
     kept = any(model.held(name) == "zero" for name in model.inputs)
     substep = np.arange(at.time.shape[1]) % at.run.substeps
@@ -193,10 +193,10 @@ def _left(at: Trajectory) -> FloatArray:
 def _memory(
     at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    """The effect's own states at strength zero, driven by what it sees.
+    """The effect's own states at strength zero, driven by the signals at its port.
 
-    It runs through all windows in one go: what one window left is what the next begins with, after
-    the last sample of the first has been kept for as long as the others.
+    One run covers all windows: each window continues from the end of the previous one, whose last
+    sample is held for one sample period.
     """
     more = ((0, 0), (0, at.run.substeps - 1))
     along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
@@ -216,9 +216,9 @@ def _neutral_values(candidate: Candidate) -> dict[str, float]:
 def _propagated(
     run: Linearisation, free: int, pushes: FloatArray, columns: IntArray, held: BoolArray
 ) -> FloatArray:
-    """Outputs moved by pushes at probes, shape (windows, samples, outputs, candidates).
+    """Change of outputs by pushes at probes, shape (windows, samples, outputs, candidates).
 
-    A push that is `held` jumps at samples alone: up to there it is what it was a step before.
+    A `held` push changes only at samples: up to there it keeps its value of the previous node.
     """
     n = run.states.shape[2]
     if n == 0:

@@ -1,8 +1,8 @@
-"""Which candidate explains the residual best: one row a label, with the best of its shapes.
+"""Ranks candidates by the residual that they explain: one row per label, with its best shape.
 
-Effects at ports and coefficients of springs are ranked alike; a label names what is ranked, and
-candidates that share one differ in their shapes alone. Directions that are nearly parallel once
-all that is fitted is taken out of them form a class that the recording cannot tell apart.
+Effects at ports and coefficients of springs are ranked in the same way; candidates with the same
+label differ only in shape. Candidates whose directions are nearly parallel after projecting out the
+fitted parameters form a class that the recording cannot distinguish.
 """
 
 from collections.abc import Sequence
@@ -16,17 +16,17 @@ from rigwatch.wire.arrays import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """What one label explains, with the best of its shapes.
+    """Result of one label with its best shape.
 
     Attributes:
-        label: what is ranked.
+        label: name of the candidate.
         index: of its best shape among the candidates.
-        score: χ²(1) where it is absent.
+        score: χ²(1) distributed if the effect is absent.
         p_value: of the score, corrected for the number of candidates.
         explained: share of the residual's energy.
         strength: first-order estimate.
-        turned: cosines with every other label, negative where both explain the residual in
-            opposite ways.
+        turned: signed cosine with every other label: negative if the two explain the residual
+            with opposite signs.
     """
 
     label: str
@@ -39,12 +39,12 @@ class Standing:
 
     @property
     def cosines(self) -> dict[str, float]:
-        """The same without a sign."""
+        """Absolute cosines with every other label."""
         return {label: abs(cosine) for label, cosine in self.turned.items()}
 
     @property
     def alike(self) -> list[str]:
-        """Labels of its class, but for its own."""
+        """Labels of its class, without its own."""
         return [label for label, cosine in self.cosines.items() if cosine > ALIKE]
 
 
@@ -60,7 +60,7 @@ def standings(
         labels: of the candidates.
         scores: of the candidates.
         p_values: of the scores, corrected for the number of candidates, shape (candidates,).
-        allowed: whether a candidate's strength makes sense; all of them do if None.
+        allowed: whether each candidate's strength is valid; all are if None.
     """
     best = _best_shapes(labels, scores, allowed)
     chosen = list(best.values())
@@ -80,7 +80,7 @@ def standings(
 def _best_shapes(
     labels: Sequence[str], scores: Scores, allowed: Sequence[bool] | None
 ) -> dict[str, int]:
-    """The place of each label's best shape."""
+    """The index of each label's best shape."""
     best: dict[str, int] = {}
     for index, label in enumerate(labels):
         if allowed is not None and not allowed[index]:
@@ -91,11 +91,11 @@ def _best_shapes(
 
 
 def freed(directions: FloatArray, known: FloatArray) -> FloatArray:
-    """Unit directions without what could have been made otherwise.
+    """Unit directions with the fitted directions projected out.
 
     Args:
         directions: shape (samples, candidates).
-        known: directions of all else that is fitted, shape (samples, n).
+        known: directions of everything already fitted, shape (samples, n).
     """
     basis = np.linalg.qr(known).Q
     rest = directions - basis @ (basis.T @ directions)
@@ -104,5 +104,5 @@ def freed(directions: FloatArray, known: FloatArray) -> FloatArray:
 
 
 def cosines_with(units: FloatArray, place: int) -> FloatArray:
-    """Absolute cosines of unit directions with that at `place`, at most 1, shape (candidates,)."""
+    """Absolute cosines of unit directions with the one at `place`, shape (candidates,)."""
     return np.asarray(np.minimum(np.abs(units.T @ units[:, place]), 1.0))

@@ -1,13 +1,13 @@
-"""Score test of candidates: which missing effect would explain the residual, and which look alike.
+"""Score test of candidates: which effect explains the residual, and which are indistinguishable.
 
-With scaled residuals r, the sensitivities J of all that is already fitted (parameters and initial
-states) and a candidate's direction d, both made free of J (J's column space projected out),
+With scaled residuals r and a candidate's direction d, both projected off the column space of the
+sensitivities J of everything already fitted (parameters and initial states),
 
-    strength ≈ d·r / d·d,    score = (d·r)² / (d·d · s²)  ~ χ²(1) where the effect is absent
+    strength ≈ d·r / d·d,    score = (d·r)² / (d·d · s²)  ~ χ²(1) if the effect is absent
 
-(C. R. Rao, 1948). The best of K candidates is compared with what the best of K would reach by
-chance (Z. Šidák, 1967). Candidates whose projected directions are nearly parallel cannot be told
-apart by this recording and form a class.
+(C. R. Rao, 1948). The best of K candidates is compared with the best of K by chance (Z. Šidák,
+1967). Candidates whose projected directions are nearly parallel cannot be distinguished by this
+recording and form a class.
 """
 
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ from scipy.stats import chi2
 from rigwatch.wire.arrays import FloatArray
 
 ALIKE = 0.95
-"""Cosine above which two candidates form a class."""
+"""Cosine above which two candidates belong to one class."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """One row a candidate.
+    """Scores, one entry per candidate.
 
     Attributes:
-        score: shape (k,); 0 where the direction vanishes in what is already fitted.
-        p_value: of one candidate alone, shape (k,).
-        corrected: of the best of all of them, shape (k,).
+        score: shape (k,); 0 if the direction lies in the space already fitted.
+        p_value: of a single candidate, shape (k,).
+        corrected: for the best of all candidates, shape (k,).
         strength: first-order estimate, shape (k,).
         explained: share of the residual's energy, shape (k,).
         cosines: between projected directions, absolute, shape (k, k).
@@ -45,11 +45,11 @@ class Scores:
 
 
 class Projector:
-    """Takes out of signals what the fitted parameters and initial states could have made.
+    """Projects the fitted parameters and initial states out of signals.
 
     Args:
-        by_parameter: scaled sensitivities, shape (windows, k, m).
-        by_start: by each window's own initial states, shape (windows, k, n).
+        by_parameter: scaled sensitivities by parameters, shape (windows, k, m).
+        by_start: sensitivities by each window's own initial states, shape (windows, k, n).
     """
 
     def __init__(self, by_parameter: FloatArray, by_start: FloatArray) -> None:
@@ -62,13 +62,13 @@ class Projector:
         return np.asarray(signals - np.einsum("wki,wic->wkc", self._starts, along))
 
     def clean(self, signals: FloatArray) -> FloatArray:
-        """What is left of `signals` (windows, k, c), windows below one another: (windows·k, c)."""
+        """Projected `signals` (windows, k, c), windows stacked: shape (windows·k, c)."""
         flat = self._without_starts(signals).reshape(-1, signals.shape[-1])
         return np.asarray(flat - self._parameters @ (self._parameters.T @ flat))
 
 
 def best_of(alone: FloatArray, count: int) -> FloatArray:
-    """p-values of the best of `count` candidates, from those of each of them alone (Šidák)."""
+    """p-values of the best of `count` candidates from their single p-values (Šidák)."""
     return np.asarray(-np.expm1(max(count, 1) * np.log1p(-np.minimum(alone, 1 - 1e-16))))
 
 
@@ -80,8 +80,8 @@ def score(
     Args:
         residuals: scaled, shape (windows, k).
         candidates: scaled directions, shape (windows, k, candidates).
-        fitted: what has been fitted already.
-        variance: of the scaled residuals where nothing is missing (the noise floor's).
+        fitted: projector of everything already fitted.
+        variance: of the scaled residuals if nothing is missing (of the noise floor).
     """
     left, r = fitted.clean(candidates), fitted.clean(residuals[..., None])[:, 0]
     energy = np.einsum("kc,kc->c", left, left)

@@ -1,7 +1,7 @@
-"""How likely chance alone would make a candidate look as good as it does.
+"""p-values of the score test for autocorrelated residuals and multiple candidates.
 
-Residuals are autocorrelated where a model is wrong, and the best of many
-candidates looks good without being so: the p-values of the score test allow for both.
+A wrong model leaves autocorrelated residuals, and the best of many candidates scores high by
+chance; the p-values allow for both.
 """
 
 import numpy as np
@@ -12,16 +12,16 @@ from rigwatch.wire.arrays import FloatArray
 
 
 def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> FloatArray:
-    """p-values of the scores where residuals are autocorrelated, corrected for all candidates.
+    """p-values of the scores for autocorrelated residuals, corrected for all candidates.
 
-    The variance of a sum of products of two series is larger than that of white noise by
-    Σ_k ρr(k)·ρd(k) (M. S. Bartlett, 1946), with the autocorrelations ρ of the direction and of
-    the residual that is left without the candidate.
+    The variance of a sum of products of two series exceeds that of white noise by the factor
+    Σ_k ρr(k)·ρd(k) (M. S. Bartlett, 1946), where ρ are the autocorrelations of the direction and of
+    the residual after removing the candidate.
 
     Args:
         scores: of the candidates.
-        residual: scaled, what the scores are of, shape (samples,).
-        windows_: windows that the samples come from.
+        residual: the scaled residual, shape (samples,).
+        windows_: number of windows of the samples.
     """
     shape = (windows_, -1, scores.units.shape[1])
     along = scores.units.T @ residual
@@ -37,7 +37,7 @@ def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> F
 
 
 def _autocorrelation(signals: FloatArray) -> FloatArray:
-    """Over the windows of (windows, samples, k), tapered, up to a quarter of a window."""
+    """Autocorrelation over windows (windows, samples, k), tapered, up to a quarter of a window."""
     count = signals.shape[1]
     spectrum = np.fft.rfft(signals, 2 * count, axis=1)
     power = np.mean(np.abs(spectrum) ** 2, axis=0)

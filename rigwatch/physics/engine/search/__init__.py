@@ -1,4 +1,4 @@
-"""Fits from afar: where they begin, when there are enough of them, and how the best one ended.
+"""Multi-start fits: initial values, stopping rule, and convergence of the best fit.
 
 search (ShortHorizons, WholeRuns) ──attempts──▶ fit_from_afar ──▶ Fit, Convergence
 """

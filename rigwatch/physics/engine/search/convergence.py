@@ -1,11 +1,11 @@
-"""Whether a fit converged, and how: what a verdict may be built on.
+"""Convergence of a fit, as a basis for verdicts.
 
-The gradient is measured as J. Dennis and R. Schnabel do (Numerical Methods for Unconstrained
-Optimization, 1983, 7.2): by the share of the squared error that a Gauss-Newton step promises,
+The gradient is measured by the relative reduction of the squared error that a Gauss-Newton step
+predicts (J. Dennis, R. Schnabel, Numerical Methods for Unconstrained Optimization, 1983, 7.2),
 
-    promise = |P·r|² / |r|²,   P: projection on the slopes of the parameters that are free to move
+    promise = |P·r|² / |r|²,   P: projection on the slopes of the parameters not at a bound
 
-which is free of units and of the size of the error.
+which is independent of units and of the size of the error.
 """
 
 from collections.abc import Sequence
@@ -17,30 +17,30 @@ from rigwatch.physics.engine.fit import Fit, bounds
 from rigwatch.wire.arrays import FloatArray
 
 PROMISED = 0.02
-"""Share of the squared error that a further step may promise where a fit has converged."""
+"""Largest predicted relative reduction of the squared error at which a fit has converged."""
 AGREE = 1.02
-"""Ratio of errors up to which two fits have come to the same end."""
+"""Largest ratio of errors at which two fits count as the same optimum."""
 UNDETERMINED = 1e-6
-"""Singular value over the largest below which the data do not determine a direction."""
+"""Singular value, relative to the largest, below which the data do not determine a direction."""
 HEAVY = 0.3
-"""Share of an undetermined direction from which a parameter counts as a part of it."""
+"""Share of an undetermined direction above which a parameter belongs to it."""
 TOUCHING = 1e-6
-"""Distance from a bound, over the parameter's size, at which it sits on the bound."""
+"""Distance from a bound, relative to the parameter's size, at which it counts as on the bound."""
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """How a fit ended.
+    """Convergence of a fit.
 
     Attributes:
-        converged: whether verdicts may be built on it.
-        gradient: share of the squared error that a further step promises.
-        starts: fits that were made, each from a start of its own.
-        agreeing: those that came to the same error as the best, itself among them.
+        converged: whether verdicts may rely on it.
+        gradient: predicted relative reduction of the squared error by a further step.
+        starts: number of fits from different starts.
+        agreeing: number of fits with the same error as the best, including itself.
         undetermined: free parameters that the data do not determine.
-        at_bound: free parameters that sit on a bound.
-        begun: what the best fit began from.
-        reason: in words.
+        at_bound: free parameters on a bound.
+        begun: start of the best fit, in words.
+        reason: why it counts as converged or not, in words.
     """
 
     converged: bool
@@ -61,22 +61,22 @@ def convergence(
     near_noise: bool,
     gradient: float | None = None,
 ) -> Convergence:
-    """How the best of several fits ended.
+    """Convergence of the best of several fits.
 
     Args:
-        best: the fit that is kept.
+        best: the best fit.
         others: fits of the same data from other starts.
-        begun: what the best one began from.
-        near_noise: whether its error is so small that no other end could be much better.
-        gradient: share of what was minimised that a further step promises, where that is not the
-            squared error alone.
+        begun: start of the best fit, in words.
+        near_noise: whether its error is so small that no other optimum could be much better.
+        gradient: predicted relative reduction of the cost by a further step, if the cost is not
+            the squared error alone.
     """
     gradient = promise(best) if gradient is None else gradient
     size = spread(best)
     agreeing = 1 + sum(spread(other) <= AGREE * size for other in others)
     alone = bool(others) and agreeing == 1 and not near_noise
     steep = gradient > PROMISED
-    reason = f"a further step promises {gradient:.1%} of the squared error" if steep else ""
+    reason = f"a further step would reduce the squared error by {gradient:.1%}" if steep else ""
     if alone:
         also = f"none of {len(others) + 1} starts leads where another does"
         reason = f"{reason}; {also}" if reason else also
@@ -106,7 +106,7 @@ def spread(fitted: Fit) -> float:
 
 
 def promise(fitted: Fit) -> float:
-    """Share of the squared error that a Gauss-Newton step promises, bounds respected."""
+    """Predicted relative reduction of the squared error by a Gauss-Newton step within bounds."""
     names = fitted.compiled.system.free
     residual, jacobian = fitted.error.ravel(), _jacobian(fitted)
     size = float(residual @ residual)
@@ -125,7 +125,7 @@ def promise(fitted: Fit) -> float:
 
 
 def at_bound(fitted: Fit) -> tuple[str, ...]:
-    """Free parameters that sit on a bound."""
+    """Free parameters on a bound."""
     low, high = bounds(fitted.compiled.system)
     values = fitted.values()
     found = []
@@ -138,7 +138,7 @@ def at_bound(fitted: Fit) -> tuple[str, ...]:
 
 
 def _undetermined(fitted: Fit) -> tuple[str, ...]:
-    """Parameters in directions that change the error by next to nothing, over their own sizes."""
+    """Parameters in directions along which the error hardly changes, relative to their sizes."""
     names, jacobian = fitted.compiled.system.free, _jacobian(fitted)
     if not names:
         return ()

@@ -1,7 +1,7 @@
-"""Where else a fit may begin: values drawn over the bounds of each parameter.
+"""Random starts of a fit, drawn over the bounds of each parameter.
 
-A parameter that cannot be negative is drawn log-uniformly, between its bounds where both are known
-and else over some decades around its value; another one is drawn evenly.
+A nonnegative parameter is drawn log-uniformly, between its bounds if both are known and otherwise
+over some decades around its value; others are drawn uniformly.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ from rigwatch.physics.engine.equations import Parameter, System
 from rigwatch.wire.arrays import FloatArray
 
 DECADES = 3.0
-"""Powers of ten to both sides of the value where a bound is missing."""
+"""Decades on either side of the value if a bound is missing."""
 
 
 def drawn_start(system: System, begin: FloatArray, generator: np.random.Generator) -> FloatArray:
-    """All parameters, the free ones drawn; shape (n_p,).
+    """All parameters, with the free ones drawn at random; shape (n_p,).
 
     Args:
         system: its parameters have bounds.

@@ -1,12 +1,11 @@
-"""Start values of a fit without simulation: the equations balanced along the measured motion.
+"""Initial values of a fit without simulation: the equations balanced along the measured motion.
 
-Where channels show all states of a model, every equation that holds a free parameter is a balance
-of measured signals: an output that reads acceleration, or the rate of change of a velocity. With a
-common denominator most are linear in the parameters (m·a = F − k·x − c·v), so that bounded least
-squares finds them from nowhere. Those that are not are solved by bounded Gauss-Newton steps, from
-several starts; both are cheap, as nothing is integrated. The classical equation-error method
-(L. Ljung, System Identification, 1999, 7.3): noise of the motion biases it, so it starts a fit and
-decides nothing.
+If channels measure all states of a model, every equation with a free parameter is a balance of
+measured signals: an acceleration output, or the rate of a velocity. Multiplied by their common
+denominator most are linear in the parameters (m·a = F − k·x − c·v), so bounded least squares needs
+no initial values. The others are solved by bounded Gauss-Newton steps from several starts. Both are
+cheap, as nothing is integrated. This is the classical equation-error method (L. Ljung, System
+Identification, 1999, 7.3). Noise of the motion biases it, so it only provides initial values.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,13 +23,13 @@ from rigwatch.wire.arrays import FloatArray
 
 TARGET = "target_"
 WIDTHS = (7, 15, 41)
-"""Samples that motion is smoothed over; which is best depends on noise and speed."""
+"""Smoothing widths of the motion [samples]; the best depends on noise and speed."""
 MOST = 3000
-"""Samples that are balanced at most, evenly spread."""
+"""Most samples used in a balance, evenly spaced."""
 REWEIGHTED = 3
-"""Times that equations are weighed by what they leave."""
+"""Number of reweightings of the equations by their residuals."""
 STEPS = 60
-"""Evaluations of the nonlinear balance at most."""
+"""Most evaluations of the nonlinear balance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +38,10 @@ class Balance:
 
     Attributes:
         name: of the output or state.
-        left: target less expression.
+        left: target minus expression.
         columns, rest: the same times its denominator, as Σ columns·parameters + rest; no columns
-            where that is not linear in the parameters.
-        target: what was measured, shape (n,); NaN where nothing valid was.
+            if that is not linear in the parameters.
+        target: measured values, shape (n,); NaN without a valid sample.
         rate: whether the target is the rate of change of a state.
     """
 
@@ -57,15 +56,15 @@ class Balance:
 def equation_error_starts(
     compiled: CompiledSystem, recording: Recording, begin: FloatArray
 ) -> list[FloatArray]:
-    """Parameters that balance the equations, one vector for each width of smoothing.
+    """Parameters that balance the equations, one vector per smoothing width.
 
     Args:
         compiled: the system.
-        recording: what it will be fitted to.
-        begin: all parameters, of which the fixed ones stay, shape (n_p,).
+        recording: the recording to fit.
+        begin: all parameters, shape (n_p,); the fixed ones are kept.
 
     Returns:
-        Vectors of shape (n_p,); none where a state of the model shows in no channel.
+        Vectors of shape (n_p,); none if a state of the model is not measured.
     """
     system = compiled.system
     if not system.free or not system.model.states or not _shown(system):
@@ -76,7 +75,7 @@ def equation_error_starts(
 
 
 def _shown(system: System) -> bool:
-    """Whether a channel shows every state of the model."""
+    """Whether every state of the model is measured."""
     channels = {output.channel or name for name, output in system.model.outputs.items()}
     return all(
         state.measured in channels or state.rate_of in channels
@@ -99,12 +98,12 @@ def _solved(
             start = _linear(system, balances, signals, begin)
         return _nonlinear(system, balances, signals, start)
     except (ValueError, np.linalg.LinAlgError):
-        # Signals too large to be squared balance nothing.
+        # Signals that overflow when squared cannot be balanced.
         return None
 
 
 def _balances(system: System, recording: Recording, width: int) -> list[Balance]:
-    """Outputs and rates of change that hold free parameters."""
+    """Outputs and rates of change that contain free parameters."""
     outputs = system.model.outputs
     channels = {o.channel or name: j for j, (name, o) in enumerate(outputs.items())}
     found = []
@@ -126,7 +125,7 @@ def _has(expression: sympy.Expr, names: Sequence[str]) -> bool:
 
 
 def _smooth(signal: FloatArray, width: int, order: int, dt: float) -> FloatArray:
-    """A derivative of a signal; NaN beside what is missing."""
+    """A derivative of a signal; NaN next to gaps."""
     made = savgol_filter(filled(signal), width, 3, deriv=order, delta=dt)
     gaps = np.convolve(~np.isfinite(signal), np.ones(width), "same") > 0.5
     return np.where(gaps, np.nan, made)
@@ -149,7 +148,7 @@ def _balance(
 def _signals(
     system: System, recording: Recording, begin: FloatArray, width: int
 ) -> dict[str, FloatArray]:
-    """All that the equations name but the free parameters, along the recording."""
+    """All variables of the equations except the free parameters, along the recording."""
     states = initial_states(system, recording, width)
     inputs, dt = recording.inputs, recording.dt
     for column, led in Recall(system, inputs, states, dt, begin).at(begin).items():
@@ -168,9 +167,9 @@ def _signals(
 def _along(
     system: System, balance: Balance, signals: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    """The signals of one balance at the samples that count, with its target.
+    """The signals of one balance at the valid samples, with its target.
 
-    A smoothed rate of change lies around the sample: an input that is kept has changed there.
+    A smoothed rate of change is centred on the sample, at which a held input changes.
     """
     seen = dict(signals) | {TARGET: balance.target}
     for name in system.model.inputs if balance.rate else ():
@@ -190,7 +189,7 @@ def _linear(
     signals: Mapping[str, FloatArray],
     begin: FloatArray,
 ) -> FloatArray:
-    """Bounded least squares of the balances times their denominators, each of equal weight."""
+    """Bounded least squares of the balances times their denominators, with equal weights."""
     free = _places(system)
     low, high = bounds(system)
     blocks, rests = [], []
@@ -223,7 +222,7 @@ def _nonlinear(
     signals: Mapping[str, FloatArray],
     start: FloatArray,
 ) -> FloatArray:
-    """The balances as they are read, weighed by what they leave; `start` where that fails."""
+    """The original balances, weighted by their residuals; `start` if the solver fails."""
     free, (low, high) = _places(system), bounds(system)
     parts = []
     for balance in balances:

@@ -1,8 +1,8 @@
-"""The fitting driver: a fit that reaches the best parameters from wherever it is told to begin.
+"""The fitting driver: finds the best parameters from any start.
 
-A search says where to begin, the likeliest place first: `ShortHorizons` over windows with unknown
-initial states, `WholeRuns` along the measured motion. Attempts are made until it has enough; one
-that blows up is left, and the best of the others is kept.
+A search supplies the starts, most promising first: `ShortHorizons` over windows with unknown
+initial states, `WholeRuns` along the measured motion. Attempts are made until the search is
+satisfied; diverging ones are skipped, and the best of the others is kept.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -16,15 +16,15 @@ from rigwatch.wire.errors import ModelError
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """Where one start has led.
+    """Result of one start.
 
     Attributes:
-        begun: what it began from.
-        fit: what was found.
-        cost: what was minimised.
-        error: scaled, root mean square.
-        gradient: share of the cost that a further step promises, None where that is the squared
-            error alone.
+        begun: the start, in words.
+        fit: the fit.
+        cost: the minimised cost.
+        error: scaled error, root mean square.
+        gradient: predicted relative reduction of the cost by a further step, None if the cost is
+            the squared error alone.
     """
 
     begun: str
@@ -35,23 +35,23 @@ class Attempt:
 
 
 class Search(Protocol):
-    """Where fits begin, and when there are enough of them."""
+    """Starts of fits, and the stopping rule."""
 
     def attempts(self) -> Iterator[Callable[[], Attempt]]:
-        """Attempts, the likeliest first; one raises a `ModelError` where it blows up."""
+        """Attempts, most promising first; one that diverges raises a `ModelError`."""
 
     def enough(self, found: Sequence[Attempt]) -> bool:
-        """Whether no further start is worth its time."""
+        """Whether no further start is needed."""
 
     def near_noise(self, best: Attempt) -> bool:
-        """Whether an error is so small that no other end could be much better."""
+        """Whether an error is so small that no other optimum could be much better."""
 
 
 def fit_from_afar(search: Search) -> tuple[Fit, Convergence]:
-    """The best of fits from several starts, and how it ended.
+    """The best of fits from several starts, and its convergence.
 
     Raises:
-        ModelError: the recording is too short, or every start blows up.
+        ModelError: the recording is too short, or every start diverges.
     """
     found: list[Attempt] = []
     trouble: ModelError | None = None

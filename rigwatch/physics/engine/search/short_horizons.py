@@ -1,16 +1,15 @@
-"""Where a fit over short horizons begins, so that it ends at the best parameters.
+"""Starts of a fit over windows, chosen to reach the global minimum.
 
-Over a long horizon the error of a simulation has valleys that lead nowhere: a mass of tons that
-does not move, a spring so stiff that it follows nothing. So a fit begins at several places:
+Over a long horizon the simulation error has spurious minima: a mass of tons that does not move, a
+spring too stiff to respond. A fit is therefore started from several points:
 
-1. the values that are given;
-2. those that balance the equations along the measured motion, where channels show all states;
-3. either of these over horizons that grow from a few samples to the whole, as each is a good start
-   for the next (what is left of a short one has few valleys);
-4. values drawn over the bounds, over growing horizons as well.
+1. the given values;
+2. values that balance the equations along the measured motion, if channels measure all states;
+3. either of these over horizons that grow from a few samples to the full one, each the start of the
+   next (the error over a short horizon has few minima);
+4. values drawn over the bounds, also over growing horizons.
 
-The later ones are tried only until two have come to the same error. A window that blows up is
-shortened.
+Further starts are tried only until two reach the same error. A diverging window is shortened.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -29,34 +28,34 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 NEAR = 2.0
-"""Error over the sensors' noise up to which no other end of a fit could be much better."""
+"""Ratio of error to sensor noise below which no other optimum could be much better."""
 QUIET = 0.1
-"""Noise over what a sensor reads up to which a fit that leaves no more than noise says much."""
+"""Largest ratio of noise to signal at which a fit at the noise level is conclusive."""
 GROWTH = 4
-"""A horizon over the one before."""
+"""Ratio of successive horizons."""
 FEWEST = 8
 """Samples of the shortest horizon."""
 DRAWN = 4
-"""Starts that are drawn at most."""
+"""Most random starts."""
 DEAR = 1_500_000
-"""Numbers integrated in one simulation from which no start is drawn."""
+"""Integrated numbers per simulation above which no random starts are tried."""
 LONG = 2000
-"""Samples of a horizon from which a fit goes by way of shorter ones from the outset."""
+"""Horizon in samples above which a fit uses growing horizons from the outset."""
 
 
 @dataclass(frozen=True, eq=False)
 class ShortHorizons:
-    """What `fit_from_afar` searches over windows.
+    """Search of `fit_from_afar` over windows.
 
     Attributes:
         compiled: the system.
-        recording: what it is fitted to.
+        recording: the recording to fit.
         horizon: samples from one re-initialisation to the next.
-        start: all parameters to begin with, shape (n_p,); the model's own if None.
+        start: initial values of all parameters, shape (n_p,); the model's own if None.
         scale: divisor of each output's residuals, shape (outputs,); its standard deviation if None.
-        noise: of the sensors, shape (outputs,); None where it is not known.
-        initial: states that the search begins with, see `fit`.
-        substeps: Runge-Kutta steps between samples, where nothing is stiff.
+        noise: of the sensors, shape (outputs,); None if unknown.
+        initial: initial states, see `fit`.
+        substeps: Runge-Kutta steps between samples for non-stiff systems.
     """
 
     compiled: CompiledSystem
@@ -69,12 +68,12 @@ class ShortHorizons:
     substeps: int = 4
 
     def attempts(self) -> Iterator[Callable[[], Attempt]]:
-        """Starts, the likeliest first."""
+        """Attempts, most promising first."""
         for name, where, growing in self._starts():
             yield partial(self._attempt, name, where, growing=growing)
 
     def enough(self, found: Sequence[Attempt]) -> bool:
-        """Whether two have come to the same best error, or it is noise, and it is a minimum."""
+        """Whether the best is a minimum and at noise level, or reached by two starts."""
         best = min(found, key=lambda each: each.cost)
         steep = promise(best.fit) > PROMISED
         system = self.compiled.system
@@ -83,7 +82,7 @@ class ShortHorizons:
         return not steep and (fixed or agreeing > 1 or self.near_noise(best))
 
     def near_noise(self, best: Attempt) -> bool:
-        """Whether the best leaves little more than noise."""
+        """Whether the best error is near the noise level."""
         if self.noise is None or np.any(
             self.noise > QUIET * np.nanstd(self.recording.outputs, axis=0)
         ):
@@ -91,7 +90,7 @@ class ShortHorizons:
         return float(np.sqrt(np.mean((best.fit.rms / self.noise) ** 2))) <= NEAR
 
     def _starts(self) -> Iterator[tuple[str, FloatArray, bool]]:
-        """Each with its name and whether its horizons grow."""
+        """Starts with their names and whether their horizons grow."""
         begin = self.compiled.parameters if self.start is None else self.start
         balanced, closer = self._balanced(begin)
         given = ("the given values", begin, self.horizon >= LONG)
@@ -121,10 +120,10 @@ class ShortHorizons:
         )  # fmt: skip
 
     def _grown(self, start: FloatArray) -> FloatArray:
-        """Parameters to which horizons lead that grow up to the last but one.
+        """Parameters after fits over growing horizons, up to the last but one.
 
         Raises:
-            ModelError: even the shortest blows up.
+            ModelError: even the shortest diverges.
         """
         trouble: ModelError | None = None
         reached = False
@@ -142,10 +141,10 @@ class ShortHorizons:
         return start
 
     def _balanced(self, begin: FloatArray) -> tuple[FloatArray | None, bool]:
-        """Of the starts that balance the equations the best one over a short horizon.
+        """The best equation-error start over a short horizon.
 
         Returns:
-            It, None where there is none; and whether it does better there than the given values.
+            The start, None if there is none; and whether it is better there than the given values.
         """
         starts = equation_error_starts(self.compiled, self.recording, begin)
         if not starts:
@@ -164,14 +163,14 @@ class ShortHorizons:
         )
 
     def _numbers(self) -> int:
-        """Numbers that one simulation with its sensitivities integrates."""
+        """Number of integrated values in one simulation with sensitivities."""
         columns = 1 + self.compiled.columns
         states = len(self.compiled.system.states)
         return len(self.recording) * self.substeps * states * columns
 
 
 def growing_horizons(horizon: int) -> list[int]:
-    """Horizons before the last, the shortest first."""
+    """Horizons before the full one, shortest first."""
     found: list[int] = []
     while horizon // GROWTH >= FEWEST:
         horizon //= GROWTH

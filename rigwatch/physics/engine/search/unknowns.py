@@ -1,7 +1,7 @@
-"""Unknowns of a search, moved so that decades of them are as near as shares of them.
+"""Unknowns of a search, scaled so that it can cover decades.
 
-An unknown that must be positive is moved by its logarithm, any other one over a size of its own,
-each within its bounds. What the data do not say holds it near its centre, by a weak prior.
+A positive unknown is varied by its logarithm, any other relative to its own size, each within its
+bounds. A weak prior keeps undetermined unknowns near their centre.
 """
 
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ import numpy as np
 from rigwatch.wire.arrays import BoolArray, FloatArray
 
 INSIDE = 1e-9
-"""Distance from the bounds at which a search may begin."""
+"""Smallest distance from the bounds at the start of a search."""
 LEAST = 1e-4
-"""Share of its centre to which an unknown with a lower bound of 0 may fall."""
+"""Smallest value of an unknown with a lower bound of 0, as a share of its centre."""
 
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """Each is centre·e^z where it is logarithmic, else centre + size·z.
+    """Unknowns: centre·e^z if logarithmic, otherwise centre + size·z.
 
     Attributes:
         centre, size: shape (unknowns,).
@@ -33,7 +33,7 @@ class Unknowns:
     high: FloatArray
 
     def value(self, z: FloatArray) -> FloatArray:
-        """The unknowns at a place of the search."""
+        """The unknowns at a point z of the search."""
         grown = self.centre * np.exp(np.where(self.logarithmic, z, 0.0))
         return np.where(self.logarithmic, grown, self.centre + self.size * z)
 
@@ -42,7 +42,7 @@ class Unknowns:
         return np.where(self.logarithmic, self.value(z), self.size)
 
     def inside(self, z: FloatArray) -> FloatArray:
-        """The nearest place within the bounds."""
+        """The nearest point within the bounds."""
         return np.clip(z, self.low + INSIDE, self.high - INSIDE)
 
 
@@ -51,7 +51,7 @@ def unknowns(centre: FloatArray, low: FloatArray, high: FloatArray, positive: in
 
     Args:
         centre, low, high: shape (unknowns,).
-        positive: of the first so many, those that cannot be negative are moved by logarithms.
+        positive: number of leading unknowns of which nonnegative ones are logarithmic.
     """
     centre = np.clip(centre, low, high)
     logarithmic = (low >= 0) & (centre > 0) & (np.arange(len(centre)) < positive)
@@ -69,6 +69,6 @@ def unknowns(centre: FloatArray, low: FloatArray, high: FloatArray, positive: in
 
 
 def _sizes(values: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """How far one unit moves an unknown: its value, else a tenth of its range, else 1."""
+    """Size of each unknown: its value, otherwise a tenth of its range, otherwise 1."""
     span = np.where(np.isfinite(high - low), high - low, 10.0) / 10
     return np.where(values != 0, np.abs(values), np.where(span > 0, span, 1.0))

@@ -1,15 +1,14 @@
-"""Fits a model along the measured motion, over whole recordings, from a model's default values.
+"""Fits a model along the measured motion, over whole recordings, from its default values.
 
-What is simulated is stable and in one piece, so that its error bends gently over decades of the
-parameters (see `unknowns.py`). A robust loss keeps samples at which the model fails from pulling at
-all the others,
+The simulation is one stable run, so the error varies smoothly over decades of the parameters (see
+`unknowns.py`). A robust loss limits the influence of samples at which the model fails,
 
     min Σ ρ(r²),   ρ(z) = 2·(√(1 + z) - 1)   (soft L1: B. Triggs et al., Bundle Adjustment, 2000)
 
-with r in deviations of the channel's noise. A prior holds each parameter near its centre where the
-data do not say anything. The initial states are unknowns like any other. Where the first search
-ends well above the noise, others start from values spread about the centre, over a part of each
-recording, and the best is carried on over all of it.
+with r in standard deviations of the channel's noise. A prior keeps undetermined parameters near
+their centre. The initial states are further unknowns. If the first search ends well above the
+noise, others start from values spread around the centre, over a part of each recording, and the
+best is continued over the whole.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,38 +26,38 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 ROBUST = 2.0
-"""Deviations of noise from which a residual counts less than by its square, if not told."""
+"""Default transition of the robust loss from quadratic to linear [standard deviations of noise]."""
 PRIOR = 0.3
-"""Deviations of noise that a parameter may cost when it is off by a factor of e."""
+"""Prior cost of a parameter that is off by a factor of e [standard deviations of noise]."""
 SPREAD = 0.6
-"""Standard deviation of the starts about the centre, in logarithms."""
+"""Standard deviation of the starts around the centre, in natural logarithms."""
 STARTS = 5
-"""Searches beside the one from the given values, where that ends above `GOOD`."""
+"""Number of further searches if the one from the given values ends above `GOOD`."""
 GOOD = 1.3
-"""Error over the channels' noise from which no other start is tried."""
+"""Ratio of error to noise below which no other start is tried."""
 NEAR = 3.0
-"""Error over the channels' noise from which another search must lead to the same end."""
+"""Ratio of error to noise above which another search must reach the same optimum."""
 LOOK, POLISH = 25, 60
-"""Simulations at most: of a first look over a part of a recording, and over all of it."""
+"""Most simulations of a first search over a part of a recording, and of one over the whole."""
 ROUNDS = 3
-"""Times at most that a search over all of it goes on, for as long as a further step promises."""
+"""Most continuations of a search over the whole while a further step predicts a reduction."""
 REACH = 1.0
-"""Units, factors of e for what must be positive, to which a linearisation is believed."""
+"""Range of validity of a linearisation, in units of z (factors of e if logarithmic)."""
 PART = 2048
-"""Samples of a first look."""
+"""Number of samples of a first search."""
 BLOWN_UP = 1e3
-"""Deviations that count where a simulation diverges."""
+"""Residual assigned to a diverged simulation [standard deviations of noise]."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """Where a search ended.
+    """Result of a search.
 
     Attributes:
-        z: unknowns as they are moved, shape (unknowns,).
-        cost: robust.
-        rms: of the residual, in deviations of noise.
-        promise: share of the cost that a further Gauss-Newton step promises.
+        z: scaled unknowns, shape (unknowns,).
+        cost: robust cost.
+        rms: of the residual, in standard deviations of noise.
+        promise: predicted relative reduction of the cost by a further Gauss-Newton step.
     """
 
     z: FloatArray
@@ -68,17 +67,18 @@ class _Look:
 
 
 class WholeRuns:
-    """What `fit_from_afar` searches along the measured motion.
+    """Search of `fit_from_afar` along the measured motion.
 
     Args:
-        compiled: of a model that `along_measured_motion` made, with effects.
-        recordings: of `motion_recording`, each simulated in one piece.
+        compiled: a model from `along_measured_motion`, with effects.
+        recordings: from `motion_recording`, each simulated in one run.
         scale: noise of each output, shape (outputs,).
-        start: all parameters to begin with and to hold to, shape (n_p,); the model's own if None.
-        pull: deviations of noise that a free parameter may cost when it is off by a factor of e,
-            or by its size, shape (m,); `PRIOR` if None.
-        initial: states to begin with, shape (recordings, states); as channels show them if None.
-        robust: deviations of noise from which a residual counts less than by its square.
+        start: initial values and prior means of all parameters, shape (n_p,); the model's own if
+            None.
+        pull: prior cost of a free parameter that is off by a factor of e, or by its size, in
+            standard deviations of noise, shape (m,); `PRIOR` if None.
+        initial: initial states, shape (recordings, states); from the channels if None.
+        robust: transition of the robust loss to linear [standard deviations of noise].
         substeps: Runge-Kutta steps between samples.
     """
 
@@ -123,16 +123,16 @@ class WholeRuns:
         return unknowns(centre, low, high, positive=self._m)
 
     def attempts(self) -> Iterator[Callable[[], Attempt]]:
-        """The given values; then the best of several about them."""
+        """The given values; then the best of several around them."""
         yield lambda: self._attempt("the values to start from", np.zeros(self._unknowns.size.size))
         yield lambda: self._attempt("the best of several starts", self._drawn())
 
     def enough(self, found: Sequence[Attempt]) -> bool:
-        """Whether little more than noise is left, or nothing can be moved."""
+        """Whether the error is near the noise, or there is no free parameter."""
         return found[0].error <= GOOD or not self._m
 
     def near_noise(self, best: Attempt) -> bool:
-        """Whether no other end could be much better."""
+        """Whether no other optimum could be much better."""
         return best.error <= NEAR
 
     def _attempt(self, begun: str, z: FloatArray) -> Attempt:
@@ -145,7 +145,7 @@ class WholeRuns:
         return Attempt(begun, self._fit(look), look.cost, look.rms, look.promise)
 
     def _drawn(self) -> FloatArray:
-        """Where the best of several starts leads over a part of each recording."""
+        """Result of the best of several starts over a part of each recording."""
         parts = [beginning(each, PART) for each in self._recordings]
         part = WholeRuns(
             self._compiled, parts, self._scale, start=self._begin, pull=self._pull[: self._m],
@@ -156,7 +156,7 @@ class WholeRuns:
         return self._begun(min(looks, key=lambda look: look.cost).z[: self._m])
 
     def _begun(self, z: FloatArray) -> FloatArray:
-        """Unknowns with these parameters, within their bounds, and the initial states as given."""
+        """Unknowns for these parameters, within their bounds, and the given initial states."""
         whole = np.zeros(self._unknowns.size.size)
         whole[: self._m] = z
         return self._unknowns.inside(whole)
@@ -168,7 +168,7 @@ class WholeRuns:
             if look.promise <= PROMISED or look.rms >= BLOWN_UP:
                 break
             further = self._run(look.z, POLISH)
-            # Along a bent valley a linearisation promises what a whole round does not find.
+            # In a curved valley a linearisation predicts a reduction that a full round misses.
             found = 1 - further.cost / look.cost
             look = replace(further, promise=min(further.promise, found))
         return look
@@ -197,7 +197,7 @@ class WholeRuns:
         return _Look(found.x, float(found.cost), rms, promised)
 
     def _evaluated(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residuals and their slopes by the unknowns, the priors' rows below."""
+        """Residuals and their slopes by the unknowns, followed by the rows of the priors."""
         key = z.tobytes()
         if self._last is None or self._last[0] != key:
             self._last = (key, self._simulated(z))
@@ -240,7 +240,7 @@ def _beside(slopes: FloatArray, m: int) -> FloatArray:
 
 
 def _promise(found: OptimizeResult, low: FloatArray, high: FloatArray) -> float:
-    """Share of the cost that a Gauss-Newton step promises, within the bounds and `REACH`."""
+    """Predicted relative reduction of the cost by a Gauss-Newton step within bounds, `REACH`."""
     root = np.linalg.qr(found.jac)[1]
     wanted = -np.linalg.lstsq(root.T, found.grad)[0]
     least, most = np.maximum(low - found.x, -REACH), np.minimum(high - found.x, REACH)
