@@ -1,10 +1,11 @@
 """Watches a test rig against a model of it and tells its people what the model is missing.
 
-The workbench from Python, and on a notebook's cell, where results show themselves:
+The workbench from Python, and in a notebook, where results display themselves:
 
     import rigwatch
-    rigwatch.explain("emps")
-    rigwatch.add("emps", "coulomb")
+    study = rigwatch.Study("emps")
+    study.explain()
+    study.add("coulomb")
 
 Names are loaded when they are first used, so that no command waits for what it does not need.
 """
@@ -15,9 +16,9 @@ from typing import TYPE_CHECKING
 from rigwatch.version import __version__
 
 if TYPE_CHECKING:
-    from rigwatch.workbench.api import add, compare, explain, locate, new, report, undo
+    from rigwatch.workbench.api import Study
 
-__all__ = ["__version__", "add", "compare", "explain", "locate", "new", "report", "undo"]
+__all__ = ["Study", "__version__"]
 
 
 def __getattr__(name: str) -> object:

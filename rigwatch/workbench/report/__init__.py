@@ -1,5 +1,6 @@
 """Reports of a study, as text for the terminal and as one self-contained HTML page."""
 
+from rigwatch.workbench.report.charts import motion_units, residual_over_motion
 from rigwatch.workbench.report.html_report import write_report
 from rigwatch.workbench.report.text_report import (
     VERDICTS,
@@ -21,9 +22,11 @@ __all__ = [
     "comparison_lines",
     "doubt_of",
     "explanation_lines",
+    "motion_units",
     "number",
     "region_data",
     "region_lines",
+    "residual_over_motion",
     "table",
     "write_report",
 ]

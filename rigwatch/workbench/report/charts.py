@@ -115,11 +115,11 @@ def residual_chart(
 
 def surface_chart(stage: Stage, channel: int, most: float, unit: str) -> str | None:
     """Mean residual over position × velocity; None if the model has no motion."""
-    grid = _surface(stage, channel)
+    grid = residual_over_motion(stage, channel)
     if grid is None:
         return None
     x, v, means, counts = grid
-    words = _motion_units(stage)
+    words = motion_units(stage)
     plot = Plot(
         "mean residual by position and velocity", (x[0], x[-1]), (v[0], v[-1]),
         f"position [{words[0]}]", f"velocity [{words[1]}]", 372, 290,
@@ -133,7 +133,7 @@ def surface_chart(stage: Stage, channel: int, most: float, unit: str) -> str | N
     return plot.drawn()
 
 
-def _motion_units(stage: Stage) -> tuple[str, str]:
+def motion_units(stage: Stage) -> tuple[str, str]:
     """Units of the pair returned by `locate.motion`: of two inputs, otherwise of two states."""
     model = stage.bench.study.model
     if "position" in model.inputs and "velocity" in model.inputs:
@@ -143,16 +143,21 @@ def _motion_units(stage: Stage) -> tuple[str, str]:
 
 def surface_peak(stage: Stage, channel: int) -> float:
     """Largest mean residual of a cell with enough samples, drawn in full colour."""
-    grid = _surface(stage, channel)
+    grid = residual_over_motion(stage, channel)
     if grid is None:
         return 1.0
     _, _, means, counts = grid
     return max(float(np.quantile(np.abs(means[counts > 0]), 0.97)), 1e-300)
 
 
-def _surface(
+def residual_over_motion(
     stage: Stage, channel: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """Mean training residual by position and velocity; None if the model has no motion.
+
+    Returns edges of the position and of the velocity, shape (cells + 1,), mean residual and number
+    of samples of each cell, shape (cells, cells).
+    """
     residual = stage.bench.base.train.residuals[..., channel].ravel()
     moved = motion(stage.bench, sample_numbers(stage.bench.data.train, len(residual)))
     if moved is None:

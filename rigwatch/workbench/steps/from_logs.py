@@ -25,6 +25,13 @@ from rigwatch.workbench.data import (
 from rigwatch.workbench.steps.log_columns import Matched, matched
 from rigwatch.workbench.study import FILE, Span, Study, open_study
 
+SAMPLES_PER_PERIOD = 2.5
+"""Residual samples kept in a period of the low-pass's corner frequency."""
+FEWEST = 200
+"""Residual samples that each recording keeps at least."""
+EDGE = 15
+"""Residual samples left out at both ends, where filters have not settled."""
+
 
 @dataclass(frozen=True)
 class Logs:
@@ -129,6 +136,11 @@ def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str
         ]
         said.append(f"{', '.join(reading.rates)} made from {', '.join(sources)}, low-passed at"
                     f" {low_pass:g} Hz")  # fmt: skip
+        factor = int(min(rates) / (SAMPLES_PER_PERIOD * low_pass))
+        enough = min(map(len, tables)) >= FEWEST * factor
+        if factor > 1 and enough and not model.states:
+            lines += ["", "[thin]", f"factor = {factor}", f"edge = {EDGE}"]
+            said.append(f"residuals low-passed alike: every {factor}th sample counts")
     for use, parts in (("train", train), ("held_out", held_out)):
         for part in parts:
             lines += _span(use, logs.data[part.recording].stem, part)

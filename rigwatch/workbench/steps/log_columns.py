@@ -44,26 +44,31 @@ def matched(columns: Sequence[str], model: Model, given: Mapping[str, str]) -> M
     time = next((header for header in headers if header.name in TIMES), None)
     free = [header for header in headers if header is not time]
     signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
-    found, rates, remarks = dict(given), dict[str, tuple[str, int]](), list[str]()
+    found, remarks = dict(given), list[str]()
+    missing = dict[str, Input | Output]()
     for name, signal in signals.items():
         channel = signal.channel or name
-        if channel in found or channel in rates:
+        if channel in found:
             continue
         column = _column(name, channel, signal, free)
-        if column is not None:
-            unit = _unit(column, signal)
-            found[channel] = f"{column.column}[{unit}]"
-            free.remove(column)
-            if not column.units:
-                remarks.append(f"{column.column}: no unit in its header, assumed {unit}")
-        elif made := _rate(signal, signals):
-            rates[channel] = made
-        else:
-            raise ModelError(_unknown(name, channel, signal, columns))
+        if column is None:
+            missing[name] = signal
+            continue
+        unit = _unit(column, signal)
+        found[channel] = f"{column.column}[{unit}]"
+        free.remove(column)
+        if not column.units:
+            remarks.append(f"{column.column}: no unit in its header, assumed {unit}")
+    measured = {s.channel or name: s for name, s in signals.items() if name not in missing}
+    rates = {s.channel or name: _rate(s, measured) for name, s in missing.items()}
+    for name, signal in missing.items():
+        if rates[signal.channel or name] is None:
+            raise ModelError(_unknown(name, signal.channel or name, signal, columns))
     if time is not None and not time.units:
         remarks.append(f"{time.column}: no unit in its header, assumed s")
     told = f"{time.column}[{_time_unit(time)}]" if time else ""
-    return Matched(found, told, rates, tuple(remarks))
+    made = {channel: rate for channel, rate in rates.items() if rate is not None}
+    return Matched(found, told, made, tuple(remarks))
 
 
 def _time_unit(time: Header) -> str:
@@ -101,14 +106,13 @@ def _unit(header: Header, signal: Input | Output) -> str:
     return next(fitting, signal.shown or signal.unit)
 
 
-def _rate(signal: Input | Output, signals: Mapping[str, Input | Output]) -> tuple[str, int] | None:
+def _rate(signal: Input | Output, measured: Mapping[str, Input | Output]) -> tuple[str, int] | None:
     """The channel whose derivative a signal is, and the order of the derivative."""
     own = unit_of(signal.shown or signal.unit).dimension
     for order in (1, 2):
-        for name, other in signals.items():
-            unit = f"({other.shown or other.unit})/s^{order}"
-            if other is not signal and unit_of(unit).dimension == own:
-                return other.channel or name, order
+        for channel, other in measured.items():
+            if unit_of(f"({other.shown or other.unit})/s^{order}").dimension == own:
+                return channel, order
     return None
 
 

@@ -1,31 +1,156 @@
-"""The workbench from Python: what the commands do, on results that show themselves."""
+"""The workbench from Python: what the commands do, with arrays and data frames in and out."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import polars as pl
 import pytest
+import xarray as xr
 
 import rigwatch
+from rigwatch.wire.errors import ImportDataError, ModelError
 from tests.workbench.conftest import CONFIGS
 
+mpl.use("Agg")
+NOTEBOOKS = Path(__file__).parents[3] / "docs" / "notebooks"
+RATE = 100.0
+MODEL = """
+name = "slide"
+summary = "A mass on guides, pushed."
+inputs.force = { unit = "N" }
+parameters.m = { value = 1.0, unit = "kg" }
+states.v = { unit = "m/s", derivative = "(force + load)/m" }
+outputs.speed = { unit = "m/s", expression = "v" }
+[ports.load]
+kind = "force"
+unit = "N"
+variables.v = { expression = "v", unit = "m/s" }
+"""
 
-def test_a_cell_shows_what_the_command_prints(
+
+def run(seed: int) -> dict[str, np.ndarray]:
+    """A mass with drag, by Euler steps of a tenth of a sample."""
+    time = np.arange(1500) / RATE
+    force = 4 * np.sin(2 * np.pi * (0.3 + 0.04 * seed) * time) + 2 * np.sin(7 * time)
+    speed, v = [], 0.0
+    for now in force:
+        speed.append(v)
+        for _ in range(10):
+            v += (now - 3.0 * v) / 2.0 / RATE / 10
+    noise = np.random.default_rng(seed).normal(0, 0.005, len(time))
+    return {"time[s]": time, "force[N]": force, "speed[m/s]": np.array(speed) + noise}
+
+
+def as_pandas(table: dict[str, np.ndarray]) -> Any:
+    return pd.DataFrame(table)
+
+
+def as_polars(table: dict[str, np.ndarray]) -> Any:
+    return pl.DataFrame(table)
+
+
+def as_xarray(table: dict[str, np.ndarray]) -> Any:
+    time, force, speed = table.values()
+    return xr.Dataset(
+        {"force": ("time", force, {"units": "N"}), "speed": ("time", speed, {"units": "m/s"})},
+        coords={"time": ("time", time, {"units": "s"})},
+    )
+
+
+def as_times(table: dict[str, np.ndarray]) -> Any:
+    frame = pd.DataFrame(table).drop(columns="time[s]")
+    frame.index = pd.date_range("2026-01-01", periods=len(frame), freq="10ms", name="time")
+    return frame
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> str:
+    path = tmp_path / "slide.toml"
+    path.write_text(MODEL)
+    return str(path)
+
+
+def test_the_steps_are_those_of_the_commands(
     emps: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from rigwatch.commands import main
 
-    folder = rigwatch.new(tmp_path / "study", CONFIGS / "studies" / "emps.toml", emps)
+    template = CONFIGS / "studies" / "emps.toml"
+    study = rigwatch.Study.from_template(tmp_path / "study", template, emps)
     capsys.readouterr()
-    assert main(["compare", str(folder)]) == 0
-    shown = rigwatch.compare(folder)
+    assert main(["compare", str(study.folder)]) == 0
+    shown = study.compare()
     assert repr(shown) == capsys.readouterr().out.rstrip("\n")
     assert shown._repr_html_().startswith("<pre>")
-    assert rigwatch.add(folder, "coulomb").found.step == "add"
-    assert rigwatch.compare(folder).found.effects == ["coulomb@load"]
-    assert "coulomb" in repr(rigwatch.undo(folder))
-    assert rigwatch.compare(folder).found.effects == []
-    assert "by motion" in repr(rigwatch.locate(folder))
+    assert study.add("coulomb").found.step == "add"
+    assert study.compare().found.effects == ["coulomb@load"]
+    assert repr(study).endswith("emps-force + coulomb@load")
+    assert "coulomb" in repr(study.undo())
+    assert study.compare().found.effects == []
+    assert "by motion" in repr(study.locate())
+    lines = (study.folder / "ledger.jsonl").read_text().splitlines()
+    assert [json.loads(line)["step"] for line in lines] == ["new", "add", "undo"]
+
+
+@pytest.mark.parametrize("kind", [dict, as_pandas, as_polars, as_xarray, as_times])
+def test_a_table_of_any_kind_becomes_the_same_study(tmp_path: Path, model: str, kind: Any) -> None:
+    plain = rigwatch.Study.new(tmp_path / "plain", model=model, data={"one": run(1), "two": run(2)})
+    data = {"one": kind(run(1)), "two": kind(run(2))}
+    study = rigwatch.Study.new(tmp_path / "study", model=model, data=data)
+    assert study.compare().found.held_out_error == pytest.approx(
+        plain.compare().found.held_out_error, rel=1e-6
+    )
+
+
+def test_from_arrays_to_the_missing_effect_and_back_to_data_frames(
+    tmp_path: Path, model: str
+) -> None:
+    data = {"one": run(1), "two": run(2)}
+    study = rigwatch.Study.new(tmp_path / "study", model=model, data=data)
+    explained = study.explain()
+    assert explained.found.verdict in {"missing_effect", "undetermined"}
+    ranked = explained.table().to_pandas()
+    assert "viscous" in set(ranked["effect"][:3])
+    study.add("viscous")
+    parameters = study.compare().table().to_polars()
+    drag = parameters.filter(pl.col("parameter").str.contains("viscous"))["value"][0]
+    assert drag == pytest.approx(3.0, rel=0.05)
+    signals = study.signals().to_xarray()
+    assert float(np.sqrt((signals["speed residual"] ** 2).mean())) == pytest.approx(0.005, rel=0.2)
+    assert list(study.steps().to_pandas()["step"]) == ["model alone", "+ viscous"]
+    drawn = [study.plot_signals(), study.plot_where("speed"), study.plot_steps()]
+    assert [len(figure.axes) for figure in drawn] == [2, 1, 1]
+    with pytest.raises(ModelError, match="found 'sped'; did you mean 'speed'"):
+        study.plot_where("sped")
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        (3.0, "run: found float, expected arrays by name"),
+        ({"force": [1.0, 2.0], "speed": [1.0]}, r"run: found force \(2,\), speed \(1,\)"),
+    ],
+)
+def test_what_is_no_table_is_refused(tmp_path: Path, model: str, table: object, words: str) -> None:
+    with pytest.raises(ImportDataError, match=words):
+        rigwatch.Study.new(tmp_path / "study", model=model, data={"run": table})
+    assert not (tmp_path / "study").exists()
+
+
+@pytest.mark.parametrize("path", sorted(NOTEBOOKS.glob("*.ipynb")), ids=lambda path: path.stem)
+def test_the_notebooks_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "__main__"}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            exec(compile("".join(cell["source"]), path.name, "exec"), names)
 
 
 def test_the_package_loads_nothing_before_it_is_used() -> None:
@@ -35,5 +160,5 @@ def test_the_package_loads_nothing_before_it_is_used() -> None:
 
 
 def test_a_name_that_is_not_there_is_told_with_those_that_are() -> None:
-    with pytest.raises(AttributeError, match="explain"):
+    with pytest.raises(AttributeError, match="Study"):
         _ = rigwatch.explains

@@ -93,6 +93,19 @@ def test_a_speed_that_no_column_shows_is_made_from_the_displacement(tmp_path):
     assert np.corrcoef(data.train.inputs[:, place], expected)[0, 1] > 0.99
 
 
+def test_speed_and_acceleration_are_both_made_from_the_position_and_the_residual_is_thinned_alike(
+    tmp_path,
+):
+    time = np.arange(8000) / 500.0
+    position = 0.1 * np.sin(2.0 * time) + 0.02 * np.sin(5.0 * time)
+    table = {"time_s": time, "position_m": position, "force_N": 20 * np.cos(2.0 * time)}
+    assert made(tmp_path, written(tmp_path / "run.csv", table), more=["--model", "emps-force"]) == 0
+    file = open_study(tmp_path / "study").file
+    derived = {name: (s.channel, s.order) for name, s in file.derive.signals.items()}
+    assert derived == {"velocity": ("position", 1), "acceleration": ("position", 2)}
+    assert file.thin.factor * file.derive.low_pass == pytest.approx(500 / 2.5, rel=0.1)
+
+
 def test_columns_without_names_are_named_by_an_option(tmp_path, run):
     path = written(tmp_path / "run.csv", run)
     path.write_text(path.read_text().partition("\n")[2])
