@@ -38,7 +38,7 @@ class Witness:
 
     def __init__(self, settings: WitnessSection, bus: Bus, now: float) -> None:
         self.settings, self._bus = settings, bus
-        self._estimates = bus.overhear(ESTIMATES)
+        self._estimates = bus.subscribe_lossy(ESTIMATES)
         self._alarms = bus.listen(ALARMS)
         self._notices = Notices(settings)
         self._heard_at = now + max(0.0, FOR_MONITOR - settings.stale_after)
