@@ -184,6 +184,7 @@ class AlarmManager:
         alarm.active = active
         if not alarm.settings.enabled or alarm.shelved_until_ns:
             alarm.occasion = at
+            self._raise_unnamed(at.t_ns)
         elif alarm.may_flap and self._flapped(alarm, at):
             return
         elif active:
