@@ -70,8 +70,9 @@ docs: $(STAMPS)/run  ## write the pages, tables and pictures that are made by th
 	@python -m benchmarks.results_page
 
 mutate: $(STAMPS)/mutation  ## change the code a little and see which changes no test notices (MUTATE names some)
-	@CI=true mutmut run --max-children 2 $(MUTATE)
-	@mutmut results
+	@mutmut run --max-children $(WORKERS) $(MUTATE)
+	@mutmut results | grep -v ': not checked' || true
+	@python -m tools.mutants
 
 lock: $(STAMPS)/dev  ## write the lock files again (UPGRADE=1 takes newer versions)
 	@tools/lock.sh $(PYTHON_IN)

@@ -3,10 +3,17 @@
 import os
 
 import pytest
-from hypothesis import settings
+from hypothesis import Phase, settings
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do, before NumPy is imported
 settings.register_profile("rigwatch", deadline=None, derandomize=os.environ.get("CI") == "true")
+settings.register_profile(
+    "mutation",  # of a change in the code it matters only whether a test fails, not how simply
+    settings.get_profile("rigwatch"),
+    max_examples=50,
+    phases=[Phase.explicit, Phase.generate],
+    derandomize=True,
+)
 settings.load_profile("rigwatch")
 
 

@@ -1,4 +1,4 @@
-"""Alarms: from per-sample conditions to something that a person sees, acknowledges and resets.
+"""Alarms: from per-sample conditions to alarms that an operator sees, acknowledges and resets.
 
 The core is pure (`AlarmManager`); only `journal.py` touches a file. One table, `kinds.py`, declares
 every alarm with its severity, cause, guidance and default settings.

@@ -1,8 +1,7 @@
-"""From a flag a sample to edges that mean something: persistence on the way in, hysteresis on the
-way out.
+"""Debounces per-sample flags: persistence for the rising edge, hysteresis for the falling edge.
 
 The level rises at the `persistence`-th consecutive sample with the condition and falls at the
-`clear_after`-th consecutive sample without it. Nothing depends on how the samples are cut into
+`clear_after`-th consecutive sample without it, independently of how samples are divided into
 blocks.
 """
 
@@ -14,10 +13,10 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """The level has changed.
+    """A change of the level.
 
     Attributes:
-        index: place in the block of the sample that decided.
+        index: index in the block of the sample at which the level changes.
         rising: whether the level is on from here.
         onset_seq: for a rising edge, number of the first sample of the run.
     """
@@ -48,7 +47,7 @@ class Debouncer:
         self._onset_seq = -1
 
     def interrupt(self) -> None:
-        """Forget a run that has begun: the next sample does not follow the last one."""
+        """Discard a run in progress: the next sample does not follow the last one."""
         self._run = 0
 
     def update(self, active: NDArray[np.uint8], first_seq: int) -> list[Edge]:
@@ -67,7 +66,7 @@ class Debouncer:
     def _take_run(
         self, active: bool, start: int, stop: int, first_seq: int, edges: list[Edge]
     ) -> None:
-        """Account for the samples from `start` to `stop`, all alike."""
+        """Account for the samples from `start` to `stop`, which have equal flags."""
         if active == self.level:
             self._run = 0
             return

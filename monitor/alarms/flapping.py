@@ -1,8 +1,8 @@
-"""An alarm that comes and goes again and again is one alarm with a count (ISA-18.2: chattering).
+"""Chattering alarms are combined into one alarm with a count (ISA-18.2).
 
-From the fifth time within a minute on, the alarm keeps standing while its condition comes and goes,
-and is published again only when the count has doubled. Once the condition has neither come nor gone
-for a minute, the alarm follows it again.
+From the fifth occurrence within a minute on, the alarm stays active while its condition comes and
+goes, and is published again only when the count has doubled. After a minute without a change of the
+condition, the alarm follows it again.
 """
 
 from collections import deque
@@ -12,11 +12,11 @@ MOST_IN_WINDOW = 4
 
 
 class FlapWatch:
-    """Counts how often one alarm comes; it looks at time stamps only, never at a clock.
+    """Counts occurrences of one alarm by their time stamps; reads no clock.
 
     Attributes:
-        holding: the alarm stands whether or not its condition holds.
-        count: how often it has come since the first of the series.
+        holding: the alarm is kept active regardless of its condition.
+        count: occurrences since the start of the series.
     """
 
     def __init__(self) -> None:
@@ -28,11 +28,11 @@ class FlapWatch:
 
     @property
     def ends_ns(self) -> int | None:
-        """When the series ends if nothing changes [ns]; None if there is none."""
+        """End of the series if nothing changes [ns]; None without a series."""
         return self._changed_ns + WINDOW_NS if self.holding else None
 
     def came(self, t_ns: int) -> bool:
-        """The condition has come; whether the alarm stood already, as part of a series."""
+        """The condition has become true; returns whether a series already held the alarm."""
         stood = self.holding
         if not stood and self._risen and self._risen[-1] + WINDOW_NS <= t_ns:
             self._risen.clear()
@@ -46,18 +46,18 @@ class FlapWatch:
         return stood
 
     def went(self, t_ns: int) -> bool:
-        """The condition has gone; whether the alarm stands all the same."""
+        """The condition has become false; returns whether the alarm stays active."""
         self._changed_ns = t_ns
         return self.holding
 
     def is_news(self) -> bool:
-        """Whether the count is worth publishing: it has doubled."""
+        """Whether the count is to be published, as it has doubled."""
         if self.count < 2 * self._told:
             return False
         self._told = self.count
         return True
 
     def end(self) -> None:
-        """The series is over."""
+        """End the series."""
         self.holding, self.count, self._told = False, 0, 0
         self._risen.clear()

@@ -1,7 +1,7 @@
-"""Alarm floods after ISA-18.2 and EEMUA 191: more alarms in ten minutes than a person can follow.
+"""Alarm floods after ISA-18.2 and EEMUA 191: more alarms in ten minutes than one can follow.
 
-A flood begins with the eleventh alarm within ten minutes and ends once fewer than five lie within
-ten minutes.
+A flood begins with the eleventh alarm within ten minutes and ends when fewer than five remain
+within ten minutes.
 """
 
 from collections import deque
@@ -12,7 +12,7 @@ FEWEST_TO_LAST = 5
 
 
 class FloodWatch:
-    """Counts raised alarms; it looks at their time stamps only, never at a clock."""
+    """Counts raised alarms by their time stamps; reads no clock."""
 
     def __init__(self) -> None:
         self.active = False
@@ -20,18 +20,18 @@ class FloodWatch:
 
     @property
     def count(self) -> int:
-        """Alarms within the window, counted up to one more than a person can follow."""
+        """Number of alarms within the window, up to one more than an operator can follow."""
         return len(self._raised)
 
     @property
     def ends_ns(self) -> int | None:
-        """When the flood ends if no alarm follows [ns]; None where there is no flood."""
+        """End of the flood if no alarm follows [ns]; None without a flood."""
         if not self.active:
             return None
         return self._raised[-FEWEST_TO_LAST] + WINDOW_NS
 
     def add(self, t_ns: int) -> bool:
-        """Count an alarm raised at `t_ns` [ns]; True if it begins a flood."""
+        """Count an alarm raised at `t_ns` [ns]; returns whether it begins a flood."""
         while self._raised and self._raised[0] + WINDOW_NS <= t_ns:
             self._raised.popleft()
         self._raised.append(t_ns)
@@ -40,5 +40,5 @@ class FloodWatch:
         return begins
 
     def end(self) -> None:
-        """The flood is over."""
+        """End the flood."""
         self.active = False

@@ -1,10 +1,10 @@
-"""The alarm journal: an append-only file of JSON lines that a killed monitor leaves readable.
+"""The alarm journal: an append-only file of JSON lines that stays readable after a kill.
 
     {"alarm": {"name": "dry_friction", "state": "unacknowledged", …}, "active": true, …}
 
-Each write ends with fsync, so that what has been published is on disk. A line torn by a kill or a
-power cut has no newline or is no JSON: reading skips it and counts it, and writing starts a fresh
-line behind it. Figures that JSON cannot say are written as the words "nan", "inf" and "-inf".
+Each write ends with fsync, so everything published is on disk. A line torn by a kill or a power cut
+has no newline or is not valid JSON: reading skips and counts it, and writing continues on a new
+line. Non-finite numbers are written as the strings "nan", "inf" and "-inf".
 """
 
 import json
@@ -22,21 +22,21 @@ from rigwatch.wire.messages import Alarm
 _ALARM_TYPES = get_type_hints(Alarm)
 _RECORD_TYPES = get_type_hints(AlarmRecord)
 LARGEST, KEPT = 16 << 20, 8
-"""Size at which a journal is rotated [bytes], and how many older ones are kept."""
+"""Size at which a journal is rotated [bytes], and number of older files kept."""
 LONGEST_LINE = 1 << 16
-"""No line of ours comes near this [bytes]."""
+"""Longest line read, far above any line written [bytes]."""
 
 
 class AlarmJournal:
     """The journal at one path, open for appending.
 
     Args:
-        path: the file; it and its folder are made where they are missing.
-        largest: size at which it is rotated: set aside as `<path>.1`, older ones as `.2` and so on,
-            and continued with the newest record of each alarm [bytes].
+        path: the file; it and its folder are created if missing.
+        largest: size at which it is rotated [bytes]: renamed to `<path>.1`, older ones to `.2` and
+            so on, and continued with the newest record of each alarm.
 
     Attributes:
-        failure: why the last write failed, "" where it did not; the lines wait in memory for the
+        failure: why the last write failed, otherwise ""; unwritten lines stay in memory for the
             next write.
 
     Raises:
@@ -60,7 +60,7 @@ class AlarmJournal:
             ) from error
 
     def write(self, records: Iterable[AlarmRecord]) -> None:
-        """Append records and force them to disk; a full disk shows in `failure` only."""
+        """Append records and force them to disk; a full disk only sets `failure`."""
         for record in records:
             self._waiting.append(_line(record))
             self._newest[record.alarm.name] = record
@@ -77,13 +77,13 @@ class AlarmJournal:
         self.failure = ""
 
     def newest(self) -> list[AlarmRecord]:
-        """The newest record of each alarm: the state in which a restarted monitor starts."""
+        """The newest record of each alarm: the initial state of a restarted monitor."""
         return list(self._newest.values())
 
     def _rotate(self) -> None:
-        """Set the file aside and begin one that holds the newest record of each alarm.
+        """Rotate the file and start one that holds the newest record of each alarm.
 
-        At every moment a whole journal stands at the path: a kill or power cut loses nothing.
+        A complete journal is at the path at all times: a kill or power cut loses nothing.
         """
         beside = self.path.with_name(f"{self.path.name}.new")
         beside.write_bytes(b"".join(map(_line, self._newest.values())))
@@ -106,18 +106,18 @@ class AlarmJournal:
         return self.path.with_name(f"{self.path.name}.{number}")
 
     def close(self) -> None:
-        """Close the file; what could not be written is lost."""
+        """Close the file; unwritten lines are lost."""
         os.close(self._file)
 
     def _end_torn_line(self) -> None:
-        """The newline goes out with the first line: there may be no space for it now."""
+        """Terminate a torn line with the next write, as there may be no space for it now."""
         size = os.fstat(self._file).st_size
         if size and os.pread(self._file, 1, size - 1) != b"\n":
             self._waiting.append(b"\n")
 
 
 def _newest(path: Path) -> dict[str, AlarmRecord]:
-    """The newest record of each alarm; memory is that of these, however long the journal is."""
+    """The newest record of each alarm, in memory independent of the journal's length."""
     if not path.is_file():  # a device may be endless
         return {}
     with path.open("rb") as file:
@@ -143,12 +143,12 @@ def read_journal(path: Path | str) -> tuple[list[AlarmRecord], int]:
 
 
 def last_records(records: Iterable[AlarmRecord]) -> list[AlarmRecord]:
-    """The newest record of each alarm: what a restarted monitor has to stand by."""
+    """The newest record of each alarm, which a restarted monitor restores."""
     return list({record.alarm.name: record for record in records}.values())
 
 
 def _lines(file: BinaryIO) -> Iterator[bytes]:
-    """The lines of a journal; of one that is longer than any of ours no more than its start."""
+    """The lines of a journal; overlong lines are truncated."""
     while line := file.readline(LONGEST_LINE):
         yield line
         while len(line) == LONGEST_LINE and not line.endswith(b"\n"):
@@ -156,7 +156,7 @@ def _lines(file: BinaryIO) -> Iterator[bytes]:
 
 
 def _write_all(file: int, waiting: list[bytes]) -> None:
-    """Write and drop line by line; a line that was written in part is written again as a whole."""
+    """Write lines and remove them one by one; a partly written line is repeated in full."""
     while waiting:
         line = waiting[0]
         if os.write(file, line) < len(line):
@@ -166,7 +166,7 @@ def _write_all(file: int, waiting: list[bytes]) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """A new file survives a power cut only once its folder is on disk as well."""
+    """Sync the folder; a new file survives a power cut only after that."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -194,11 +194,11 @@ def _parse(line: bytes) -> AlarmRecord | None:
 
 
 def _typed(plain: dict[str, Any], kind: type, types: dict[str, Any]) -> dict[str, Any]:
-    """The fields of `kind` that `plain` must hold, with figures as their type says.
+    """The fields of `kind` from `plain`, with numbers converted to their types.
 
     Raises:
         KeyError: a field is missing.
-        TypeError: a field is of another type.
+        TypeError: a field has the wrong type.
     """
     typed: dict[str, Any] = {}
     for name in [one.name for one in fields(kind) if one.name != "alarm"]:

@@ -1,10 +1,10 @@
-"""Every alarm there is, in one table: name, severity, cause, guidance and default settings.
+"""All alarms in one table: name, severity, cause, guidance and default settings.
 
-An alarm takes its name from the condition that raises it. A sensor alarm exists once a channel and
-is called `<kind>.<channel>`, such as "sensor_stuck.position"; `{channel}` in its texts stands for
-the channel. Severities follow EEMUA 191: critical means that nobody is watching the rig any more,
-info is a remark that nobody has to acknowledge. An alarm that `refines` another names the same
-fault better and takes its place.
+An alarm is named after the condition that raises it. A sensor alarm exists per channel and is named
+`<kind>.<channel>`, such as "sensor_stuck.position"; `{channel}` in its texts stands for the
+channel. Severities follow EEMUA 191: critical means that the rig is no longer monitored, info is a
+remark that needs no acknowledgement. An alarm that `refines` another names the same fault more
+precisely and replaces it.
 """
 
 import difflib
@@ -22,10 +22,9 @@ class AlarmSettings:
     """How a condition becomes an alarm, with every default filled in.
 
     Attributes:
-        persistence: consecutive samples that the condition must hold before the alarm is raised
-            [1].
+        persistence: consecutive samples with the condition before the alarm is raised [1].
         clear_after: consecutive samples without the condition before it counts as gone [1].
-        latch: a person must reset the alarm after the condition has gone.
+        latch: an operator must reset the alarm after the condition has gone.
         enabled: whether the alarm is raised at all.
     """
 
@@ -37,16 +36,16 @@ class AlarmSettings:
 
 @dataclass(frozen=True, slots=True)
 class AlarmKind:
-    """One line of the table.
+    """One row of the table.
 
     Attributes:
         name: the condition that raises it; for a sensor alarm the part before the dot.
-        severity: how bad; "info" needs no acknowledging.
-        cause: what is probably wrong.
-        guidance: what to do now.
-        defaults: settings where the configuration says nothing.
-        safety: it calls for the rig to be stopped: a flood never groups it.
-        refines: the alarm that this one takes the place of, "" for none.
+        severity: of the alarm; "info" needs no acknowledgement.
+        cause: the probable cause.
+        guidance: what the operator should do.
+        defaults: settings if the configuration gives none.
+        safety: the rig should be stopped; a flood never groups it.
+        refines: the alarm that this one replaces, "" for none.
     """
 
     name: str
@@ -59,7 +58,7 @@ class AlarmKind:
 
     @property
     def always_shown(self) -> bool:
-        """Whether no flood may group it."""
+        """Whether a flood never groups it."""
         return self.safety or self.severity == "critical"
 
 
@@ -72,7 +71,7 @@ _REMARK = AlarmSettings(persistence=1, clear_after=64, latch=False)
 ALARM_FLOOD = "alarm_flood"
 
 ALARM_KINDS: tuple[AlarmKind, ...] = (
-    # The line to the rig: without it nothing below can be judged.
+    # The link to the rig: without it no other condition can be judged.
     AlarmKind(
         "link",
         "critical",
@@ -171,7 +170,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "window; commission anew if it repeats.",
         _AT_ONCE,
     ),
-    # The sensors: an alarm a channel.
+    # The sensors: one alarm per channel.
     AlarmKind(
         "sensor_non_finite",
         "error",
@@ -267,7 +266,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         _LASTING,
         refines="departure",
     ),
-    # The detectors beside the friction scheme.
+    # The detectors in addition to the friction scheme.
     AlarmKind(
         "parity_arma",
         "warning",
@@ -290,7 +289,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "Compare with the friction estimates; check the position sensor's zero and mounting.",
         _LASTING,
     ),
-    # Remarks: why there is no verdict just now.
+    # Remarks: why there is no verdict at present.
     AlarmKind(
         "excitation_changed",
         "warning",
@@ -347,20 +346,20 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
 )
 
 REFINED = tuple(dict.fromkeys(kind.refines for kind in ALARM_KINDS if kind.refines))
-"""Alarms that others give a better name."""
+"""Alarms that others refine."""
 
 _BY_NAME = {kind.name: kind for kind in ALARM_KINDS}
 _ORDER = {kind.name: place for place, kind in enumerate(ALARM_KINDS)}
 
 
 def split(name: str) -> tuple[str, str]:
-    """Kind and channel of an alarm's name; the channel is "" where there is none."""
+    """Kind and channel of an alarm's name; the channel is "" if there is none."""
     kind, _, channel = name.partition(".")
     return kind, channel
 
 
 def kind_of(name: str) -> AlarmKind:
-    """The table's line for the alarm `name`; a plain warning for a condition that is not listed."""
+    """The table's row for the alarm `name`; a plain warning for an unlisted condition."""
     kind, _ = split(name)
     if kind in _BY_NAME:
         return _BY_NAME[kind]
@@ -369,12 +368,12 @@ def kind_of(name: str) -> AlarmKind:
 
 
 def order_of(name: str) -> tuple[int, str]:
-    """Place of the alarm `name` among alarms raised by one sample: nearest to the cause first."""
+    """Order of the alarm `name` among alarms raised by one sample: nearest to the cause first."""
     return _ORDER.get(split(name)[0], len(_ORDER)), name
 
 
 def settings_of(name: str, settings: Mapping[str, AlarmSection]) -> AlarmSettings:
-    """Settings of the alarm `name`: its own section, else its kind's, over the table's defaults."""
+    """Settings of the alarm `name`: its own section, else its kind's, else the table's defaults."""
     defaults = kind_of(name).defaults
     section = settings.get(name) or settings.get(split(name)[0])
     if section is None:
@@ -388,7 +387,7 @@ def settings_of(name: str, settings: Mapping[str, AlarmSection]) -> AlarmSetting
 
 
 def check_settings(settings: Mapping[str, AlarmSection], file: Path | str) -> None:
-    """Refuse settings for alarms that do not exist.
+    """Check that settings name existing alarms.
 
     Raises:
         ConfigError: a section under [monitor.alarms] names no alarm of the table.

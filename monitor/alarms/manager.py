@@ -1,19 +1,18 @@
-"""All alarms of a rig: conditions, reports and commands come in, transitions go out.
+"""All alarms of a rig: conditions, reports and commands in, transitions out.
 
-Three ways in, one way out. `update` takes the per-sample conditions of a block; `report` takes what
-processes notice without a sample (link, disk, clock); `command` takes what an operator wants. Each
-returns what is to be published. The manager reads no clock and no file; how samples are cut into
-blocks changes nothing.
+`update` takes the per-sample conditions of a block, `report` conditions that processes detect
+without a sample (link, disk, clock), `command` an operator's command. Each returns the messages to
+publish. The manager reads no clock and no file; the division into blocks has no influence.
 
-A fault is detected before it is named. `departure` is raised first; when `dry_friction`, `stiction`
-or `other_fault` follows while the departure lasts, it takes the departure's place in the list, with
-the departure's `onset_seq` and first-out mark, so that one fault stands as one alarm with the best
-name it has.
+A fault is detected before it is named. `departure` is raised first. If `dry_friction`, `stiction`
+or `other_fault` follows while the departure lasts, it replaces the departure in the list, with the
+departure's `onset_seq` and first-out mark, so that one fault is one alarm under its most precise
+name.
 
-The first alarm raised while no other waits to be seen is the first-out. In a flood (`flood.py`)
-further alarms stand and are journalled, but are announced only as events, until the flood ends;
-critical alarms and those that ask for the rig to be stopped always show. An alarm that comes and
-goes again and again is one alarm with a count (`flapping.py`).
+The first alarm raised while no other is unacknowledged is the first-out. In a flood (`flood.py`)
+further alarms are journalled but announced only as events until the flood ends; critical alarms and
+those that require stopping the rig are always shown. A chattering alarm is one alarm with a count
+(`flapping.py`).
 """
 
 from collections.abc import Iterable, Mapping
@@ -33,7 +32,7 @@ from rigwatch.wire.rig_config import AlarmSection
 Announcement = Alarm | Event
 
 SHELF_LIFE_NS = 8 * 3600 * 1_000_000_000
-"""Shelving ends by itself after one shift, so that no alarm is forgotten on the shelf."""
+"""Longest shelving: one shift, so that no alarm is forgotten on the shelf."""
 SOURCE = "monitor/alarms"
 
 
@@ -69,14 +68,14 @@ class AlarmManager:
         t_ns: IntArray,
         conditions: Iterable[Condition],
     ) -> list[Announcement]:
-        """Judge consecutive samples.
+        """Process the conditions of consecutive samples.
 
         Args:
-            device: the device whose samples these are.
+            device: the device of the samples.
             boot: boot of the samples.
             seq: number of the first one.
             t_ns: shape (n,), their times [ns].
-            conditions: each over the same n samples; one that is left out keeps its level.
+            conditions: each over the same n samples; one that is missing keeps its level.
         """
         if self._next != (boot, seq):
             for debouncer in self._debouncers.values():
@@ -92,10 +91,10 @@ class AlarmManager:
         return self._take_said()
 
     def report(self, name: str, at: Occasion, *, active: bool) -> list[Announcement]:
-        """Take over what a process knows without a sample: whether `name` holds since `at`.
+        """Set a condition detected without a sample: whether `name` holds since `at`.
 
-        Saying the same again changes nothing. Persistence and hysteresis are counted in samples and
-        do not apply here.
+        Repeating the same report has no effect. Persistence and hysteresis are counted in samples
+        and do not apply here.
         """
         self._advance(at.t_ns)
         if self._alarm(name).active != active:
@@ -103,7 +102,7 @@ class AlarmManager:
         return self._take_said()
 
     def command(self, command: AlarmCommand) -> list[Announcement]:
-        """Do what an operator asks, or say in an event why not."""
+        """Execute an operator's command, or return an event that says why not."""
         self._advance(command.t_ns)
         found = wanted(command, self._alarms.values())
         why_not = refusal(command, found)
@@ -121,16 +120,16 @@ class AlarmManager:
         return sorted(alarms, key=lambda alarm: (not alarm.first_out, alarm.t_ns))
 
     def take_changes(self) -> list[AlarmRecord]:
-        """What the journal has to keep since the last call, in order."""
+        """Records for the journal since the last call, in order."""
         changes, self._changes = self._changes, []
         return changes
 
     def restore(self, records: Iterable[AlarmRecord], now_ns: int | None = None) -> list[Alarm]:
-        """Stand as the records say, and return the standing alarms to be published again.
+        """Restore the state of the records and return the standing alarms to be published again.
 
         Args:
             records: the newest of each alarm.
-            now_ns: Unix time; nothing stays on the shelf for longer than a shelf life from it [ns].
+            now_ns: Unix time; shelving ends at most one shelf life after it [ns].
         """
         for record in records:
             self._restore_one(record)
@@ -179,11 +178,12 @@ class AlarmManager:
         return self._debouncers[name]
 
     def _set(self, name: str, at: Occasion, *, active: bool) -> None:
-        """The condition of `name` has come or gone."""
+        """Set the condition of `name`."""
         alarm = self._alarm(name)
         alarm.active = active
         if not alarm.settings.enabled or alarm.shelved_until_ns:
             alarm.occasion = at
+            self._raise_unnamed(at.t_ns)
         elif alarm.may_flap and self._flapped(alarm, at):
             return
         elif active:
@@ -192,7 +192,7 @@ class AlarmManager:
             self._clear(alarm, at)
 
     def _flapped(self, alarm: AlarmInstance, at: Occasion) -> bool:
-        """Whether the condition came or went within a series that stands as one alarm."""
+        """Whether the condition changed within a chattering series."""
         if not alarm.active:
             return alarm.flaps.went(at.t_ns)
         if not alarm.flaps.came(at.t_ns) or alarm.state == "normal":
@@ -230,16 +230,16 @@ class AlarmManager:
         self._raise_unnamed(at.t_ns)
 
     def _refinements(self, alarm: AlarmInstance) -> list[AlarmInstance]:
-        """Alarms that give `alarm` a better name."""
+        """Alarms that refine `alarm`."""
         return [other for other in self._alarms.values() if other.kind.refines == alarm.kind.name]
 
     def _named_by(self, alarm: AlarmInstance) -> AlarmInstance | None:
-        """The standing alarm whose place `alarm` takes."""
+        """The standing alarm that `alarm` replaces."""
         coarse = self._alarms.get(alarm.kind.refines)
         return coarse if coarse and coarse.active and coarse.state != "normal" else None
 
     def _raise_unnamed(self, t_ns: int) -> None:
-        """Raise again what still holds although every better name for it is off the list."""
+        """Raise a still active alarm again when no alarm that refines it is standing."""
         for name in REFINED:
             coarse = self._alarms.get(name)
             if not coarse or not (coarse.superseded and coarse.active):
@@ -256,7 +256,7 @@ class AlarmManager:
         )
 
     def _count(self, alarm: AlarmInstance, *, is_new: bool) -> None:
-        """Count a raised alarm; begin a flood, or group the alarm in the one that runs."""
+        """Count a raised alarm; begin a flood, or group the alarm in the current one."""
         if alarm.is_remark or alarm.name == ALARM_FLOOD:
             return
         t_ns = alarm.occasion.t_ns
@@ -273,7 +273,7 @@ class AlarmManager:
             self._set(ALARM_FLOOD, at, active=True)
 
     def _advance(self, to_ns: int) -> None:
-        """Let everything happen whose time has come by `to_ns` [ns]."""
+        """Process everything due by `to_ns` [ns]."""
         while due := [when for when in self._deadlines() if when[0] <= to_ns]:
             t_ns, name = min(due)
             if name == ALARM_FLOOD:
@@ -299,7 +299,7 @@ class AlarmManager:
         return [*flood, *shelved, *flapping]
 
     def _end_series(self, alarm: AlarmInstance, t_ns: int) -> None:
-        """The condition has neither come nor gone for a while: the alarm follows it again."""
+        """End a chattering series: the alarm follows its condition again."""
         if not alarm.active and alarm.clear():
             self._publish(alarm, t_ns)
         alarm.flaps.end()
@@ -326,7 +326,7 @@ class AlarmManager:
                 self._acknowledge_group(command)
 
     def _acknowledge_group(self, command: AlarmCommand) -> None:
-        """Whoever acknowledges a flood acknowledges what is grouped in it."""
+        """Acknowledge the alarms grouped in an acknowledged flood."""
         for alarm in self._alarms.values():
             if alarm.grouped and alarm.acknowledge():
                 self._publish(alarm, command.t_ns, command.user, command.text)
@@ -355,7 +355,7 @@ class AlarmManager:
             self._said.append(alarm.message(user, t_ns))
 
     def _note(self, alarm: AlarmInstance, t_ns: int, user: str = "", text: str = "") -> None:
-        """Leave a record for the journal."""
+        """Add a record for the journal."""
         self._changes.append(
             AlarmRecord(
                 alarm.message(user, t_ns), alarm.active, alarm.latched, alarm.shelved_until_ns,

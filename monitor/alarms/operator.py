@@ -1,4 +1,4 @@
-"""What an operator's command means: which alarms it is for, and why it may be refused."""
+"""Operator commands: the alarms that they address, and reasons for refusing them."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -9,17 +9,17 @@ from rigwatch.wire.messages import AlarmCommand
 
 EVERY = "*"
 LONGEST_NAME, LONGEST_TEXT = 100, 500
-"""Characters kept of the names in a command and of its text."""
+"""Longest names and text of a command that are kept [characters]."""
 MOST_APART_NS = 60_000_000_000
-"""A command's time further than this from the monitor's is a wrong clock, or a lie [ns]."""
+"""Largest difference between a command's time and the monitor's; beyond it, it is wrong [ns]."""
 
 
 def bounded(command: AlarmCommand, now_ns: int) -> AlarmCommand:
-    """The command as it may be obeyed and journalled.
+    """The command with bounded texts and a valid time.
 
     Args:
-        command: as it was sent, by whomever.
-        now_ns: the monitor's time, Unix time, which counts where the command's is far off [ns].
+        command: as received.
+        now_ns: the monitor's Unix time, used if the command's is far off [ns].
     """
     wrong_clock = abs(command.t_ns - now_ns) > MOST_APART_NS
     return replace(
@@ -36,7 +36,7 @@ def _shortened(text: str, longest: int) -> str:
 
 
 def wanted(command: AlarmCommand, alarms: Iterable[AlarmInstance]) -> list[AlarmInstance]:
-    """The alarms meant: one, all channels of a kind, or with "*" all that the action can change."""
+    """The alarms addressed: one, all channels of a kind, or with "*" all that can be changed."""
     alarms = list(alarms)
     if command.name == EVERY:
         return [alarm for alarm in alarms if not obstacle(command, alarm)]
@@ -44,7 +44,7 @@ def wanted(command: AlarmCommand, alarms: Iterable[AlarmInstance]) -> list[Alarm
 
 
 def refusal(command: AlarmCommand, found: list[AlarmInstance]) -> str:
-    """One plain line saying why nothing is done; "" where the command can be obeyed."""
+    """Why the command is refused, in one line; "" if it can be executed."""
     if not command.user:
         return f"{command.action} of {command.name} refused: no user given"
     if command.name == EVERY:
@@ -56,7 +56,7 @@ def refusal(command: AlarmCommand, found: list[AlarmInstance]) -> str:
 
 
 def obstacle(command: AlarmCommand, alarm: AlarmInstance) -> str:
-    """What stands between one alarm and the command; "" for nothing."""
+    """Why the command cannot be applied to one alarm; "" if it can."""
     if command.action == "acknowledge":
         return "" if alarm.state in UNSEEN else f"it is {alarm.state}"
     if command.action == "reset":

@@ -1,4 +1,4 @@
-"""Sensor alarms: the quality flags of a block's channels as conditions, one a channel and flag."""
+"""Sensor alarms: quality flags of a block's channels as conditions, one per channel and flag."""
 
 from functools import cache
 
@@ -26,7 +26,7 @@ def _names(channel: str) -> tuple[tuple[int, str], ...]:
 def quality_conditions(block: SampleBlock) -> list[Condition]:
     """Conditions `<kind>.<channel>` of every channel that has quality flags.
 
-    `value` is the channel's own value [SI]; there are no limits, `daq` has decided.
+    `value` is the channel's own value [SI]; there are no limits, as `daq` sets the flags.
     """
     none, no_limit = np.zeros(len(block), np.uint8), np.full(len(block), np.nan)
     conditions = []

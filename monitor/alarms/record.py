@@ -1,4 +1,4 @@
-"""What is remembered of an alarm, so that a restarted monitor stands where the old one stood."""
+"""Persistent record of an alarm, from which a restarted monitor restores its state."""
 
 from dataclasses import dataclass
 
@@ -10,12 +10,12 @@ class AlarmRecord:
     """One alarm after one transition.
 
     Attributes:
-        alarm: the transition as it was (or, in a flood, would have been) published.
+        alarm: the transition as published (or, in a flood, as it would have been).
         active: whether the condition holds, after persistence and hysteresis.
-        latched: whether a person must still reset the alarm.
-        shelved_until_ns: end of shelving, Unix time [ns]; 0 where it is not shelved.
-        grouped: whether it stands hidden in a flood.
-        text: what the operator wrote, or why there was a transition.
+        latched: whether an operator must still reset the alarm.
+        shelved_until_ns: end of shelving, Unix time [ns]; 0 if not shelved.
+        grouped: whether it is hidden in a flood.
+        text: the operator's text, or the reason for the transition.
     """
 
     alarm: Alarm

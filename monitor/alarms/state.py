@@ -1,4 +1,4 @@
-"""The states of one alarm after ISA-18.2, and how it moves between them.
+"""The states of one alarm after ISA-18.2, and the transitions between them.
 
                        condition holds                        condition holds again
         ┌──────────┐  for `persistence`   ┌────────────────┐ ◀───────────────────────┐
@@ -11,11 +11,11 @@
          │   └──── reset, once gone ───── └──────────────┘                               │
          └───────────────────── acknowledge, not latched (any more) ─────────────────────┘
 
-An alarm that latches stays acknowledged after its condition has gone (the standard's state F,
-latched acknowledged) until a person resets it. `reset` on a cleared alarm that nobody has seen yet
-releases the latch only (E to D): it must still be acknowledged. `reset` while the condition holds
-is refused. A remark (severity info) needs nobody: it is acknowledged from the start and never
-latches. Shelving keeps an alarm in normal, whatever its condition does, for a limited time.
+A latching alarm stays acknowledged after its condition has gone (the standard's state F, latched
+acknowledged) until an operator resets it. `reset` on a cleared, unacknowledged alarm only releases
+the latch (E to D): it must still be acknowledged. `reset` while the condition holds is refused. A
+remark (severity info) is acknowledged from the start and never latches. Shelving keeps an alarm in
+normal regardless of its condition, for a limited time.
 """
 
 from dataclasses import dataclass, field
@@ -29,12 +29,12 @@ UNSEEN: tuple[AlarmState, ...] = ("unacknowledged", "cleared_unacknowledged")
 
 @dataclass(frozen=True, slots=True)
 class Occasion:
-    """What decided on a transition: sample, time, and the figure with its limits.
+    """Cause of a transition: sample, time, and the value with its limits.
 
     Attributes:
-        device, boot, seq, t_ns: the sample; seq -1 where no sample decided.
-        value, low, high: the figure judged and its limits; NaN where there are none.
-        onset_seq: first sample at which the condition held; -1 where there is none.
+        device, boot, seq, t_ns: the sample; seq -1 if not caused by a sample.
+        value, low, high: the value judged and its limits; NaN if there are none.
+        onset_seq: first sample at which the condition held; -1 if there is none.
         text: added to the cause.
     """
 
@@ -51,20 +51,20 @@ class Occasion:
 
 @dataclass(slots=True)
 class AlarmInstance:
-    """One alarm and the state it is in.
+    """One alarm and its state.
 
     Attributes:
         name: the alarm's name.
         settings: its settings.
         state: state of ISA-18.2 as published.
         active: whether the condition holds, after persistence and hysteresis.
-        latched: a person must still reset it.
-        shelved_until_ns: end of shelving [ns]; 0 where it is not shelved.
-        superseded: an alarm that refines it has named this episode.
-        first_out: it was raised while no other alarm waited to be seen.
-        grouped: it stands hidden in a flood.
+        latched: an operator must still reset it.
+        shelved_until_ns: end of shelving [ns]; 0 if not shelved.
+        superseded: an alarm that refines it has replaced it in this episode.
+        first_out: it was raised while no other alarm was unacknowledged.
+        grouped: it is hidden in a flood.
         occasion: what raised it.
-        flaps: how often it has come lately.
+        flaps: recent occurrences.
     """
 
     name: str
@@ -85,27 +85,27 @@ class AlarmInstance:
 
     @property
     def is_remark(self) -> bool:
-        """Whether nobody has to acknowledge it."""
+        """Whether it needs no acknowledgement."""
         return self.kind.severity == "info"
 
     @property
     def may_flap(self) -> bool:
-        """Whether its comings are counted; names of one fault replace each other instead."""
+        """Whether chattering is counted; names of one fault replace each other instead."""
         return not self.kind.refines and self.kind.name not in REFINED
 
     @property
     def stands_for_fault(self) -> bool:
-        """Whether the list shows it, or would if nobody had shelved it."""
+        """Whether the list shows it, or would if it were not shelved."""
         return self.state != "normal" or (self.active and self.shelved_until_ns > 0)
 
     def raise_(self, occasion: Occasion, *, first_out: bool) -> None:
-        """The condition has come: the alarm waits to be seen, whatever it was before."""
+        """The condition has become true: the alarm becomes unacknowledged from any state."""
         self.state = "acknowledged" if self.is_remark else "unacknowledged"
         self.latched = self.settings.latch and not self.is_remark
         self.first_out, self.occasion = first_out, occasion
 
     def clear(self) -> bool:
-        """The condition has gone; whether the published state changed."""
+        """The condition has become false; returns whether the published state changed."""
         if self.state == "unacknowledged":
             self.state = "cleared_unacknowledged"
             return True
@@ -115,7 +115,7 @@ class AlarmInstance:
         return False
 
     def acknowledge(self) -> bool:
-        """A person has seen it; whether that meant anything."""
+        """An operator acknowledges it; returns whether the state changed."""
         if self.state not in UNSEEN:
             return False
         gone = self.state == "cleared_unacknowledged"
@@ -123,7 +123,7 @@ class AlarmInstance:
         return True
 
     def reset(self) -> bool:
-        """A person releases the latch; whether that was possible."""
+        """An operator releases the latch; returns whether that was possible."""
         if self.active or not self.latched:
             return False
         self.latched = False
@@ -132,13 +132,13 @@ class AlarmInstance:
         return True
 
     def dismiss(self) -> bool:
-        """Leave the list without a person: shelved, or a better name stands in its place."""
+        """Return to normal without acknowledgement: shelved, or replaced by a refining alarm."""
         was_standing = self.state != "normal"
         self.state, self.latched, self.grouped = "normal", False, False
         return was_standing
 
     def message(self, user: str = "", t_ns: int | None = None) -> Alarm:
-        """The alarm as published; decided at `t_ns` [ns] by `user`, else by its occasion."""
+        """The alarm as published; changed at `t_ns` [ns] by `user`, otherwise by its occasion."""
         at = self.occasion
         cause = self.kind.cause.format(channel=split(self.name)[1])
         counted = f"came {self.flaps.count} times" if self.flaps.holding else ""

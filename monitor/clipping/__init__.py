@@ -1,4 +1,4 @@
-"""Readings that repeat at the top: a sensor or converter at its limit."""
+"""Clipping: readings that repeat at an extreme, as of a sensor or converter at its limit."""
 
 from monitor.clipping.clipping import Clipping
 from monitor.clipping.flat_top import NEVER, judge_flat_tops, new_flat_tops

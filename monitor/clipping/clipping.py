@@ -1,4 +1,4 @@
-"""Clipping of each channel as conditions: runs `flat_top.py` with the model's figures."""
+"""Clipping of each channel as conditions: runs `flat_top.py` with the model's probabilities."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ class Clipping:
     """Accumulates the evidence of every channel from block to block.
 
     Args:
-        model: how often a healthy reading repeats; a channel without this figure is not judged.
+        model: gives the probability of a repeated reading; channels without one are not judged.
     """
 
     def __init__(self, model: RigModel) -> None:

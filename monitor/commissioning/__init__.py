@@ -1,4 +1,4 @@
-"""A model file from recordings: transfer function, friction filter, signature, thresholds."""
+"""Commissioning: a model file from recordings."""
 
 from monitor.commissioning.commission import CommissionSettings, commission
 from monitor.commissioning.scheme_choice import commission_best

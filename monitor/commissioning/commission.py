@@ -1,4 +1,4 @@
-"""Commissioning: recordings in, one model file out.
+"""Commissioning of the friction scheme: recordings in, one model file out.
 
 chirp or multisine, no friction ──▶ Ĝ (5.16), (5.19); corner of the accelerometer
 healthy reference(s)            ──▶ shift, amplitude scale, one healthy period, noise
@@ -39,13 +39,13 @@ CHANNELS = ("voltage", "position", "acceleration")
 
 @dataclass(frozen=True)
 class CommissionSettings:
-    """What can be chosen.
+    """Settings of commissioning.
 
     Args:
-        band: frequencies that the transfer function is fitted to [Hz].
+        band: frequency band of the transfer function's fit [Hz].
         velocity_corner: of the high-pass before the integrator [Hz].
         window, hop: of the windowed least squares [samples].
-        before, after: samples before and after the onset that the friction filter is fitted to.
+        before, after: samples before and after the onset used to fit the friction filter.
     """
 
     band: tuple[float, float] = (1.0, 14.0)
@@ -59,7 +59,7 @@ class CommissionSettings:
 def commission(
     recordings: Sequence[Recording], settings: CommissionSettings | None = None
 ) -> RigModel:
-    """The model of a rig from its commissioning recordings; at least one of each role.
+    """The model of a rig from its commissioning recordings, at least one of each role.
 
     Raises:
         ModelError: a recording is missing, too short, of another rate, or cannot be fitted.
@@ -117,9 +117,7 @@ def _fit_plant(chirp: Recording, settings: CommissionSettings) -> TransferPlant:
 
 
 def _sensor_corner(chirp: Recording) -> float:
-    """Corner p of the accelerometer's own high-pass [Hz]: a/ẍ = jω/(jω + p) against the
-    double-differentiated LVDT.
-    """
+    """Corner p of the accelerometer's high-pass [Hz]: a/ẍ = jω/(jω + p), with ẍ from the LVDT."""
     response: FrequencyResponse = frequency_response(
         chirp.channel("position"), chirp.channel("acceleration"), chirp.sample_rate
     )
@@ -135,10 +133,10 @@ def _sensor_corner(chirp: Recording) -> float:
 
 
 def _with_shift(plant: TransferPlant, healthy: Sequence[Recording], rate: float) -> TransferPlant:
-    """The shift at which modelled and measured acceleration agree best (docs/theory.md 1.2).
+    """The model with the shift at which both accelerations agree best (docs/theory.md 1.2).
 
-    Only advances that Ĝ's own delay pays for are tried: a longer one would delay every alarm, and
-    the healthy average takes up what it would have gained.
+    Only advances up to Ĝ's own delay are tried: a longer one would delay every alarm, and the
+    healthy average absorbs the remaining error.
     """
     leading = int(np.argmax(np.array(plant.b) != 0.0))
     candidates = [TransferPlant(b=plant.b, a=plant.a, shift=shift) for shift in range(leading + 1)]
@@ -146,9 +144,7 @@ def _with_shift(plant: TransferPlant, healthy: Sequence[Recording], rate: float)
 
 
 def _likeness(plant: TransferPlant, healthy: Recording, rate: float) -> float:
-    """Correlation of modelled and measured acceleration in the later three quarters of a
-    recording.
-    """
+    """Correlation of modelled and measured acceleration, without a recording's first quarter."""
     signals = _signals(healthy, plant, rate)[:, healthy.channel("voltage").size // 4 :]
     return float(np.corrcoef(signals[2], signals[3])[0, 1])
 
@@ -162,7 +158,7 @@ def _signals(recording: Recording, plant: TransferPlant, rate: float) -> FloatAr
 
 
 def _steady(recording: Recording, plant: TransferPlant, rate: float) -> tuple[FloatArray, int]:
-    """Signals of the part in which everything has settled, and the period."""
+    """Signals of the settled part, and the period."""
     signals = _signals(recording, plant, rate)[:, round(4.0 * rate) :]
     period = period_of(signals[0], longest=1024) if signals.shape[1] else 0
     if period == 0 or signals.shape[1] < 4 * period:
@@ -192,9 +188,7 @@ def _reference(recording: Recording, plant: TransferPlant, rate: float) -> Refer
 
 
 def _noise(healthy: Sequence[Recording], plant: TransferPlant, rate: float) -> NoiseSection:
-    """The largest scatter, and the largest chance of a repeated reading, of any healthy
-    recording.
-    """
+    """The largest scatter and probability of a repeated reading of any healthy recording."""
     scatters = []
     for recording in healthy:
         signals, period = _steady(recording, plant, rate)
@@ -211,7 +205,7 @@ def _noise(healthy: Sequence[Recording], plant: TransferPlant, rate: float) -> N
 
 
 def _repeats(healthy: Recording) -> list[float]:
-    """Of each channel: readings as they came, from where everything has settled."""
+    """Probability of a repeated reading of each channel, from raw readings after settling."""
     rate = healthy.sample_rate
     signals = np.array([healthy.channel(name) for name in CHANNELS])[:, round(4.0 * rate) :]
     period = period_of(signals[0], longest=1024)
@@ -221,9 +215,7 @@ def _repeats(healthy: Recording) -> list[float]:
 
 
 def _settling(healthy: Recording, plant: TransferPlant, rate: float) -> int:
-    """Samples until the modelled acceleration, started from rest at any phase, has joined its
-    steady course.
-    """
+    """Samples until the modelled acceleration, started from rest at any phase, is steady."""
     signals, period = _steady(healthy, plant, rate)
     found = averaged(signals, period)
     function, _ = modelled_acceleration(plant, rate)
@@ -240,9 +232,7 @@ def _settling(healthy: Recording, plant: TransferPlant, rate: float) -> int:
 
 @dataclass(frozen=True, eq=False)
 class _Onset:
-    """Velocity, zero before the onset, and change of the residual, around the onset of a known
-    fault.
-    """
+    """Velocity (zero before the onset) and change of the residual around a known fault's onset."""
 
     velocity: FloatArray
     change: FloatArray
@@ -255,14 +245,14 @@ def _friction(
     rate: float,
     settings: CommissionSettings,
 ) -> FrictionFilter:
-    """One filter from each recording; the one that serves all of them best."""
+    """The friction filter: one per recording is fitted, and the best for all of them is used."""
     onsets = [_onset(recording, plant, velocity, rate, settings) for recording in recordings]
     fits = [fit_friction_filter(onset.velocity, onset.change, skip=0) for onset in onsets]
     return min(fits, key=lambda fit: sum(_unexplained(fit, onset) for onset in onsets))
 
 
 def _unexplained(fit: FrictionFilter, onset: _Onset) -> float:
-    """Share of the change's energy that the filter leaves, its strength being free."""
+    """Share of the change's energy that the filter leaves, with free strength."""
     model = fit.function.simulate(np.sign(onset.velocity) + fit.gamma * onset.velocity)
     strength = (model @ onset.change) / (model @ model)
     left = onset.change - strength * model
@@ -288,9 +278,7 @@ def _onset(
 def _change(
     recording: Recording, signals: FloatArray, period: int, rate: float
 ) -> tuple[FloatArray, int]:
-    """Change of the residual against the recording's own healthy beginning, and the sample at
-    which it sets in.
-    """
+    """Change of the residual against the recording's own healthy start, and its onset [sample]."""
     beginning = max(4, round(rate / period)) * period
     found = averaged(signals[:, :beginning], period)
     scale = _scale(found.mean)

@@ -3,8 +3,8 @@
     chirp, healthy ─▶ motion ─▶ sensor behind the balance ─▶ parameters of the equations ─▶
     remainder ─▶ range of motion, healthy spread and limits
 
-The equations are fitted to the earlier part of each recording; what they leave of the later part is
-what says whether they describe the rig at all. No recording of a fault is needed.
+The equations are fitted to the first part of each recording; their residual on the rest decides
+whether they describe the rig. No recording of a fault is needed.
 """
 
 from collections.abc import Sequence
@@ -55,19 +55,19 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 EQUATIONS = "servo-pneumatic"
-"""Shipped model that is fitted where none is named."""
+"""Shipped model that is fitted by default."""
 FITTED, CHIRP = 6.5, 14.5
-"""Beginning of a recording, and of one that sweeps through frequencies, that is fitted [s]."""
+"""Length of the fitted part of a recording, and of one with a frequency sweep [s]."""
 TRAINED = 2.0 / 3.0
-"""Share of each recording from which the remainder is learnt before it is judged on the rest."""
+"""Share of each recording used to fit the remainder; the rest judges it."""
 SKIPPED = 1.0
-"""Beginning of each recording that limits are not taken from [s]."""
+"""Start of each recording that is skipped for the limits [s]."""
 STARTED = 2.0
-"""Beginning of each recording over which its spectrum is a start's [s]."""
+"""Start of each recording during which its spectrum is transient [s]."""
 WORST = 0.2
-"""Residual of held-out healthy data, over what is measured, above which nothing is described."""
+"""Relative residual on held-out healthy data above which the equations are refused."""
 SLOW, TURNS = 0.02, 4.0
-"""Share of the speed's rms, and deviations of its noise, that cannot be told from rest."""
+"""Share of the speed's rms, and multiple of its noise, indistinguishable from rest."""
 
 
 def commission_equations(
@@ -78,7 +78,7 @@ def commission_equations(
     Args:
         recordings: chirps and healthy ones; others are not used.
         name: of a shipped model, or its file.
-        corner: of the high-pass of all that is judged [Hz].
+        corner: of the high-pass of all judged signals [Hz].
 
     Raises:
         ModelError: there is no healthy recording, rates differ, a recording is short or at rest,
@@ -98,7 +98,7 @@ def commission_equations(
 
 
 def _fitted(used: Sequence[Recording], name: str, corner: float, rate: float) -> EquationsPlant:
-    """The equations with parameters from the earlier part of each recording."""
+    """The equations with parameters from the first part of each recording."""
     model = base_model(name)
     port = force_port(model)
     layout = layout_of(model, port)
@@ -159,10 +159,10 @@ def _observed(
 def _remainder(
     used: Sequence[Recording], plant: EquationsPlant, rate: float
 ) -> tuple[list[Observed], RemainderSection, SchemeSection]:
-    """The remainder, and how much is left of the part of each recording that it has not seen.
+    """The remainder, and the residual on the held-out part of each recording.
 
     Raises:
-        ModelError: too much, or a recording is not healthy.
+        ModelError: the residual is too large, or a recording is not healthy.
     """
     layout = layout_of(base_model(plant.model), plant.port)
     size = ObserverSignals(plant, no_remainder(0), rate).remainder_size
@@ -200,7 +200,7 @@ def _rms(signal: FloatArray) -> float:
 
 
 def _spectrum(seen: Observed, layout: Layout, slow: float, rate: float) -> Spectrum:
-    """Of a recording's motion, once it has begun."""
+    """Spectrum of a recording's motion after its start."""
     speed = np.ascontiguousarray(seen.rows[:, layout.speed])
     found = SpectralWidth(slow, rate).update(speed, seen.state)
     return Spectrum(*(figure[round(STARTED * rate) :] for figure in found))

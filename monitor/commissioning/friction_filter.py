@@ -27,13 +27,13 @@ GAMMAS = tuple(float(gamma) for gamma in np.round(np.arange(0.0, 10.01, 0.2), 1)
 
 @dataclass(frozen=True, eq=False)
 class FrictionFilter:
-    """Ge with the signature it was found with.
+    """Ge with its signature.
 
     Args:
         function: Ge, from sgn(v) + γf·v to the residual [m/s^2].
         gamma: γf [s/m].
         explained: share of the residual's energy that it explains, 1 is all.
-        coulomb: θ1 of the signature: 1, or 0 where the known fault is viscous alone.
+        coulomb: θ1 of the signature: 1, or 0 if the known fault is purely viscous.
     """
 
     function: TransferFunction
@@ -56,9 +56,9 @@ def fit_friction_filter(  # noqa: PLR0917
         velocity: [m/s], shape (n,).
         residual: a_r [m/s^2], shape (n,).
         orders: of the output-error model.
-        gammas: values of γf that are tried [s/m].
-        skip: first samples that are not scored, while the filter settles [samples].
-        coulomb: weight of sgn(v); 0 for a known fault that is viscous alone.
+        gammas: values of γf to try [s/m].
+        skip: number of first samples not scored, while the filter settles.
+        coulomb: weight of sgn(v); 0 for a purely viscous known fault.
 
     Raises:
         ModelError: no γf gives a filter.

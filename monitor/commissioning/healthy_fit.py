@@ -1,6 +1,6 @@
 """Fits a model of equations to healthy recordings, driven along their measured motion.
 
-Hidden states begin near balance, residuals are high-passed as the monitor has them, and parameters
+Hidden states start near equilibrium, residuals are high-passed as in the monitor, and parameters
 that the data do not determine stay near the model file's values.
 """
 
@@ -27,13 +27,13 @@ from rigwatch.physics.engine.search import WholeRuns, fit_from_afar
 from rigwatch.wire.arrays import FloatArray
 
 SPREAD, UNBOUND = 0.15, 2.0
-"""How far parameters lie from the file's values: in their logarithm, as a share of what their
-bounds allow or, without those, by so much; in their size where they have a sign.
+"""Prior spread of parameters around the file's values: in the logarithm, as a share of the range
+of their bounds, or a default without bounds; relative to the size for signed parameters.
 """
 PULL = 0.1
-"""Weight of that against the data: a sum over n samples pulls as this share of √n does."""
+"""Weight of the prior relative to the data: grows as this share of √n for n samples."""
 EDGE = 0.5
-"""Ends of a recording that are not counted: what its own high-pass takes to settle [s]."""
+"""Ends of a recording that are skipped while the high-pass settles [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,17 +63,17 @@ def fit_healthy(
     noise: float,
     known: Mapping[str, float],
 ) -> HealthyFit:
-    """Parameters of the model called `name` from healthy stretches.
+    """Parameters of the model named `name` from healthy recordings.
 
     Args:
         name: of a shipped model, or its file.
         port: where friction enters.
         stretches: inputs and motion, shape (n, inputs), and the output, shape (n, 1), smoothed.
-        turn: speed over which dry friction turns its sign.
+        turn: speed over which dry friction changes sign.
         corner: of the high-pass [Hz].
-        rate: samples a second [Hz].
+        rate: sample rate [Hz].
         noise: of the measured output, rms.
-        known: parameters that have been found already, and stay.
+        known: parameters already determined, which are fixed.
     """
     model = base_model(name)
     free = frozenset(n for n, p in model.parameters.items() if p.kept or not p.fixed)
@@ -101,21 +101,21 @@ def fit_healthy(
 
 
 def _balance(model: Model) -> Model:
-    """The model with its first output alone."""
+    """The model with only its first output."""
     first = next(iter(model.outputs))
     ports = {n: p for n, p in model.ports.items() if p.kind != "sensor" or p.signal == first}
     return replace(model, outputs={first: model.outputs[first]}, ports=ports)
 
 
 def _still(model: Model, row: FloatArray, rate: float) -> FloatArray:
-    """Rows of rest over which hidden states come into balance."""
+    """Rows at rest over which hidden states reach equilibrium."""
     still = np.repeat(row[None, :], round(SETTLING * rate), axis=0)
     still[:, rate_columns(model)] = 0.0
     return still
 
 
 def _spreads(system: System) -> FloatArray:
-    """How far each free parameter lies from its value, shape (m,)."""
+    """Prior spread of each free parameter around its value, shape (m,)."""
     found = []
     for name in system.free:
         p = system.parameters[name]

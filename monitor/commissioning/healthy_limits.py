@@ -1,4 +1,4 @@
-"""Limits from healthy recordings: the residual's size, its growth, and how far it ever strays."""
+"""Limits from healthy recordings: the residual's size, its growth with motion, its extremes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from rigwatch.wire.arrays import FloatArray
 
 NEVER = 1 << 40
 LOW, HIGH = 5.0, 90.0
-"""Percentiles of windows that stand for the spread at rest, and for its growth with the motion."""
+"""Percentiles of windows that represent the spread at rest, and its growth with the motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,8 @@ def healthy_limits(parts: Sequence[HealthyPart], speed_noise: float, skip: int) 
 
     Args:
         parts: the recordings.
-        speed_noise: speed that cannot be told from rest.
-        skip: samples of each beginning that are not counted.
+        speed_noise: speed that cannot be distinguished from rest.
+        skip: number of samples skipped at the start of each.
     """
     errors = [part.energies(E, skip) for part in parts]
     noise, growth = variance(errors, [part.grown(skip) for part in parts])
@@ -84,10 +84,10 @@ def healthy_limits(parts: Sequence[HealthyPart], speed_noise: float, skip: int) 
 def variance(
     errors: Sequence[FloatArray], levels: Sequence[FloatArray]
 ) -> tuple[float, FloatArray]:
-    """Noise n and growth κ ≥ 0 of a variance n² + κ·A, fitted in shares of what is there.
+    """Noise n and growth κ ≥ 0 of a variance n² + κ·A, fitted with relative weights.
 
     Args:
-        errors: mean squares over windows, one array a recording.
+        errors: mean squares over windows, one array per recording.
         levels: mean levels over the same windows, shape (windows, levels).
     """
     error, level = np.concatenate(errors), np.concatenate(levels)
@@ -106,13 +106,13 @@ def spread(errors: FloatArray, levels: FloatArray) -> tuple[float, float]:
 
 
 def _means(signal: FloatArray, length: int) -> FloatArray:
-    """Means over all windows of a length."""
+    """Means over all windows of one length."""
     total = np.cumsum(np.concatenate([[0.0], signal]))
     return np.asarray((total[length:] - total[:-length]) / length)
 
 
 def _energies(signal: FloatArray, length: int) -> FloatArray:
-    """Mean squares over all windows of a length."""
+    """Mean squares over all windows of one length."""
     return _means(signal**2, length)
 
 
@@ -122,7 +122,7 @@ def _largest(signal: FloatArray, length: int, allowed: FloatArray, skip: int) ->
 
 
 def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
-    """The decision's columns, whatever it would say."""
+    """The decision's columns for a recording, with the limits disabled."""
     out = np.zeros((len(OUTPUTS), len(part.state)))
     inside, jumped = np.ones((2, len(part.state)), np.bool_)
     jumped[:] = False

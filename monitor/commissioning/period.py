@@ -1,4 +1,4 @@
-"""Periodic recordings: their period, one average period, and the scatter about it."""
+"""Periodic recordings: their period, the average period, and the scatter around it."""
 
 from dataclasses import dataclass
 
@@ -8,11 +8,11 @@ from rigwatch.physics.transfer import shortest_period
 from rigwatch.wire.arrays import FloatArray
 
 MATCH = 0.006
-"""Rms by which an excitation may differ from itself one period later, as a share of its swing."""
+"""Allowed rms difference of an excitation one period later, as a share of its amplitude."""
 
 
 def period_of(voltage: FloatArray, longest: int, noise: float = 1e-3) -> int:
-    """Samples after which the voltage repeats, 0 where it does not within `longest`."""
+    """Period of the voltage in samples, 0 if it does not repeat within `longest`."""
     swing = float(np.std(voltage))
     if swing < 10.0 * noise:
         return 0
@@ -27,8 +27,8 @@ class Averaged:
 
     Args:
         mean: shape (signals, period).
-        scatter: standard deviation about the mean, shape (signals,).
-        periods: how many were averaged.
+        scatter: standard deviation around the mean, shape (signals,).
+        periods: number of periods averaged.
     """
 
     mean: FloatArray
@@ -37,9 +37,7 @@ class Averaged:
 
 
 def averaged(signals: FloatArray, period: int) -> Averaged:
-    """Average of whole periods of `signals`, shape (signals, n), from the first sample on; at
-    least two periods.
-    """
+    """Average over at least two whole periods of `signals`, shape (signals, n)."""
     periods = signals.shape[1] // period
     folded = signals[:, : periods * period].reshape(len(signals), periods, period)
     mean = folded.mean(axis=1)

@@ -1,13 +1,12 @@
-"""How often a healthy reading repeats the one before it: what `flat_top.py` goes by, from a healthy
-recording.
+"""Probability that a healthy reading repeats its predecessor, as needed by `flat_top.py`.
 
-Two readings of one and the same true value agree at most with the chance
+Two readings of the same true value agree at most with probability
 
     p = erf( Δ / (2√2·σ) ),     σ² = E[(e_k - e_{k-1})²]/2 - Δ²/12,
 
-Δ the converter's step and e the deviation from the average period. Only what changes from one
-sample to the next counts as noise: a slow disturbance does not keep readings from repeating. The
-share of repeats that the recording itself shows, at its upper confidence limit, is a second bound.
+with Δ the converter's step and e the deviation from the average period. Only changes between
+successive samples count as noise, since a slow disturbance does not prevent repeats. A second bound
+is the share of repeats in the recording itself, at its upper confidence limit.
 """
 
 import numpy as np
@@ -17,22 +16,22 @@ from monitor.clipping import NEVER, judge_flat_tops, new_flat_tops
 from rigwatch.wire.arrays import FloatArray
 
 SURE = 0.999
-"""Confidence of the share of repeats that has been seen."""
+"""Confidence level of the observed share of repeats."""
 _ON_GRID = 0.99
-"""Share of the readings that must lie on whole steps, or there is no step: the recording was
-resampled, and says nothing about repeats of the live channel.
+"""Share of readings that must lie on whole steps; otherwise the recording was resampled and gives
+no information on repeats of the live channel.
 """
 
 
 def chance_of_repeat(values: FloatArray, mean: FloatArray) -> float:
-    """Largest chance that a healthy reading repeats the one before it.
+    """Largest probability that a healthy reading repeats its predecessor.
 
     Args:
         values: readings of one channel, whole periods of the excitation, shape (k·P,).
         mean: the average period, shape (P,).
 
     Returns:
-        From 0 to 1; 1 where the channel cannot be judged.
+        From 0 to 1; 1 if the channel cannot be judged.
     """
     step = step_of(values)
     if step == 0.0:
@@ -46,7 +45,7 @@ def chance_of_repeat(values: FloatArray, mean: FloatArray) -> float:
 
 
 def step_of(values: FloatArray) -> float:
-    """The converter's step, 0 where the readings lie on no grid."""
+    """The converter's step, 0 if the readings are not on a grid."""
     levels = np.unique(values)
     if levels.size < 2:
         return 0.0

@@ -1,8 +1,8 @@
-"""Which scheme a rig is watched by: the one that describes its healthy recordings.
+"""Chooses the monitoring scheme that describes a rig's healthy recordings.
 
-Equations that describe held-out healthy data are run along the motion, as they do so for any
-excitation. Where they do not, the thesis's scheme is taken, which needs no equations of the rig, if
-it arms on the healthy recordings as they are and raises nothing there.
+If equations describe held-out healthy data, they are run along the motion, which works for any
+excitation. Otherwise the thesis's scheme is used, which needs no equations of the rig, provided
+that it arms on the healthy recordings and raises no alarm there.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,10 +32,10 @@ def commission_best(
     equations: str = EQUATIONS,
     say: Callable[[str], None] = lambda _: None,
 ) -> RigModel:
-    """The model of a rig by the scheme that describes it, or by the one that is asked for.
+    """The model of a rig for the scheme that describes it, or for the requested scheme.
 
     Raises:
-        ModelError: recordings are missing or do not fit, or no scheme describes the healthy rig.
+        ModelError: recordings are missing or inconsistent, or no scheme describes the healthy rig.
     """
     if scheme == "transfer":
         return commission(recordings, settings)
@@ -64,7 +64,7 @@ def _with_reason(model: RigModel, why: str) -> RigModel:
 def _transfer(
     recordings: Sequence[Recording], settings: CommissionSettings | None
 ) -> tuple[RigModel | None, str]:
-    """The thesis's scheme where it serves, and why it does or does not."""
+    """The thesis's scheme if it is suitable, and why it is or is not."""
     try:
         model = commission(recordings, settings)
     except ModelError as error:
@@ -86,7 +86,7 @@ def _transfer(
 
 
 def _watched(one: Recording, model: RigModel) -> tuple[float, str]:
-    """Share of a recording over which the scheme is armed, and the fault that it sees if any."""
+    """Share of a recording over which the scheme is armed, and the fault detected, if any."""
     n = len(one.channel(model.channels[0]))
     at = np.arange(n, dtype=np.int64)
     times = np.asarray(at * (1e9 / one.sample_rate), np.int64)

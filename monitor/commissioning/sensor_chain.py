@@ -1,8 +1,8 @@
-"""What lies between the balance and its sensor, found from the motion alone.
+"""Identifies the dynamics between the balance and its sensor from the motion alone.
 
-The rate of the measured motion is the balance itself, so that the states behind the sensor (those
-that no other equation needs) can be driven by it, whatever is not known of the plant. Their
-parameters are found so before the plant's own are, which could otherwise bend each other.
+The rate of the measured motion is the balance itself. It can therefore drive the sensor states
+(those that no other equation needs) without a model of the plant. Their parameters are identified
+before the plant's own, as they could otherwise bias each other.
 """
 
 import ast
@@ -28,15 +28,15 @@ from rigwatch.wire.arrays import FloatArray
 
 RATE = "motion_rate"
 CORNER = 0.3
-"""Corner of the high-pass below which a twice differentiated position tells nothing [Hz]."""
+"""Corner of the high-pass, below which a twice differentiated position is uninformative [Hz]."""
 SETTLED = 4.0
-"""Beginning of each recording that is not counted [s]."""
+"""Start of each recording that is skipped [s]."""
 TRIES = 5
 """Decades of starts."""
 
 
 def sensor_parameters(model: Model) -> frozenset[str]:
-    """Parameters that stand only in the equations of states which no other state needs."""
+    """Parameters used only in equations of states that no other state needs."""
     model = spelt_out(model)
     needed = [(name, _named(state.derivative)) for name, state in model.states.items()]
     sinks = {n for n, _ in needed if not any(n in used for other, used in needed if other != n)}
@@ -50,12 +50,12 @@ def sensor_parameters(model: Model) -> frozenset[str]:
 def fit_sensor(
     model: Model, recordings: Sequence[tuple[FloatArray, FloatArray, FloatArray]], rate: float
 ) -> dict[str, float]:
-    """Values of the sensor's parameters; none where the model has no such equations.
+    """Values of the sensor's parameters; none if the model has no sensor equations.
 
     Args:
-        model: as it was written.
-        recordings: rows of inputs and motion, measured output, and rate of the motion, of each.
-        rate: samples a second [Hz].
+        model: the unmodified model.
+        recordings: for each, rows of inputs and motion, measured output, and rate of the motion.
+        rate: sample rate [Hz].
     """
     names = sorted(sensor_parameters(model))
     seen = _behind_the_balance(model, frozenset(names))
@@ -89,7 +89,7 @@ def fit_sensor(
 
 
 def _behind_the_balance(model: Model, free: frozenset[str]) -> Model | None:
-    """The states behind the sensor, driven by the rate of the motion; None without any."""
+    """The sensor states, driven by the rate of the motion; None if there are none."""
     model = spelt_out(model)
     along = along_measured_motion(model)
     balance = model.states[balanced_states(model)[0].name]
@@ -119,7 +119,7 @@ def _driven(text: str, balance: str) -> str:
 
 
 def _sum_of_known(text: str, known: set[str]) -> str:
-    """Those terms of a sum in which nothing stands that is not known."""
+    """The terms of a sum that contain only known names."""
     kept = [
         f"{sign}({ast.unparse(term)})"
         for sign, term in _terms(ast.parse(text.strip(), mode="eval").body, "+")

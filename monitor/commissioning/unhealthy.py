@@ -1,14 +1,14 @@
-"""Healthy recordings that tell nothing, being short or at rest, and those that are not healthy:
-friction that sets in, or one that rubs while the others do not.
+"""Refuses unsuitable healthy recordings: too short, at rest, or not healthy.
 
-Dry friction is estimated block by block,
+A recording is not healthy if friction sets in, or if it has more friction than the others. Dry
+friction is estimated block by block,
 
     F = Σ g·e / Σ g²
 
-with e the residual and g what one newton makes of it. A step of F between two parts of a recording,
-or between it and the others, is compared with the residual that stands without it: in healthy
-recordings of simulated rigs it is at most a tenth of that, where friction sets in at least six
-times as much.
+with e the residual and g its response to 1 N. A step of F between two parts of a recording, or
+between it and the others, is compared with the residual without friction. In healthy recordings of
+simulated rigs the ratio is at most one tenth; where friction sets in it is at least six times as
+large.
 """
 
 from collections.abc import Sequence
@@ -21,24 +21,24 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 SECONDS, MOVES = 5.0, 5.0
-"""Least length of a recording [s], and of its motion in deviations of the channel's noise."""
+"""Minimum length of a recording [s], and of its motion in standard deviations of the noise."""
 BLOCK, SETTLED = 128, 512
-"""Samples of one estimate, and of a beginning that is not counted."""
+"""Samples per estimate, and samples skipped at the start."""
 LEAST = 3
-"""Blocks that either side of a step must have, and recordings of which one is told apart."""
+"""Minimum number of blocks on either side of a step, and of recordings to single one out."""
 STEP = 2.5
-"""Step of the friction over the residual beside it, from which a recording is refused."""
+"""Ratio of a friction step to the remaining residual above which a recording is refused."""
 
 
 def check_moves(recordings: Sequence[Recording], shown: Sequence[str]) -> None:
-    """Refuse recordings in which too little moves for too short a time.
+    """Refuse recordings that are too short or without motion.
 
     Args:
         recordings: chirps and healthy ones.
-        shown: channels that show the motion.
+        shown: channels that measure the motion.
 
     Raises:
-        ModelError: a recording is short, or a channel holds nothing but its noise.
+        ModelError: a recording is short, or a channel contains only noise.
     """
     for one in recordings:
         seconds = len(one.channel(shown[0])) / one.sample_rate
@@ -62,12 +62,12 @@ def white_noise(signal: FloatArray) -> float:
 
 
 def check_healthy(names: Sequence[str], judged: Sequence[FloatArray], rate: float) -> None:
-    """Refuse healthy recordings in which something rubs.
+    """Refuse healthy recordings with friction.
 
     Args:
         names: of the recordings.
-        judged: columns of each as the decision has them, shape (n, 6).
-        rate: samples a second [Hz].
+        judged: judged columns of each, as in the decision, shape (n, 6).
+        rate: sample rate [Hz].
 
     Raises:
         ModelError: friction sets in within a recording, or one recording has more than the others.

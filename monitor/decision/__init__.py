@@ -1,4 +1,4 @@
-"""Sample by sample: estimates, departure from the healthy course, isolation, verdict.
+"""Per-sample decision: estimates, departure from healthy behaviour, isolation, verdict.
 
 sample_kernel ──▶ estimates ──▶ departure ──▶ episode ──▶ isolation ──▶ isolation_verdict
 """

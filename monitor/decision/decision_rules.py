@@ -1,14 +1,13 @@
-"""How far is too far: the factors behind the thresholds, from one allowed chance of a false alarm.
+"""Threshold factors, derived from one allowed probability of a false alarm.
 
-A healthy deviation D² of two estimates follows χ² with two degrees of freedom, so P(D > k) =
-exp(-k²/2) at each look. With one look a sample, n looks a year and an allowed chance P of any
-false alarm in a year,
+A healthy deviation D² of two estimates follows χ² with two degrees of freedom, so
+P(D > k) = exp(-k²/2) per test. With one test per sample, n tests a year and an allowed probability
+P of any false alarm in a year,
 
-    k = √( 2·ln(n·g/P) ),   g = 3 statistics that are watched together.
+    k = √( 2·ln(n·g/P) ),   g = 3 statistics tested together.
 
-Neighbouring looks share samples, so there are fewer independent ones: counting every look errs to
-the safe side. The energies over m samples follow χ² with m degrees of freedom and get the same
-chance.
+Successive tests share samples, so fewer are independent: counting every test is conservative. The
+energies over m samples follow χ² with m degrees of freedom and get the same probability.
 """
 
 import numpy as np
@@ -20,18 +19,18 @@ from monitor.model import RigModel
 SECONDS_A_YEAR = 365.25 * 86400.0
 STATISTICS = 3
 POSITION_FLOOR, VOLTAGE_FLOOR = 0.02, 0.03
-"""Shares of its swing by which a channel may drift from the healthy period, root mean square: what
-temperature does to the supply and to the valve in a day.
+"""Allowed rms drift of a channel from the healthy period, as a share of its amplitude: the daily
+influence of temperature on supply and valve.
 """
 
 
 def chance_a_look(false_alarm: float, sample_rate: float) -> float:
-    """Allowed chance of leaving at one look, from the one a year."""
+    """Allowed false-alarm probability per test, from that per year."""
     return false_alarm / (SECONDS_A_YEAR * sample_rate * STATISTICS)
 
 
 def rules_for(model: RigModel) -> Rules:
-    """What the kernel decides by."""
+    """The kernel's decision rules."""
     decision = model.decision
     chance = chance_a_look(decision.false_alarm, model.sample_rate)
     low, high = (model.band.low, model.band.high) if model.band else ((0.0, 0.0), (0.0, 0.0))

@@ -1,7 +1,7 @@
-"""Whether the rig has left its healthy course: the estimates, the change of the residual over 8 and
-64 samples, and how far position and voltage have moved from the healthy period.
+"""Departure test: estimates, change of the residual over 8 and 64 samples, position and voltage.
 
-A fault of one sensor shows in one channel alone, and not every fault shows in the estimates.
+Position and voltage are compared with the healthy period: a fault of one sensor shows only in its
+own channel, and not every fault shows in the estimates.
 """
 
 # Compiled functions are untyped to mypy.
@@ -30,7 +30,7 @@ from monitor.reference import (
 )
 
 _NOISES = 6.0
-"""Root mean square over a window that a channel's own noise does not reach, in its deviations."""
+"""Rms over a window that noise alone does not exceed, in standard deviations of the channel."""
 
 
 @njit(inline="always")
@@ -43,7 +43,7 @@ def moved(energies: Energies, signal: int, count: int) -> float:
 
 @njit(inline="always")
 def position_limit(rules: Rules, ref: Reference) -> float:
-    """How far the position may lie from its healthy period, root mean square [m]."""
+    """Allowed rms deviation of the position from its healthy period [m]."""
     return max(
         _NOISES * ref.levels.position_noise, rules.position_floor * ref.levels.position_swing
     )
@@ -51,15 +51,13 @@ def position_limit(rules: Rules, ref: Reference) -> float:
 
 @njit(inline="always")
 def voltage_limit(rules: Rules, ref: Reference) -> float:
-    """The same of the voltage [V]."""
+    """Allowed rms deviation of the voltage from its healthy period [V]."""
     return max(_NOISES * ref.levels.voltage_noise, rules.voltage_floor * ref.levels.swing)
 
 
 @njit(inline="always")
 def departed(rules: Rules, ref: Reference, state: WatchState) -> bool:
-    """Whether anything has left its limits; the largest of all goes into the deviation, in units
-    of k.
-    """
+    """Whether any statistic exceeds its limit; stores the largest as deviation, in units of k."""
     held, energies = state.held, state.energies
     if ref.counts.source == FIXED:
         return held[DEVIATION] > rules.factor

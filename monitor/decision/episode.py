@@ -1,5 +1,5 @@
-"""Episodes: from a departure until everything has been quiet, with a look at what it is every four
-samples. Between episodes the healthy average grows.
+"""Episodes: from a departure until all statistics are quiet, with an isolation test every four
+samples. Between episodes the healthy average is extended.
 """
 
 # Compiled functions are untyped to mypy.
@@ -42,20 +42,20 @@ from monitor.reference import (
 from rigwatch.wire.arrays import FloatArray
 
 ENDS_AFTER = 64
-"""Quiet samples that end an episode."""
+"""Number of quiet samples that end an episode."""
 FIRST_LOOK, LOOK_EVERY = 12, 4
-"""Samples after the departure before the first look, and between looks."""
+"""Samples from the departure to the first isolation test, and between tests."""
 PLAINLY_HEALTHY = 0.6
-"""Share of the threshold below which a sample may enter the healthy average."""
+"""Share of the threshold below which a sample is added to the healthy average."""
 LOOKS_AT_NEW_EXCITATION = 32
-"""Looks after which another excitation is taken for granted and learnt."""
+"""Number of tests after which another excitation is accepted and learnt."""
 LOUDER = 2.0
-"""Swing of a voltage without a period, in that of the learnt stretch, that makes it another
-excitation. No fault is named there: beside what the model leaves of a motion that never repeats, a
-dead band looks like dry friction and heavy friction like anything else.
+"""Ratio of an aperiodic voltage's amplitude to that of the learnt stretch above which it is another
+excitation. No fault is named then: with the model error of an aperiodic motion, a dead band
+resembles dry friction, and heavy friction resembles any fault.
 """
 SHORTEST_CYCLE, LONGEST_CYCLE = 32, 256
-"""Samples; evidence needs some, and a slow drive must not put off the verdict for ever."""
+"""Limits of the number of samples judged: evidence needs some, a slow drive must not delay it."""
 
 
 @njit(inline="always")
@@ -68,7 +68,7 @@ def follow(  # noqa: PLR0917
     ref: Reference,
     state: WatchState,
 ) -> None:
-    """Take sample `seq`, at `place` of the period, which is `out` of its limits or not."""
+    """Process sample `seq`, at `place` of the period; `out`: whether it exceeds its limits."""
     counts = state.counts
     _count(out, state)
     if counts.episode == 0:
@@ -101,7 +101,7 @@ def _count(out: bool, state: WatchState) -> None:
 
 @njit()
 def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
-    """Weigh the evidence since the departure and judge by it."""
+    """Evaluate the evidence since the departure and update the verdict."""
     held, since = state.held, state.counts.episode
     if ref.counts.source == FIXED:
         held[VERDICT] = FRICTION if held[THETA1] > rules.high1 else OTHER
@@ -120,7 +120,7 @@ def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
 
 @njit()
 def _seen(since: int, cycle: int, rules: Rules, ref: Reference, state: WatchState) -> Seen:
-    """Which channels have moved since the departure."""
+    """Channels that have deviated since the departure."""
     energies, count = state.energies, min(since, LONG)
     spread = spread_of_change(ref)
     acceleration_limit = max(3.0 * spread, 0.002 * ref.levels.acceleration_swing)

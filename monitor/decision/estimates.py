@@ -2,9 +2,9 @@
 
     D² = Σ explained / (σ²·(1 + 4/depth)),   θ leaves its thresholds where D > k
 
-D is how far (θ1, θ2) lies from healthy in standard deviations, both taken together: the thresholds
-are the ellipse that the normal matrix gives, and the printed limits ±k·sd its half axes. `depth`
-is the number of periods in the healthy average, whose own error does not average out.
+D is the joint deviation of (θ1, θ2) from healthy in standard deviations: the threshold is the
+ellipse of the normal matrix, and the published limits ±k·sd are its half axes. `depth` is the
+number of periods in the healthy average, whose own error does not average out.
 """
 
 # Compiled functions are untyped to mypy.
@@ -36,14 +36,14 @@ from monitor.reference import (
 )
 
 LEAST_FILL = 8
-"""Samples before two parameters are estimated at all."""
+"""Minimum number of samples to estimate two parameters."""
 _APERIODIC_VARIANCE = 9.0
-"""Without a period the residual itself is judged, which swings by about three of its own sizes."""
+"""Factor for aperiodic drives, where the residual itself is judged: it peaks at about 3 rms."""
 
 
 @njit(inline="always")
 def spread_of_change(ref: Reference) -> float:
-    """Standard deviation of the change of the residual, error of the healthy average included."""
+    """Standard deviation of the change of the residual, including the healthy average's error."""
     if ref.counts.source == APERIODIC:
         level = max(ref.levels.quick, ref.levels.slow)
         variance = ref.levels.noise**2 + ref.levels.left_share * level
@@ -53,7 +53,7 @@ def spread_of_change(ref: Reference) -> float:
 
 @njit(inline="always")
 def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
-    """θ, its limits, D and whether friction can be seen at all, into `state.held`."""
+    """Write θ, its limits, D and the observability of friction to `state.held`."""
     held, s = state.held, state.sums
     sums(state.window, s)
     theta1, theta2, condition = solve_two(s)
@@ -79,7 +79,7 @@ def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
 
 @njit()
 def _judge_by_band(rules: Rules, state: WatchState) -> None:
-    """Fixed limits; the deviation is k at a limit. A window that is not full yet has no say."""
+    """Test against fixed limits, where the deviation is k; a partly filled window is ignored."""
     held, place = state.held, state.window.place
     held[LOW1], held[HIGH1] = rules.low1, rules.high1
     held[LOW2], held[HIGH2] = rules.low2, rules.high2

@@ -1,22 +1,21 @@
-"""What kind of change it is: dry friction, or one of its rivals.
+"""Isolation: is the change dry friction, or one of its rivals?
 
-The change of the residual since its onset is put before two explanations over the same samples:
+The change of the residual since its onset is fitted by two hypotheses over the same samples:
 
     friction   y = θ1·Ge[sgn v] + θ2·Ge[v]                                                 (5.33)
-    rivals     any change that is smooth in the healthy motion: gain, lag, delay, lost pressure,
-        spring, mass,
-               damping, bias, and what bends them; as  A, dA, X, dX, 1, the first two growing in
-               time, and the products X², X·dX, X³, X²·dX, with A and X one healthy period of
-               acceleration and position and d a difference of neighbours
+    rivals     any change that is smooth in the healthy motion (gain, lag, delay, lost pressure,
+               spring, mass, damping, bias, and their nonlinearities), spanned by A, dA, X, dX, 1,
+               the first two also growing in time, and the products X², X·dX, X³, X²·dX, with A and
+               X one healthy period of acceleration and position and d the difference of neighbours
 
-Other faults are smooth in the healthy motion or nearly so. Dry friction is not: it jumps where the
-velocity turns. So the question is what the jump explains that no rival can,
+Other faults are smooth in the healthy motion or nearly so. Dry friction jumps when the velocity
+changes sign. The test therefore measures what the jump explains beyond the rivals,
 
-    share = (part of y that Ge[sgn v] explains beyond the rivals)² / y²,   ρ = the same over what
-    the rivals leave,
+    share = (part of y that Ge[sgn v] explains beyond the rivals)² / y²,
+    ρ     = the same, relative to the residual of the rivals,
 
-with the sign that takes energy out (θ1 > 0). A mass that stands still where the healthy one moves,
-by position and acceleration alike, is stick; no smooth fault does that either.
+with the sign that dissipates energy (θ1 > 0). A mass at rest while the healthy one moves, in both
+position and acceleration, is stiction; no smooth fault does that.
 """
 
 # Compiled functions are untyped to mypy.
@@ -33,16 +32,14 @@ from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 
 HISTORY = 512
-"""Samples that are kept for judging."""
+"""Number of samples stored for isolation."""
 Y, SIGN_PART, SPEED_PART, SPEED, AT_REST, VOLTS = range(6)
-"""Columns of the history: change of the residual, g1, g2, velocity, 1 at rest, change of the
-voltage.
-"""
+"""Columns of the history: change of residual, g1, g2, velocity, 1 at rest, change of voltage."""
 _RIVALS = 11
 
 
 class History(NamedTuple):
-    """Ring of the newest samples, with the friction filter for judging from the onset on."""
+    """Ring of the newest samples, with the friction filter for the time since the onset."""
 
     rows: FloatArray
     head: NDArray[np.int64]
@@ -51,19 +48,19 @@ class History(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What the samples since the onset say.
+    """Evidence from the samples since the onset.
 
     Args:
         explained: share of y² that friction explains.
-        share: share of y² that the jump explains beyond the rivals, negative where it would put
-            energy in.
-        rho: correlation of the jump with what the rivals leave.
+        share: share of y² that the jump explains beyond the rivals; negative if the jump would
+            supply energy.
+        rho: correlation of the jump with the residual of the rivals.
         rest: share of the samples at rest.
-        rest_always: the same of the half of the samples that has less of it.
+        rest_always: the smaller of the shares at rest in the two halves of the samples.
         rivals: share of y² that the rivals explain.
         jump: energy explained by the jump beyond the rivals [(m/s^2)^2].
         together: share of y² that rivals and jump explain together.
-        dry: share of y² in the Coulomb part of the friction fit, zero where θ1 is negative.
+        dry: share of y² in the Coulomb part of the friction fit, zero if θ1 is negative.
         peak: share of y² in its largest sample; near 1 for a spike.
     """
 
@@ -80,7 +77,7 @@ class Evidence(NamedTuple):
 
 
 def new_history(b: FloatArray, a: FloatArray) -> History:
-    """An empty history for the friction filter b/a, padded to one length."""
+    """An empty history for the friction filter b/a, padded to equal length."""
     return History(np.zeros((HISTORY, 6)), np.zeros(1, np.int64), b, a)
 
 
@@ -88,7 +85,7 @@ def new_history(b: FloatArray, a: FloatArray) -> History:
 def remember(  # noqa: PLR0917
     history: History, y: float, g1: float, g2: float, speed: float, rest: float, volts: float
 ) -> None:
-    """Keep one sample."""
+    """Store one sample."""
     row = history.rows[history.head[0]]
     row[Y], row[SIGN_PART], row[SPEED_PART], row[SPEED] = y, g1, g2, speed
     row[AT_REST], row[VOLTS] = rest, volts
@@ -103,9 +100,9 @@ def weigh(history: History, ref: Reference, seq: int, since: int, count: int) ->
     Args:
         history: the newest samples, the last of them number `seq`.
         ref: one period of the healthy rig.
-        since: samples since the onset of the change, the regressors start from rest there where it
-            is kept.
-        count: samples that are judged, at most HISTORY and `since`.
+        since: samples since the onset of the change; the regressors start from rest there if the
+            onset is still stored.
+        count: number of samples judged, at most HISTORY and `since`.
     """
     n = min(count, HISTORY)
     data = np.zeros((n, _RIVALS + 3))
@@ -127,9 +124,7 @@ def weigh(history: History, ref: Reference, seq: int, since: int, count: int) ->
 
 @njit()
 def swing_of_voltage_change(history: History, count: int) -> float:
-    """Standard deviation of the voltage's change over the newest `count` samples [V]; a shifted
-    mean is none.
-    """
+    """Standard deviation of the change of voltage over the newest `count` samples [V]."""
     mean = square = 0.0
     for k in range(count):
         volts = history.rows[(history.head[0] - 1 - k) % HISTORY, VOLTS]
@@ -182,7 +177,7 @@ def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> No
 
 @njit()
 def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> Evidence:
-    """The evidence in the normal matrix of rivals, friction regressors and y, in this order."""
+    """Evidence from the normal matrix of rivals, friction regressors and y, in this order."""
     yy = max(gram[-1, -1], 1e-30)
     explained, dry = _friction_fit(gram, yy)
     remains, jump, sign = _beyond_rivals(gram)
@@ -203,7 +198,7 @@ def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> 
 
 @njit()
 def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
-    """Shares of y² that both friction terms explain, and that the Coulomb term alone stands for."""
+    """Shares of y² explained by both friction terms and contained in the Coulomb term alone."""
     y, g1, g2 = gram.shape[0] - 1, _RIVALS, _RIVALS + 1
     determinant = gram[g1, g1] * gram[g2, g2] - gram[g1, g2] ** 2
     if determinant <= 1e-12 * gram[g1, g1] * gram[g2, g2]:
@@ -216,7 +211,7 @@ def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
 
 @njit()
 def _beyond_rivals(gram: FloatArray) -> tuple[float, float, float]:
-    """Energy that the rivals leave of y, what of it the jump explains, and the jump's sign."""
+    """Residual energy of the rivals, the part of it that the jump explains, and the jump's sign."""
     y, g1 = gram.shape[0] - 1, _RIVALS
     left = gram.copy()
     for i in range(_RIVALS):
@@ -230,9 +225,7 @@ def _beyond_rivals(gram: FloatArray) -> tuple[float, float, float]:
 
 @njit()
 def _eliminate(gram: FloatArray, pivot: int, least: float) -> None:
-    """Take out of every column what column `pivot` explains; a column that others explained
-    already is skipped.
-    """
+    """Project column `pivot` out of all columns; a column already explained is skipped."""
     strength = gram[pivot, pivot]
     if strength <= least or strength <= 0.0:
         return

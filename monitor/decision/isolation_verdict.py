@@ -1,11 +1,11 @@
-"""What to call a departure: dry friction, sticking, another excitation, or another fault.
+"""Names a departure: dry friction, stiction, another excitation, or another fault.
 
-Dry friction is named where one of six patterns holds over three looks in a row, and stays named
-until the episode ends. Before the first reversal friction is a constant force; two patterns are
-plain enough to count as soon as there has been one, two more from half a cycle on, the weakest two
-once the onset has rung off, as no rival describes how a rig goes from one motion to another. What
-has not been named by then is another fault. All figures that this rests on stand here; they are
-shares of energies and correlations, so they hold for any rig, drive and unit.
+Dry friction is named if one of six patterns holds in three tests in a row, and stays named until
+the episode ends. Before the first reversal friction is a constant force. Two patterns are clear
+enough to count after one reversal, two more after half a cycle, and the weakest two after the onset
+transient has decayed, as no rival describes the transition between two motions. A departure not
+named by then is another fault. All constants are defined here; they are shares of energy and
+correlations, so they apply to any rig, drive and unit.
 """
 
 # Compiled functions are untyped to mypy.
@@ -26,53 +26,54 @@ from monitor.decision.kernel_state import (  # fmt: skip
 )
 
 LOOKS = 3
-"""Looks in a row, four samples apart, that must agree on friction: one may be chance."""
+"""Consecutive tests, four samples apart, that must agree on friction; one may be chance."""
 RUNG_OFF, GIVE_UP = 3, 4
-"""Cycles of the motion after which an onset has rung off: two are looked at, one is left out. One
-more, and 64 samples, and what could not be named as friction is not friction.
+"""Cycles of the motion after which an onset transient has decayed: one is skipped, two are tested.
+After one more cycle and 64 samples, a departure that is not named friction is another fault.
 """
 LEAST_JUMP = 30.0
-"""Energy of the jump in the noise's variance: χ² of one sample beyond any doubt."""
+"""Energy of the jump over the noise variance: χ² of one sample, far beyond chance."""
 LEAST_SHARE, LEAST_DRY = 0.003, 0.2
-"""The jump and the Coulomb part must matter in what is seen, or they are a detail of a rival."""
+"""Smallest shares of the jump and of the Coulomb part; below, they are a detail of a rival."""
 CERTAIN_RHO, CERTAIN_FIT = 0.9, 0.95
-"""The jump explains what the rivals leave (ρ² = 0.8), friction all but the scatter of its filter,
-which explains 95 % of the known fault at worst.
+"""The jump explains the rivals' residual (ρ² = 0.8), and friction all but the error of its filter,
+which explains at least 95 % of the known fault.
 """
 PLAIN_RHO, PLAIN_FIT, PLAIN_SHARE, PLAIN_DRY = 0.6, 0.8, 0.01, 0.3
-"""A jump that can hardly be mistaken: in no run of 2500 with other faults has one been seen."""
+"""Share of an unmistakable jump: none of 2500 runs with other faults reached it."""
 JUMP_RHO, JUMP_FIT = 0.35, 0.6
-"""Heavy or uneven friction bends the motion, and the linear filter explains less of it."""
+"""Limits for heavy or uneven friction, which distorts the motion so that the filter explains less.
+"""
 FOLLOW_FIT, FOLLOW_DRY, FOLLOW_SHARE, FOLLOW_RHO = 0.93, 0.3, 0.001, 0.2
-"""Weak friction: the rivals can mimic most of it, but not with a Coulomb part of a third."""
+"""Limits for weak friction: rivals can mimic most of it, but not a Coulomb part of one third."""
 THIN_SHARE, THIN_RHO = 0.3, 0.6
-"""The jump alone is a third of all that is seen."""
+"""The jump alone is one third of the change."""
 STILL, STILL_TOGETHER, STILL_RHO = 0.04, 0.7, -0.5
-"""Slip and stick: at rest for longer than a smooth motion is at its turning points and not in one
-cycle only, in a change that is not chaos, and with no jump that plainly feeds energy in, as that of
-a fading drive does. Unless it is stuck for good, rubbing also takes energy out while it slips: its
-Coulomb part is positive, which that of a rig damped to rest is not.
+"""Stick-slip: at rest for longer than a smooth motion is at its turning points, in more than one
+cycle, in a change that is not chaotic, and without a jump that clearly supplies energy, as that of
+a fading drive does. Unless the mass is stuck permanently, friction also dissipates energy while it
+slips: its Coulomb part is positive, unlike that of a rig damped to rest.
 """
 STUCK = 0.5
-"""At rest for half the time: stiction rather than friction."""
+"""Share of the time at rest above which it is stiction rather than friction."""
 SPIKE = 0.5
-"""Share of the energy in one sample; no friction lasts one sample."""
+"""Share of the energy in one sample above which it is a spike, not friction."""
 SURE_SHARE = 0.1
-"""A jump of this share counts also where the position has not moved yet."""
+"""Share of a jump that counts even if the position has not deviated yet."""
 NEW_DRIVE = 0.1
-"""Swing of the voltage's change, in that of the voltage, that makes it another excitation."""
+"""Amplitude of the change of voltage, relative to the voltage's, of another excitation."""
 
 
 class Seen(NamedTuple):
-    """What one look sees beside the evidence.
+    """Observations of one test besides the evidence.
 
     Args:
         before: the verdict so far.
         since: samples since the departure.
         cycle: of the motion, at least 32 [samples].
-        moved_voltage, moved_position, moved_acceleration: which channels left the healthy period.
-        voltage_swing: standard deviation of the voltage's change, in that of the voltage.
-        spread: of the residual's change when healthy [m/s^2].
+        moved_voltage, moved_position, moved_acceleration: channels that left the healthy period.
+        voltage_swing: standard deviation of the change of voltage, relative to the voltage's.
+        spread: healthy standard deviation of the change of the residual [m/s^2].
     """
 
     before: float
@@ -87,7 +88,7 @@ class Seen(NamedTuple):
 
 @njit()
 def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
-    """The verdict after one more look."""
+    """The verdict after one more test."""
     if seen.moved_voltage and not seen.moved_acceleration:
         return OTHER
     if seen.voltage_swing > NEW_DRIVE and seen.moved_acceleration:
@@ -102,7 +103,7 @@ def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
 
 @njit()
 def _friction(seen: Seen, evidence: Evidence) -> bool:
-    """Whether this look finds dry friction."""
+    """Whether this test finds dry friction."""
     if not seen.moved_acceleration or evidence.peak > SPIKE:
         return False
     if not (seen.moved_position or evidence.share > SURE_SHARE):
@@ -123,41 +124,41 @@ def _jump_seen(seen: Seen, evidence: Evidence) -> bool:
 
 @njit()
 def _certain(seen: Seen, evidence: Evidence) -> bool:
-    """Nothing but friction is left over."""
+    """Pattern: friction explains the change completely."""
     plain = evidence.rho > CERTAIN_RHO and evidence.explained > CERTAIN_FIT
     return plain and _jump_seen(seen, evidence)
 
 
 @njit()
 def _plain(evidence: Evidence) -> bool:
-    """A plain jump, in a change that is friction for the greater part."""
+    """Pattern: a clear jump, in a change that is mostly friction."""
     fits = evidence.rho > PLAIN_RHO and evidence.explained > PLAIN_FIT
     return fits and evidence.share > PLAIN_SHARE and evidence.dry > PLAIN_DRY
 
 
 @njit()
 def _jumps(seen: Seen, evidence: Evidence) -> bool:
-    """A jump that no rival has, in a change that friction explains more than half of."""
+    """Pattern: a jump beyond all rivals, in a change of which friction explains more than half."""
     plain = evidence.rho > JUMP_RHO and evidence.explained > JUMP_FIT
     return plain and _jump_seen(seen, evidence)
 
 
 @njit()
 def _follows(evidence: Evidence) -> bool:
-    """A change that follows the friction filter closely."""
+    """Pattern: a change that follows the friction filter closely."""
     fits = evidence.explained > FOLLOW_FIT and evidence.dry > FOLLOW_DRY
     return fits and evidence.share > FOLLOW_SHARE and evidence.rho > FOLLOW_RHO
 
 
 @njit()
 def _thin(evidence: Evidence) -> bool:
-    """Hardly anything but the jump."""
+    """Pattern: little but the jump."""
     return evidence.share > THIN_SHARE and evidence.rho > THIN_RHO
 
 
 @njit()
 def _slips(seen: Seen, evidence: Evidence) -> bool:
-    """The mass stands still where the healthy one moves."""
+    """Pattern: the mass is at rest while the healthy one moves."""
     if seen.since < seen.cycle or seen.before == OTHER:
         return False
     orderly = evidence.together > STILL_TOGETHER and evidence.rho > STILL_RHO
@@ -168,7 +169,7 @@ def _slips(seen: Seen, evidence: Evidence) -> bool:
 
 @njit()
 def _other(seen: Seen, evidence: Evidence) -> bool:
-    """Whether it is time to call it another fault."""
+    """Whether the departure is to be named another fault."""
     if seen.since >= GIVE_UP * seen.cycle + LONG:
         return True
     if seen.since >= seen.cycle and evidence.peak > SPIKE:

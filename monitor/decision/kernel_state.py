@@ -1,7 +1,7 @@
-"""What the watch carries from sample to sample, and the names of its places.
+"""State of the decision kernel, and the indices of its outputs.
 
-`WatchState.held` holds the newest value of every output; `counts` counts samples of the running
-episode, the stretch from a departure until everything has been quiet again.
+`WatchState.held` holds the newest value of every output; `counts` counts samples of the current
+episode, from a departure until all statistics are quiet again.
 """
 
 from typing import Any, NamedTuple
@@ -29,27 +29,27 @@ NO_VERDICT, FRICTION, OTHER, STICKING, NEW_EXCITATION = 0, 1, 2, 3, 4
     MOVED_VOLTAGE, SPEED_RMS, TOGETHER, LEARNT_HERE,
 ) = range(23)  # fmt: skip
 OUTPUTS = 23
-"""Places in `held` and in the kernel's output."""
+"""Number of outputs; the names above index `held` and the kernel's output."""
 
 _COUNTS = np.dtype(
     [
         ("episode", np.int64),  # samples since the departure
         ("quiet", np.int64),  # quiet samples
-        ("agreed", np.int64),  # looks in a row that found friction
+        ("agreed", np.int64),  # consecutive tests that found friction
         ("hop", np.int64),  # samples since the last estimate
-        ("excited", np.int64),  # looks in a row that found another excitation
+        ("excited", np.int64),  # consecutive tests that found another excitation
     ]
 )
 Y, X, V, A, S = range(5)
-"""Signals whose energies are kept: change of the residual, of position, voltage and acceleration
-against the healthy period, and the velocity itself.
+"""Signals whose energies are computed: change of the residual, of position, voltage and
+acceleration against the healthy period, and the velocity itself.
 """
 SHORT, LONG = 8, 64
-"""Samples over which energies are judged: a blow shows in the short, a small change in the long."""
+"""Samples over which energies are tested: the short for impacts, the long for small changes."""
 
 
 class Rules(NamedTuple):
-    """Everything a departure is judged by; `decision_rules.py` derives the figures."""
+    """Parameters of the departure test; `decision_rules.py` derives them."""
 
     window: int
     hop: int
@@ -67,9 +67,7 @@ class Rules(NamedTuple):
 
 
 class WatchState(NamedTuple):
-    """All that is carried: sliding sums, the newest samples, counters, outputs, and room for one
-    sample's signals, regressors and sums.
-    """
+    """Carried state: sliding sums, newest samples, counters, outputs and a sample's workspace."""
 
     window: Window
     energies: Energies
@@ -85,11 +83,11 @@ class WatchState(NamedTuple):
 def new_watch_state(
     longest_window: int, friction_b: FloatArray, friction_a: FloatArray
 ) -> WatchState:
-    """A state that has seen nothing.
+    """The initial state.
 
     Args:
-        longest_window: samples that the sliding least squares has to have room for.
-        friction_b, friction_a: friction filter Ge, padded to one length.
+        longest_window: capacity of the sliding least squares [samples].
+        friction_b, friction_a: friction filter Ge, padded to equal length.
     """
     return WatchState(
         new_window(longest_window, 2),
@@ -106,7 +104,7 @@ def new_watch_state(
 
 @njit()
 def forget(state: WatchState, window: int) -> None:
-    """Back to nothing seen; from now on the least squares spans `window` samples."""
+    """Reset to the initial state; the least squares then spans `window` samples."""
     restart_window(state.window, window)
     restart_energies(state.energies)
     state.history.rows[:, :] = 0.0

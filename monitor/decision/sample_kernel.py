@@ -1,5 +1,6 @@
-"""Sample by sample, while armed: change of the residual, estimates, departure, verdict
-(docs/theory.md 1.4).
+"""Per-sample decision while armed: change of residual, estimates, departure, verdict.
+
+See docs/theory.md 1.4.
 
     change ─▶ sums and history ─▶ estimates ─▶ departure ─▶ episode ─▶ verdict
 
@@ -78,9 +79,7 @@ def watch_block(  # noqa: PLR0917
     state: WatchState,
     out: FloatArray,
 ) -> None:
-    """Take the residual stage's columns for samples `first`, `first` + 1, … and fill `out`, shape
-    (OUTPUTS, n).
-    """
+    """Process the residual stage's columns from sample `first` on; fills `out`, (OUTPUTS, n)."""
     for k in range(code.size):
         seq = first + k
         if code[k] == RESTART or code[k] == NEW_BOOT:
@@ -100,10 +99,10 @@ def watch_block(  # noqa: PLR0917
 
 @njit()
 def _window_length(wanted: int, ref: Reference, window: Window) -> int:
-    """Whole periods of the excitation, at least what was wanted, at most what there is room for.
+    """Window of whole periods of the excitation, at least as requested, at most the capacity.
 
-    Without a period it is as long as the history: what the model leaves in a healthy rig comes and
-    goes with the drive, and averages out over seconds only.
+    Without a period it is as long as the history: the model error of a healthy rig varies with the
+    drive and averages out only over seconds.
     """
     period = ref.counts.period
     room = window.rows.shape[0]
@@ -114,7 +113,7 @@ def _window_length(wanted: int, ref: Reference, window: Window) -> int:
 
 @njit()
 def _skip(state: WatchState) -> None:
-    """A sample that counts in nothing, so that the windows stay stretches of time."""
+    """Process a sample that does not count, so that windows keep their length in time."""
     push(state.window, np.zeros(3))
     add(state.energies, np.zeros(5))
     remember(state.history, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -131,7 +130,7 @@ def _judge(  # noqa: PLR0917
     ref: Reference,
     state: WatchState,
 ) -> None:
-    """One good sample."""
+    """Process one good sample."""
     place = place_in_period(ref, seq)
     _take(data, place, position_valid, ref, state)
     state.counts.hop += 1
@@ -145,7 +144,7 @@ def _judge(  # noqa: PLR0917
 def _take(
     data: FloatArray, place: int, position_valid: int, ref: Reference, state: WatchState
 ) -> None:
-    """The sample's changes against the healthy period into sums and history."""
+    """Add the sample's changes against the healthy period to sums and history."""
     signals, row, healthy = state.signals, state.row, ref.template
     acceleration = data[ACCELERATION] - healthy[ACCELERATION, place]
     modelled = data[MODELLED_COLUMN] - healthy[MODELLED_COLUMN, place]
@@ -165,10 +164,10 @@ def _take(
 
 @njit(inline="always")
 def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
-    """1.0 where position and acceleration have stood still over four samples.
+    """1.0 if position and acceleration are at rest over four samples.
 
-    Position within its noise (six deviations between the largest and the smallest of four), the
-    acceleration within ten, and small: what is left of it is the piezo's own high-pass.
+    The position must be within its noise (six standard deviations between the largest and the
+    smallest of four), the acceleration within ten, and small: the rest is the piezo's high-pass.
     """
     recent = state.recent
     for n in range(3):

@@ -1,6 +1,4 @@
-"""Running mean squares over a short window, exact like `window.py`: a queue made of two stacks, no
-subtraction.
-"""
+"""Running energies over a short window, exact as in `window.py`: a two-stack queue."""
 
 # Compiled functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
@@ -37,7 +35,7 @@ def new_energies(length: int, signals: int) -> Energies:
 
 @njit()
 def restart_energies(energies: Energies) -> None:
-    """Forget every sample."""
+    """Remove all samples."""
     energies.place[:] = 0
     energies.front[0, :] = 0.0
     energies.back[:] = 0.0
@@ -45,7 +43,7 @@ def restart_energies(energies: Energies) -> None:
 
 @njit(inline="always")
 def add(energies: Energies, signals: FloatArray) -> None:
-    """Take the squares of one sample's signals in, the oldest out."""
+    """Add the squares of one sample's signals and remove the oldest."""
     rows, front, back, place = energies
     length, width = rows.shape
     head = place[HEAD]

@@ -1,7 +1,7 @@
-"""Thresholds of the estimates, from a stretch that is known to be healthy.
+"""Thresholds of the estimates, from healthy data.
 
-The thesis takes mean ± 3·sd of the first 50 estimates. That is right for its few hundred
-estimates; at 256 a second a normal estimate leaves three standard deviations every second or two.
+The thesis uses mean ± 3·sd of the first 50 estimates. That suits its few hundred estimates; at 256
+a second a healthy estimate exceeds three standard deviations every second or two.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Thresholds:
     high: FloatArray
 
     def left(self, theta: FloatArray) -> FloatArray:
-        """1.0 where an estimate lies outside, shape (n,); `theta` of shape (n, 2)."""
+        """1.0 where an estimate is outside the limits, shape (n,); `theta` of shape (n, 2)."""
         outside = np.any((theta < self.low) | (theta > self.high), axis=1)
         return np.asarray(outside, dtype=np.float64)
 

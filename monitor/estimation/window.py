@@ -2,15 +2,15 @@
 
     θ̂ = ( Σ g·gᵀ )⁻¹ · Σ g·y   over the last N samples                                     (5.39)
 
-The sums over the window are never down-dated. They are kept the way a queue is made of two stacks:
-`back` is the running sum of the newer samples, `front[i]` the sum of the older ones from place i
-up to where `back` begins. A sample that leaves is left out by reading the next `front`; when none
-is left, `front` is summed anew from the stored samples. So a spike is gone to the last bit once it
-has left, at a constant cost a sample on average.
+The sums over the window are never down-dated. They are organised as a two-stack queue: `back` is
+the running sum of the newer samples, `front[i]` the sum of the older ones from place i up to where
+`back` begins. A sample is removed by moving to the next `front`; when none is left, `front` is
+recomputed from the stored samples. A spike therefore leaves no trace, to the last bit, at constant
+average cost per sample.
 
-Rows are (g1 … gp, y); the sums are those of all products of two entries, upper triangle row by
-row. A row that must not count (an invalid sample) is pushed as zeros, so that the window stays a
-stretch of time.
+Rows are (g1 … gp, y); the sums are those of all products of two entries, upper triangle row by row.
+A row that must not count (an invalid sample) is pushed as zeros, so the window keeps its length in
+time.
 """
 
 from typing import NamedTuple
@@ -54,9 +54,7 @@ def new_window(length: int, parameters: int) -> Window:
 
 @njit()
 def restart_window(window: Window, length: int) -> None:
-    """Forget every sample; from now on the window spans `length` samples, at most what it was made
-    for.
-    """
+    """Remove all samples; the window then spans `length` samples, at most its capacity."""
     window.place[HEAD] = 0
     window.place[FILL] = 0
     window.place[FRONT_LEFT] = 0
@@ -67,7 +65,7 @@ def restart_window(window: Window, length: int) -> None:
 
 @njit(inline="always")
 def push(window: Window, row: FloatArray) -> None:
-    """Take one row in, and the oldest out when the window is full."""
+    """Add one row, and remove the oldest if the window is full."""
     rows, _, back, place = window
     width, length = rows.shape[1], place[LENGTH]
     head = place[HEAD]
@@ -118,8 +116,8 @@ def sums(window: Window, out: FloatArray) -> None:
 def solve_two(s: FloatArray) -> tuple[float, float, float]:
     """(θ1, θ2, condition number of the normal matrix scaled to unit diagonal) from six sums.
 
-    `s` holds Σ g1², g1·g2, g1·y, g2², g2·y, y². The condition number is infinite where the matrix
-    is singular, and θ is zero then.
+    `s` holds Σ g1², g1·g2, g1·y, g2², g2·y, y². If the matrix is singular, the condition number is
+    infinite and θ is zero.
     """
     determinant = s[0] * s[3] - s[1] * s[1]
     scale = s[0] * s[3]
@@ -136,9 +134,7 @@ def solve_two(s: FloatArray) -> tuple[float, float, float]:
 def windowed_least_squares(
     window: Window, g1: FloatArray, g2: FloatArray, y: FloatArray, theta: FloatArray
 ) -> None:
-    """Estimates after each sample of a block into `theta`, shape (n, 2): the plain scheme of the
-    thesis.
-    """
+    """Write estimates after each sample to `theta`, shape (n, 2): the thesis's plain scheme."""
     row, s = np.empty(3), np.empty(6)
     for k in range(y.size):
         row[0], row[1], row[2] = g1[k], g2[k], y[k]

@@ -1,4 +1,4 @@
-"""The monitor's model: its file, and the versions that it has had."""
+"""The monitor's model file and its versions."""
 
 from monitor.model import model_versions
 from monitor.model.model_file import (

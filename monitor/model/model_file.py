@@ -1,8 +1,7 @@
-"""The model file: all that commissioning found out about a rig, as one TOML file that people can
-read.
+"""The model file: the results of commissioning in one readable TOML file.
 
-`load_model` reads it, `model_text` prints it. Numbers are printed with all their digits, so a file
-read back gives the same estimates to the last bit.
+`load_model` reads it, `model_text` prints it. Numbers are printed in full precision, so a file read
+back gives the same estimates to the last bit.
 """
 
 from pathlib import Path
@@ -30,7 +29,7 @@ class FunctionSection(Section, frozen=True, kw_only=True):
     """B(q⁻¹)/A(q⁻¹), ascending powers of q⁻¹."""
 
     b: Annotated[Floats, Meta(min_length=1, description="numerator")]
-    a: Annotated[Floats, Meta(min_length=1, description="denominator, begins with 1")]
+    a: Annotated[Floats, Meta(min_length=1, description="denominator, starts with 1")]
 
     def function(self) -> TransferFunction:
         """The transfer function."""
@@ -86,7 +85,7 @@ class WindowSection(Section, frozen=True, kw_only=True):
 
 
 class NoiseSection(Section, frozen=True, kw_only=True):
-    """[noise] — what a healthy rig leaves unexplained, standard deviations."""
+    """[noise] — standard deviations of the residual of a healthy rig."""
 
     residual: Annotated[float, Meta(gt=0, description="acceleration residual [m/s^2]")]
     position: Annotated[float, Meta(gt=0, description="position [m]")] = 1e-5
@@ -101,17 +100,17 @@ class NoiseSection(Section, frozen=True, kw_only=True):
 
 
 class DecisionSection(Section, frozen=True, kw_only=True):
-    """[decision] — when an estimate has left, and what counts as friction."""
+    """[decision] — thresholds of departure and friction."""
 
     false_alarm: Annotated[
-        float, Meta(gt=0, lt=1, description="allowed chance of a false alarm in a year")
+        float, Meta(gt=0, lt=1, description="allowed probability of a false alarm in a year")
     ] = 1e-3
-    settle: Annotated[int, Meta(ge=0, description="samples after a start that are not judged")] = (
-        128
-    )
-    learn: Annotated[int, Meta(ge=16, description="samples the run's own reference takes")] = 256
-    longest_period: Annotated[int, Meta(ge=4, description="samples a period may have")] = 1024
-    longest_hold: Annotated[int, Meta(ge=0, description="samples predicted through")] = 2
+    settle: Annotated[int, Meta(ge=0, description="samples skipped after a start")] = 128
+    learn: Annotated[int, Meta(ge=16, description="samples of the run's own reference")] = 256
+    longest_period: Annotated[int, Meta(ge=4, description="longest period in samples")] = 1024
+    longest_hold: Annotated[
+        int, Meta(ge=0, description="longest gap bridged by prediction, in samples")
+    ] = 2
     least_velocity: Annotated[
         float, Meta(ge=0, description="rms below which friction is not observable [m/s]")
     ] = 0.005
@@ -128,7 +127,7 @@ class BandSection(Section, frozen=True, kw_only=True):
 class ReferenceSection(Section, frozen=True, kw_only=True):
     """[[reference]] — one period of the healthy rig under one excitation."""
 
-    periods: Annotated[int, Meta(ge=1, description="periods that were averaged")]
+    periods: Annotated[int, Meta(ge=1, description="number of periods averaged")]
     scale: Annotated[float, Meta(description="amplitude scale, measured over modelled")]
     voltage: Annotated[Floats, Meta(description="[V]")]
     position: Annotated[Floats, Meta(description="[m]")]
@@ -137,7 +136,7 @@ class ReferenceSection(Section, frozen=True, kw_only=True):
 
 
 class PromotedSection(Section, frozen=True, kw_only=True):
-    """[promoted] — friction that the model has learnt: part of what is expected from now on.
+    """[promoted] — learnt friction, which is part of the prediction.
 
     Friction is (coulomb + coulomb_by_direction·sgn v)·sgn v + (viscous + viscous_by_direction·sgn
     v)·v, in units of θ.
@@ -148,14 +147,14 @@ class PromotedSection(Section, frozen=True, kw_only=True):
     coulomb_by_direction: Annotated[float, Meta(description="half the difference, theta1")] = 0.0
     viscous_by_direction: Annotated[float, Meta(description="half the difference, theta2")] = 0.0
     smooth: Annotated[
-        float, Meta(ge=0, description="speed over which the sign of v turns, 0 for at once [m/s]")
+        float, Meta(ge=0, description="speed over which the sign of v changes, 0: at once [m/s]")
     ] = 0.0
     study: Annotated[str, Meta(description="where it was learnt")] = ""
     sha256: Annotated[str, Meta(description="hash of the study's model and effects")] = ""
 
 
 class RecordingSection(Section, frozen=True, kw_only=True):
-    """[[recording]] — what the model was made from."""
+    """[[recording]] — a recording used for commissioning."""
 
     role: Annotated[str, Meta(description="chirp, healthy or friction")]
     name: Annotated[str, Meta(description="file name")]
@@ -163,7 +162,7 @@ class RecordingSection(Section, frozen=True, kw_only=True):
 
 
 class RigModel(Section, frozen=True, kw_only=True):
-    """The whole model file."""
+    """The model file."""
 
     sample_rate: Annotated[float, Meta(ge=SLOWEST, le=FASTEST, description="[Hz]")]
     channels: Annotated[tuple[str, ...], Meta(min_length=2, description="input, position, …")]
@@ -184,7 +183,7 @@ class RigModel(Section, frozen=True, kw_only=True):
 
     @property
     def signature(self) -> tuple[float, float]:
-        """(θ1, θ2) of the fault the filter was made with: (1, γf)."""
+        """(θ1, θ2) of the fault with which the filter was fitted: (1, γf)."""
         return 1.0, self.friction.gamma
 
 
@@ -192,7 +191,7 @@ def load_model(path: Path | str) -> RigModel:
     """The model at `path`.
 
     Raises:
-        ConfigError: the file cannot be read or does not fit.
+        ConfigError: the file cannot be read or is invalid.
     """
     model = load(path, RigModel)
     check_model(model, path)
@@ -200,10 +199,10 @@ def load_model(path: Path | str) -> RigModel:
 
 
 def parse_model(text: str, name: str) -> RigModel:
-    """The model in a file's text; `name` stands in errors.
+    """The model in a file's text; `name` is used in error messages.
 
     Raises:
-        ConfigError: it does not fit.
+        ConfigError: it is invalid.
     """
     model = parse(text, RigModel, name)
     check_model(model, name)
@@ -211,10 +210,10 @@ def parse_model(text: str, name: str) -> RigModel:
 
 
 def check_model(model: RigModel, path: Path | str) -> None:
-    """What the types alone cannot say.
+    """Check the consistency of a model beyond its types.
 
     Raises:
-        ConfigError: the parts of the model do not fit together.
+        ConfigError: the parts of the model are inconsistent.
     """
     _check_references(model, path)
     if isinstance(model.plant, EquationsPlant):

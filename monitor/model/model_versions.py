@@ -1,9 +1,9 @@
-"""The model file with its history: every version that was in force stays beside it.
+"""The model file with its history: every former version is kept beside it.
 
-model.toml                what a start of the monitor reads
-model.v1.toml, .v2.toml   what stood before, the newest with the highest number
-model.undone-….toml       what was rolled back, named by the beginning of its SHA-256
-model.history.jsonl       who did what, when and why, one line each
+model.toml                the current model, read at the monitor's start
+model.v1.toml, .v2.toml   former versions, the newest with the highest number
+model.undone-….toml       rolled-back versions, named by the start of their SHA-256
+model.history.jsonl       user, time, action and reason of each change, one line each
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from rigwatch.wire.host import replace_file
 
 
 def install(path: Path, text: str, t_ns: int, user: str, why: str) -> None:
-    """Put a new version in force and keep the one before.
+    """Install a new version and keep the previous one.
 
     Raises:
         ConfigError: a file cannot be written.
@@ -31,7 +31,7 @@ def install(path: Path, text: str, t_ns: int, user: str, why: str) -> None:
 
 
 def version_before(path: Path) -> str:
-    """Text of the version that a rollback brings back.
+    """Text of the version that a rollback restores.
 
     Raises:
         ConfigError: there is none, or it cannot be read.
@@ -45,7 +45,7 @@ def version_before(path: Path) -> str:
 
 
 def roll_back(path: Path, t_ns: int, user: str, why: str) -> str:
-    """Put the version before in force again; its text.
+    """Restore the previous version; returns its text.
 
     Raises:
         ConfigError: there is none, or a file cannot be written.

@@ -1,4 +1,4 @@
-"""What the model file holds for the observer scheme."""
+"""Sections of the model file for the observer scheme."""
 
 from typing import Annotated
 
@@ -18,7 +18,7 @@ class EquationsPlant(Section, frozen=True, kw_only=True, tag="equations", tag_fi
     port: Annotated[str, Meta(description="force port at which friction enters")]
     coulomb: Annotated[float, Meta(description="dry friction of the healthy rig [N]")] = 0.0
     turn: Annotated[
-        float, Meta(gt=0, description="speed over which the sign of the motion turns [m/s]")
+        float, Meta(gt=0, description="speed over which the sign of the motion changes [m/s]")
     ] = 1e-3
     half_width: Annotated[
         int, Meta(ge=2, le=32, description="lag of the smoothed motion [samples]")
@@ -29,7 +29,7 @@ class EquationsPlant(Section, frozen=True, kw_only=True, tag="equations", tag_fi
 
 
 class RemainderSection(Section, frozen=True, kw_only=True):
-    """What the equations leave of a healthy rig, as a polynomial of second degree in its states."""
+    """The equations' residual on a healthy rig, as a second-degree polynomial in its states."""
 
     centre: Annotated[Floats, Meta(description="mean of each signal")]
     scale: Annotated[Floats, Meta(description="standard deviation of each signal")]
@@ -37,9 +37,9 @@ class RemainderSection(Section, frozen=True, kw_only=True):
 
 
 class RangeSection(Section, frozen=True, kw_only=True):
-    """The motion that the model has seen."""
+    """The range of motion to which the model was fitted."""
 
-    names: Annotated[tuple[str, ...], Meta(description="inputs, motion, and what is predicted")]
+    names: Annotated[tuple[str, ...], Meta(description="inputs, motion, and predicted output")]
     low: Annotated[Floats, Meta(description="least value of each")]
     high: Annotated[Floats, Meta(description="largest value of each")]
     narrow: Annotated[
@@ -47,8 +47,8 @@ class RangeSection(Section, frozen=True, kw_only=True):
         Meta(
             ge=0,
             le=1,
-            description="least narrowness of its spectrum: 1 for one frequency, towards 0 for "
-            "broad noise",
+            description="least narrowness of its spectrum: 1 for one frequency, near 0 for "
+            "broadband noise",
         ),
     ] = 0.0
     sizes: Annotated[
@@ -59,7 +59,7 @@ class RangeSection(Section, frozen=True, kw_only=True):
         Meta(description="largest mean frequency of a motion of at least each size [Hz]"),
     ] = ()
     channels: Annotated[
-        tuple[str, ...], Meta(description="channels that show a state, which cannot jump")
+        tuple[str, ...], Meta(description="channels that measure a state, which cannot jump")
     ] = ()
     bends: Annotated[
         Floats,
@@ -71,7 +71,7 @@ class RangeSection(Section, frozen=True, kw_only=True):
 
 
 class HealthyLimits(Section, frozen=True, kw_only=True):
-    """What the healthy rig leaves, and how far it strays."""
+    """Size and extremes of the healthy residual."""
 
     noise: Annotated[float, Meta(gt=0, description="residual at standstill, rms")]
     growth: Annotated[
@@ -83,18 +83,22 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
     ]
     short: Annotated[float, Meta(gt=0, description="largest energy of a short window")]
     medium: Annotated[float, Meta(gt=0, description="largest energy of a medium window")]
-    friction: Annotated[float, Meta(gt=0, description="largest Coulomb estimate in deviations")]
+    friction: Annotated[
+        float, Meta(gt=0, description="largest Coulomb estimate in standard deviations")
+    ]
     sensor_noise: Annotated[float, Meta(gt=0, description="sensors' disagreement at rest, rms")]
     sensor_growth: Annotated[float, Meta(ge=0, description="of it with the measured output")]
     sensor: Annotated[float, Meta(gt=0, description="largest energy of their disagreement")]
-    speed_noise: Annotated[float, Meta(gt=0, description="speed that cannot be told from rest")]
+    speed_noise: Annotated[
+        float, Meta(gt=0, description="speed that cannot be distinguished from rest")
+    ]
 
 
 class SchemeSection(Section, frozen=True, kw_only=True):
-    """[scheme] — why the file's plant was chosen, and what was left of healthy recordings."""
+    """[scheme] — why the file's plant was chosen, and its residual on healthy recordings."""
 
     why: Annotated[str, Meta(description="why this scheme was chosen, with figures")]
     held_out: Annotated[
         float, Meta(ge=0, description="residual on held-out healthy data, rms, high-passed")
     ] = 0.0
-    share: Annotated[float, Meta(ge=0, description="of the measured output that it is")] = 0.0
+    share: Annotated[float, Meta(ge=0, description="share of the measured output")] = 0.0

@@ -1,13 +1,13 @@
-"""The observer scheme: fitted equations run along the measured motion, whatever drives it.
+"""The observer scheme: fitted equations run along the measured motion, for any excitation.
 
     samples ─▶ motion ─▶ prediction ─▶ residual ─▶ decision ─▶ estimates, conditions
                (lag)     (equations)   (remainder,  (range, window,
                                         high-pass)   episode, verdict)
 
-A model of equations is driven by what the sensors show, so that its hidden states need no initial
-values and its residual is the missing force at every sample: no period, no phase, and no recording
+A model of equations is driven by the measured motion, so its hidden states need no initial values
+and its residual is the missing force at every sample. It needs no period, no phase and no recording
 of a known fault. Its part of the model file is declared in `monitor.model`, and
-`monitor.commissioning` makes it from healthy recordings.
+`monitor.commissioning` creates it from healthy recordings.
 """
 
 from monitor.observer import decision_state

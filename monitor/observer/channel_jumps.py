@@ -1,8 +1,8 @@
-"""Jumps of a channel that shows a state: a state is an integral, so that no motion makes one.
+"""Detects jumps of channels that measure a state, which no motion can cause.
 
-The difference of neighbouring samples follows the rate of the state that the channel shows; if that
-rate is a state as well, the difference of two differences follows its rate (T²·a of a position).
-Healthy recordings say how large it becomes, noise and the converter's steps included.
+A state is an integral. The difference of neighbouring samples is bounded by the rate of the state;
+if that rate is also a state, the second difference is bounded by its rate (T²·a of a position).
+Healthy recordings give the largest values, including noise and quantisation.
 """
 
 from collections.abc import Sequence
@@ -16,13 +16,13 @@ from rigwatch.physics.engine.equations import Model, measured_states
 from rigwatch.wire.arrays import FloatArray
 
 JUMP = 2.0
-"""Difference, over the largest of healthy recordings, that is a jump."""
+"""Ratio of a difference to the largest of healthy recordings above which it is a jump."""
 DEEPEST = 2
-"""Differences of a higher order tell noise."""
+"""Highest order of difference used; higher orders are dominated by noise."""
 
 
 def bend_orders(model: Model) -> dict[str, int]:
-    """Order of the difference that is bounded, of each channel that shows a state."""
+    """Order of the bounded difference, for each channel that measures a state."""
     orders: dict[str, int] = {}
     for state in measured_states(model):
         orders[state.channel] = min(max(orders.get(state.channel, 0), state.order + 1), DEEPEST)
@@ -30,7 +30,7 @@ def bend_orders(model: Model) -> dict[str, int]:
 
 
 def bends_of(healthy: Sequence[Recording], model: Model) -> dict[str, float]:
-    """Largest difference that healthy recordings hold of each channel that shows a state."""
+    """Largest difference in healthy recordings, for each channel that measures a state."""
     return {
         name: max(float(np.abs(np.diff(one.channel(name), order)).max()) for one in healthy)
         for name, order in bend_orders(model).items()
@@ -41,9 +41,9 @@ class ChannelJumps:
     """Finds jumps block by block.
 
     Args:
-        seen: largest differences of healthy recordings; channels that it does not name cannot jump.
-        model: as it was written.
-        channels: what the columns of the samples are called.
+        seen: largest differences of healthy recordings, by channel; others are not checked.
+        model: the unmodified model.
+        channels: names of the columns of the samples.
     """
 
     def __init__(self, seen: RangeSection, model: Model, channels: Sequence[str]) -> None:
@@ -56,7 +56,7 @@ class ChannelJumps:
         self._run = 0
 
     def update(self, signals: FloatArray, code: Codes) -> NDArray[np.bool_]:
-        """Whether each channel has jumped to a sample, shape (n, channels)."""
+        """Whether each channel jumps at each sample, shape (n, channels)."""
         rows = np.concatenate([self._rows, signals[:, self._places]])
         run = self._runs(code)
         found = np.zeros((code.size, len(self._places)), np.bool_)
@@ -67,7 +67,7 @@ class ChannelJumps:
         return found
 
     def _runs(self, code: Codes) -> Codes:
-        """Good samples in a row up to each."""
+        """Number of consecutive good samples up to each sample."""
         at = np.arange(code.size)
         began = np.where(code == GOOD, -1 - self._run, at)
         began = np.where((code == RESTART) | (code == NEW_BOOT), at - 1, began)

@@ -1,4 +1,4 @@
-"""What the observer's decision carries from sample to sample, and what it puts out."""
+"""State and outputs of the observer's decision."""
 
 from typing import NamedTuple
 
@@ -9,15 +9,15 @@ from monitor.model import HealthyLimits
 from rigwatch.wire.arrays import FloatArray
 
 SHORT, MEDIUM, LONG = 8, 32, 128
-"""Windows [samples]: a jump, one estimate, one name."""
+"""Window lengths [samples]: of jump detection, estimates and naming."""
 RISING = 2
-"""Samples after a reversal in which real friction still turns."""
+"""Samples after a reversal during which real friction still changes sign."""
 HISTORY = LONG + RISING
 WAKE = 256
-"""Samples after a jump of a channel in which filters and hidden states still ring."""
+"""Samples after a jump of a channel during which filters and hidden states settle."""
 
 ARMING, JUDGING, BEYOND = 0.0, 1.0, 2.0
-"""Modes: hidden states settle; everything is judged; the motion is beyond what was fitted."""
+"""Modes: hidden states settling; armed; motion outside the fitted range."""
 UNNAMED, FRICTION, STICKING, OTHER = 0.0, 1.0, 2.0, 3.0
 """Verdicts."""
 
@@ -31,11 +31,11 @@ OUTPUTS = (
 ) = range(len(OUTPUTS))  # fmt: skip
 
 ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, SPEED, LEVELS = range(8)
-"""Columns of the history; from `LEVELS` on, what the healthy variance grows with."""
+"""Columns of the history; from `LEVELS` on, the levels on which the healthy variance depends."""
 
 
 class Counts(NamedTuple):
-    """Places in `DecisionState.counts`."""
+    """Indices of `DecisionState.counts`."""
 
     head: int = 0
     filled: int = 1
@@ -61,7 +61,7 @@ class DecisionState(NamedTuple):
     Args:
         rows: the last samples, shape (HISTORY, LEVELS + levels).
         counts: see `Counts`; since_onset is -1 without an episode.
-        value: verdict, named force, and energies of the drive of late and before.
+        value: verdict, named force, and energies of the drive recently and before.
     """
 
     rows: FloatArray
@@ -70,10 +70,10 @@ class DecisionState(NamedTuple):
 
 
 def new_state(levels: int) -> DecisionState:
-    """Before the first sample.
+    """The initial state.
 
     Args:
-        levels: what the healthy variance grows with.
+        levels: number of levels on which the healthy variance depends.
     """
     count = np.zeros(len(AT), np.int64)
     count[AT.since_onset] = -1
@@ -82,7 +82,7 @@ def new_state(levels: int) -> DecisionState:
 
 
 class DecisionRules(NamedTuple):
-    """What is decided by; energies are in the healthy variance, see `HealthyLimits`."""
+    """Decision thresholds; energies are relative to the healthy variance, see `HealthyLimits`."""
 
     noise: float
     growth: FloatArray
@@ -98,7 +98,7 @@ class DecisionRules(NamedTuple):
 
 
 MARGIN = 1.6
-"""How far a statistic must be beyond the largest of healthy recordings, in amplitude."""
+"""Amplitude ratio of a threshold to the largest value of healthy recordings."""
 
 
 def rules_of(limits: HealthyLimits, rate: float) -> DecisionRules:
@@ -120,4 +120,4 @@ def rules_of(limits: HealthyLimits, rate: float) -> DecisionRules:
 
 
 SETTLE, PATIENCE = 1.0, 0.75
-"""Time until hidden states and filters settle, and in which friction shows itself [s]."""
+"""Settling time of hidden states and filters, and time in which friction shows [s]."""

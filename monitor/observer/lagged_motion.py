@@ -1,7 +1,7 @@
-"""The measured motion, live: every signal through one short symmetric kernel, with a fixed lag.
+"""The measured motion in real time: each signal filtered by a short symmetric kernel, fixed lag.
 
-Signals that are not differentiated are delayed by the same lag, so that all columns belong to the
-same instant. The kernels are polynomials of third order fitted to the samples about each instant
+Signals that are not differentiated are delayed by the same lag, so all columns refer to the same
+instant. The kernels are third-order polynomial fits to the samples around each instant
 (A. Savitzky, M. Golay, Analytical Chemistry 36, 1964).
 """
 
@@ -17,12 +17,12 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
 DELAY, MATCHED = -1, -2
-"""Orders of columns that are only delayed, or smoothed as one that is differentiated twice is."""
+"""Codes of columns that are only delayed, or smoothed like one that is differentiated twice."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionColumn:
-    """One column: a channel by its place, smoothed and differentiated `order` times, or delayed."""
+    """One column: a channel by index, smoothed and differentiated `order` times, or delayed."""
 
     channel: int
     order: int
@@ -32,9 +32,9 @@ class FixedLag:
     """Carries the last samples from block to block.
 
     Args:
-        columns: what is made of the channels.
+        columns: columns computed from the channels.
         half_width: lag [samples].
-        rate: samples a second [Hz].
+        rate: sample rate [Hz].
     """
 
     def __init__(self, columns: Sequence[MotionColumn], half_width: int, rate: float) -> None:
@@ -44,10 +44,10 @@ class FixedLag:
         self._count = np.zeros(3, np.int64)
 
     def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes]:
-        """The next samples, shape (n, channels), to columns, shape (n, columns), and their state.
+        """Convert the next samples, shape (n, channels), to columns, (n, columns), with states.
 
-        The state of a sample is 0 without a whole kernel, 1 for the first with one after a start, 2
-        for a good one, 3 where a reading in its kernel is held.
+        The state of a sample is 0 with an incomplete kernel, 1 for the first complete one after a
+        start, 2 for a good sample, 3 if a reading within its kernel is held.
         """
         out = np.zeros((code.size, self._channels.size))
         state = np.zeros(code.size, np.int64)
@@ -83,7 +83,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
     out: FloatArray,
     state: Codes,
 ) -> None:
-    """`count` holds the ring's head, the samples since the start, and those since one was held."""
+    """`count` holds the ring's head, samples since the start, and samples since a held one."""
     width = ring.shape[0]
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:

@@ -1,10 +1,10 @@
-"""The residual of the observer: what is measured less what equations and remainder predict.
+"""The residual of the observer: measured output minus the prediction of equations and remainder.
 
     e  = H[ y - ŷ - w·φ(z) ],   φ(z) = (z_i, z_i·z_j),   z = (motion, hidden states), scaled
     g1 = H[ŷ with one newton of dry friction - ŷ],   g2 = the same for viscous friction
 
-Where a plant integrates, small errors of its flows add up to slow ones of its forces, so that
-everything is judged above a corner: H is a Butterworth high-pass of second order, the same for all.
+In an integrating plant, small errors of flows accumulate to slow errors of forces. All signals are
+therefore judged above a corner frequency: H is a second-order Butterworth high-pass.
 """
 
 from typing import NamedTuple
@@ -31,7 +31,7 @@ class Polynomial(NamedTuple):
 
 
 def polynomial(section: RemainderSection) -> Polynomial:
-    """The remainder of a model file."""
+    """Convert the remainder of a model file to arrays."""
     return Polynomial(*map(np.array, (section.centre, section.scale, section.weights)))
 
 
@@ -43,12 +43,12 @@ def terms(signals: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatAr
 
 
 def levels(motion: FloatArray, predicted: FloatArray, known: RemainderSection) -> FloatArray:
-    """What the healthy variance grows with, shape (n, 1 + 2·motions).
+    """Levels on which the healthy variance depends, shape (n, 1 + 2·motions).
 
     Args:
         motion: shape (n, motions).
         predicted: the high-passed prediction, shape (n,).
-        known: centre and scale of the motion, which comes first in it.
+        known: the remainder, whose first centres and scales are those of the motion.
     """
     count = motion.shape[1]
     z = (motion - np.array(known.centre[:count])) / np.array(known.scale[:count])
@@ -70,7 +70,7 @@ class HighPassed:
         self._remainder = polynomial(remainder)
 
     def update(self, columns: FloatArray, z: FloatArray, state: np.ndarray) -> FloatArray:
-        """High-passed columns, shape (n, 6), from raw ones and the signals of the remainder."""
+        """High-passed columns, shape (n, 6), from raw columns and the remainder's signals."""
         out = np.zeros_like(columns)
         _advance(columns, z, state, self._remainder, self._b, self._a, self._state, out)
         return out
@@ -109,7 +109,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
 
 @kernel()
 def _at_rest(row: FloatArray, kept: FloatArray, b: FloatArray) -> None:
-    """States of a high-pass that has seen this row for ever, in transposed direct form II."""
+    """Steady state of a high-pass for a constant row, in transposed direct form II."""
     for c in range(kept.shape[0]):
         kept[c, 0] = -b[0] * row[c]
         kept[c, 1] = b[2] * row[c]

@@ -1,7 +1,7 @@
-"""From admitted samples to what is decided on: motion, prediction, residual in one stage.
+"""From admitted samples to judged signals: motion, prediction and residual in one stage.
 
-Which channel is an input, which shows the motion and which is predicted follows from the model of
-equations; nothing here knows what a rig measures.
+The roles of channels (input, motion, predicted output) follow from the model of equations; nothing
+here is specific to a rig.
 """
 
 from dataclasses import dataclass
@@ -26,17 +26,17 @@ from rigwatch.wire.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Layout:
-    """How a model's signals are laid out.
+    """Layout of a model's signals.
 
     Attributes:
-        channels: read from the samples: inputs, then motion, then what is predicted.
-        columns: made of them: inputs, motion, measured output, the motion's own second view of
-            that output, and the output smoothed as that is.
-        inputs: how many inputs and motions drive the equations.
-        speed: place among them of the speed that friction acts against.
-        motions: of them, the places of the motion.
-        rates: of them, the places of rates of change.
-        signals: names of them.
+        channels: read from the samples: inputs, then motion, then predicted outputs.
+        columns: computed from them: inputs, motion, measured output, the same output derived from
+            the motion, and the output with equal smoothing.
+        inputs: number of inputs and motions that drive the equations.
+        speed: index among them of the speed that friction opposes.
+        motions: indices among them of the motion.
+        rates: indices among them of rates of change.
+        signals: their names.
     """
 
     channels: tuple[str, ...]
@@ -49,10 +49,10 @@ class Layout:
 
 
 def layout_of(model: Model, port: str) -> Layout:
-    """The layout of a model as it was written.
+    """The layout for an unmodified model.
 
     Raises:
-        ModelError: nothing measured is left to predict.
+        ModelError: no measured output is left to predict.
     """
     inputs = [own.channel or name for name, own in model.inputs.items()]
     motion = measured_states(model)
@@ -79,14 +79,14 @@ def layout_of(model: Model, port: str) -> Layout:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """What the stage gives for each sample, all of one instant, `half_width` samples ago.
+    """Results of the stage for each sample, all for the instant `half_width` samples earlier.
 
     Attributes:
-        state: see `motion.FixedLag`, shape (n,).
+        state: see `lagged_motion.FixedLag`, shape (n,).
         rows: inputs and motion, shape (n, inputs).
         measured: the measured output, shape (n,).
-        predicted: the equations' columns.
-        judged: high-passed, columns of `residual.COLUMNS`, shape (n, 6).
+        predicted: the columns of the prediction.
+        judged: high-passed columns, see `missing_force`, shape (n, 6).
     """
 
     state: Codes
@@ -101,11 +101,11 @@ class ObserverSignals:
 
     Args:
         plant: the equations with their parameters.
-        remainder: what they leave of a healthy rig.
-        rate: samples a second [Hz].
+        remainder: their residual on a healthy rig.
+        rate: sample rate [Hz].
 
     Raises:
-        ModelError: the plant's model does not fit.
+        ModelError: the plant does not match its model.
     """
 
     def __init__(self, plant: EquationsPlant, remainder: RemainderSection, rate: float) -> None:
@@ -134,5 +134,5 @@ class ObserverSignals:
 
 
 def remainder_signals(rows: FloatArray, predicted: Predicted, layout: Layout) -> FloatArray:
-    """Motion and hidden states, shape (n, signals): what a healthy remainder is a function of."""
+    """Motion and hidden states, the arguments of the remainder, shape (n, signals)."""
     return np.ascontiguousarray(np.hstack([rows[:, list(layout.motions)], predicted.hidden]))

@@ -1,16 +1,13 @@
-"""Sample by sample: estimates, departure, episode and verdict of the observer.
+"""Per-sample decision of the observer: estimates, departure, episode and verdict.
 
     e ─▶ energies of a short and a medium window ─┐
     e, g ─▶ Coulomb and viscous force (window) ───┼▶ departure ─▶ episode ─▶ verdict
     two views of the measured output ─────────────┘
 
-Energies are in the healthy variance n² + κ·A, with A mean squares and fourth powers of the motion
-and of what is predicted, as what equations leave grows with the motion. A departure is friction
-where, since its onset, dry friction explains what is seen, a reversal is among it, and the sensors
-agree with each other.
-
-Only `decide` is kept compiled, with the fingerprint of what is compiled into it (as
-`monitor.decision.sample_kernel`).
+Energies are relative to the healthy variance n² + κ·A, with A mean squares and fourth powers of the
+motion and of the prediction, since the equations' error grows with the motion. A departure is
+friction if, since its onset, dry friction explains the residual, the motion has reversed, and the
+sensors agree with each other.
 """
 
 # Compiled functions are untyped to mypy.
@@ -72,28 +69,28 @@ from rigwatch.wire.kernel import kernel
     HEAD, FILLED, SINCE_START, QUIET, OUTSIDE, ONSET, DEPARTURE_AGO, AGREED, DISAGREED, CHANGED,
     ABOVE, JUMP_AGO, WAS_JUDGING,
 ) = range(13)  # fmt: skip
-"""Places of `decision_state.Counts`, as the kernel needs constants."""
+"""Indices of `decision_state.Counts` as constants for the kernel."""
 LOOKS = 3
-"""Samples in a row that must agree on friction."""
+"""Consecutive samples that must agree on friction."""
 LEAST_LOOK = 12
-"""Samples from the onset on before friction is named [samples]."""
+"""Delay from the onset before friction is named [samples]."""
 FITS, DRY_PART = 0.7, 0.5
-"""Share of the missing force, beyond noise, that friction explains and its dry part stands for;
-real friction also rises before it slides and falls with speed, which neither part describes.
+"""Shares of the missing force, beyond noise, that friction must explain and that its dry part must
+contain; real friction also has presliding and the Stribeck effect, which neither part describes.
 """
 AT_REST, STUCK = 0.25, 0.5
-"""Share of the time at rest that makes it sticking."""
+"""Share of the time at rest above which it is stiction."""
 OVER = 256
-"""Samples without a departure after which an episode is over."""
+"""Samples without a departure after which an episode ends."""
 VIOLATED = 16
-"""Samples in a row in which the sensors disagree."""
+"""Consecutive samples in which the sensors must disagree."""
 SURE, LASTING = 2.0, 128
-"""A deviation so far beyond the limit is a departure at once, a smaller one after so many samples:
-what a change of the drive stirs up is small or short.
+"""Ratio to the limit above which a deviation is a departure at once, and samples after which a
+smaller one is: transients of a drive change are small or short.
 """
 SUDDEN, LATE, BEFORE = 8.0, 16.0, 256.0
-"""A drive whose energy over `LATE` samples is so many times that over `BEFORE` has just begun, or
-grown; what follows is no steady motion.
+"""Ratio of the drive's energy over `LATE` samples to that over `BEFORE` above which the drive has
+just started or increased, and the motion is not steady.
 """
 
 
@@ -135,7 +132,7 @@ def _restart(kept: DecisionState) -> None:
 
 @njit()
 def _follow_drive(energy: float, kept: DecisionState) -> None:
-    """Notice that the drive begins or grows suddenly."""
+    """Detect a sudden start or increase of the drive."""
     late, before = kept.value[2], kept.value[3]
     late += (energy - late) / LATE
     before += (energy - before) / BEFORE
@@ -147,7 +144,7 @@ def _follow_drive(energy: float, kept: DecisionState) -> None:
 
 @njit()
 def _follow_jumps(jumped: bool, kept: DecisionState) -> None:
-    """A jump where the motion is judged is another fault, elsewhere it has the rig settle anew."""
+    """Handle a jump: another fault while armed, otherwise settling starts again."""
     count = kept.counts
     count[JUMP_AGO] = min(count[JUMP_AGO] + 1, WAKE)
     if not jumped:
@@ -162,7 +159,7 @@ def _follow_jumps(jumped: bool, kept: DecisionState) -> None:
 
 @njit()
 def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray) -> None:
-    """The first columns stand in the order of the residual's."""
+    """Store a sample; the first columns are in the order of the residual's."""
     head = kept.counts[HEAD]
     for c in range(6):
         kept.rows[head, c] = row[c]
@@ -210,7 +207,7 @@ def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: F
 
 @njit()
 def _variance(kept: DecisionState, rules: DecisionRules) -> float:
-    """What a healthy rig leaves under the motion of the medium window."""
+    """Healthy variance of the residual for the motion of the medium window."""
     n = min(MEDIUM, kept.counts[FILLED])
     total = rules.noise**2
     for c in range(rules.growth.size):
@@ -223,7 +220,7 @@ def _variance(kept: DecisionState, rules: DecisionRules) -> float:
 
 @njit()
 def _mode(kept: DecisionState, rules: DecisionRules) -> float:
-    """Armed once everything has settled and is quiet, or has had time enough to be."""
+    """The mode: armed once everything has settled and is quiet, or after a maximum time."""
     count = kept.counts
     if count[SINCE_START] < rules.settle:
         count[OUTSIDE] = min(count[SINCE_START], LONG)
@@ -248,7 +245,7 @@ def _follow(  # noqa: PLR0917 -- a kernel
     kept: DecisionState,
     out: FloatArray,
 ) -> None:
-    """Begin, carry on or end an episode, and name it."""
+    """Begin, continue or end an episode, and name it."""
     count = kept.counts
     if away:
         count[DEPARTURE_AGO] = 0

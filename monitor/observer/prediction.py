@@ -1,9 +1,9 @@
-"""Equations driven along the measured motion, block by block, with hidden states carried along.
+"""Equations driven along the measured motion, block by block, with carried hidden states.
 
-Beside the prediction itself two more run, with a unit of dry and of viscous friction at the force
-port: what they add is what friction of one newton, or of one newton over one metre a second, makes
-of the predicted output, through whatever lies between (an inertia, the sensor's own high-pass). As
-the motion is given, that is linear in the force.
+Two further predictions run with unit dry and unit viscous friction at the force port. Their
+differences to the plain prediction are the responses of the predicted output to friction of 1 N and
+of 1 N s/m, including everything in between (an inertia, the sensor's own high-pass). As the motion
+is given, the response is linear in the force.
 """
 
 import dataclasses
@@ -37,15 +37,15 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 SETTLING = 8.0
-"""Time for which the first sample is held, so that hidden states begin in balance [s]."""
+"""Time for which the first sample is held, so that hidden states start in equilibrium [s]."""
 SUBSTEPS = 4
 """Runge-Kutta steps between samples."""
 DRY, VISCOUS = "coulomb", "viscous"
-"""Effects of the library that stand for friction."""
+"""Effects of the library that represent friction."""
 
 
 def base_model(name: str) -> Model:
-    """The model of equations that a plant names.
+    """The model of equations named by a plant.
 
     Raises:
         ModelError: there is none of this name.
@@ -62,7 +62,7 @@ def force_port(model: Model) -> str:
     """The port at which friction enters.
 
     Raises:
-        ModelError: no force port offers a speed.
+        ModelError: no force port has a speed.
     """
     for name, port in model.ports.items():
         if port.kind == "force" and not port.passive and "v" in port.variables:
@@ -76,17 +76,17 @@ def speed_state(model: Model, port: str) -> str:
 
 
 def rate_columns(model: Model) -> list[int]:
-    """Places, among inputs and motion, of the states that are rates of change."""
+    """Indices, among inputs and motion, of the states that are rates of change."""
     first = len(model.inputs)
     return [first + k for k, state in enumerate(measured_states(model)) if state.order]
 
 
 def driven(model: Model, free: frozenset[str]) -> Model:
-    """The model along its measured motion, its hidden states among the outputs.
+    """The model along its measured motion, with its hidden states as further outputs.
 
     Args:
-        model: as it was written.
-        free: parameters that a fit moves.
+        model: the unmodified model.
+        free: parameters to be fitted.
     """
     along = along_measured_motion(model)
     outputs = {name: along.outputs[name] for name in list(along.outputs)[:1]}
@@ -100,14 +100,14 @@ def driven(model: Model, free: frozenset[str]) -> Model:
 
 
 def friction_at(port: str, turn: float) -> list[Placement]:
-    """Dry and viscous friction at the port, both of no strength."""
+    """Dry and viscous friction at the port, both of zero strength."""
     sizes = {"v": turn * 1e3, "x": 1.0}
     known = library()
     return [Placement(name, _fixed(known[name].scaled(sizes)), port) for name in (DRY, VISCOUS)]
 
 
 def _fixed(effect: Effect) -> Effect:
-    """The effect with everything but its strength constant, beginning with none of it."""
+    """The effect with all parameters constant except its strength, which starts at zero."""
     parameters = {
         name: p if p.role == "strength" else replace(p, role="constant")
         for name, p in effect.parameters.items()
@@ -149,7 +149,7 @@ class AlongMotion:
         self._row = np.zeros(0)
 
     def update(self, rows: FloatArray, state: Codes) -> Predicted:
-        """The next rows of inputs and motion, shape (n, inputs); those without a kernel give 0."""
+        """Predict the next rows of inputs and motion, shape (n, inputs); 0 without a kernel."""
         n = len(rows)
         out = Predicted(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((n, self.hidden)))
         for begin, end in _stretches(state):
@@ -161,7 +161,7 @@ class AlongMotion:
         return out
 
     def _begin(self, row: FloatArray) -> None:
-        """Hidden states in balance with a row, the motion at rest there."""
+        """Hidden states in equilibrium with a row, with the motion at rest."""
         self._row = row.copy()
         still = np.repeat(row[None, :], round(SETTLING / self._dt), axis=0)
         still[:, self._rates] = 0.0
@@ -169,7 +169,7 @@ class AlongMotion:
             self._states[case] = balanced(self._compiled, parameters, still, self._dt)
 
     def _run(self, rows: FloatArray, first: int, out: Predicted) -> int:
-        """Run along the rows until they end or a state diverges; how many were done."""
+        """Run along the rows until they end or a state diverges; returns the number done."""
         inputs = np.concatenate([self._row[None, :], rows])
         made = [self._simulated(case, inputs) for case in range(len(self._parameters))]
         outputs = np.stack([one.outputs[0, 1:] for one in made])
@@ -195,7 +195,7 @@ class AlongMotion:
 
 
 def _stretches(state: Codes) -> Iterator[tuple[int, int]]:
-    """Runs of samples with a whole kernel; a start begins a run of its own."""
+    """Runs of samples with a complete kernel; a start begins a new run."""
     begin = -1
     for k in range(state.size):
         if begin >= 0 and state[k] in (EMPTY, FIRST):
@@ -208,7 +208,7 @@ def _stretches(state: Codes) -> Iterator[tuple[int, int]]:
 
 
 def _without_fit(system: System) -> System:
-    """The system with nothing to fit, so that no sensitivity is carried along."""
+    """The system without free parameters, so that no sensitivities are computed."""
     fixed = {name: replace(p, fixed=True) for name, p in system.parameters.items()}
     return dataclasses.replace(system, parameters=fixed)
 
@@ -216,7 +216,7 @@ def _without_fit(system: System) -> System:
 def balanced(
     compiled: CompiledSystem, parameters: FloatArray, still: FloatArray, dt: float
 ) -> FloatArray:
-    """Hidden states after rows of rest, shape (states,); the model's own where they diverge."""
+    """Hidden states after rows at rest, shape (states,); the model's own if they diverge."""
     start = np.array([state.start for state in compiled.system.states.values()])
     with np.errstate(over="ignore", invalid="ignore"):
         made = compiled.simulate(
@@ -227,10 +227,10 @@ def balanced(
 
 
 def predicted_channel(model: Model) -> str:
-    """The channel that the prediction is held against.
+    """The channel that the prediction is compared with.
 
     Raises:
-        ModelError: nothing measured is left to predict.
+        ModelError: no measured output is left to predict.
     """
     names = predicted_outputs(model)
     if not names:

@@ -1,4 +1,4 @@
-"""The range of motion that a model was fitted to, and how far a sample lies beyond it."""
+"""The range of motion that a model was fitted to, and the distance of a sample from it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,23 +12,23 @@ from monitor.observer.spectral_width import SpectralWidth, Spectrum
 from rigwatch.wire.arrays import FloatArray
 
 ALLOWED = 1.2
-"""Half width of what is judged, in half the width of what was fitted."""
+"""Half width of the judged range, relative to that of the fitted range."""
 WIDER = 0.25
-"""Broadening that is always judged: what changes of the drive and faults do to a tone."""
+"""Spectral broadening that is always judged: that of a tone by drive changes and faults."""
 FASTER = 1.1
-"""Mean frequency that is judged, over the largest that was fitted of a motion of that size."""
+"""Largest judged mean frequency, relative to the largest fitted for a motion of that size."""
 LEVELS, LEVEL_STEP = 24, 1.1
-"""Sizes of motion that are told apart, and the ratio of two of them."""
+"""Number of motion sizes distinguished, and ratio of successive sizes."""
 PREDICTION = "predicted"
-"""What the high-passed prediction is called among the signals of a range."""
+"""Name of the high-passed prediction among the signals of a range."""
 
 
 class RangeSeen:
     """Judges samples by the range in the model file, block by block.
 
     Args:
-        model: with a range, and the speed that cannot be told from rest.
-        speed: place of the speed among inputs and motion.
+        model: with a range, and the speed that cannot be distinguished from rest.
+        speed: index of the speed among inputs and motion.
     """
 
     def __init__(self, model: RigModel, speed: int) -> None:
@@ -44,8 +44,10 @@ class RangeSeen:
         self._paces = np.array([*model.motion_range.paces, np.inf])
 
     def distance(self, seen: Observed) -> FloatArray:
-        """Largest of: distance of a signal from the middle, of the spectrum's width from a tone's,
-        mean frequency against what was seen of a motion of that size; 1 at the limit, shape (n,).
+        """Distance from the fitted range, 1 at the limit, shape (n,).
+
+        It is the largest of: distance of a signal from the centre, width of the spectrum compared
+        with a tone's, and mean frequency compared with the largest for a motion of that size.
         """
         signals = range_signals(seen)
         far = (np.abs(signals - self._middle) / self._half).max(axis=1)
@@ -62,7 +64,7 @@ def range_signals(seen: Observed) -> FloatArray:
 
 
 def drive_energy(rows: FloatArray, seen: RangeSection, motions: Sequence[int]) -> FloatArray:
-    """Square of the inputs that are no motion, 1 at the edge of their range, shape (n,)."""
+    """Squared inputs other than motion, 1 at the edge of their range, shape (n,)."""
     inputs = [place for place in range(rows.shape[1]) if place not in motions]
     low, high = np.array(seen.low)[inputs], np.array(seen.high)[inputs]
     scaled = (rows[:, inputs] - 0.5 * (low + high)) / np.maximum(0.5 * (high - low), 1e-12)
@@ -80,8 +82,8 @@ def range_of(
     Args:
         names: of the signals.
         parts: of each recording, shape (n, signals).
-        motions: spectra of each recording once it has begun.
-        bends: largest differences of channels that show a state.
+        motions: spectra of each recording after its start.
+        bends: largest differences of channels that measure a state.
     """
     every = np.concatenate(parts)
     narrow, pace, size = (np.concatenate(part) for part in zip(*motions, strict=True))

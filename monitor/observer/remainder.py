@@ -1,7 +1,7 @@
-"""What the equations leave of healthy recordings, as a polynomial in motion and hidden states.
+"""The equations' residual on healthy recordings, as a polynomial in motion and hidden states.
 
-It is smooth and fixed once it is fitted, so that what a fault adds later is not in it. Ridge
-regression keeps terms small that the recordings do not tell apart.
+The polynomial is smooth and fixed after fitting, so it cannot absorb a later fault. Ridge
+regression keeps terms small that the recordings do not determine.
 """
 
 from collections.abc import Sequence
@@ -14,11 +14,11 @@ from monitor.observer.missing_force import terms
 from rigwatch.wire.arrays import FloatArray
 
 RIDGE = 3e-3
-"""Weight of the terms' size against the error, both in their deviations."""
+"""Ridge weight of the coefficients relative to the error, both in standard deviations."""
 
 
 def no_remainder(signals: int) -> RemainderSection:
-    """Nothing is left."""
+    """The zero remainder."""
     count = signals + signals * (signals + 1) // 2
     return RemainderSection(centre=(0.0,) * signals, scale=(1.0,) * signals, weights=(0.0,) * count)
 
@@ -33,7 +33,7 @@ def fit_remainder(
     Args:
         parts: signals, shape (n, signals), and high-passed residual, shape (n,), of each recording.
         filters: of the high-pass.
-        skip: samples of each beginning that are not counted.
+        skip: number of samples skipped at the start of each.
     """
     every = np.concatenate([signals[skip:] for signals, _ in parts])
     centre, scale = every.mean(axis=0), np.maximum(every.std(axis=0), 1e-12)

@@ -1,10 +1,10 @@
-"""How broad the spectrum of the motion is, of late: a tone's is narrow, that of noise is not.
+"""Current bandwidth of the motion's spectrum: narrow for a tone, broad for noise.
 
     q = ⟨v²⟩ / √(⟨(∫v)²⟩·⟨(Δv)²⟩),   1 for one frequency, less for several at once
 
-the bandwidth parameter of random processes (D. E. Cartwright, M. S. Longuet-Higgins, Proc. Royal
-Society A 237, 1956). What equations leave of tones says nothing about several at once, which mix
-in whatever they lack.
+This is the bandwidth parameter of random processes (D. E. Cartwright, M. S. Longuet-Higgins, Proc.
+Royal Society A 237, 1956). A remainder fitted to single tones is not valid for several at once, as
+nonlinear terms missing in the equations mix them.
 """
 
 from typing import NamedTuple
@@ -17,17 +17,17 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
 SLOWEST = 1.0
-"""Corner below which motion does not count: the mass drifts [Hz]."""
+"""Corner below which motion is ignored, as the mass drifts [Hz]."""
 MEMORY = 0.5
-"""Time over which the means reach back [s]."""
+"""Averaging time of the means [s]."""
 
 
 class Spectrum(NamedTuple):
-    """Figures of the motion after each sample, each of shape (n,).
+    """Spectral parameters of the motion after each sample, each of shape (n,).
 
     Attributes:
-        narrow: q; 1 at rest and without a whole kernel.
-        pace: mean frequency, √(⟨(Δv)²⟩/⟨v²⟩) as that of a tone [Hz]; 0 at rest.
+        narrow: q; 1 at rest and with an incomplete kernel.
+        pace: mean frequency, from √(⟨(Δv)²⟩/⟨v²⟩) as for a tone [Hz]; 0 at rest.
         size: root mean square of the rate of the speed [m/s^2]; 0 at rest.
     """
 
@@ -40,8 +40,8 @@ class SpectralWidth:
     """Carries the means from block to block.
 
     Args:
-        slow: speed that cannot be told from rest [m/s].
-        rate: samples a second [Hz].
+        slow: speed that cannot be distinguished from rest [m/s].
+        rate: sample rate [Hz].
     """
 
     def __init__(self, slow: float, rate: float) -> None:
@@ -69,7 +69,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
     kept: FloatArray,
     out: FloatArray,
 ) -> None:
-    """`kept` holds the way, the last speed, and the means of way, speed and change squared."""
+    """`kept` holds displacement, last speed, and mean squares of displacement, speed and change."""
     for k in range(state.size):
         if state[k] == EMPTY:
             continue

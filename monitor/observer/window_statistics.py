@@ -1,4 +1,4 @@
-"""Statistics of the last samples that the observer decides by: energies, friction, rest."""
+"""Window statistics for the observer's decision: energies, friction, rest."""
 
 # Compiled functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
@@ -17,14 +17,14 @@ from monitor.observer.decision_state import (
 )
 
 HEAD, FILLED = 0, 1
-"""Places of `decision_state.Counts`, as the kernel needs constants."""
+"""Indices of `decision_state.Counts` as constants for the kernel."""
 RIDGE = 1e-3
-"""Of the viscous regressor against the dry one, where the two cannot be told apart."""
+"""Correlation of the viscous and the dry regressor above which they cannot be distinguished."""
 
 
 @njit()
 def mean_square(kept: DecisionState, column: int, length: int) -> float:
-    """Of a column over the last samples."""
+    """Mean square of a column over the last samples."""
     n = min(length, kept.counts[FILLED])
     total = 0.0
     for ago in range(1, n + 1):
@@ -34,8 +34,9 @@ def mean_square(kept: DecisionState, column: int, length: int) -> float:
 
 @njit()
 def _slides(kept: DecisionState, ago: int) -> bool:
-    """Whether the motion has kept its direction for as long as real friction takes to turn its own:
-    contacts deform before they slide, and sensors are late.
+    """Whether the motion has kept its direction long enough for real friction to change sign.
+
+    Contacts deform before they slide, and sensors are delayed.
     """
     head = kept.counts[HEAD]
     speed = kept.rows[(head - ago) % HISTORY, SPEED]
@@ -49,8 +50,10 @@ def _slides(kept: DecisionState, ago: int) -> bool:
 def friction(
     kept: DecisionState, length: int, spread: float
 ) -> tuple[float, float, float, float, float]:
-    """Coulomb force, viscous coefficient, the former in deviations, and the shares of the residual,
-    beyond its healthy spread, that both explain and that the dry part stands for.
+    """Coulomb force, viscous coefficient, the former in standard deviations, and two shares.
+
+    The shares are of the residual beyond its healthy variance: explained by both friction terms,
+    and contained in the dry term.
     """
     n = min(length, kept.counts[FILLED])
     used = 0
@@ -82,8 +85,10 @@ def friction(
 
 @njit()
 def dry_force(kept: DecisionState, length: int) -> float:
-    """Force of dry friction alone [N]: viscous friction beside it is hardly told from it by a
-    steady motion, and takes from it what smoothing and presliding round off.
+    """Force of dry friction alone [N].
+
+    A steady motion hardly distinguishes viscous friction from it, and a joint fit would assign to
+    viscous friction what smoothing and presliding round off.
     """
     n = min(length, kept.counts[FILLED])
     a = p = 0.0
@@ -98,7 +103,7 @@ def dry_force(kept: DecisionState, length: int) -> float:
 
 @njit()
 def rest(kept: DecisionState, length: int, slow: float) -> float:
-    """Share of the time at which the motion cannot be told from rest."""
+    """Share of the time at which the motion cannot be distinguished from rest."""
     n = min(length, kept.counts[FILLED])
     still = 0
     for ago in range(1, n + 1):
@@ -108,7 +113,7 @@ def rest(kept: DecisionState, length: int, slow: float) -> float:
 
 @njit()
 def reversals(kept: DecisionState, length: int, slow: float) -> int:
-    """How often the motion turns, beyond what noise does."""
+    """Number of reversals of the motion beyond noise."""
     n = min(length, kept.counts[FILLED])
     found, side = 0, 0
     for ago in range(n, 0, -1):

@@ -1,4 +1,4 @@
-"""From samples to results, without a clock, a bus or a file.
+"""The processing pipeline from samples to results, without clock, bus or files.
 
 RigMonitor.update(block) ──▶ admission ──▶ residual ──▶ decision ──▶ estimates ──▶ alarms
 """

@@ -3,9 +3,9 @@
     SampleBlock ─▶ admission ─▶ signals ─▶ range ─▶ decision ─▶ Result
                        └─▶ clipping of each channel ─▶ Result
 
-As with the other scheme, every stage carries its state from sample to sample, so that live and
-replay agree to the last bit however the samples are cut. What is judged lies `half_width` samples
-back, and is published with the sample that completes it.
+As in the friction scheme, every stage carries its state from sample to sample, so live and replay
+agree to the last bit for any division into blocks. Results refer to the sample `half_width` earlier
+and are published with the sample that completes them.
 """
 
 import numpy as np
@@ -42,8 +42,8 @@ class ObserverMonitor:
         model: with a plant of equations.
 
     Raises:
-        ModelError: its equations do not fit.
-        KeyError: at `update`, where a block lacks one of the model's channels.
+        ModelError: its equations are invalid.
+        KeyError: at `update`, if a block lacks one of the model's channels.
     """
 
     def __init__(self, model: RigModel) -> None:
@@ -61,10 +61,10 @@ class ObserverMonitor:
         self._follow(model)
 
     def adopt(self, model: RigModel) -> None:
-        """Go on with another model from the next sample: filters run on.
+        """Use another model from the next sample; filters keep their state.
 
         Raises:
-            ModelError: the equations of the new model are others.
+            ModelError: the new model has other equations.
         """
         check_can_follow(self.model, model)
         self._follow(model)
@@ -76,7 +76,7 @@ class ObserverMonitor:
         self._clipping = Clipping(model)
 
     def update(self, block: SampleBlock) -> Result | None:
-        """Take the next block; None where it holds nothing new."""
+        """Process the next block; None if it contains nothing new."""
         admitted = self._admission.admit(block)
         if admitted is None:
             return None
@@ -149,7 +149,7 @@ class ObserverMonitor:
         )
 
     def _force_limit(self, out: FloatArray) -> FloatArray:
-        """Coulomb force at which the rig has departed [N]; 0 where nothing moves."""
+        """Coulomb force at which the rig has departed [N]; 0 at rest."""
         sizes = np.abs(out[d.DEVIATIONS])
         with np.errstate(divide="ignore", invalid="ignore"):
             found = np.abs(out[d.FORCE]) / sizes * self.rules.friction

@@ -1,10 +1,10 @@
-"""The monitor as one pure object: sample blocks in, estimates and conditions out.
+"""The friction scheme as one pure object: sample blocks in, estimates and conditions out.
 
     SampleBlock ─▶ admission ─▶ residual ─▶ watch (reference, estimates, departure, verdict) ─▶
     Result               └─▶ clipping of each channel ─▶ Result
 
-It knows no clock, bus or file, and every stage goes sample by sample with carried state: the same
-samples give the same numbers to the last bit, live or replayed, however they are cut into blocks.
+It uses no clock, bus or file, and every stage works sample by sample with carried state: the same
+samples give the same numbers to the last bit, live or in replay, for any division into blocks.
 """
 
 from dataclasses import replace
@@ -53,17 +53,17 @@ PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("rho", "", w.RHO),
     ("together", "", w.TOGETHER),
 )
-"""Columns of an estimate block: name, unit, place in the kernel's output."""
+"""Columns of an estimate block: name, unit, index in the kernel's output."""
 
 
 class Monitor:
     """The friction scheme, running.
 
     Args:
-        model: what commissioning found.
+        model: the model file from commissioning.
 
     Raises:
-        KeyError: at `update`, where a block lacks one of the model's channels.
+        KeyError: at `update`, if a block lacks one of the model's channels.
     """
 
     def __init__(self, model: RigModel) -> None:
@@ -74,10 +74,10 @@ class Monitor:
         self._follow(model)
 
     def adopt(self, model: RigModel) -> None:
-        """Go on with another model from the next sample: filters run on, estimates start anew.
+        """Use another model from the next sample; filters keep their state, estimates restart.
 
         Raises:
-            ModelError: the filters of the new model are others.
+            ModelError: the new model has other filters.
         """
         check_can_follow(self.model, model)
         if isinstance(self._residual, InertiaResidual) and isinstance(model.plant, InertiaPlant):
@@ -85,7 +85,7 @@ class Monitor:
         self._follow(model)
 
     def _follow(self, model: RigModel) -> None:
-        """Judge by this model from the next sample on."""
+        """Use the decision rules of this model from the next sample on."""
         self.model, self.rules = model, rules_for(model)
         self._clipping = Clipping(model)
         self._promoted = PromotedFriction(model)
@@ -94,7 +94,7 @@ class Monitor:
         self._state = _new_state(model)
 
     def update(self, block: SampleBlock) -> Result | None:
-        """Take the next block; None where it holds nothing new."""
+        """Process the next block; None if it contains nothing new."""
         admitted = self._admission.admit(block)
         if admitted is None:
             return None
@@ -191,7 +191,7 @@ def _arming_rules(model: RigModel) -> ReferenceRules:
 
 def _known(model: RigModel) -> list[tuple[FloatArray, float, int]]:
     if model.promoted:
-        # Kept periods were modelled without what has been learnt since.
+        # Stored periods were modelled without the friction learnt since.
         return []
     return [
         (np.array([r.voltage, r.position, r.acceleration, r.modelled]), r.scale, r.periods)

@@ -1,14 +1,14 @@
-"""Friction that the model has learnt, as part of the modelled acceleration.
+"""Promoted friction: learnt friction as part of the modelled acceleration.
 
     am ← am + θ1·g1 + θ2·g2 - d1·|g1| - d2·|g2|
 
-with g1, g2 the regressors of the residual stage, so that friction goes through the same filter as
-its estimates do; d, the halves of what differs by direction, only for an inertia, whose g have the
+with g1, g2 the regressors of the residual stage, so friction passes through the same filter as its
+estimates; d, half the differences between the directions, only for an inertia, whose g have the
 sign of -v.
 
-Where the velocity is noisy, its sign turns a sample early or late, and a promoted friction jumps
-with it: noise that was not there before. With `smooth`, g1 is Ge[tanh(v/smooth)] here. What is
-estimated from then on is friction beyond that.
+With a noisy velocity the sign changes a sample early or late, and promoted friction jumps with it,
+which adds noise. With `smooth`, g1 is Ge[tanh(v/smooth)] here. Subsequent estimates are of friction
+in addition to this.
 """
 
 import math
@@ -28,7 +28,7 @@ class PromotedFriction:
     """The running stage, between residual and watch.
 
     Args:
-        model: in force; without promoted friction nothing is added.
+        model: the current model; without promoted friction nothing is added.
     """
 
     def __init__(self, model: RigModel) -> None:
@@ -37,7 +37,7 @@ class PromotedFriction:
         self._state = np.zeros(max(self._b.size - 1, 1))
 
     def add(self, data: FloatArray, code: Codes) -> None:
-        """Add it to the residual stage's columns, shape (n, 7), sample by sample, in place."""
+        """Add promoted friction to the residual stage's columns, shape (n, 7), in place."""
         known = self._promoted
         if known.smooth > 0.0:
             g1 = np.zeros(len(data))
@@ -71,7 +71,7 @@ def _smoothed(  # noqa: PLR0917
 
 @dataclass(frozen=True)
 class Frozen:
-    """What of a model must stay as it is while the monitor runs on."""
+    """The parts of a model that must not change while the monitor runs."""
 
     sample_rate: float
     channels: tuple[str, ...]
@@ -80,10 +80,10 @@ class Frozen:
 
 
 def check_can_follow(old: RigModel, new: RigModel) -> None:
-    """Refuse a model that the running filters do not suit.
+    """Check that a new model is compatible with the running filters.
 
     Raises:
-        ModelError: more differs than mass, offset, friction, noise and limits.
+        ModelError: it differs in more than mass, offset, friction, noise and limits.
     """
     if _frozen(old) != _frozen(new):
         raise ModelError(

@@ -1,4 +1,4 @@
-"""What a scheme of the monitor gives for one block of samples."""
+"""Result of a monitoring scheme for one block of samples."""
 
 from dataclasses import dataclass
 
@@ -8,11 +8,10 @@ from rigwatch.wire.messages import EstimateBlock
 
 @dataclass(frozen=True)
 class Result:
-    """What one sample block gave.
+    """Result for one sample block.
 
     Args:
-        estimates: the published columns, one row a sample of the block that had not been seen
-            before.
+        estimates: the published columns, one row per new sample of the block.
         conditions: one of each of `conditions.CONDITION_KINDS`, and one of clipping for each
             channel that the model can judge, of the same length.
     """

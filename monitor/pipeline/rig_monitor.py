@@ -1,11 +1,11 @@
-"""All that the monitor makes of samples, live and in replay alike: estimates and alarms.
+"""The complete monitor, for live use and replay: samples in, estimates and alarms out.
 
     SampleBlock ─▶ pipeline ──▶ conditions ─▶ alarms ─▶ announcements
                 ├▶ detectors ─▶ conditions ─┘
                 └▶ quality ───▶ conditions ─┘
 
-Pure as its parts are: no clock, bus or file, and the same samples give the same results however
-they are cut into blocks.
+It is pure: no clock, bus or file, and the same samples give the same results for any division into
+blocks.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,12 +23,12 @@ from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, cut
 from rigwatch.wire.rig_config import AlarmSection
 
 OF_SAMPLES = frozenset({GAP, SENSOR_CLIPPED, SENSOR_INVALID})
-"""Conditions of the samples themselves, judged whether the friction scheme is wanted or not."""
+"""Conditions of the samples themselves, independent of the friction scheme."""
 
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What came of one block: its estimates, its conditions, and what to announce, in order."""
+    """Results of one block: estimates, conditions, and messages to announce, in order."""
 
     estimates: EstimateBlock
     conditions: tuple[Condition, ...]
@@ -39,11 +39,11 @@ class RigMonitor:
     """Pipeline, detectors and alarms of one rig.
 
     Args:
-        model: what commissioning found.
+        model: the model file from commissioning.
         settings: sections of [monitor.alarms].
-        detectors: what runs beside the friction scheme.
+        detectors: detectors in addition to the friction scheme.
         file: the configuration's name, for errors.
-        friction: whether the friction scheme raises alarms; its estimates are made in any case.
+        friction: whether the friction scheme raises alarms; its estimates are always computed.
 
     Raises:
         ConfigError: a section names no alarm.
@@ -63,7 +63,7 @@ class RigMonitor:
         self._detectors = tuple(detectors)
 
     def update(self, block: SampleBlock) -> Watched | None:
-        """Take the next block; None where it holds nothing new.
+        """Process the next block; None if it contains nothing new.
 
         Raises:
             KeyError: the block lacks a channel of the model.
@@ -72,7 +72,7 @@ class RigMonitor:
         return None if judged is None else Watched(*judged, self.announce(*judged))
 
     def judge(self, block: SampleBlock) -> tuple[EstimateBlock, tuple[Condition, ...]] | None:
-        """Estimates and conditions of the next block, to be published before its alarms.
+        """Compute estimates and conditions of the next block, to be published before its alarms.
 
         Raises:
             KeyError: the block lacks a channel of the model.
@@ -92,44 +92,44 @@ class RigMonitor:
         return replace(at, columns=columns), (*own, *more, *quality)
 
     def announce(self, at: EstimateBlock, conditions: tuple[Condition, ...]) -> list[Announcement]:
-        """What the alarms say to conditions, in the order in which they were judged."""
+        """Messages of the alarms for conditions, in order."""
         return self.alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
 
     @property
     def model(self) -> RigModel:
-        """The model in force."""
+        """The current model."""
         return self._pipeline.model
 
     def adopt(self, model: RigModel) -> None:
-        """Judge with another model from the next sample on.
+        """Use another model from the next sample on.
 
         Raises:
-            ModelError: it asks for other channels or filters.
+            ModelError: it needs other channels or filters.
         """
         self._pipeline.adopt(model)
 
     def learn(self, block: SampleBlock) -> None:
-        """Take a block that an earlier run has judged already: state moves on, nothing is said."""
+        """Process a block that an earlier run has published: update the state, publish nothing."""
         self._pipeline.update(block)
         for detector in self._detectors:
             detector.update(block)
 
 
 def scheme_of(model: RigModel) -> Monitor | ObserverMonitor:
-    """The scheme that a model's plant asks for.
+    """The scheme for a model's plant.
 
     Raises:
-        ModelError: its equations do not fit.
+        ModelError: its equations are invalid.
     """
     return ObserverMonitor(model) if isinstance(model.plant, EquationsPlant) else Monitor(model)
 
 
 def compile_kernels(model: RigModel, detectors: Sequence[Detector] = ()) -> None:
-    """Run every kernel once on a monitor of its own, so that the first sample does not wait.
+    """Run every kernel once on a separate monitor, so that the first sample is not delayed.
 
     Args:
         model: of the rig.
-        detectors: the configured ones, made for this: they are fed with zeros.
+        detectors: separate instances of the configured detectors, which receive zeros.
     """
     n = 4
     zeros = np.zeros(n)

@@ -1,7 +1,7 @@
-"""How far the monitor has come, kept so that a killed monitor's successor continues from there.
+"""The monitor's position in the stream, from which it continues after a kill.
 
-Twenty bytes in a file that is mapped into memory: boot, seq, CRC-32. Writing costs no system call,
-and the kernel keeps what was written when the process is killed.
+Twenty bytes in a memory-mapped file: boot, seq, CRC-32. Writing needs no system call, and the
+kernel keeps the data when the process is killed.
 """
 
 import contextlib
@@ -21,10 +21,10 @@ _SIZE = _POSITION.size + _CRC.size
 
 
 class Cursor:
-    """(boot, seq) of the last sample dealt with, in the file at `path`.
+    """(boot, seq) of the last processed sample, in the file at `path`.
 
     Raises:
-        SessionError: the file cannot be opened or made.
+        SessionError: the file cannot be opened or created.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -38,7 +38,7 @@ class Cursor:
             raise SessionError(f"{path}: cannot be opened: {error.strerror}") from error
 
     def read(self) -> tuple[int, int] | None:
-        """The position that stands in the file; None where none does."""
+        """The stored position; None if there is none."""
         data = self._bytes[:]
         (crc,) = _CRC.unpack_from(data, _POSITION.size)
         if crc == 0 or crc != zlib.crc32(data[: _POSITION.size]):
@@ -50,13 +50,13 @@ class Cursor:
         return boot, seq
 
     def set_aside(self) -> None:
-        """Keep what stands in the file beside it for whoever looks, and begin anew."""
+        """Move the invalid content to a file beside it for inspection, and start afresh."""
         with contextlib.suppress(OSError):
             self._path.with_name(f"{self._path.name}.set-aside").write_bytes(self._bytes[:])
         self._bytes[:] = bytes(_SIZE)
 
     def write(self, boot: int, seq: int) -> None:
-        """The sample `seq` of `boot` and all before it are dealt with."""
+        """Record that sample `seq` of `boot` and all before it are processed."""
         data = _POSITION.pack(boot, seq)
         self._bytes[:] = data + _CRC.pack(zlib.crc32(data))
 
@@ -66,7 +66,7 @@ class Cursor:
 
 
 def _mapped(file: int) -> mmap.mmap:
-    """The file in memory, or memory alone: a write without its place on a full disk would kill."""
+    """The mapped file, or plain memory: writing to a mapping on a full disk kills the process."""
     try:
         os.posix_fallocate(file, 0, _SIZE)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""How the monitor itself is doing, once a second: samples, losses, queue, latency."""
+"""The monitor's own health message, once a second: samples, losses, queue, latency."""
 
 from collections import deque
 
@@ -12,10 +12,10 @@ INTERVAL_NS = 1_000_000_000
 
 
 class HealthBook:
-    """Collects figures and turns them into a message.
+    """Collects figures for the health message.
 
     Args:
-        source: who speaks, such as "monitor".
+        source: name of the sender, such as "monitor".
     """
 
     def __init__(self, source: str) -> None:
@@ -24,7 +24,7 @@ class HealthBook:
         self._said_ns = 0
 
     def judged(self, sample_ns: int, now_ns: int) -> None:
-        """Estimates of a sample that was taken at `sample_ns` left at `now_ns` [ns]."""
+        """Record that estimates of a sample taken at `sample_ns` are published at `now_ns` [ns]."""
         self._latency_ms.append((now_ns - sample_ns) / 1e6)
 
     def is_due(self, now_ns: int) -> bool:
@@ -37,7 +37,7 @@ class HealthBook:
     def message(
         self, t_ns: int, state: str, text: str, counters: Counters, extra: dict[str, float]
     ) -> Health:
-        """The health now."""
+        """The current health message."""
         latencies = np.array(self._latency_ms) if self._latency_ms else np.full(1, np.nan)
         self._latency_ms.clear()
         figures = {

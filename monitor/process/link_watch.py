@@ -1,7 +1,7 @@
-"""What the monitor notices without a sample: silence, a missing daq, a second source, losses.
+"""Alarms of the link: silence, a missing daq, a second source, losses.
 
-Each is an alarm that clears by itself when its reason is gone. `LinkWatch` is told the time and
-what was seen, and reads neither clock nor bus.
+Each alarm clears when its cause is gone. `LinkWatch` receives the time and the observations as
+arguments and reads neither clock nor bus.
 """
 
 from collections.abc import Iterator
@@ -11,26 +11,26 @@ from monitor.alarms import Occasion
 from rigwatch.wire.messages import Health
 
 LOSS_SHOWN_NS = 1_000_000_000
-"""A loss stands for this long after its last gap [ns]."""
+"""Time for which a loss alarm holds after the last gap [ns]."""
 DRIFT_PPM = 500.0
-"""A device's clock that runs faster or slower by more is worth an alarm [ppm]."""
+"""Clock deviation of a device above which an alarm is raised [ppm]."""
 UNJUDGED_S = 1.0
-"""Samples without an estimate for longer are an alarm [s]."""
+"""Time without an estimate, while samples arrive, after which an alarm is raised [s]."""
 ALMOST_FULL = 0.02
-"""Share of the disk below which recording ends soon."""
+"""Share of free disk below which recording is about to stop."""
 CLOCK_STEP_NS = 500_000_000
-"""A wall clock that moves by more against the monotonic one was set [ns]."""
+"""Step of the wall clock against the monotonic one that counts as setting the clock [ns]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What the process sees at one moment.
+    """Observations of the process at one moment.
 
     Attributes:
         t_ns: Unix time [ns].
-        monotonic_ns: time on a clock that nobody sets [ns].
-        silent_s: time since the last sample came [s].
-        daq_trouble: why no samples can come, as far as daq says so or is gone; "" for no reason.
+        monotonic_ns: monotonic time [ns].
+        silent_s: time since the last sample [s].
+        daq_trouble: why no samples arrive, as reported by daq or because it is gone; otherwise "".
         contested: whether a second source sends samples.
         device: the device's name.
         position: (boot, seq) of the last sample.
@@ -59,12 +59,12 @@ class LinkWatch:
         self._clock_offset_ns: int | None = None
 
     def lost(self, samples: int, monotonic_ns: int) -> None:
-        """Samples were lost; 0 for an unknown number."""
+        """Record lost samples; 0 for an unknown number."""
         self._lost += samples
         self._lost_at_ns = monotonic_ns
 
     def reports(self, seen: Seen) -> Iterator[tuple[str, Occasion, bool]]:
-        """Name, occasion and whether it holds, of every alarm of the link."""
+        """Name, occasion and state of every alarm of the link."""
         silent_ms, limit_ms = seen.silent_s * 1e3, self._stale_after * 1e3
         stale = seen.silent_s > self._stale_after
         yield "stale", _occasion(seen, silent_ms, limit_ms), stale
@@ -74,7 +74,7 @@ class LinkWatch:
         yield "loss", _occasion(seen, float(self._lost), 0.0, "samples lost so far"), losing
 
     def clock_step(self, seen: Seen) -> int:
-        """By how much the wall clock was set since the last call [ns]; 0 where it was not."""
+        """Step of the wall clock since the last call [ns]; 0 if it was not set."""
         offset, before = seen.t_ns - seen.monotonic_ns, self._clock_offset_ns
         self._clock_offset_ns = offset
         step = 0 if before is None else offset - before
@@ -84,13 +84,13 @@ class LinkWatch:
 def device_reports(
     seen: Seen, daq: Health | None, unjudged_s: float, why: str
 ) -> Iterator[tuple[str, Occasion, bool]]:
-    """The same for what is wrong with the device although samples arrive.
+    """The same for faults of the device while samples arrive.
 
     Args:
-        seen: what the process sees now.
+        seen: current observations.
         daq: the last health message of data acquisition, None if there is none.
         unjudged_s: time since the last estimate, while samples arrived [s].
-        why: why there are none, "" if that is not known.
+        why: why there are no estimates, "" if unknown.
     """
     state, text = (daq.state, daq.text) if daq else ("", "")
     yield "line_noise", _occasion(seen, text=text), state == "garbage"
@@ -107,9 +107,9 @@ def disk_reports(
     """The same for the alarms of disk and recording.
 
     Args:
-        seen: what the process sees now.
+        seen: current observations.
         recorder: the recorder's last health message, None if it has never sent one.
-        alive: whether the recorder's process is there.
+        alive: whether the recorder's process is running.
         journal_failure: why the alarm journal cannot be written, "" if it can.
     """
     free = recorder.counters.get("free_share", -1.0) if recorder else -1.0

@@ -48,19 +48,19 @@ from rigwatch.wire.messages import (
 from rigwatch.wire.rig_config import MonitorSection, RigConfig, load_rig, section_or_error
 
 TURN = 0.02
-"""Longest wait for samples before commands and silence are looked at [s]."""
+"""Longest wait for samples before commands and silence are checked [s]."""
 LONGEST_BLOCK = 512
-"""Samples judged and published at a time when the monitor is behind."""
+"""Number of samples processed and published per step while the monitor catches up."""
 
 
 class MonitorProcess:
-    """Everything that one run of the monitor has open.
+    """The resources of one run of the monitor.
 
     Args:
         config: the rig's configuration, with a section [monitor].
         path: its file, for errors.
-        model: as `suitable_model` gives it.
-        bus: where samples come from and results go.
+        model: from `suitable_model`.
+        bus: source of samples and destination of results.
 
     Raises:
         ConfigError: a section of [monitor.alarms] names no alarm, or a detector does not suit.
@@ -102,7 +102,7 @@ class MonitorProcess:
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
 
     def take(self, item: SampleBlock | Gap | Event) -> None:
-        """Deal with one thing that the reader gave."""
+        """Process one item from the reader."""
         if isinstance(item, SampleBlock):
             for block in pieces(item, LONGEST_BLOCK):
                 self._judge(block)
@@ -114,7 +114,7 @@ class MonitorProcess:
                 self._cursor.set_aside()
 
     def look_around(self) -> None:
-        """Remember how far it has come, obey commands, judge the link, tell the health."""
+        """Store the position, execute commands, check the link, publish the health."""
         if self._cursor and (position := self.reader.position):
             self._cursor.write(*position)
         for command in self._commands.drain():
@@ -138,7 +138,7 @@ class MonitorProcess:
             self._tell_health(seen)
 
     def _announce_router(self, seen: Seen) -> None:
-        """Tell those who only listen that the router was away: nobody could while it was."""
+        """Report to subscribers that the router was unavailable."""
         if not self.bus.connected():
             self._router_lost_at = self._router_lost_at or time.monotonic()
         elif self._router_lost_at is not None:
@@ -147,7 +147,7 @@ class MonitorProcess:
             self.bus.publish(EVENTS, Event("monitor", seen.t_ns, "warning", "ROUTER BACK", text))
 
     def say(self, announcements: Iterable[Announcement]) -> None:
-        """Journal what changed, then publish it."""
+        """Write changes to the journal, then publish them."""
         if changes := self.rig.alarms.take_changes():
             self._standing = self.rig.alarms.standing()
             if self._journal:
@@ -158,7 +158,7 @@ class MonitorProcess:
             self.bus.publish(ALARMS if isinstance(said, Alarm) else EVENTS, said)
 
     def close(self) -> None:
-        """Leave everything in order."""
+        """Close all resources."""
         self.reader.close()
         self._models.close()
         for kept in (self._journal, self._cursor):
@@ -166,7 +166,7 @@ class MonitorProcess:
                 kept.close()
 
     def _change_models(self) -> None:
-        """Between two samples: all that the reader has given so far has been judged."""
+        """Apply model changes; all samples read so far have been processed."""
         boot, last = self.reader.position or (0, -1)
         at = self._judged_ns + 1 if last >= 0 else time.time_ns()
         for change in self._models.changes(Place(self._device, boot, last + 1, at)):
@@ -198,7 +198,7 @@ class MonitorProcess:
         self.say(self.rig.announce(*judged))
 
     def _known_of(self, block: SampleBlock) -> int:
-        """How many of the block's samples an earlier run has judged already."""
+        """Number of the block's samples that an earlier run has processed."""
         if self._done is None or self._done[0] != block.boot:
             return 0
         return max(0, min(len(block), self._done[1] + 1 - block.seq))
@@ -284,7 +284,7 @@ def suitable_model(config: RigConfig, path: Path | str) -> RigModel:
 
 
 def watch(process: MonitorProcess, stop: threading.Event) -> None:
-    """The loop: samples as they come, everything else in between, until `stop` is set."""
+    """The loop: samples as they arrive, everything else in between, until `stop` is set."""
     heartbeat = Heartbeat("monitor")
     prepare_for_real_time()
     heartbeat.ready()
@@ -300,12 +300,12 @@ def run(path: Path | str) -> int:
     """Monitor the rig at `path` until a signal ends it; the exit code.
 
     Raises:
-        RigwatchError: configuration, model, journal or bus are not as they should be.
+        RigwatchError: configuration, model, journal or bus are invalid or unavailable.
     """
     stop = set_at_signal()
     config = load_rig(path)
     model = suitable_model(config, path)
-    # Before the bus is joined, so that one who is seen there is ready to judge.
+    # Before joining the bus, so that a monitor visible there is ready.
     names = monitor_section(config, path).detectors
     compile_kernels(model, detectors_of(names, model, path))
     raise_priority(MONITOR)

@@ -18,7 +18,7 @@ from rigwatch.wire.messages import ModelChange
 
 @dataclass(eq=False)
 class _Waiting:
-    """A wish whose sender waits for the answer."""
+    """A request whose sender waits for the answer."""
 
     wish: Wish
     withdrawn: bool = False
@@ -28,7 +28,7 @@ class _Waiting:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where in the stream of samples the monitor stands: the next sample and its time at least."""
+    """Position in the stream of samples: the next sample and its earliest time."""
 
     device: str
     boot: int
@@ -37,11 +37,11 @@ class Place:
 
 
 class ModelDesk:
-    """One desk of one monitor.
+    """Receives and applies the model-change requests of one monitor.
 
     Args:
-        bus: where requests come from.
-        rig: what judges with the model.
+        bus: source of requests.
+        rig: the pipeline that uses the model.
         path: the model file.
     """
 
@@ -51,7 +51,7 @@ class ModelDesk:
         self._close = bus.serve(KEY, self._take)
 
     def changes(self, place: Place) -> list[ModelChange]:
-        """Grant what waits, in the monitor's own thread; what is to be published."""
+        """Apply waiting requests in the monitor's own thread; return the messages to publish."""
         found = []
         while not self._waiting.empty():
             one = self._waiting.get()
@@ -64,7 +64,7 @@ class ModelDesk:
             except RigwatchError as error:
                 one.answer = Granted(False, str(error))
             except (OSError, ValueError, ArithmeticError, RecursionError, MemoryError) as error:
-                # Whatever a stranger's model is, it is not the end of the monitor.
+                # An unusable model must not stop the monitor.
                 one.answer = Granted(False, f"the new model cannot be used: {error}")
             one.answered.set()
         return found
@@ -74,7 +74,7 @@ class ModelDesk:
         self._close()
 
     def _take(self, question: bytes) -> list[bytes]:
-        """In a thread of the bus: hand over and wait."""
+        """In a thread of the bus: queue the request and wait."""
         try:
             one = _Waiting(_bounded(msgspec.json.decode(question, type=Wish)))
         except (msgspec.DecodeError, RecursionError) as error:
@@ -84,7 +84,7 @@ class ModelDesk:
         return [msgspec.json.encode(one.answer)]
 
     def _grant(self, wish: Wish, place: Place) -> ModelChange:
-        """The file first: what is in force must survive a restart."""
+        """Apply one request; the file is written first, so the model survives a restart."""
         previous = self._rig.model
         model = self._wanted(wish)
         check_can_follow(previous, model)
@@ -111,5 +111,5 @@ class ModelDesk:
 
 
 def _bounded(wish: Wish) -> Wish:
-    """The wish with no more of its user and reason than the records of versions need."""
+    """The request with user and reason limited in length for the version records."""
     return replace(wish, user=wish.user[:LONGEST_NAME], text=wish.text[:LONGEST_TEXT])

@@ -1,21 +1,20 @@
-"""Patience at the start: silence of others who are starting too is no alarm yet.
+"""Grace period at start-up: silence of processes that are still starting raises no alarm.
 
 `rigwatch up` starts all processes at once, and on a cold machine they compete for its processors.
-So for a while the monitor waits for daq to appear, for its first sample, and lets the stream
-settle. A rig that stays silent is told all the same, only later; a running one within
-`daq.stale_after`.
+The monitor therefore waits for daq to appear, for its first sample, and for the stream to settle. A
+rig that stays silent is reported after the grace period, a running one within `daq.stale_after`.
 """
 
 FOR_DAQ = 20.0
 """Longest wait for the daq process [s]."""
 FOR_SAMPLES = 20.0
-"""Longest wait for the first sample once daq is there [s]."""
+"""Longest wait for the first sample once daq is running [s]."""
 SETTLING, HICCUP = 5.0, 1.0
-"""For so long after the first sample [s], silence of so much is no alarm [s]."""
+"""Settling period after the first sample, and silence allowed during it [s]."""
 
 
 class Patience:
-    """Says how long a silence counts; it is told the time and reads no clock.
+    """Decides how much of a silence counts; receives the time and reads no clock.
 
     Args:
         now: when the monitor started [s].
@@ -27,13 +26,13 @@ class Patience:
         self._first_sample: float | None = None
 
     def counted(self, now: float, silent: float, *, daq_alive: bool, heard: bool) -> float:
-        """The part of a silence that may be alarmed [s].
+        """The part of a silence that counts for an alarm [s].
 
         Args:
             now: monotonic time [s].
-            silent: since the last sample, or since the start [s].
-            daq_alive: whether the daq process is there.
-            heard: whether a sample has ever come.
+            silent: time since the last sample, or since the start [s].
+            daq_alive: whether the daq process is running.
+            heard: whether a sample has ever arrived.
         """
         if daq_alive and self._daq_since is None:
             self._daq_since = now

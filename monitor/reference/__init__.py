@@ -1,4 +1,4 @@
-"""The healthy residual: learnt for drives that repeat, and bounded for drives that do not."""
+"""The healthy residual: averaged for periodic drives, bounded for aperiodic ones."""
 
 from monitor.reference.aperiodic import follow_level
 from monitor.reference.learning import learnt_here, observe, place_in_period, refine, restart

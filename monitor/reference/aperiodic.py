@@ -1,9 +1,9 @@
-"""The reference of a drive that does not repeat: how large a healthy residual may be.
+"""The reference of an aperiodic drive: the largest healthy residual.
 
-There is no period to average. There the residual itself is judged. How much a linear model leaves
-grows with the motion, so its variance is taken as n² + r²·am² with am² the modelled acceleration's
-mean square of late, r² its share over sixteen stretches of the run, and n² so large that no stretch
-lies above it.
+Without a period there is no average, and the residual itself is judged. The error of a linear model
+grows with the motion, so its variance is modelled as n² + r²·am², with am² the recent mean square
+of the modelled acceleration, r² the ratio over sixteen stretches of the run, and n² large enough
+that no stretch exceeds it.
 """
 
 import numpy as np
@@ -18,14 +18,14 @@ from monitor.reference.reference_state import (
 from rigwatch.wire.arrays import FloatArray
 
 STRETCHES = 16
-"""Stretches of `learn` samples of which an excitation without a period is learnt from."""
+"""Number of stretches of `learn` samples from which an aperiodic excitation is learnt."""
 APERIODIC_CYCLE = 256
-"""Taken for one cycle of the motion where there is none [samples]."""
+"""Assumed cycle of the motion for an aperiodic drive [samples]."""
 
 
 @njit()
 def learn_aperiodic(ref: Reference, rules: ReferenceRules, row: FloatArray) -> None:
-    """Σa², Σa·am, Σam², Σx² and ΣV² of each stretch; their number counts one by one."""
+    """Accumulate Σa², Σa·am, Σam², Σx² and ΣV² of each stretch; one sample per call."""
     stretch = ref.counts.learnt // rules.learn
     a, am = row[2], row[3]
     ref.sums[0, stretch] += a * a
@@ -40,9 +40,7 @@ def learn_aperiodic(ref: Reference, rules: ReferenceRules, row: FloatArray) -> N
 
 @njit()
 def _arm_aperiodic(ref: Reference, length: int) -> None:
-    """Nothing repeats: the residual itself is judged, against what stretches of `length` samples
-    left.
-    """
+    """Arm for an aperiodic drive; limits come from stretches of `length` samples."""
     total, learnt = np.zeros(4), ref.counts.learnt
     for i in range(4):
         for k in range(STRETCHES):
@@ -72,6 +70,6 @@ def _arm_aperiodic(ref: Reference, length: int) -> None:
 
 @njit(inline="always")
 def follow_level(ref: Reference, modelled: float) -> None:
-    """Take in one modelled acceleration, scaled, where there is no period [m/s^2]."""
+    """Update the level with one scaled modelled acceleration [m/s^2], for aperiodic drives."""
     ref.levels.quick += (modelled * modelled - ref.levels.quick) / 64.0
     ref.levels.slow += (modelled * modelled - ref.levels.slow) / 512.0

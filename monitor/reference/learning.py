@@ -1,17 +1,16 @@
-"""The healthy rig under the present excitation: one period of each signal, and how much they
-scatter about it.
+"""The healthy reference for the current excitation: one period of each signal and its scatter.
 
-A linear model leaves about a tenth of the acceleration of a pneumatic rig unexplained. That part
-is no noise: it repeats with the excitation. Its average over whole periods is subtracted, so that
-what remains is the change of the residual
+A linear model leaves about a tenth of the acceleration of a pneumatic rig unexplained. That part is
+not noise: it repeats with the excitation. Its average over whole periods is subtracted, which
+leaves the change of the residual
 
     y(φ) = [ a(φ) - s·am(φ) ] - [ A(φ) - s·AM(φ) ],   s = Σ A·AM / Σ AM²
 
-with φ the place in the period, A and AM the averages of measured and modelled acceleration, s the
-amplitude scale. The average comes from the model file where that holds this very excitation, else
-from the first second of the run, and it continues to grow while the rig is plainly healthy.
+with φ the place in the period, A and AM the averages of measured and modelled acceleration, and s
+the amplitude scale. The average comes from the model file if it contains this excitation, otherwise
+from the first second of the run, and it is extended while the rig is clearly healthy.
 
-An excitation that does not repeat has no such average; see `aperiodic.py`.
+An aperiodic excitation has no such average; see `aperiodic.py`.
 
     SETTLING ──settled, period found──▶ LEARNING ──enough periods, quiet──▶ ARMED
         ▲    ──a reference of the model file fits and agrees─────────────────▲
@@ -44,7 +43,7 @@ from rigwatch.wire.arrays import FloatArray
 
 @njit()
 def restart(ref: Reference, new_boot: bool) -> None:
-    """Filters have been reset: settle again, and forget the reference where its phase is lost."""
+    """Settle again after a reset of the filters; discard the reference if its phase is lost."""
     ref.counts.since = 0
     ref.counts.ring_fill = 0
     ref.counts.ring_head = 0
@@ -63,14 +62,14 @@ def place_in_period(ref: Reference, seq: int) -> int:
 
 @njit(inline="always")
 def learnt_here(ref: Reference) -> int:
-    """Samples of this run that the reference rests on, 0 where the model file holds it."""
+    """Number of samples of this run in the reference, 0 if it is from the model file."""
     own = ref.counts.source in (FROM_RUN, APERIODIC)
     return ref.counts.depth * ref.counts.period if own else 0
 
 
 @njit()
 def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> None:
-    """Take one good sample (V, x, a, am) before the reference is armed; may arm it."""
+    """Process one good sample (V, x, a, am) before the reference is armed; may arm it."""
     counts = ref.counts
     counts.since += 1
     _remember(ref, row[0])
@@ -89,7 +88,7 @@ def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) ->
 
 @njit()
 def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
-    """No healthy average: the residual is friction itself, its limits stand in the model file."""
+    """Arm without a healthy average: the residual is friction, with limits from the model file."""
     ref.template[:, :] = 0.0
     ref.counts.period, ref.counts.anchor, ref.counts.depth = 1, 0, LONGEST_AVERAGE
     ref.counts.source, ref.counts.mode = FIXED, ARMED
@@ -140,7 +139,7 @@ def _look_for_period(ref: Reference, rules: ReferenceRules, seq: int) -> None:
 
 @njit()
 def _repeats(ref: Reference, period: int, count: int, tolerance: float) -> bool:
-    """Whether the voltage repeats after `period`; gives up as soon as it cannot."""
+    """Whether the voltage repeats after `period`; stops at the first contradiction."""
     total = 0.0
     for n in range(count):
         total += (_past(ref, n) - _past(ref, n + period)) ** 2
@@ -172,9 +171,7 @@ def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: 
 
 @njit()
 def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
-    """Place in the known period that the newest voltage belongs to, -1 where it is another
-    excitation.
-    """
+    """Place of the newest voltage in the known period, -1 if it is another excitation."""
     best, best_turn = (0.02 * swing) ** 2 * period, -1
     for turn in range(period):
         total = 0.0
@@ -189,9 +186,7 @@ def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
 
 @njit()
 def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) -> None:
-    """The model file's reference holds for this run: no learning, and a fault from the start
-    shows.
-    """
+    """Use the model file's reference without learning; a fault from the start is detected."""
     for row in range(4):
         for place in range(period):
             ref.template[row, place] = ref.known[index, row, place]
@@ -225,9 +220,7 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
 
 @njit()
 def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
-    """Averages, amplitude scale and scatter; start over where the scatter says that the rig has
-    not settled.
-    """
+    """Compute averages, amplitude scale and scatter; restart if the rig has not settled."""
     counts, levels, period = ref.counts, ref.levels, ref.counts.period
     for i in range(4):
         for place in range(period):
@@ -273,7 +266,7 @@ def _measure_swings(ref: Reference) -> None:
 
 @njit()
 def _periodic_rms(signal: FloatArray, period: int) -> float:
-    """Root mean square of a period of a signal, about its mean."""
+    """Root mean square of one period of a signal around its mean."""
     mean = 0.0
     for k in range(period):
         mean += signal[k] / period
@@ -285,8 +278,9 @@ def _periodic_rms(signal: FloatArray, period: int) -> float:
 
 @njit()
 def _turns(ref: Reference) -> int:
-    """How often the mass goes to and fro within one period of the samples, at least once: an
-    excitation of 5 Hz repeats after 256 samples and has five cycles in them.
+    """Number of cycles of the motion per period of the samples, at least one.
+
+    For example, an excitation of 5 Hz repeats after 256 samples, which contain five cycles.
     """
     period, swing = ref.counts.period, ref.levels.position_swing
     mean = 0.0
@@ -305,7 +299,7 @@ def _turns(ref: Reference) -> int:
 
 @njit(inline="always")
 def refine(ref: Reference, place: int, row: FloatArray) -> None:
-    """Let one plainly healthy sample into the average, while that is still growing."""
+    """Add one clearly healthy sample to the average, until it is complete."""
     period = ref.counts.period
     if period == 1 or ref.counts.source != FROM_RUN or ref.counts.depth >= LONGEST_AVERAGE:
         return

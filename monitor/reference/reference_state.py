@@ -1,4 +1,4 @@
-"""What the healthy reference carries from sample to sample."""
+"""State of the healthy reference."""
 
 from typing import Any, NamedTuple
 
@@ -41,18 +41,18 @@ _LEVELS = np.dtype(
 )
 
 LONGEST_AVERAGE = 512
-"""Periods after which the reference is complete."""
+"""Number of periods after which the reference is complete."""
 
 
 def new_record(layout: np.dtype[Any]) -> Any:
-    """Named numbers, all zero, that a compiled function reads and changes by name."""
+    """A record of named numbers, initially zero, for compiled functions."""
     return np.zeros(1, layout).view(np.recarray)[0]
 
 
 class Reference(NamedTuple):
-    """State: `counts` and `levels` are records of named numbers.
+    """State; `counts` and `levels` are records of named numbers.
 
-    Templates and sums have one row a signal (V, x, a, am) and one column a place in the period.
+    Templates and sums have one row per signal (V, x, a, am) and one column per place in the period.
     """
 
     counts: Any
@@ -68,7 +68,7 @@ class Reference(NamedTuple):
 
 
 class ReferenceRules(NamedTuple):
-    """What arming goes by; see `DecisionSection` and `NoiseSection` for units."""
+    """Rules for arming; see `DecisionSection` and `NoiseSection` for units."""
 
     settle: int
     learn: int
@@ -80,7 +80,7 @@ class ReferenceRules(NamedTuple):
 
 
 def new_reference(rules: ReferenceRules, known: list[tuple[FloatArray, float, int]]) -> Reference:
-    """A state that knows the model file's references: ((4, P) signals, scale, periods averaged)."""
+    """Initial state with the model file's references: ((4, P) signals, scale, periods averaged)."""
     longest = max([rules.longest_period, *[signals.shape[1] for signals, _, _ in known]])
     stored = np.zeros((len(known), 4, longest))
     for place, (signals, _, _) in enumerate(known):

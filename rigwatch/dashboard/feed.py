@@ -35,7 +35,8 @@ class Feed:
         self._bus = bus
         self._alarms = bus.listen(ALARMS, capacity=_CAPACITY)
         self._subscriptions: list[Subscription] = [
-            self._alarms if topic is ALARMS else bus.overhear(topic, _CAPACITY) for topic in _DRAWN
+            self._alarms if topic is ALARMS else bus.subscribe_lossy(topic, _CAPACITY)
+            for topic in _DRAWN
         ]
 
     def drain(self) -> list[Message]:

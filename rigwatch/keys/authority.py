@@ -1,8 +1,7 @@
-"""Issues and revokes certificates (X.509, ECDSA P-256), with the library `cryptography`.
+"""Issues and revokes certificates (X.509, ECDSA P-256) with the library `cryptography`.
 
-The common name of a certificate is `<name>.<serial>`: the router admits the common names that the
-register lists as valid, so that a revoked certificate is worth nothing when its name is issued
-again.
+The common name of a certificate is `<name>.<serial>`. The router admits the common names that the
+register lists as valid, so a revoked certificate stays invalid when its name is issued again.
 """
 
 import ipaddress
@@ -69,7 +68,7 @@ class Authority:
         return cls(folder)
 
     def issue(self, name: str, role: str, addresses: Iterable[str] = ()) -> Issued:
-        """A certificate for `name` in `role`; one that it had before is revoked.
+        """Issue a certificate for `name` in `role`; a previous one is revoked.
 
         Args:
             name: such as "daq" or "ann".
@@ -102,10 +101,10 @@ class Authority:
         return issued
 
     def revoke(self, name: str) -> Issued:
-        """Take the certificate of `name` off the valid ones.
+        """Revoke the certificate of `name`.
 
         Raises:
-            KeysError: none is valid.
+            KeysError: there is no valid one.
         """
         found = [one for one in self.register.issued if one.name == name and not one.revoked]
         if not found:
@@ -167,7 +166,7 @@ def _private(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _write(folder: Path, name: str, data: bytes, *, secret: bool = False) -> None:
-    """Write a file whole; one with a private key is readable by its owner only from the start."""
+    """Write a file atomically; a private key is never readable by others."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         new = folder / f"{name}.new"

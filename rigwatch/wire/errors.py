@@ -7,6 +7,7 @@ RigwatchError             one plain line, shown by the command line without a tr
 │   ├── ModbusError       a Modbus reply: short, late, an exception code, a wrong register map
 │   └── MessageError      a message on the bus or in a file
 ├── DeviceError           a device cannot be opened or is gone
+├── KeysError             keys or certificates are missing
 ├── BusError              the bus cannot be reached
 ├── SessionError          a session file cannot be read or written
 ├── ImportDataError       foreign data cannot be turned into a session (column, unit, rate)
@@ -64,7 +65,7 @@ class DeviceError(RigwatchError):
 
 
 class KeysError(RigwatchError):
-    """Keys or certificates are missing, or cannot be made."""
+    """Keys or certificates are missing, or cannot be created."""
 
 
 class BusError(RigwatchError):
@@ -100,6 +101,6 @@ class MissingExtraError(RigwatchError):
 
 
 def nearest(name: str, known: Mapping[str, object]) -> str:
-    """The end of a sentence that found `name`: what may have been meant, or what there is."""
+    """Ending of an error message about `name`: the likely intended name, or all known names."""
     close = " or ".join(map(repr, difflib.get_close_matches(name, known, 3, 0.5)))
     return f"; did you mean {close}?" if close else f", expected one of {', '.join(sorted(known))}"

@@ -1,8 +1,7 @@
-"""The configuration of a rig: one TOML file that every process of it reads.
+"""The configuration of a rig: one TOML file read by all its processes.
 
-Each process has its section. `load_rig` reads the file; `configs/demo.toml` is an example with
-every part in use. A key's description is its documentation: `docs/configuration.md` is printed from
-them.
+Each process has its section. `load_rig` reads the file; `configs/demo.toml` is an example with all
+sections. The descriptions of the keys are the source of `docs/configuration.md`.
 """
 
 from pathlib import Path
@@ -21,7 +20,7 @@ SLOWEST, FASTEST = 1e-3, 1e6
 
 
 class RigSection(Section, frozen=True):
-    """[rig] — what is watched."""
+    """[rig] — the monitored rig."""
 
     id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_-]+$", description="the rig's name on the bus")]
     sample_rate: Annotated[
@@ -30,14 +29,14 @@ class RigSection(Section, frozen=True):
 
 
 class SecuritySection(Section, frozen=True):
-    """[bus.security] — who may speak on the bus."""
+    """[bus.security] — access to the bus."""
 
     keys: Annotated[
         str,
         Meta(description="folder with the rig's certificates, empty for none (loopback only)"),
     ] = ""
     operator: Annotated[
-        Text, Meta(description="name of the certificate that commands on this machine use")
+        Text, Meta(description="name of the certificate used by commands on this machine")
     ] = "operator"
     isolated_network: Annotated[
         bool,
@@ -49,7 +48,7 @@ class SecuritySection(Section, frozen=True):
 
 
 class BusSection(Section, frozen=True):
-    """[bus] — where the Zenoh router is."""
+    """[bus] — endpoints of the Zenoh router."""
 
     router: Annotated[Text, Meta(description="endpoint that processes connect to")] = (
         "tcp/127.0.0.1:7447"
@@ -100,7 +99,8 @@ class ModbusSection(Section, frozen=True, tag="modbus-tcp", tag_field="adapter")
     unit: Annotated[int, Meta(ge=0, le=247, description="unit id")] = 1
     polls: Annotated[float, Meta(gt=0, description="polls a second")] = 32.0
     word_order: Annotated[
-        Literal["big", "little"], Meta(description="which half of a 32-bit value comes first")
+        Literal["big", "little"],
+        Meta(description="word order of 32-bit values: big puts the high word first"),
     ] = "big"
     timeout: Annotated[float, Meta(gt=0, description="time a reply may take [s]")] = 0.3
 
@@ -113,13 +113,14 @@ class ModbusRtuSection(Section, frozen=True, tag="modbus-rtu", tag_field="adapte
     unit: Annotated[int, Meta(ge=0, le=247, description="unit id")] = 1
     polls: Annotated[float, Meta(gt=0, description="polls a second")] = 32.0
     word_order: Annotated[
-        Literal["big", "little"], Meta(description="which half of a 32-bit value comes first")
+        Literal["big", "little"],
+        Meta(description="word order of 32-bit values: big puts the high word first"),
     ] = "big"
     timeout: Annotated[float, Meta(gt=0, description="time a reply may take [s]")] = 0.3
 
 
 class ReplaySection(Section, frozen=True, tag="replay", tag_field="adapter"):
-    """[daq.device] adapter = "replay" — a recorded session in place of a device."""
+    """[daq.device] adapter = "replay" — a recorded session instead of a device."""
 
     session: Annotated[Text, Meta(description="session file or folder")]
     speed: Annotated[float, Meta(gt=0, description="times real time")] = 1.0
@@ -141,16 +142,16 @@ DeviceSection = SerialSection | ModbusSection | ModbusRtuSection | ReplaySection
 class DaqSection(Section, frozen=True):
     """[daq] — the device and how its samples are published."""
 
-    device: Annotated[DeviceSection, Meta(description="which adapter, and its settings")]
+    device: Annotated[DeviceSection, Meta(description="the adapter and its settings")]
     name: Annotated[Text, Meta(description="the device's name in messages")] = "rig"
-    ring: Annotated[int, Meta(ge=256, description="samples kept for readers that miss some")] = (
-        65536
-    )
+    ring: Annotated[
+        int, Meta(ge=256, description="samples stored for readers that missed some")
+    ] = 65536
     stale_after: Annotated[float, Meta(gt=0, description="silence that means stale [s]")] = 0.1
 
 
 class PlantSection(Section, frozen=True):
-    """[plant] — the simulated rig that takes the device's place."""
+    """[plant] — the simulated rig, used instead of a device."""
 
     scenario: Annotated[Text, Meta(description="scenario file")]
     serve: Annotated[
@@ -163,7 +164,7 @@ class PlantSection(Section, frozen=True):
 
 
 class AlarmSection(Section, frozen=True):
-    """[monitor.alarms.<name>] — how a condition becomes an alarm; left out: the alarm's own."""
+    """[monitor.alarms.<name>] — how a condition becomes an alarm; defaults are the alarm's own."""
 
     persistence: Annotated[
         Annotated[int, Meta(ge=1)] | None, Meta(description="samples the condition must hold")
@@ -171,12 +172,12 @@ class AlarmSection(Section, frozen=True):
     clear_after: Annotated[
         Annotated[int, Meta(ge=1)] | None, Meta(description="samples without it before it clears")
     ] = None
-    latch: Annotated[bool | None, Meta(description="stays until reset by a person")] = None
+    latch: Annotated[bool | None, Meta(description="stays until reset by an operator")] = None
     enabled: Annotated[bool, Meta(description="whether it is raised at all")] = True
 
 
 class MonitorSection(Section, frozen=True):
-    """[monitor] — the model and what is watched with it."""
+    """[monitor] — the model, detectors and alarms."""
 
     model: Annotated[Text, Meta(description="model file made by `rigwatch commission`")]
     detectors: Annotated[
@@ -190,12 +191,12 @@ class MonitorSection(Section, frozen=True):
         default_factory=dict
     )
     effect_files: Annotated[
-        tuple[str, ...], Meta(description="own effects that an alarm's probable cause may be")
+        tuple[str, ...], Meta(description="own effects considered as probable causes of an alarm")
     ] = ()
 
 
 class RecorderSection(Section, frozen=True):
-    """[recorder] — where session files go."""
+    """[recorder] — recording of sessions."""
 
     folder: Annotated[Text, Meta(description="folder of the sessions")] = "sessions"
     segment: Annotated[float, Meta(gt=0, description="length of a segment [s]")] = 3600.0
@@ -217,7 +218,7 @@ class RecorderSection(Section, frozen=True):
 
 
 class WitnessSection(Section, frozen=True):
-    """[witness] — a process that watches the monitor from outside and notifies people."""
+    """[witness] — a separate process that supervises the monitor and sends notifications."""
 
     stale_after: Annotated[
         float, Meta(gt=0, description="time without estimates that is an alarm [s]")
@@ -235,11 +236,13 @@ class WitnessSection(Section, frozen=True):
     ] = ()
     notify_from: Annotated[
         Literal["info", "warning", "error", "critical"],
-        Meta(description="lowest severity that people are notified of"),
+        Meta(description="lowest severity that is notified"),
     ] = "error"
     repeat_minutes: Annotated[
         float,
-        Meta(ge=0, description="repeat while nobody has acknowledged the alarm [min]; 0 for never"),
+        Meta(
+            ge=0, description="interval of repeats for an unacknowledged alarm [min]; 0 for never"
+        ),
     ] = 0.0
 
 
@@ -255,7 +258,7 @@ class DashboardSection(Section, frozen=True):
 
 
 class RigConfig(Section, frozen=True):
-    """The whole file."""
+    """The configuration file."""
 
     rig: Annotated[RigSection, Meta(description="what is watched")]
     channels: Annotated[tuple[ChannelSection, ...], Meta(min_length=1, description="channels")]
@@ -272,7 +275,7 @@ def load_rig(path: Path | str) -> RigConfig:
     """The configuration at `path`; relative paths in it stay relative to the working folder.
 
     Raises:
-        ConfigError: the file is wrong, or two channels have one name.
+        ConfigError: the file is invalid, or two channels have the same name.
     """
     config = load(path, RigConfig)
     names = [channel.name for channel in config.channels]

@@ -1,4 +1,4 @@
-"""The witness: not the monitor, it says when the monitor is stale, and notifies people.
+"""The witness: supervises the monitor from a separate process and sends notifications.
 
 bus ──estimates, alarms──▶ Witness ──▶ alarm `monitor_stale`, heartbeat file, notifications
 """

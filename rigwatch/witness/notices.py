@@ -1,4 +1,4 @@
-"""Decides when people are notified of an alarm: at once, and again while nobody has seen it."""
+"""Decides when to notify of an alarm: at once, and again while it is unacknowledged."""
 
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.rig_config import WitnessSection
@@ -7,7 +7,7 @@ _SEVERITIES = ("info", "warning", "error", "critical")
 
 
 class Notices:
-    """The alarms that people know of; told the time, it reads no clock.
+    """Tracks notified alarms; receives the time and reads no clock.
 
     Args:
         settings: section [witness].
@@ -19,7 +19,7 @@ class Notices:
         self._unseen: dict[str, tuple[Alarm, float]] = {}
 
     def hear(self, alarm: Alarm, now: float) -> list[Alarm]:
-        """What to notify people of, now that an alarm has changed; `now` in seconds."""
+        """Alarms to notify of after a change of one; `now` in seconds."""
         if _SEVERITIES.index(alarm.severity) < self._lowest:
             return []
         if alarm.state != "unacknowledged":
@@ -30,7 +30,7 @@ class Notices:
         return [] if known else [alarm]
 
     def due(self, now: float) -> list[Alarm]:
-        """Alarms that nobody has acknowledged for so long that people are notified again."""
+        """Unacknowledged alarms that are due for another notification."""
         again = self._settings.repeat_minutes * 60.0
         found = [
             alarm for alarm, told in self._unseen.values() if again > 0 and now - told >= again

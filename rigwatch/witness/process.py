@@ -1,4 +1,4 @@
-"""The witness as a process: looks ten times a second, and says what it sees.
+"""The witness as a process: checks ten times a second and reports.
 
 python -m rigwatch witness CONFIG
 """
@@ -23,22 +23,22 @@ PROCESS = "witness"
 STALE = "monitor_stale"
 TURN = 0.1
 FOR_MONITOR = 30.0
-"""Time that a monitor may take until its first estimate [s]."""
+"""Time allowed until a monitor's first estimate [s]."""
 _NONE = float("nan")
 
 
 class Witness:
-    """One rig, watched from outside.
+    """Supervises the monitor of one rig.
 
     Args:
         settings: section [witness].
-        bus: where the monitor speaks.
-        now: time on a monotonic clock [s].
+        bus: on which the monitor publishes.
+        now: monotonic time [s].
     """
 
     def __init__(self, settings: WitnessSection, bus: Bus, now: float) -> None:
         self.settings, self._bus = settings, bus
-        self._estimates = bus.overhear(ESTIMATES)
+        self._estimates = bus.subscribe_lossy(ESTIMATES)
         self._alarms = bus.listen(ALARMS)
         self._notices = Notices(settings)
         self._heard_at = now + max(0.0, FOR_MONITOR - settings.stale_after)
@@ -48,7 +48,7 @@ class Witness:
         serve_alarm_list(bus, lambda: [self._stale] if self._stale else [])
 
     def turn(self, now: float, t_ns: int) -> None:
-        """Look once; `now` is a monotonic clock's time [s], `t_ns` Unix time [ns]."""
+        """Check once; `now` is monotonic time [s], `t_ns` Unix time [ns]."""
         if self._estimates.drain():
             self._heard_at = now
         silent = now - self._heard_at
@@ -78,7 +78,7 @@ class Witness:
         return alarm
 
     def _notify(self, alarms: list[Alarm]) -> None:
-        """Start the command for each alarm; nothing waits for it."""
+        """Start the command for each alarm without waiting for it."""
         self._running = [one for one in self._running if one.poll() is None]
         for alarm in alarms if self.settings.notify else ():
             with contextlib.suppress(OSError):
@@ -107,23 +107,23 @@ class Witness:
             self._beat(Path(self.settings.heartbeat_file), t_ns)
 
     def _beat(self, path: Path, t_ns: int) -> None:
-        """A file whose age says how long ago the rig was last watched."""
+        """Update the heartbeat file, whose age shows when the monitor last published."""
         new = path.with_name(f"{path.name}.new")
         with contextlib.suppress(OSError):
             new.write_text(f"{t_ns / 1e9:.3f} {self._bus.rig} running\n", encoding="utf-8")
             new.replace(path)
 
     def close(self) -> None:
-        """Leave the bus in order."""
+        """Close the connection to the bus."""
         self._alarms.close()
         self._estimates.close()
 
 
 def run(config: RigConfig, stop: threading.Event) -> None:
-    """Witness the rig until `stop` is set.
+    """Supervise the rig until `stop` is set.
 
     Raises:
-        BusError: the bus cannot be joined.
+        BusError: the bus cannot be reached.
     """
     bus = connect(config, PROCESS)
     try:

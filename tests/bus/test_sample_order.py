@@ -23,6 +23,7 @@ class Bench:
     ring_replies: bool = True
     stores: dict[int, RingStore] = field(default_factory=dict)
     ledger: Ledger = field(default_factory=Ledger)
+    losses: list[Loss] = field(default_factory=list)
     remarks: list[Remark] = field(default_factory=list)
     asks: deque[Ask] = field(default_factory=deque)
     asked: int = 0
@@ -42,6 +43,7 @@ class Bench:
                 self.remarks.append(outcome)
             else:
                 self.ledger.add(outcome)
+                self.losses += [outcome] if isinstance(outcome, Loss) else []
 
     def send(self, part: SampleBlock) -> None:
         self.take(self.order.on_block(self.keep(part)))

@@ -1,6 +1,10 @@
 """Messages survive the way to bytes and back, and foreign bytes are refused."""
 
+import importlib.util
+import json
 from dataclasses import fields, replace
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -27,6 +31,8 @@ from rigwatch.wire.messages.message_types import (
 from rigwatch.wire.messages.protobuf import decode, encode, file_descriptor_set, type_name
 from rigwatch.wire.messages.topics import TOPICS
 
+SCHEMA = Path(__file__).with_name("schema.txt")
+BYTES: dict[str, str] = json.loads(Path(__file__).with_name("messages.json").read_text())
 TIMES = np.array([1_700_000_000_000_000_000, 1_700_000_000_003_906_250])
 COLUMN = Column("voltage", "V", np.array([1.5, -0.1]), np.array([0, 2], np.uint8))
 EXAMPLES: dict[type[Message], Message] = {
@@ -120,3 +126,115 @@ def test_a_column_is_found_by_name():
     assert EXAMPLES[SampleBlock].channel("voltage") is COLUMN
     with pytest.raises(KeyError):
         EXAMPLES[EstimateBlock].column("voltage")
+
+
+@pytest.fixture
+def started() -> ModuleType:
+    """The codec as a process builds it when it starts: no table of another test is in it."""
+    spec = importlib.util.find_spec("rigwatch.wire.messages.protobuf")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def described(message: descriptor_pb2.DescriptorProto) -> list[str]:
+    """The fields of a message and of what is nested in it, a line each."""
+    kinds = descriptor_pb2.FieldDescriptorProto
+    lines = [f"{message.name}{' (entry of a map)' * message.options.map_entry}"]
+    for field in message.field:
+        word = kinds.Label.Name(field.label)[6:].lower()
+        kind = field.type_name or kinds.Type.Name(field.type)[5:].lower()
+        lines.append(f"    {field.number} {field.name}: {word} {kind}")
+    return lines + [f"    {line}" for part in message.nested_type for line in described(part)]
+
+
+def test_files_of_earlier_versions_stay_readable(started):
+    """Numbers and types as in every session recorded so far; new fields come at the end."""
+    (file,) = descriptor_pb2.FileDescriptorSet.FromString(started.file_descriptor_set()).file
+    assert (file.name, file.package, file.syntax) == ("rigwatch.proto", "rigwatch", "proto3")
+    lines = [line for message in file.message_type for line in described(message)]
+    assert lines == SCHEMA.read_text().splitlines()
+
+
+@pytest.mark.parametrize("kind", MESSAGE_TYPES, ids=lambda kind: kind.__name__)
+def test_a_process_that_has_just_started_speaks_like_the_others(started, kind):
+    data = started.encode(EXAMPLES[kind])
+    assert same(started.decode(kind, data), EXAMPLES[kind])
+    assert data.hex() == BYTES[kind.__name__]
+
+
+def test_empty_columns_keep_their_types(started):
+    none = np.zeros(0)
+    columns = (Column("voltage", "V", none),)
+    block = SampleBlock("rig", 1, 0, none.astype(np.int64), none.astype(np.int64), columns)
+    assert same(started.decode(SampleBlock, started.encode(block)), block)
+
+
+def test_what_was_decoded_can_be_changed_and_compared(started):
+    health = started.decode(Health, started.encode(EXAMPLES[Health]))
+    assert type(health.counters) is dict
+    block = started.decode(SampleBlock, started.encode(EXAMPLES[SampleBlock]))
+    assert all(c.values.flags.writeable and c.quality.flags.writeable for c in block.channels)
+
+
+def test_the_same_counters_are_the_same_bytes_in_whatever_order_they_were_counted(started):
+    names = [f"counter_{i}" for i in range(20)]
+    data = {
+        started.encode(replace(EXAMPLES[Health], counters=dict.fromkeys(some, 1.0)))
+        for some in (names, names[::-1])
+    }
+    assert len(data) == 1
+
+
+def test_what_is_wrong_with_the_bytes_is_told(started):
+    odd = started.encode(replace(EXAMPLES[AlarmCommand], action="ignore"))
+    with pytest.raises(MessageError) as told:
+        started.decode(AlarmCommand, odd)
+    words = "found 'ignore', expected one of acknowledge, reset, shelve, unshelve"
+    assert str(told.value) == f"AlarmCommand: {len(odd)} bytes that are none: {words}"
+    with pytest.raises(MessageError, match=r"^Event: 3 bytes that are none: "):
+        started.decode(Event, b"\xff\xff\xff")
+
+
+@pytest.mark.parametrize(
+    ("block", "wrong"),
+    [
+        (replace(EXAMPLES[SampleBlock], device_us=TIMES[:1]), r"\['device_us'\]"),
+        (replace(EXAMPLES[SampleBlock], t_ns=TIMES[:1], device_us=TIMES[:1]), r"\['voltage'\]"),
+        (
+            replace(
+                EXAMPLES[SampleBlock],
+                channels=(COLUMN, replace(COLUMN, quality=COLUMN.quality[:1])),
+            ),
+            r"\['voltage'\]",
+        ),
+        (replace(EXAMPLES[EstimateBlock], t_ns=TIMES[:1]), r"\['theta1'\]"),
+    ],
+)
+def test_columns_that_do_not_fit_are_named(started, block, wrong):
+    kind = type(block)
+    expected = f"^{kind.__name__}: columns {wrong} do not have {len(block)} samples$"
+    with pytest.raises(MessageError, match=expected):
+        started.decode(kind, started.encode(block))
+
+
+def test_a_block_without_device_times_or_quality_is_whole(started):
+    column = replace(COLUMN, quality=np.zeros(0, np.uint8))
+    block = replace(EXAMPLES[SampleBlock], device_us=np.zeros(0, np.int64), channels=(column,))
+    assert same(started.decode(SampleBlock, started.encode(block)), block)
+
+
+def test_the_tag_before_each_field_is_its_number_and_wire_type(started):
+    varint, by_length = 0, 2
+    assert started.field_tags(SampleBlock) == {
+        "device": 1 << 3 | by_length,
+        "boot": 2 << 3 | varint,
+        "seq": 3 << 3 | varint,
+        "device_us": 4 << 3 | by_length,
+        "t_ns": 5 << 3 | by_length,
+        "channels": 6 << 3 | by_length,
+    }
+    assert started.field_tags(Column)["values"] == 3 << 3 | by_length
+    assert started.field_tags(Alarm)["first_out"] == 13 << 3 | varint

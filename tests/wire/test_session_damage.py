@@ -107,9 +107,9 @@ def test_bit_flips_anywhere(flips: list[tuple[int, int]]) -> None:
 
 
 def test_a_flip_of_each_bit_of_every_record_head(tmp_path: Path) -> None:
-    """Opcode, lengths and checksum of a chunk in the middle, and what stands around it."""
+    """The file's first record; a chunk in the middle: opcode, lengths, checksum, what is beside."""
     start, _ = chunk_spans()[5]
-    for at in range(start - 40, start + 60):
+    for at in [*range(8, 17), *range(start - 40, start + 60)]:
         for bit in range(8):
             data = bytearray(intact())
             data[at] ^= 1 << bit
@@ -132,6 +132,14 @@ def test_bytes_replaced_by_others(at: int, garbage: bytes, dropped: int) -> None
     with TemporaryDirectory() as folder:
         touched = set(range(first, first + max(1, dropped)))
         check(data, touched, Path(folder))
+
+
+@pytest.mark.parametrize("beyond", [0, 1, 9, 30, 57, 100, 5000])
+def test_a_head_that_claims_to_be_longer_hides_no_chunk(tmp_path: Path, beyond: int) -> None:
+    data = bytearray(intact())
+    first_with_samples, _ = chunk_spans()[1]
+    data[9:17] = struct.pack("<Q", first_with_samples + beyond - 17)
+    check(bytes(data), set(range(9, 17)), tmp_path)
 
 
 def test_a_lost_span_says_where_and_between_which_times(tmp_path: Path) -> None:

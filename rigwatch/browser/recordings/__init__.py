@@ -1,4 +1,4 @@
-"""From files to a new study: looked at, imported, put beside a model."""
+"""From files to a new study: inspect, import, combine with a model."""
 
 from rigwatch.browser.recordings.looking import Look, look_at
 from rigwatch.browser.recordings.new_study import make_study, template_data, template_names

@@ -1,4 +1,4 @@
-"""A look at a foreign file before it is imported: its columns, and which mapping would fit."""
+"""Inspects a foreign file before import: its columns, and a suitable mapping."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,18 +12,18 @@ from rigwatch.wire.exchange import ImportMapping, columns_of, parse_source
 from rigwatch.wire.typed_files import find_file, load, shipped_names
 
 SHOWN = 5
-"""Values of a column that are shown."""
+"""Number of values shown per column."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """What a file holds.
+    """Content of a file.
 
     Attributes:
         columns: name, first values and range of each.
-        scalars: single numbers beside them.
-        mapping: name of the shipped mapping that fits best, empty where none does.
-        suggested: the mapping itself, or a beginning of one.
+        scalars: single numbers in the file.
+        mapping: name of the best matching shipped mapping, empty if none matches.
+        suggested: that mapping, or a draft of one.
         rows: of the longest column.
     """
 
@@ -35,7 +35,7 @@ class Look:
 
 
 def look_at(path: Path) -> Look:
-    """What a CSV, MAT, Parquet or JSON file holds.
+    """Inspect a CSV, MAT, Parquet or JSON file.
 
     Raises:
         ImportDataError: it cannot be read.
@@ -58,7 +58,7 @@ def _column(name: str, values: Any) -> dict[str, Any]:
 
 
 def _fitting(path: Path, columns: list[str]) -> tuple[str, ImportMapping]:
-    """The shipped mapping that takes most columns of the file, all of which are there."""
+    """The shipped mapping that uses most columns of the file, if the file has all of them."""
     found: list[tuple[int, str, ImportMapping]] = []
     for name in shipped_names("imports"):
         mapping = load(find_file(name, "imports"), ImportMapping)
@@ -83,7 +83,7 @@ def _taken(mapping: ImportMapping, columns: tuple[str, ...]) -> int:
 
 
 def _beginning(columns: list[str]) -> ImportMapping:
-    """The first column for the time, every other as a channel of its own without a unit."""
+    """A draft mapping: the first column as time, the others as channels without units."""
     names = {c: "".join(ch if ch.isalnum() or ch in "_-" else "_" for ch in c) for c in columns}
     channels = {names[c]: f"{c}[1]" for c in columns[1:] if names[c]}
     time = f"{columns[0]}[s]" if columns else ""

@@ -1,4 +1,4 @@
-"""A new study's file: a template's settings with recordings of one's own."""
+"""Creates a study file from a template's settings and the user's recordings."""
 
 import os
 from collections.abc import Sequence
@@ -18,13 +18,13 @@ USES = ("train", "held_out", "healthy")
 
 
 def template_names() -> dict[str, list[str]]:
-    """Templates and models that a study may begin with, by name."""
+    """Names of templates and models from which a study can start."""
     usable = [n for n in shipped_names("studies") if not _template(n).model.endswith(".toml")]
     return {"templates": usable, "models": list(shipped_models())}
 
 
 def template_data(name: str) -> dict[str, Any]:
-    """What a template says of its recordings: file, use and span of each."""
+    """A template's recordings: file, use and span of each."""
     file = _template(name)
     spans = [
         {
@@ -41,7 +41,7 @@ def template_data(name: str) -> dict[str, Any]:
 
 
 def _template(name: str) -> StudyFile:
-    """A template that ships with rigwatch: no file that somebody else names."""
+    """A shipped template; other files are not accepted."""
     if name not in (known := shipped_names("studies")):
         raise RigwatchError(f"found template {name!r}, expected one of {', '.join(known)}")
     return load(find_file(name, "studies"), StudyFile)
@@ -50,15 +50,15 @@ def _template(name: str) -> StudyFile:
 def make_study(
     folder: Path, begin: str, spans: Sequence[tuple[str, Path, float, float | None]]
 ) -> Study:
-    """Make a study in `folder`.
+    """Create a study in `folder`.
 
     Args:
-        folder: holds none yet.
-        begin: name of a template, or "model:" and that of a model.
-        spans: use, recording, begin and end [s] of each part.
+        folder: without a study.
+        begin: name of a template, or "model:" followed by the name of a model.
+        spans: use, recording, start and end [s] of each part.
 
     Raises:
-        RigwatchError: there is one already, or the parts do not fit.
+        RigwatchError: there is a study already, or the parts are invalid.
     """
     if (folder / FILE).exists():
         raise ConfigError(folder / FILE, "", "a study", "another name")
@@ -90,7 +90,7 @@ def make_study(
 
 
 def _said(section: msgspec.Struct) -> dict[str, Any]:
-    """What differs from what a section says where it is silent."""
+    """The fields of a section that differ from their defaults."""
     found = {}
     for field in structs.fields(section):
         value = getattr(section, field.name)

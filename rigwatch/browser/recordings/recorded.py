@@ -17,7 +17,7 @@ MOST = 500
 
 
 def recordings_in(root: Path) -> list[str]:
-    """Every session below a folder, by its name from there; links that lead out are left out."""
+    """All sessions below a folder, by relative name; links that lead outside are skipped."""
     return sorted(path.relative_to(root).as_posix() for path in _sessions(root))[:MOST]
 
 
@@ -29,7 +29,7 @@ def _sessions(root: Path) -> Iterator[Path]:
 
 
 def channels_of(root: Path, path: Path) -> tuple[Results, dict[str, Any]]:
-    """Where a recording's channels are for charts, and what they are; written where they are not.
+    """Folder of a recording's chart data, and its channels; written if missing.
 
     Raises:
         RigwatchError: the session cannot be read.
@@ -44,7 +44,7 @@ def channels_of(root: Path, path: Path) -> tuple[Results, dict[str, Any]]:
 
 
 def write_channels(kept: Results, path: Path) -> dict[str, Any]:
-    """Write every channel as a line; names with units, seconds and samples."""
+    """Write every channel as a chart line; returns names with units, duration [s] and samples."""
     blocks = list(open_session(path).samples())
     if not blocks:
         raise RigwatchError(f"{path.name}: found no samples")

@@ -1,4 +1,4 @@
-"""Stories to begin with: recordings and a model from which an effect is missing."""
+"""Example stories: recordings and a model that lacks an effect."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -23,9 +23,9 @@ class Story:
     """One story.
 
     Attributes:
-        name: of it, and of the study that it makes.
-        title, text: for people.
-        hindrance: why it cannot be begun, empty where it can.
+        name: of the story and of its study.
+        title, text: shown to the user.
+        hindrance: why it cannot be started; empty if it can.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Story:
 
 
 def stories(root: Path) -> list[Story]:
-    """What may be begun in a folder: those that are not there yet."""
+    """Stories that are not in a folder yet."""
     missing = (
         "" if _measured() else f"its recordings are not here: {DATA} names no folder with them"
     )
@@ -57,10 +57,10 @@ def stories(root: Path) -> list[Story]:
 
 
 def begin_story(root: Path, name: str) -> str:
-    """Make a story's recordings and its study; the study's name.
+    """Create a story's recordings and its study; returns the study's name.
 
     Raises:
-        RigwatchError: there is none of that name, or something of it is there already.
+        RigwatchError: the name is unknown, or one of the story's files exists already.
     """
     if name not in _MADE:
         raise RigwatchError(f"found story {name!r}, expected one of {', '.join(_MADE)}")

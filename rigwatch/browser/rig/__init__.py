@@ -1,4 +1,4 @@
-"""The rig beside the studies: its signals and alarms as they come, and an alarm as a study."""
+"""The rig's page: live signals and alarms, and a study made from an alarm."""
 
 from rigwatch.browser.rig.alarm_study import study_of_alarm
 from rigwatch.browser.rig.link import RigLink

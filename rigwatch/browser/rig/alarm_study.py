@@ -1,4 +1,4 @@
-"""An alarm as a study: a healthy stretch before its onset, and what came after it."""
+"""A study made from an alarm: healthy data before its onset, and data after it."""
 
 from pathlib import Path
 
@@ -10,23 +10,23 @@ from rigwatch.wire.session import newest, open_session, trim
 from rigwatch.workbench.study import Study
 
 HEALTHY = 5.0
-"""Length of the healthy stretch [s]."""
+"""Length of the healthy part [s]."""
 FAULTY = 10.0
-"""Longest stretch with the fault [s]."""
+"""Longest part with the fault [s]."""
 LEAST = 4.0
-"""Shortest that is worth a study [s]."""
+"""Shortest useful part [s]."""
 AROUND = 0.5
-"""Time left out on both sides of the onset, and between training and held out [s]."""
+"""Time skipped on both sides of the onset, and between training and held-out data [s]."""
 TEMPLATE = "rig"
 
 
 def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm) -> Study:
-    """Cut the recording around an alarm's onset and make a study of it.
+    """Cut the recording around an alarm's onset and create a study from it.
 
     Args:
         root: folder of the studies.
-        config: the rig's.
-        alarm: whose onset it is.
+        config: the rig's configuration.
+        alarm: the alarm.
 
     Raises:
         SessionError: too little was recorded before or after the onset.

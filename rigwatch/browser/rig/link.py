@@ -1,4 +1,4 @@
-"""A rig's signals of the last seconds and its alarms, kept for whoever looks at the page."""
+"""A rig's latest signals and its alarms, buffered for the page."""
 
 import math
 import threading
@@ -32,15 +32,15 @@ from rigwatch.wire.messages import (
 from rigwatch.wire.rig_config import load_rig
 
 SECONDS = 20.0
-"""Length of what is shown [s]."""
+"""Time span shown [s]."""
 SHOWN_RATE = 64.0
-"""Samples a second that are shown [Hz]."""
+"""Sample rate of the signals shown [Hz]."""
 TIMEOUT = 2.0
 SHOWN_ESTIMATES = ("residual", "theta1", "theta2")
 
 
 class RigLink:
-    """Listens to a rig for as long as it runs; comes back when the rig does.
+    """Subscribes to a rig; reconnects when the rig restarts.
 
     Args:
         config: the rig's configuration.
@@ -52,7 +52,7 @@ class RigLink:
     def __init__(self, config: Path) -> None:
         self.config = load_rig(config)
         self._alarms: dict[str, Alarm] = {}
-        self._trouble = "looking for the rig"
+        self._trouble = "connecting to the rig"
         self._parts: dict[str, deque[tuple[FloatArray, dict[str, FloatArray]]]] = {
             "samples": deque(),
             "estimates": deque(),
@@ -63,12 +63,12 @@ class RigLink:
         self._thread.start()
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop receiving."""
         self._ended.set()
         self._thread.join(TIMEOUT)
 
     def seen(self) -> dict[str, Any]:
-        """Signals of the last seconds, their units, alarms, and what is wrong with the link."""
+        """Latest signals, their units, alarms, and the fault of the link, if any."""
         with self._lock:
             signals = {kind: _joined(list(parts)) for kind, parts in self._parts.items()}
             alarms = [_plain(alarm) for alarm in self._alarms.values()]
@@ -81,12 +81,12 @@ class RigLink:
             }
 
     def alarm(self, name: str) -> Alarm | None:
-        """An alarm that was heard of."""
+        """A received alarm."""
         with self._lock:
             return self._alarms.get(name)
 
     def command(self, command: AlarmCommand) -> tuple[list[Alarm], str]:
-        """Send an operator's command; what changed, and the reason of a refusal.
+        """Send an operator's command; returns the changes, and the reason of a refusal.
 
         Raises:
             BusError: no monitor answers.
@@ -122,7 +122,7 @@ class RigLink:
         self._say("the rig's router is gone; waiting for it")
 
     def _ask(self, bus: Bus) -> bool:
-        """The alarms that stand; whether a monitor told them."""
+        """The standing alarms, and whether a monitor replied."""
         try:
             standing = ask_alarm_list(bus, 0.3)
         except BusError as error:

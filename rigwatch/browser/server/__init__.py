@@ -1,4 +1,4 @@
-"""The pages' server: who may ask, what is where, and the answers."""
+"""The web server: access control, routes and responses."""
 
 from rigwatch.browser.server.serving import Options, serve
 

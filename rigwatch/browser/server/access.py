@@ -1,8 +1,8 @@
-"""Who may ask: Host, token and Origin of every request, and what a page may load.
+"""Access control: checks Host, token and Origin of every request, and limits what a page may load.
 
-A page elsewhere that a person has open must not reach this server: a name that was made to point to
-127.0.0.1 (DNS rebinding) fails at Host, a form or a script of another site at Origin, and whoever
-has no token gets nothing but a refusal.
+A page of another site in the user's browser must not reach this server: DNS rebinding to 127.0.0.1
+fails at the Host check, a form or script of another site at the Origin check, and requests without
+a token are refused.
 """
 
 import secrets
@@ -28,12 +28,12 @@ SAFE = frozenset({"GET", "HEAD"})
 
 @dataclass(frozen=True)
 class Access:
-    """Who may ask.
+    """Rules for requests.
 
     Attributes:
-        hosts: what `Host` may say, with the port.
-        secure: whether people reach it by https.
-        token: what a page must bring once, in its address; a cookie keeps it.
+        hosts: allowed values of `Host`, with the port.
+        secure: whether the server is reached by https.
+        token: required once in the address; then kept in a cookie.
     """
 
     hosts: frozenset[str]
@@ -41,12 +41,12 @@ class Access:
     token: str = field(default_factory=lambda: secrets.token_urlsafe(24))
 
     def origins(self) -> frozenset[str]:
-        """What `Origin` may say."""
+        """Allowed values of `Origin`."""
         scheme = "https" if self.secure else "http"
         return frozenset(f"{scheme}://{host}" for host in self.hosts)
 
     def refusal(self, method: str, headers: Headers, token: str) -> tuple[int, str] | None:
-        """Status and reason of a refusal, None where a request may pass."""
+        """Status and reason of a refusal, None if the request is allowed."""
         if headers.get("host", "").lower() not in self.hosts:
             return 421, "found another Host than this server's"
         if not secrets.compare_digest(token.encode(), self.token.encode()):
@@ -57,18 +57,18 @@ class Access:
 
 
 def hosts_of(names: Iterable[str], port: int) -> frozenset[str]:
-    """What `Host` may say for some names; the port may be left out where it is the usual one."""
+    """Allowed values of `Host` for some names; the port is optional if it is the default one."""
     plain = [f"[{name}]" if ":" in name and name[0] != "[" else name.lower() for name in names]
     usual = plain if port in (80, 443) else []
     return frozenset([*usual, *(f"{name}:{port}" for name in plain)])
 
 
 class Guard:
-    """Lets through what `Access` allows, and tells browsers to load nothing from elsewhere.
+    """Passes requests that `Access` allows, and tells browsers to load nothing from other sites.
 
     Args:
-        app: what is guarded.
-        access: who may ask.
+        app: the guarded application.
+        access: rules for requests.
     """
 
     def __init__(self, app: ASGIApp, access: Access) -> None:

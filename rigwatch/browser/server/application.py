@@ -32,7 +32,7 @@ LEDGER = "ledger.jsonl"
 
 
 def application(context: Context, access: Access) -> Starlette:
-    """The pages of a folder, for those whom `access` lets in."""
+    """The pages of a folder, for requests that `access` allows."""
     routes = [
         Route("/static/page.css", _style),
         Mount("/static", StaticFiles(directory=STATIC)),

@@ -1,4 +1,4 @@
-"""What the routes share: places, desks, and answers of one form."""
+"""Shared by the routes: folders, study processes, and responses of one form."""
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -15,18 +15,18 @@ from rigwatch.browser.work import Desk, Desks, as_plain
 from rigwatch.wire.errors import RigwatchError
 
 MOST_BODY = 1 << 20
-"""Bytes of a request that is no upload."""
+"""Largest request that is not an upload [bytes]."""
 
 
 @dataclass(frozen=True)
 class Context:
-    """What a server serves.
+    """State of the server.
 
     Attributes:
         places: the folder.
         desks: the studies' processes.
         rig: configuration of a rig, None without one.
-        most_upload: bytes of a recording that may be brought.
+        most_upload: largest upload of a recording [bytes].
     """
 
     places: Places
@@ -35,10 +35,10 @@ class Context:
     most_upload: int = 1 << 30
 
     def desk(self, request: Request) -> Desk:
-        """The desk of the study that a request names.
+        """The desk of the study named in a request.
 
         Raises:
-            RigwatchError: there is none, or its files lie elsewhere.
+            RigwatchError: there is no such study, or its files are outside the folder.
         """
         return self.desks.of(self.places.study(request.path_params["name"]))
 
@@ -50,7 +50,7 @@ def context_of(request: Request) -> Context:
 
 
 def answer(value: Any, status: int = 200) -> Response:
-    """A value as JSON; what is not finite is null."""
+    """A value as a JSON response; non-finite numbers become null."""
     body = msgspec.json.encode(as_plain(value))
     headers = {"cache-control": "no-store"}
     return Response(body, status, headers, media_type="application/json")
@@ -60,7 +60,7 @@ Handler = Callable[[Request], Awaitable[Response]]
 
 
 def told(handler: Handler) -> Handler:
-    """A handler whose errors for users become an answer of one line."""
+    """A handler whose user errors become a one-line response."""
 
     @wraps(handler)
     async def guarded(request: Request) -> Response:
@@ -75,10 +75,10 @@ def told(handler: Handler) -> Handler:
 
 
 async def body_of(request: Request) -> dict[str, Any]:
-    """A request's JSON.
+    """A request's JSON body.
 
     Raises:
-        RigwatchError: it is none, or too long.
+        RigwatchError: it is not JSON, or too long.
     """
     whole = bytearray()
     async for part in request.stream():
@@ -92,7 +92,7 @@ async def body_of(request: Request) -> dict[str, Any]:
 
 
 def number_of(request: Request, name: str) -> float | None:
-    """A number of the address, None where it is missing or none."""
+    """A numeric query parameter, None if missing or invalid."""
     try:
         return float(request.query_params[name])
     except (KeyError, ValueError):
@@ -100,5 +100,5 @@ def number_of(request: Request, name: str) -> float | None:
 
 
 def refused(text: str, status: int) -> Response:
-    """A refusal in plain words."""
+    """A refusal with its reason as text."""
     return PlainTextResponse(f"rigwatch: {text}\n", status)

@@ -1,4 +1,4 @@
-"""Recordings brought, looked at and imported; new studies and stories."""
+"""Routes for uploading, inspecting and importing recordings, and for new studies and stories."""
 
 import contextlib
 import secrets
@@ -38,7 +38,7 @@ from rigwatch.wire.session import SUFFIX, open_session
 
 
 async def new_page(request: Request) -> Response:
-    """The page on which a study is made."""
+    """The page for creating a study."""
     context = context_of(request)
     return HTMLResponse(
         render(
@@ -49,7 +49,7 @@ async def new_page(request: Request) -> Response:
 
 
 async def bring(request: Request) -> Response:
-    """Take a file, bounded; what it holds."""
+    """Receive a file of bounded size; responds with its content."""
     context = context_of(request)
     name, most = request.path_params["file"], context.most_upload
     context.places.new(name)
@@ -69,7 +69,7 @@ async def bring(request: Request) -> Response:
 
 
 async def _looked(path: Path) -> Any:
-    """What a brought file holds; None of a session, which is taken as it is."""
+    """Content of an uploaded file; None for a session, which needs no mapping."""
     if path.suffix == SUFFIX:
         await run_in_threadpool(lambda: open_session(path).check_content())
         return None
@@ -77,7 +77,7 @@ async def _looked(path: Path) -> Any:
 
 
 async def _written(request: Request, path: Path, most: int) -> bool:
-    """Write a request's body; whether it was no longer than allowed."""
+    """Write a request's body to a file; returns whether its size is allowed."""
     size, whole = 0, False
     try:
         with path.open("wb") as file:
@@ -94,11 +94,11 @@ async def _written(request: Request, path: Path, most: int) -> bool:
 
 
 async def take_in(request: Request) -> Response:
-    """Make a session of a file that was brought."""
+    """Import an uploaded file as a session."""
     context, wanted = context_of(request), await body_of(request)
     source = context.places.inside(f"{UPLOADS}/{Path(str(wanted.get('upload'))).name}")
     if not source.is_file():
-        raise PlaceError("found no file that was brought, expected one")
+        raise PlaceError("found no uploaded file, expected one")
     target = context.places.new(f"{wanted.get('name', '')}{SUFFIX}", RECORDINGS)
     target.parent.mkdir(exist_ok=True)
     if target.exists():
@@ -161,12 +161,12 @@ async def _channels(request: Request) -> Any:
 
 
 async def template(request: Request) -> Response:
-    """What a template says of its recordings."""
+    """A template's recordings."""
     return answer(template_data(request.path_params["template"]))
 
 
 async def make(request: Request) -> Response:
-    """Make a study."""
+    """Create a study."""
     places, wanted = context_of(request).places, await body_of(request)
     folder = places.new(str(wanted.get("name", "")))
     spans = []
@@ -189,7 +189,7 @@ def _seconds(part: dict[str, Any], name: str) -> float | None:
 
 
 async def story(request: Request) -> Response:
-    """Begin a story."""
+    """Start a story."""
     root = context_of(request).places.root
     made = await run_in_threadpool(begin_story, root, request.path_params["story"])
     return answer({"study": made})

@@ -1,4 +1,4 @@
-"""Long work: begun, watched by server-sent events, cancelled."""
+"""Routes for long tasks: start, progress by server-sent events, cancel."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -26,15 +26,15 @@ ARGUMENTS: dict[str, dict[str, type]] = {
     "promote": {},
     "rollback": {},
 }
-"""What a page may have done, with what."""
+"""Tasks that a page may start, with their arguments."""
 CHANGES = frozenset({"add", "undo"})
 AT_THE_RIG = frozenset({"rehearse", "promote", "rollback"})
 HEARTBEAT = 15.0
-"""Longest that a page hears nothing [s]."""
+"""Longest time without an event [s]."""
 
 
 async def begin(request: Request) -> Response:
-    """Have something done; one thing at a time a study."""
+    """Start a task; one at a time per study."""
     wanted = await body_of(request)
     task = str(wanted.get("task", ""))
     if task not in ARGUMENTS:
@@ -69,12 +69,12 @@ def _arguments(task: str, given: object) -> dict[str, object]:
 
 
 async def cancel(request: Request) -> Response:
-    """End what runs; the study is as it was."""
+    """Cancel the running task; the study is unchanged."""
     return answer({"cancelled": context_of(request).desk(request).cancel()})
 
 
 async def events(request: Request) -> Response:
-    """What happens to a study, as it happens."""
+    """Server-sent events of a study."""
     desk = context_of(request).desk(request)
     headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
     return StreamingResponse(_events(desk), media_type="text/event-stream", headers=headers)

@@ -1,4 +1,4 @@
-"""Where things are: everything that a request can name lies under one folder, links resolved."""
+"""Paths: everything that a request can name is inside one folder, with links resolved."""
 
 import re
 from dataclasses import dataclass
@@ -13,38 +13,38 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
 
 
 class PlaceError(RigwatchError):
-    """A name that is nothing under the folder."""
+    """A name that is not inside the folder."""
 
 
 @dataclass(frozen=True)
 class Places:
-    """The folder that is served.
+    """The served folder.
 
     Attributes:
-        root: it, links resolved.
+        root: its path, with links resolved.
     """
 
     root: Path
 
     def inside(self, name: str) -> Path:
-        """What a name under the root means.
+        """The path of a name under the root.
 
         Raises:
-            PlaceError: it leads out of the root, by dots or by a link.
+            PlaceError: it leads outside the root, by dots or by a link.
         """
         try:
             found = (self.root / name).resolve()
         except (ValueError, OSError):
-            raise PlaceError(f"{name!r}: no name of a file") from None
+            raise PlaceError(f"{name!r}: not a valid file name") from None
         if not found.is_relative_to(self.root):
-            raise PlaceError(f"{name}: lies outside {self.root}, expected what is in it")
+            raise PlaceError(f"{name}: lies outside {self.root}, expected a path inside it")
         return found
 
     def study(self, name: str) -> Path:
-        """The folder of a study, all of whose files lie under the root.
+        """The folder of a study with all its files under the root.
 
         Raises:
-            PlaceError: there is none, or one of its files lies elsewhere.
+            PlaceError: there is none, or one of its files is outside.
         """
         folder = self.inside(name)
         if not (folder / FILE).is_file():
@@ -53,10 +53,10 @@ class Places:
         return folder
 
     def checked(self, name: str) -> Path:
-        """The same, after a look at every file that the study names.
+        """The same, after checking every file that the study names.
 
         Raises:
-            RigwatchError: the study cannot be opened, or one of its files lies elsewhere.
+            RigwatchError: the study cannot be opened, or one of its files is outside.
         """
         folder = self.study(name)
         for path in _files(open_study(folder)):
@@ -68,17 +68,17 @@ class Places:
         return folder
 
     def new(self, name: str, below: str = "") -> Path:
-        """A place for something new.
+        """The path for a new file or folder.
 
         Raises:
-            PlaceError: it is no plain name.
+            PlaceError: it is not a plain name.
         """
         if not _NAME.fullmatch(name) or ".." in name:
             raise PlaceError(f"{name!r}: expected a name of letters, digits, '.', '_' and '-'")
         return self.inside(f"{below}/{name}" if below else name)
 
     def relative(self, path: Path) -> str:
-        """A path as the pages name it."""
+        """A path relative to the root, as used in pages."""
         return path.resolve().relative_to(self.root).as_posix()
 
 

@@ -1,4 +1,4 @@
-"""The rig's page: what it does now, its alarms, an alarm as a study."""
+"""Routes of the rig's page: live signals, alarms, a study from an alarm."""
 
 import getpass
 import time
@@ -19,7 +19,7 @@ ACTIONS = ("acknowledge", "reset")
 
 
 def _link(request: Request) -> RigLink:
-    """The rig's link, opened when somebody looks first."""
+    """The rig's link, opened on first use."""
     rig = context_of(request).rig
     if rig is None:
         raise PlaceError("no rig: start `rigwatch workbench` with --rig CONFIG")
@@ -40,7 +40,7 @@ async def rig_page(request: Request) -> Response:
 
 
 async def rig_now(request: Request) -> Response:
-    """Signals of the last seconds and alarms."""
+    """Latest signals and alarms."""
     return answer(await run_in_threadpool(_link(request).seen))
 
 
@@ -58,7 +58,7 @@ async def rig_alarm(request: Request) -> Response:
 
 
 async def rig_study(request: Request) -> Response:
-    """Open an alarm as a study."""
+    """Create a study from an alarm."""
     wanted, link, places = await body_of(request), _link(request), context_of(request).places
     alarm = link.alarm(str(wanted.get("name", "")))
     if alarm is None:

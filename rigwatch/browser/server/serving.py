@@ -1,4 +1,4 @@
-"""Runs the server: on this machine alone, unless it is told otherwise and the way is safe."""
+"""Runs the server: on loopback only, unless a secure connection to another address is set up."""
 
 import contextlib
 import socket
@@ -23,12 +23,12 @@ class Options:
     """How the pages are served.
 
     Attributes:
-        folder: what is served.
-        address, port: where it listens; port 0 takes a free one.
+        folder: the served folder.
+        address, port: to listen on; port 0 takes a free one.
         certificate, key: of TLS.
-        behind_proxy: names by which people reach a proxy in front of it, which does TLS.
+        behind_proxy: host names of a reverse proxy in front of it, which terminates TLS.
         rig: configuration of a rig to show.
-        most_upload: bytes of a recording that may be brought.
+        most_upload: largest upload of a recording [bytes].
     """
 
     folder: Path
@@ -42,10 +42,10 @@ class Options:
 
 
 def serve(options: Options, ready: Callable[[str], None]) -> None:
-    """Serve until interrupted; `ready` is told the address to open.
+    """Serve until interrupted; `ready` is called with the address to open.
 
     Raises:
-        RigwatchError: another address than this machine's without TLS, or it is taken.
+        RigwatchError: an address other than loopback without TLS, or the port is in use.
     """
     _check(options)
     listening = _listen(options)
@@ -87,7 +87,7 @@ def _listen(options: Options) -> socket.socket:
     found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         found.bind((options.address, options.port))
-        # Who is told the address may come before the server does.
+        # A browser given the address may connect before the server listens.
         found.listen(128)
     except OSError as error:
         found.close()

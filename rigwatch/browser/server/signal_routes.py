@@ -1,4 +1,4 @@
-"""Signals for the charts: any span in as many columns as a chart has."""
+"""Routes for chart data: any span, in as many columns as the chart has."""
 
 import math
 from functools import lru_cache
@@ -21,11 +21,11 @@ from rigwatch.wire.arrays import FloatArray
 WIDEST = 4000
 CHARTS = {"signals": ("measured", "modelled"), "residual": ("residual",)}
 MOST_SPANS = 400
-"""Stretches of a chosen place that are drawn at most."""
+"""Largest number of spans drawn for a selected region."""
 
 
 def _results(request: Request) -> Results:
-    """The results that a request names by the key that the page was given."""
+    """The results named in a request by the page's key."""
     folder = context_of(request).places.study(request.path_params["name"])
     key = request.query_params.get("key", "")
     if not key.isalnum():
@@ -34,7 +34,7 @@ def _results(request: Request) -> Results:
 
 
 def _lines(request: Request) -> dict[str, Trace]:
-    """The lines of a chart by their names, a preview last."""
+    """The lines of a chart by name, the preview last."""
     asked = request.query_params
     results, chart = _results(request), asked.get("chart", "signals")
     use, channel = asked.get("use", "held_out"), asked.get("channel", "")
@@ -53,7 +53,7 @@ def _lines(request: Request) -> dict[str, Trace]:
 
 
 def _preview(results: Results, label: str, use: str, channel: str, number: int) -> Trace | None:
-    """What would be left with a candidate: as it was fitted, else in training to first order."""
+    """The predicted residual with a candidate: from its fit, otherwise to first order."""
     known = results.read("evidence") or {}
     if label not in known:
         raise PlaceError(f"{label!r}: no candidate of this study")
@@ -91,7 +91,7 @@ def _directions(folder: Path, _: int) -> Directions:
 
 
 def span_of(request: Request, lines: dict[str, Trace]) -> tuple[float, float]:
-    """The span that is asked for, within the lines' ends [s]."""
+    """The requested span within the lines' ends [s]."""
     ends = [trace.ends for trace in lines.values()]
     start, end = number_of(request, "from"), number_of(request, "to")
     low, high = min(e[0] for e in ends), max(e[1] for e in ends)
@@ -113,8 +113,8 @@ def _signals(request: Request) -> Response:
 def packed(lines: dict[str, Trace], span: tuple[float, float], columns: int) -> Response:
     """Lines over a span: a head as JSON, then times and values of each.
 
-    4 bytes, the head's length; the head, padded so that what follows begins at a multiple of 8; of
-    each line its times as 64 bit floats, then of each its values as 32 bit floats.
+    Layout: length of the head (4 bytes); the head, padded so that the data start at a multiple of
+    8; the times of each line as 64-bit floats, then the values of each as 32-bit floats.
     """
     width = min(max(columns, 1), WIDEST)
     cut = {name: trace.between(*span, width) for name, trace in lines.items()}
@@ -134,7 +134,7 @@ def packed(lines: dict[str, Trace], span: tuple[float, float], columns: int) -> 
 
 
 async def place(request: Request) -> Response:
-    """The samples of a chosen place as spans of time, and what each candidate explains there."""
+    """The samples of a selected region as time spans, and what each candidate explains there."""
     results, number = _results(request), int(number_of(request, "number") or 0)
     path = results.folder / "places" / f"{number}.npy"
     if not path.is_file():
@@ -149,7 +149,7 @@ async def place(request: Request) -> Response:
 
 
 def _spans(times: FloatArray) -> FloatArray:
-    """Runs of neighbouring samples; the narrowest gaps are bridged where there are too many."""
+    """Runs of neighbouring samples; if there are too many, the narrowest gaps are closed."""
     if len(times) < 2:
         return np.array([[times[0], times[0]]])
     gaps = np.diff(times)
@@ -161,7 +161,7 @@ def _spans(times: FloatArray) -> FloatArray:
 
 
 async def figure(request: Request) -> Response:
-    """A chart over the span that is shown, as SVG or as CSV."""
+    """A chart over the displayed span, as SVG or CSV."""
     return await run_in_threadpool(_figure, request)
 
 

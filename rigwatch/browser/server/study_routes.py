@@ -1,4 +1,4 @@
-"""Pages of studies and their parts."""
+"""Routes of study pages and their parts."""
 
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ async def studies_page(request: Request) -> Response:
 
 
 async def study_page(request: Request) -> Response:
-    """One study; its model is fitted where that was not done yet."""
+    """One study; its model is fitted if it has not been yet."""
     context, name = context_of(request), request.path_params["name"]
     values: dict[str, Any] = {
         "name": name, "model": "", "trouble": "", "parts": {}, "state": "",
@@ -55,7 +55,7 @@ async def study_page(request: Request) -> Response:
 
 
 async def study_parts(request: Request) -> Response:
-    """The parts of a study's page and what its code needs to know."""
+    """The parts of a study's page and the data for its script."""
     context, name = context_of(request), request.path_params["name"]
     folder = await run_in_threadpool(context.places.checked, name)
     state, parts = await run_in_threadpool(
@@ -73,7 +73,7 @@ async def study_candidate(request: Request) -> Response:
 
 
 async def study_file(request: Request) -> Response:
-    """A file that was made of a study: its report, or the excitation of the next experiment."""
+    """A file created from a study: its report, or the excitation of the next experiment."""
     context, name = context_of(request), request.path_params["name"]
     kind = request.url.path.split("/")[3]
     folder = await run_in_threadpool(context.places.checked, name)
@@ -96,7 +96,7 @@ def _script(state: dict[str, Any]) -> Any:
 
 
 def job_data(job: Job | None) -> dict[str, Any] | None:
-    """A job as the pages know it."""
+    """A job as JSON for the pages."""
     if job is None:
         return None
     plain: dict[str, Any] = as_plain(job)

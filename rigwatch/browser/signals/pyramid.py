@@ -1,8 +1,8 @@
-"""Extremes of a signal at coarser and coarser levels, so that any span is shown at once.
+"""Extremes of a signal at several resolutions, so that any span is displayed quickly.
 
-A column of a chart needs four numbers of its samples to be drawn as all of them would be: first,
-lowest, highest, last (M4: Jugel et al., VLDB 2014, doi 10.14778/2732951.2732953). Each level keeps
-these of blocks that are `STEP` times those of the level below.
+A column of a chart looks the same as with all its samples if drawn from four of them: first,
+lowest, highest, last (M4: Jugel et al., VLDB 2014, doi 10.14778/2732951.2732953). Each level stores
+these for blocks `STEP` times as long as those of the level below.
 """
 
 from collections.abc import Sequence
@@ -17,9 +17,9 @@ Samples = NDArray[np.float32]
 FIRST, LOW, HIGH, LAST = range(4)
 STEP = 8
 FINEST = 16
-"""Samples of a block of the finest level."""
+"""Samples per block of the finest level."""
 LEAST = 64
-"""Blocks below which no coarser level is worth it."""
+"""Number of blocks below which no coarser level is created."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Columns:
     """A span of a signal, in columns.
 
     Attributes:
-        edges: sample at which each column begins, and the end of the last, shape (columns + 1,).
+        edges: first sample of each column, and the end of the last, shape (columns + 1,).
         values: first, lowest, highest and last of each, shape (columns, 4); NaN without samples.
     """
 
@@ -40,7 +40,7 @@ class Pyramid:
 
     Args:
         samples: the signal, shape (n,).
-        levels: of blocks of 16, 128, … samples, each of shape (blocks, 4); made where None.
+        levels: of blocks of 16, 128, … samples, each of shape (blocks, 4); computed if None.
     """
 
     def __init__(self, samples: Samples, levels: Sequence[Samples] | None = None) -> None:
@@ -50,7 +50,7 @@ class Pyramid:
     def span(self, begin: int, end: int, width: int) -> Columns:
         """Samples `begin` to `end` in at most `width` columns.
 
-        Columns begin where blocks do, so that each is exact for the samples it says it has.
+        Columns start at block boundaries, so each is exact for its samples.
         """
         begin, end = max(begin, 0), min(end, len(self.samples))
         if end <= begin:
@@ -63,7 +63,7 @@ class Pyramid:
         return Columns(np.minimum(edges * block, len(self.samples)), columns)
 
     def _level(self, samples_each: float) -> tuple[int, int]:
-        """Number of the level (−1 for the samples) and its block, fine for such columns."""
+        """Index of a sufficiently fine level (−1 for the samples) and its block length."""
         level, block = -1, 1
         for number in range(len(self.levels)):
             size = FINEST * STEP**number
@@ -89,7 +89,7 @@ def _levels(samples: Samples) -> list[Samples]:
 
 
 def _merged(rows: Samples, starts: NDArray[np.int64]) -> Samples:
-    """Rows joined from each start to the next, shape (starts, 4)."""
+    """Rows merged from each start to the next, shape (starts, 4)."""
     ends = np.append(starts[1:], len(rows)) - 1
     return np.stack(
         [

@@ -9,7 +9,7 @@ from rigwatch.browser.signals.pyramid import Pyramid, Samples, interleaved
 from rigwatch.wire.arrays import FloatArray
 
 DENSE = 4
-"""Columns' worth of samples below which every sample is shown."""
+"""Samples per column below which every sample is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Trace:
     def between(self, start: float, end: float, width: int) -> tuple[FloatArray, Samples]:
         """Times and values of a line over a span, for a chart of `width` columns.
 
-        One sample more at either end, so that the line leaves the chart where the signal does.
+        Includes one further sample at either end, so that the line continues to the chart's edge.
         """
         first = max(int(np.searchsorted(self.times, start, "left")) - 1, 0)
         last = min(int(np.searchsorted(self.times, end, "right")) + 1, len(self.times))
@@ -54,7 +54,7 @@ def write_trace(folder: Path, name: str, values: FloatArray, times: FloatArray |
 
 
 def open_trace(folder: Path, name: str) -> Trace:
-    """The line that was written; its samples stay on disk until they are looked at.
+    """Open a written line; its samples are memory-mapped.
 
     Raises:
         FileNotFoundError: there is none.

@@ -1,4 +1,4 @@
-"""Pages and their parts, drawn from a study and the results on disk."""
+"""Pages and their parts, rendered from a study and the results on disk."""
 
 from rigwatch.browser.views.exports import figure_csv, figure_svg
 from rigwatch.browser.views.pages import render

@@ -1,4 +1,4 @@
-"""A chart's figure as SVG and its numbers as CSV, over the span that is shown."""
+"""Exports of a chart over the displayed span: figure as SVG, numbers as CSV."""
 
 import csv
 import io
@@ -15,7 +15,7 @@ WIDE = 900
 
 
 def figure_svg(title: str, axis: str, lines: Mapping[str, Trace], span: tuple[float, float]) -> str:
-    """The lines over a span, as a file in a light page's colours."""
+    """The lines over a span, as an SVG file in the colours of the light theme."""
     drawn = {name: trace.between(*span, WIDE) for name, trace in lines.items()}
     values = [np.asarray(y, np.float64) for _, y in drawn.values()]
     plot = Plot(
@@ -28,7 +28,7 @@ def figure_svg(title: str, axis: str, lines: Mapping[str, Trace], span: tuple[fl
 
 
 def figure_csv(axis: str, lines: Mapping[str, Trace], span: tuple[float, float]) -> str:
-    """Every sample of the lines within a span; lines of other times have rows of their own."""
+    """All samples of the lines within a span; lines with different times have separate rows."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(["time [s]", *(f"{name}: {axis}" for name in lines)])

@@ -1,4 +1,4 @@
-"""The residual over position and velocity as a map whose cells can be chosen."""
+"""The residual over position and velocity as a map with selectable cells."""
 
 import re
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ class Cell:
 
     Attributes:
         number: of its region.
-        x, y, width, height: where it is drawn [pixels].
+        x, y, width, height: of the cell [pixels].
         colour: "plus" or "minus", by the sign of the mean residual.
         strength: of the colour, 0 to 1.
-        told: in words.
+        told: description in words.
     """
 
     number: int
@@ -35,7 +35,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Map:
-    """The map of one channel, with words at the ends of its axes."""
+    """The map of one channel, with labels at the ends of its axes."""
 
     cells: list[Cell]
     x: tuple[float, float]
@@ -44,7 +44,7 @@ class Map:
 
 
 def motion_map(state: State) -> dict[str, Map]:
-    """One map a channel; none where the model has no motion."""
+    """One map per channel; none if the model has no motion."""
     found: dict[str, list[tuple[int, dict[str, Any], list[float]]]] = {}
     for number, region in enumerate(state.results.read("regions") or []):
         match = _NAME.fullmatch(region["name"]) if region["view"] == "motion" else None

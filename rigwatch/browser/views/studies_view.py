@@ -1,4 +1,4 @@
-"""The list of studies: what each says at a glance."""
+"""The list of studies with a summary of each."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.study import FILE
 
 DEEP = 3
-"""Folders below the root in which studies are looked for."""
+"""Depth of folders below the root in which studies are searched."""
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,10 @@ class Listed:
     """A study of the list.
 
     Attributes:
-        name: from the root.
-        state: None where it cannot be opened.
-        trouble: why not.
-        errors: held-out error of each step over that of the model alone, as far as they are known.
+        name: path relative to the root.
+        state: None if it cannot be opened.
+        trouble: why it cannot be opened.
+        errors: held-out error of each step over that of the model alone, as far as known.
     """
 
     name: str
@@ -30,19 +30,19 @@ class Listed:
 
     @property
     def verdict(self) -> str:
-        """In a sentence."""
+        """The verdict in a sentence."""
         return headline(self.state) if self.state else self.trouble
 
     @property
     def errors(self) -> list[float]:
-        """Held-out errors of the steps, as the ledger tells them where no fit is at hand."""
+        """Held-out errors of the steps, from the ledger if there is no fit."""
         if self.state is None:
             return []
         return [s.comparison.held_out_error for s in self.state.steps if s.comparison]
 
     @property
     def last(self) -> str:
-        """What was done last."""
+        """The last step."""
         ledger = self.state.ledger if self.state else []
         if not ledger:
             return ""
@@ -52,7 +52,7 @@ class Listed:
 
 
 def listed(root: Path) -> list[Listed]:
-    """Every study below a folder."""
+    """All studies below a folder."""
     return [_listed(root, folder) for folder in _folders(root)]
 
 

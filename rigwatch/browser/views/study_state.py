@@ -1,4 +1,4 @@
-"""What is known of one step of a study: read from its folder, nothing is fitted."""
+"""State of one step of a study, read from its folder without fitting."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +14,12 @@ from rigwatch.workbench.study import Study, digest, lines, open_study
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One of the models that a study's effects make, one after another.
+    """The model with the first effects of a study.
 
     Attributes:
         number: of effects in it.
         added: the last of them, as "effect@port"; empty for the model alone.
-        comparison: its errors, None where it is not fitted yet.
+        comparison: its errors, None if not fitted yet.
     """
 
     number: int
@@ -28,7 +28,7 @@ class Step:
 
     @property
     def label(self) -> str:
-        """What people call it."""
+        """Name shown to users."""
         return f"+ {self.added.split('@')[0].replace('_', ' ')}" if self.added else "model alone"
 
 
@@ -37,15 +37,15 @@ class State:
     """A study at one step.
 
     Attributes:
-        study: with the step's effects alone.
-        name: of the study, as the page's address has it.
-        whole: with all of its effects.
-        step: how many effects are shown.
-        steps: all that there are, the model alone first.
-        results: of the step that is shown.
-        explanation: of it, None where it was not asked.
-        evidence: of each candidate, by label.
-        ledger: its lines, the oldest first.
+        study: with only the step's effects.
+        name: of the study, as in the page's address.
+        whole: the study with all its effects.
+        step: number of effects shown.
+        steps: all steps, the model alone first.
+        results: of the displayed step.
+        explanation: of the displayed step, None if not computed.
+        evidence: for each candidate, by label.
+        ledger: its lines, oldest first.
     """
 
     study: Study
@@ -60,16 +60,16 @@ class State:
 
     @property
     def comparison(self) -> Comparison | None:
-        """Errors of the step that is shown."""
+        """Errors of the displayed step."""
         return self.steps[self.step].comparison
 
     @property
     def latest(self) -> bool:
-        """Whether the study is shown as it is."""
+        """Whether the current study is displayed."""
         return self.step == len(self.whole.file.effects)
 
     def plain(self) -> dict[str, Any]:
-        """What the page's code needs to know."""
+        """Data for the page's script."""
         found = self.comparison
         channels = [
             {
@@ -93,7 +93,7 @@ class State:
 
 
 def state_of(folder: Path, name: str, step: int | None = None) -> State:
-    """The study in a folder at a step, as it is where the step is None or there is no such.
+    """The study in a folder at a step; the current one if the step is None or does not exist.
 
     Raises:
         RigwatchError: the study cannot be opened.

@@ -1,4 +1,4 @@
-"""The parts of a study's page, each a piece of HTML that replaces the one before."""
+"""The parts of a study's page, each a fragment of HTML that replaces the previous one."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,13 +22,13 @@ VIEWS = {
 
 @dataclass
 class Candidate:
-    """A row of the ranking, with those that cannot be told from it.
+    """A row of the ranking with the rows that are indistinguishable from it.
 
     Attributes:
-        row: what `explain` says.
-        told: what speaks for it.
+        row: from `explain`.
+        told: evidence for it.
         physics: of the effect, in a sentence.
-        alike: rows of its class that are not shown by themselves.
+        alike: rows of its class that are not listed separately.
     """
 
     row: Row
@@ -43,23 +43,23 @@ class Candidate:
 
     @property
     def held_out(self) -> float | None:
-        """Held-out error of its fit, a later one first."""
+        """Held-out error of its latest fit."""
         found = self.told.get("held_out_error", self.row.held_out_error)
         return None if found is None else float(found)
 
     @property
     def accepted(self) -> bool:
-        """Whether the recordings held out speak for it."""
+        """Whether the held-out error supports it."""
         return bool(self.told.get("accepted", self.row.accepted))
 
     @property
     def reason(self) -> str:
-        """The same in words."""
+        """The reason for the decision, in words."""
         return str(self.told.get("reason", self.row.reason))
 
 
 def parts_of(state: State, *, rig: bool = False) -> dict[str, str]:
-    """Every part by its name; `rig` says whether there is one to promote to."""
+    """All parts by name; `rig`: whether there is a rig to promote to."""
     values = {
         "s": state,
         "headline": headline(state),
@@ -87,7 +87,7 @@ def headline(state: State) -> str:
 
 
 def _in_words(found: Explanation) -> str:
-    """The verdict's sentence with effects as people call them."""
+    """The verdict's sentence with plain names of effects."""
     text = found.text
     for row in found.ranking:
         text = text.replace(
@@ -97,7 +97,7 @@ def _in_words(found: Explanation) -> str:
 
 
 def doubt(state: State) -> str:
-    """How often a verdict like this one was wrong."""
+    """How often similar verdicts were wrong."""
     found = state.explanation
     if found is None:
         return ""
@@ -112,7 +112,7 @@ def doubt(state: State) -> str:
 
 
 def candidates(state: State) -> list[Candidate]:
-    """The ranking, effects that cannot be told apart below the best of them."""
+    """The ranking, with indistinguishable effects below the best of them."""
     if state.explanation is None:
         return []
     shown: list[Candidate] = []
@@ -132,7 +132,7 @@ def _fitted(one: Candidate) -> bool:
 
 
 def regions(state: State) -> dict[str, dict[str, list[dict[str, Any]]]]:
-    """Where the model fails: by channel and view, each region with its number."""
+    """Regions of the residual by channel and view, each with its number."""
     found: dict[str, dict[str, list[dict[str, Any]]]] = {}
     for number, region in enumerate(state.results.read("regions") or []):
         views = found.setdefault(region["channel"], {})
@@ -152,7 +152,7 @@ def _first_number(name: str) -> float:
 
 
 def command(state: State, step: str, effect: str = "", port: str = "") -> tuple[str, str]:
-    """What one would type, and what one would call, to do the same."""
+    """The equivalent shell command and Python call."""
     name = state.study.folder.name
     if not effect:
         return f"rigwatch {step} {name}", f'rigwatch.{step}("{name}")'
@@ -163,7 +163,7 @@ def command(state: State, step: str, effect: str = "", port: str = "") -> tuple[
 
 
 def candidate_html(state: State, label: str) -> str:
-    """One candidate with the evidence for it; empty where there is none of that name."""
+    """One candidate with the evidence for it; empty if the name is unknown."""
     every = [one for c in candidates(state) for one in (c, *c.alike)]
     found = next((c for c in every if c.label == label), None)
     if found is None:

@@ -1,4 +1,4 @@
-"""Long work on studies: one process each, its results on disk, an end at any time."""
+"""Long tasks on studies: one process per study, results on disk, cancelling at any time."""
 
 from rigwatch.browser.work.desk import Desk, Desks, Job, warm_up
 from rigwatch.browser.work.directions import Directions

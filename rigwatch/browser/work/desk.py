@@ -1,4 +1,4 @@
-"""The server's side of the studies' processes: one each, one task at a time, killed to cancel."""
+"""The server's side of the study processes: one per study, one task at a time, killed to cancel."""
 
 import asyncio
 import multiprocessing
@@ -17,15 +17,15 @@ from rigwatch.wire.errors import RigwatchError
 
 WORKERS = multiprocessing.get_context("forkserver")
 MOST_PROCESSES = 4
-"""Processes that stay for their studies' next task."""
+"""Number of idle processes kept for the next task of their studies."""
 MOST_WAITING = 64
-"""Events that a page may be behind."""
+"""Number of events queued for a page."""
 QUIET = frozenset({"show"})
-"""Tasks that begin by themselves and give way to what somebody asks for."""
+"""Tasks that start automatically and give way to requested ones."""
 
 
 class BusyError(RigwatchError):
-    """A study's process is at work for somebody."""
+    """A study's process is busy with a requested task."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,10 @@ class Job:
         task: its name, such as "explain".
         arguments: of it.
         state: waiting, running, done, failed, refused or cancelled.
-        text: what it does now, or how it ended.
-        began: when [s], as `time.time` says.
-        ended: the same; None while it runs.
-        number: counts the jobs of a server.
+        text: current activity, or result.
+        began: start, Unix time [s].
+        ended: end, Unix time [s]; None while it runs.
+        number: serial number of the job in the server.
     """
 
     task: str
@@ -52,21 +52,21 @@ class Job:
 
     @property
     def active(self) -> bool:
-        """Whether it is still to be done."""
+        """Whether it is waiting or running."""
         return self.state in ("waiting", "running")
 
 
 Told = tuple[str, Job | None]
-"""What has changed, and the job as it was then."""
+"""Kind of change, and a copy of the job at that time."""
 
 
 @dataclass(eq=False)
 class Desk:
-    """One study's process and its tasks; to be used in the server's event loop alone.
+    """One study's process and its tasks; to be used only in the server's event loop.
 
     Attributes:
         folder: the study's.
-        job: what runs, or what ended last; None before.
+        job: the running job, or the last one; None before the first.
     """
 
     folder: Path
@@ -78,10 +78,10 @@ class Desk:
     _number: int = 0
 
     def ask(self, task: str, arguments: Mapping[str, Any]) -> Job:
-        """Have a task done.
+        """Start a task.
 
         Raises:
-            BusyError: another is being done that somebody asked for.
+            BusyError: another requested task is running.
         """
         same = next((job for job in self._all() if self._is(job, task, arguments)), None)
         if same is not None:
@@ -104,7 +104,7 @@ class Desk:
         return (job.task, job.arguments) == (task, arguments)
 
     def cancel(self) -> bool:
-        """End what runs and what waits, whatever it is doing; whether there was anything."""
+        """Cancel the running and the waiting task; returns whether there was one."""
         if not self._all():
             return False
         self._queue.clear()
@@ -113,37 +113,37 @@ class Desk:
         return True
 
     def close(self) -> None:
-        """End the process; nothing is lost, as a study is only ever written whole."""
+        """End the process; nothing is lost, as studies are written atomically."""
         self._queue.clear()
         self._end_process()
 
     @property
     def at_work(self) -> bool:
-        """Whether there is anything to do."""
+        """Whether there is an active job."""
         return bool(self._all())
 
     @property
     def alive(self) -> bool:
-        """Whether it has a process."""
+        """Whether its process is running."""
         return self._process is not None
 
     def listen(self) -> asyncio.Queue[Told]:
-        """A queue that is told what changes: "job" with it, or "study" where its files did."""
+        """A queue of changes: "job" with the job, or "study" if its files changed."""
         queue: asyncio.Queue[Told] = asyncio.Queue(MOST_WAITING)
         self._listeners.add(queue)
         return queue
 
     def leave(self, queue: asyncio.Queue[Told]) -> None:
-        """Tell it no more."""
+        """Remove a queue."""
         self._listeners.discard(queue)
 
     @property
     def watched(self) -> bool:
-        """Whether anybody listens."""
+        """Whether there is any listener."""
         return bool(self._listeners)
 
     def tell(self, what: str) -> None:
-        """Tell all who listen; who is far behind hears of the next change."""
+        """Notify all listeners; a full queue misses the change but gets the next one."""
         for queue in self._listeners:
             with suppress(asyncio.QueueFull):
                 queue.put_nowait((what, self.job))
@@ -168,7 +168,7 @@ class Desk:
         return self._pipe
 
     def _hear(self, pipe: Connection, loop: asyncio.AbstractEventLoop) -> None:
-        """In a thread of its own: pass on what the process says."""
+        """In a separate thread: forward the messages of the process."""
         said: tuple[str, Any] = ("", None)
         while said[0] != "gone":
             try:
@@ -213,7 +213,7 @@ class Desks:
     _desks: dict[Path, Desk] = field(default_factory=dict)
 
     def of(self, folder: Path) -> Desk:
-        """The desk of a study; idle processes of others make room for it."""
+        """The desk of a study; idle processes of others are ended to make room."""
         desk = self._desks.pop(folder, None) or Desk(folder)
         self._desks[folder] = desk
         alive = [other for other in self._desks.values() if other.alive and not other.at_work]
@@ -227,7 +227,7 @@ class Desks:
             desk.close()
 
     async def watch(self, state: Callable[[Path], object], every: float = 0.5) -> None:
-        """Tell those who look at a study that its files have changed, whoever changed them."""
+        """Notify pages of a study that its files have changed."""
         seen: dict[Path, object] = {}
         while True:
             for folder, desk in list(self._desks.items()):
@@ -240,5 +240,5 @@ class Desks:
 
 
 def warm_up() -> None:
-    """Start the process that the others are made of, with the engine in it."""
+    """Start the process from which the others are forked, with the engine loaded."""
     multiprocessing.set_forkserver_preload(["rigwatch.browser.work.worker"])

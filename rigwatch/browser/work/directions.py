@@ -1,7 +1,7 @@
-"""What each candidate would take out of the residual, sample by sample, to first order.
+"""The part of the residual that each candidate explains, per sample, to first order.
 
-The score test's projected directions, kept for the training samples: a candidate's preview and the
-order of candidates in one place need no further fit.
+The score test's projected directions are stored for the training samples, so that the preview of a
+candidate and the ranking of candidates in a region need no further fit.
 """
 
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ from rigwatch.workbench.compare import Bench, sample_numbers
 from rigwatch.workbench.ranking import Ranked, score_all
 
 MOST = 20_000
-"""Samples that are kept; longer recordings are thinned to so many."""
+"""Most samples stored; longer recordings are decimated."""
 
 
 def write_directions(folder: Path, bench: Bench, rows: Sequence[Ranked]) -> None:
-    """Keep what every row takes away, in each channel's unit."""
+    """Write the part that every row explains, in each channel's unit."""
     base = bench.base.train
     found = [_candidate(row) for row in rows]
     scores = score_all(bench.data, bench.base, found)
@@ -46,10 +46,10 @@ def _candidate(row: Ranked) -> Candidate:
 
 
 class Directions:
-    """The same, read back.
+    """Reads the stored parts.
 
     Args:
-        folder: where they were written.
+        folder: in which they were written.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -60,19 +60,19 @@ class Directions:
         self._scale: FloatArray = np.load(folder / "scale.npy")
 
     def left(self, label: str, channel: int) -> FloatArray:
-        """The residual without what the candidate takes, of one channel, shape (n,)."""
+        """The residual minus the part that the candidate explains, of one channel, shape (n,)."""
         taken = self._taken[self.labels.index(label), channel]
         return np.asarray(self._residual[channel] - taken, np.float64)
 
     def trace(self, label: str, channel: int) -> Trace:
-        """The same as a line of a chart."""
+        """The remaining residual as a chart line."""
         return Trace(Pyramid(self.left(label, channel).astype(np.float32)), self.times)
 
     def explained(self, spans: FloatArray) -> dict[str, float]:
         """Share of the residual's energy that each explains within spans of time.
 
         Args:
-            spans: begin and end of each [s], shape (spans, 2), ascending.
+            spans: start and end of each [s], shape (spans, 2), ascending.
         """
         place = np.searchsorted(spans[:, 0], self.times, "right") - 1
         inside = (place >= 0) & (self.times <= spans[np.maximum(place, 0), 1])

@@ -1,4 +1,4 @@
-"""A study's model at the monitor, over what the rig's recorder has of the last minutes."""
+"""Rehearsal of a study's model in the monitor, on the rig's latest recorded samples."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,14 +11,14 @@ from rigwatch.workbench.steps import Rehearsal, model_path, promotion, rehearse
 from rigwatch.workbench.study import Study
 
 MINUTES = 3.0
-"""Length of what is rehearsed on, at most [min]."""
+"""Longest recording used for a rehearsal [min]."""
 
 
 def rehearsal(study: Study, rig: Path, progress: Callable[[str], None]) -> Rehearsal:
     """Rehearse the study's model.
 
     Raises:
-        ModelError: the study has nothing that the monitor has a place for.
+        ModelError: the monitor's model supports no effect of the study.
         SessionError: the rig has recorded nothing.
     """
     recorder = load_rig(rig).recorder

@@ -1,7 +1,7 @@
-"""What a study's process found, on disk, so that pages show it without fitting again.
+"""Results of a study's process on disk, so that pages show them without fitting again.
 
-One folder a model: it is found by the hash of all that its errors depend on, so that a study that
-is changed anywhere finds none until it is fitted. Each result is written whole or not at all.
+There is one folder per model, named by the hash of everything its errors depend on. A changed study
+therefore has no results until it is fitted. Each result is written atomically.
 """
 
 import os
@@ -19,11 +19,11 @@ from rigwatch.workbench.study import Study, stands_on
 
 FOLDER = ".workbench"
 KEPT = 24
-"""Models whose results are kept, the latest used."""
+"""Number of most recently used models whose results are kept."""
 
 
 def as_plain(value: Any) -> Any:
-    """Dataclasses and structs as JSON has them; what is not finite becomes None."""
+    """Dataclasses and structs as JSON values; non-finite numbers become None."""
     return msgspec.json.decode(msgspec.json.encode(value, enc_hook=_plain))
 
 
@@ -41,10 +41,10 @@ def signal_key(use: str, line: str, channel: str) -> str:
 
 
 def results_of(study: Study) -> "Results":
-    """Where the results of a study's model as it is are.
+    """The results of a study's current model.
 
     Raises:
-        ModelError: a recording is not there.
+        ModelError: a recording is missing.
     """
     return Results(study.folder / FOLDER / stands_on(study)[:32])
 
@@ -54,17 +54,17 @@ class Results:
     """The results of one model of a study.
 
     Attributes:
-        folder: where they are; need not exist.
+        folder: their folder; need not exist.
     """
 
     folder: Path
 
     def has(self, name: str) -> bool:
-        """Whether a result is there."""
+        """Whether a result exists."""
         return (self.folder / name).exists()
 
     def read(self, name: str) -> Any:
-        """A result that was written as JSON, None where it is not there."""
+        """A result written as JSON, None if missing."""
         try:
             return msgspec.json.decode((self.folder / f"{name}.json").read_bytes())
         except FileNotFoundError:
@@ -79,7 +79,7 @@ class Results:
 
     @contextmanager
     def whole(self, name: str) -> Iterator[Path]:
-        """A folder to fill, which becomes the result `name` once it is full."""
+        """A temporary folder, which becomes the result `name` when complete."""
         beside = self.folder / f"{name}.{os.getpid()}.part"
         shutil.rmtree(beside, ignore_errors=True)
         beside.mkdir(parents=True)
@@ -91,7 +91,7 @@ class Results:
             shutil.rmtree(beside, ignore_errors=True)
 
     def forget_old(self) -> None:
-        """Drop the results of models that were not looked at for longest."""
+        """Remove the results of the least recently used models."""
         os.utime(self.folder)
         every = sorted(self.folder.parent.iterdir(), key=lambda path: -path.stat().st_mtime)
         for path in every[KEPT:]:

@@ -1,4 +1,4 @@
-"""What a study's process does: fits a step, explains, previews, adds, undoes, reports."""
+"""Tasks of a study's process: fit a step, explain, preview, add, undo, report."""
 
 import getpass
 from collections.abc import Callable, Mapping
@@ -37,8 +37,8 @@ class Worker:
 
     Attributes:
         folder: the study's.
-        progress: told what begins.
-        warm: fits that stay for the next task.
+        progress: called with a line of text as each part begins.
+        warm: cache of fits for the next task.
     """
 
     folder: Path
@@ -46,13 +46,13 @@ class Worker:
     warm: Warm = field(default_factory=lambda: Warm(12))
 
     def step(self, count: int | None = None) -> Study:
-        """The study with its first effects, all of them if None."""
+        """The study with its first `number` effects, all if None."""
         study = open_study(self.folder)
         effects = study.file.effects
         return study if count is None else study.with_effects(effects[:count])
 
     def show(self, step: int | None = None) -> None:
-        """Fit the model of a step: errors, signals, where it fails."""
+        """Fit the model of a step; writes errors, signals and regions."""
         study = self.step(step)
         kept = results_of(study)
         if kept.has("comparison.json"):
@@ -66,7 +66,7 @@ class Worker:
         kept.forget_old()
 
     def explain(self) -> None:
-        """Rank what may be missing, with the evidence for each fit."""
+        """Rank the effects that may be missing, with evidence for each."""
         self.show()
         study = self.step()
         kept, bench = results_of(study), self.warm.bench(study)
@@ -94,7 +94,7 @@ class Worker:
         kept.write("evidence", told | {row.label: _evidence(bench, row)})
 
     def add(self, effect: str, port: str, *, anyway: bool = False) -> dict[str, Any]:
-        """Add an effect, or refuse it; what was done."""
+        """Add or refuse an effect; returns the outcome."""
         study = open_study(self.folder)
         return self._done(
             try_add(
@@ -103,17 +103,17 @@ class Worker:
         )  # fmt: skip
 
     def undo(self) -> dict[str, Any]:
-        """Take the last effect away; what was done."""
+        """Remove the last effect; returns the outcome."""
         return self._done(try_undo(open_study(self.folder), self.progress, self.warm))
 
     def report(self) -> None:
-        """Write the study's page."""
+        """Write the study's report."""
         study = open_study(self.folder)
         self.show()
         write_report(study, results_of(study).folder / "report.html", self.progress)
 
     def rehearse(self, rig: str) -> dict[str, Any]:
-        """Run the monitor with what the study has learnt over what the rig did last."""
+        """Run the monitor with the study's results over the rig's latest samples."""
         from rigwatch.browser.work.rehearsal import rehearsal
 
         study = open_study(self.folder)
@@ -125,11 +125,11 @@ class Worker:
         return {"text": f"{text} {found.before:.3g} to {found.after:.3g} m/s^2 and it {raised}"}
 
     def promote(self, rig: str) -> dict[str, Any]:
-        """Hand what the study has learnt to the rig's monitor."""
+        """Promote the study's results to the rig's monitor."""
         return self._handed(rig, rollback=False)
 
     def rollback(self, rig: str) -> dict[str, Any]:
-        """Take the rig's model before again."""
+        """Restore the rig's previous model."""
         return self._handed(rig, rollback=True)
 
     def _handed(self, rig: str, *, rollback: bool) -> dict[str, Any]:
@@ -145,7 +145,7 @@ class Worker:
 
 
 def _lines(bench: Bench, fitted: Fitted, *, held_out: bool) -> tuple[FloatArray, FloatArray]:
-    """Residuals as the fit counts them, shape (n, outputs), and their times [s]."""
+    """Residuals of the fit, shape (n, outputs), and their times [s]."""
     recording = bench.data.held_out if held_out else bench.data.train
     found = fitted.held_out if held_out else fitted.train
     flat = found.residuals.reshape(-1, found.residuals.shape[-1])
@@ -192,7 +192,7 @@ def _write_preview(kept: Results, bench: Bench, label: str, fitted: Fitted) -> N
 
 
 def _write_experiment(kept: Results, bench: Bench, proposed: Experiment) -> None:
-    """The excitation that is proposed, as CSV."""
+    """Write the proposed excitation as CSV."""
     inputs, names = excitation(bench, proposed), list(bench.study.model.inputs)
     times = np.arange(len(inputs)) * bench.data.train.dt
     head = ["time [s]", *(f"{n} [{bench.study.model.inputs[n].unit}]" for n in names)]
@@ -202,7 +202,7 @@ def _write_experiment(kept: Results, bench: Bench, proposed: Experiment) -> None
 
 
 def _evidence(bench: Bench, row: Ranked) -> Mapping[str, Any]:
-    """What speaks for a row: to first order, and once fitted, block by block."""
+    """Evidence for a row: to first order and, if fitted, per block."""
     base = bench.base
     told: dict[str, Any] = {
         "first_order": float(base.train_error * np.sqrt(max(1 - row.explained, 0.0))),

@@ -1,4 +1,4 @@
-"""A study's process: takes tasks from a pipe, tells progress and outcome, ends with its parent."""
+"""A study's process: runs tasks from a pipe, reports progress and results, ends with its parent."""
 
 import os
 import threading
@@ -11,7 +11,7 @@ from rigwatch.wire.errors import RigwatchError
 
 
 def work(pipe: Connection, folder: str) -> None:
-    """Do what comes through the pipe, one task after another, until it is closed."""
+    """Execute tasks from the pipe, one after another, until it is closed."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     worker = Worker(Path(folder), lambda text: pipe.send(("progress", text)))
     while True:
@@ -32,7 +32,7 @@ def _outcome(worker: Worker, task: str, arguments: dict[str, object]) -> tuple[s
 
 
 def _end_with_parent() -> None:
-    """A process whose server was killed must not go on."""
+    """Let this process end when its server is killed."""
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])

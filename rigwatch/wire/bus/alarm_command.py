@@ -1,4 +1,4 @@
-"""Acknowledging and resetting alarms of a running monitor."""
+"""Sends operator commands for alarms to a running monitor."""
 
 import time
 
@@ -12,7 +12,7 @@ SETTLE = 0.2
 
 
 def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
-    """The transitions in the monitor's answer to an operator, and the reason of a refusal.
+    """Send a command; the transitions in the monitor's reply, and the reason of a refusal.
 
     Raises:
         BusError: no monitor answers.

@@ -1,4 +1,4 @@
-"""The list of alarms that stand now, served by the monitor to whoever asks."""
+"""The list of standing alarms, served by the monitor on request."""
 
 import contextlib
 from collections.abc import Callable, Sequence
@@ -10,16 +10,16 @@ from rigwatch.wire.messages import Alarm, decode, encode
 
 KEY = "monitor/standing"
 _MARK = b"alarms"
-"""Begins every list, so that an empty one differs from no answer."""
+"""First entry of every list, so that an empty list differs from no reply."""
 
 
 def serve_alarm_list(bus: Bus, standing: Callable[[], Sequence[Alarm]]) -> Close:
-    """Answer with what `standing()` returns; called in a thread of the bus."""
+    """Reply with the result of `standing()`, which is called in a thread of the bus."""
     return bus.serve(KEY, lambda _: [_MARK, *(encode(alarm) for alarm in standing())])
 
 
 def ask_alarm_list(bus: Bus, timeout: float = 1.0) -> list[Alarm]:
-    """The alarms that stand now, first-out first.
+    """The standing alarms, first-out first.
 
     Raises:
         BusError: no monitor answers.

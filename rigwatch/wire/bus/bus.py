@@ -1,12 +1,12 @@
-"""The bus between the processes of a rig: messages, questions, and who is alive.
+"""The bus between the processes of a rig: messages, queries and liveliness.
 
-    Bus             what processes use: messages in and out, encoded and checked here
-     └ Transport    what carries the bytes: Zenoh, or memory (`zenoh_transport`, `memory_transport`)
+    Bus             used by processes: messages are encoded and checked here
+     └ Transport    carries the bytes: Zenoh, or memory (`zenoh_transport`, `memory_transport`)
 
-Publishing never waits for a reader: where a reader or the link is too slow, messages are dropped,
-and readers that cannot afford that ask a ring (`ring.py`) for what they miss. A receiving callback
-only puts bytes into a bounded queue; they are decoded in the thread that takes them out, so that a
-bad message is counted there and hurts nobody.
+Publishing never waits for a reader: if a reader or the link is too slow, messages are dropped, and
+readers that need every message fetch missing ones from a ring (`message_ring.py`, `ring.py`). A
+receiving callback only puts bytes into a bounded queue; they are decoded in the reader's thread, so
+an invalid message is counted there without further effect.
 """
 
 import os
@@ -22,12 +22,12 @@ from rigwatch.wire.messages import ALIVE_KEY, Message, Topic, bus_key, encode
 
 
 class Bus:
-    """One process's place on the bus of one rig.
+    """One process's connection to the bus of one rig.
 
     Args:
-        transport: what carries the bytes.
+        transport: carries the bytes.
         rig: the rig's id, first part of every key.
-        process: who speaks, such as "daq"; shown by a liveliness token for as long as it lives.
+        process: name of the process, such as "daq"; a liveliness token exists while it lives.
     """
 
     def __init__(self, transport: Transport, rig: str, process: str) -> None:
@@ -40,11 +40,11 @@ class Bus:
         transport.declare_token(self.key(f"{ALIVE_KEY}/{process}"))
 
     def key(self, key: str) -> str:
-        """The whole key of a rig's `key`."""
+        """The full bus key of `key` within the rig."""
         return bus_key(self.rig, key)
 
     def publish(self, topic: Topic, message: Message) -> None:
-        """Send a message to all who listen; never waits for any of them.
+        """Send a message to all subscribers without waiting for any of them.
 
         Raises:
             BusError: the message is larger than the bus carries.
@@ -66,10 +66,10 @@ class Bus:
             return self._outlet
 
     def subscribe(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:
-        """The topic's messages from now on; of a numbered topic every one, once and in order."""
+        """The topic's messages from now on; for a numbered topic all, once each and in order."""
         if topic.numbered:
             return self.listen(topic, capacity=capacity)
-        return self.overhear(topic, capacity)
+        return self.subscribe_lossy(topic, capacity)
 
     def listen(
         self,
@@ -77,34 +77,34 @@ class Bus:
         resume_after: Mapping[str, Place] | None = None,
         capacity: int = QUEUE_CAPACITY,
     ) -> CompleteSubscription:
-        """The messages of a numbered topic, from those on that an earlier run has dealt with."""
+        """The messages of a numbered topic, after those that an earlier run has processed."""
         return CompleteSubscription(self, topic, capacity, resume_after)
 
-    def overhear(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:
-        """The topic's messages as they come: for who may miss some, such as a screen."""
+    def subscribe_lossy(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:
+        """The topic's messages as received; some may be lost, which suits e.g. a display."""
         subscription = Subscription(topic, capacity)
         subscription._close = self.transport.listen(self.key(topic.key), subscription.receive)
         return subscription
 
     def serve(self, key: str, answer: Answer) -> Close:
-        """Answer questions to `key` of this rig, in another thread; an error there is no reply."""
+        """Answer queries to `key` of this rig, in another thread; an error there gives no reply."""
         return self.transport.serve(self.key(key), answer)
 
     def query(self, key: str, question: bytes = b"", timeout: float = 1.0) -> list[bytes]:
-        """Replies of all processes that serve `key` of this rig, none where there is no such."""
+        """Replies of all processes that serve `key` of this rig; none if there are none."""
         return self.transport.ask(self.key(key), question, timeout)
 
     @property
     def identity(self) -> str:
-        """Who this process is to those that hear it."""
+        """Identity of this process on the bus."""
         return self.transport.identity
 
     def declare_token(self, key: str) -> Close:
-        """Show a liveliness token at `key` of this rig until closed or dead."""
+        """Declare a liveliness token at `key` of this rig until closed or the process ends."""
         return self.transport.declare_token(self.key(key))
 
     def tokens(self, pattern: str, timeout: float = 1.0) -> list[str]:
-        """Keys below this rig of the tokens alive now, such as "alive/daq"."""
+        """Keys of the current liveliness tokens within this rig, such as "alive/daq"."""
         head = len(self.key(""))
         return [key[head:] for key in self.transport.tokens(self.key(pattern), timeout)]
 
@@ -116,20 +116,20 @@ class Bus:
         )
 
     def connected(self) -> bool:
-        """Whether the router is reached now."""
+        """Whether the router is currently connected."""
         return self.transport.connected()
 
     def at_close(self, end: Close) -> None:
-        """Have `close` call `end`, which returns once a thread no longer uses the bus."""
+        """Register `end` to be called by `close`; it returns when a thread has left the bus."""
         self._at_close.append(end)
 
     def close(self) -> None:
-        """Leave the bus; the process's tokens vanish, and no thread waits for a reply any more."""
+        """Leave the bus: the process's tokens vanish, and waiting queries end."""
         self.transport.close()
         for end in self._at_close:
             end()
 
 
 def unique_process(name: str) -> str:
-    """A process name that no other process has, for tools that may run twice at a time."""
+    """A unique process name, for tools of which several may run at once."""
     return f"{name}-{os.getpid()}"

@@ -1,12 +1,12 @@
-"""The messages of a numbered topic, each once and in order; what is missing is fetched or counted.
+"""The messages of a numbered topic, each once and in order; missing ones are fetched or counted.
 
-    bus ──messages, tokens──▶ inbox ──▶ Speaker (one a process) ──▶ messages in order
+    bus ──messages, tokens──▶ inbox ──▶ Sender (one per process) ──▶ messages in order
                                 ▲            │ Ask
                                 └──replies── RingQuestions
 
-After a link or a router was away, a speaker's token shows that it is back, and its ring is asked
-for what it has said meanwhile. A message from one who does not own the run that he speaks for is
-dropped and counted.
+After an interruption of the link or router, the sender's liveliness token shows that it is back,
+and its ring is queried for the messages sent meanwhile. A message from a process that does not own
+the run it names is dropped and counted.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from rigwatch.wire.bus.message_ring import SAID_KEY, ring_key
 from rigwatch.wire.bus.ring_questions import REPLY_TIMEOUT, RingQuestions
-from rigwatch.wire.bus.speaker import Speaker
+from rigwatch.wire.bus.sender import Sender
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.transport import MAX_PAYLOAD
 from rigwatch.wire.errors import MessageError
@@ -29,24 +29,24 @@ if TYPE_CHECKING:
     from rigwatch.wire.bus.bus import Bus
 
 SILENCE = 0.5
-"""Time without a message after which the rings are asked whether they have more [s]."""
-MOST_SPEAKERS = 16
-"""Processes that are listened to: more of them are none of ours."""
+"""Time without a message after which the rings are queried for more [s]."""
+MOST_SENDERS = 16
+"""Largest number of senders followed; a rig has fewer, so further ones are ignored."""
 Place = tuple[int, int]
 
 
 class CompleteSubscription(Subscription):
-    """Messages of one numbered topic; not to be shared between threads.
+    """Messages of one numbered topic; not thread-safe.
 
     Args:
-        bus: where they are said; `bus.process` is named in gaps.
+        bus: source of the messages; `bus.process` is named in gaps.
         topic: a numbered topic.
-        capacity: messages that wait before further ones are left to the ring.
+        capacity: messages queued before further ones are left to the ring.
         resume_after: run and number of the last message of each process that an earlier run of this
-            listener has dealt with; else messages from now on.
+            subscriber has processed; None for messages from now on.
 
     Attributes:
-        lost: messages known to be gone.
+        lost: messages known to be lost.
         foreign: messages dropped because their sender does not own the run.
     """
 
@@ -60,7 +60,7 @@ class CompleteSubscription(Subscription):
         super().__init__(topic, capacity)
         self.lost = self.foreign = 0
         self._bus = bus
-        self._speakers: dict[str, Speaker] = {}
+        self._senders: dict[str, Sender] = {}
         self._runs: dict[int, str] = {}
         self._inbox: SimpleQueue[Any] = SimpleQueue()
         self._ready: deque[Any] = deque()
@@ -75,13 +75,13 @@ class CompleteSubscription(Subscription):
         for process, run, _, _ in there:
             resume_after.setdefault(process, (run, self._newest(process, run)))
         for process, place in resume_after.items():
-            self._meet(process, place)
+            self._follow(process, place)
         for token in there:
             self._take_token(token, alive=True)
         for process, place in resume_after.items():
-            # Taken for alive until the tokens that are there have been told.
-            speaker = self._speakers[process]
-            self._handle(process, speaker.vanished(place[0], 0))
+            # Assumed alive until the existing tokens have been listed.
+            peer = self._senders[process]
+            self._handle(process, peer.vanished(place[0], 0))
         closers = [
             self._bus.watch_tokens(pattern, self._token),
             self._bus.transport.listen_from(self._bus.key(self.topic.key), self._receive),
@@ -89,7 +89,7 @@ class CompleteSubscription(Subscription):
         self._closers = [*closers, self._questions.close]
 
     def _newest(self, process: str, run: int) -> int:
-        """Number of the last message that was said before anybody here listened."""
+        """Number of the last message sent before this subscription began."""
         ask = Ask(run, OPEN, OPEN)
         replies = self._bus.query(ring_key(process, self.topic), ask.to_bytes(), REPLY_TIMEOUT)
         return max((reply.settled for reply in _read(replies, run)), default=-1)
@@ -98,10 +98,10 @@ class CompleteSubscription(Subscription):
         return self._inbox.qsize() + len(self._ready)
 
     def get(self, timeout: float | None = None) -> Any:
-        """The next message, or None when none came within `timeout` [s].
+        """The next message, or None if none arrives within `timeout` [s].
 
         Args:
-            timeout: 0 does not wait, None waits for ever.
+            timeout: 0 does not wait, None waits indefinitely.
         """
         deadline = None if timeout is None else time.monotonic() + timeout
         while not self._ready:
@@ -115,7 +115,7 @@ class CompleteSubscription(Subscription):
         return self._ready.popleft() if self._ready else None
 
     def drain(self) -> list[Any]:
-        """All messages that wait now, in order."""
+        """All waiting messages, in order."""
         for _ in range(self._inbox.qsize()):
             self._take(self._inbox.get_nowait())
         self._look_for_more()
@@ -124,17 +124,17 @@ class CompleteSubscription(Subscription):
         return found
 
     def reports(self) -> list[Gap | Event]:
-        """What this listener has published of its losses since the last call."""
+        """Reports of losses that this subscriber has published since the last call."""
         found, self._reports = self._reports, []
         return found
 
     def positions(self) -> dict[str, Place]:
-        """Run and number of the last message of each process that is dealt with."""
-        found = {name: speaker.order.position for name, speaker in self._speakers.items()}
+        """Run and number of the last processed message of each process."""
+        found = {name: peer.order.position for name, peer in self._senders.items()}
         return {name: place for name, place in found.items() if place is not None}
 
     def close(self) -> None:
-        """Receive no more."""
+        """Stop receiving."""
         for close in self._closers:
             close()
 
@@ -155,7 +155,7 @@ class CompleteSubscription(Subscription):
     def _answered(self, key: str, ask: Ask, replies: list[bytes]) -> None:
         self._inbox.put((key.split("/")[1], ask, replies, None))
 
-    # ---- called in the listener's thread ------------------------------------------------
+    # ---- called in the subscriber's thread ----------------------------------------------
 
     def _take(self, incoming: Any) -> None:
         if len(incoming) == 2:
@@ -166,24 +166,24 @@ class CompleteSubscription(Subscription):
             process, ask, replies, _ = incoming
             known = _read(replies, ask.boot)
             best = max(known, key=lambda reply: reply.settled, default=None)
-            self._handle(process, self._speakers[process].replied(ask, best))
+            self._handle(process, self._senders[process].replied(ask, best))
 
     def _take_token(self, token: "Token", alive: bool) -> None:
         process, run, since_ns, sender = token
-        if process not in self._speakers and not (alive and self._meet(process, (run, -1))):
+        if process not in self._senders and not (alive and self._follow(process, (run, -1))):
             return
-        speaker = self._speakers[process]
+        peer = self._senders[process]
         if alive:
             self._runs[run] = process
-            self._handle(process, speaker.appeared(run, since_ns, sender))
+            self._handle(process, peer.appeared(run, since_ns, sender))
         else:
-            self._handle(process, speaker.vanished(run, since_ns))
+            self._handle(process, peer.vanished(run, since_ns))
 
-    def _meet(self, process: str, place: Place) -> bool:
-        """Listen to a further process, if it is not one too many."""
-        if len(self._speakers) >= MOST_SPEAKERS:
+    def _follow(self, process: str, place: Place) -> bool:
+        """Follow a further process, unless the limit is reached."""
+        if len(self._senders) >= MOST_SENDERS:
             return False
-        self._speakers[process] = Speaker(place)
+        self._senders[process] = Sender(place)
         return True
 
     def _take_message(self, payload: bytes, sender: str, mark: bytes) -> None:
@@ -193,7 +193,7 @@ class CompleteSubscription(Subscription):
             self.rejected += 1
             return
         process = self._runs.get(message.boot, "")
-        outcomes = self._speakers[process].said(message, sender) if process else None
+        outcomes = self._senders[process].received(message, sender) if process else None
         if outcomes is None:
             self.foreign += 1
         else:
@@ -203,8 +203,8 @@ class CompleteSubscription(Subscription):
         now = time.monotonic()
         if now - self._looked_at >= SILENCE:
             self._looked_at = now
-            for process, speaker in self._speakers.items():
-                self._handle(process, speaker.silent())
+            for process, peer in self._senders.items():
+                self._handle(process, peer.silent())
 
     def _handle(self, process: str, outcomes: list[Outcome[Numbered]]) -> None:
         for outcome in outcomes:
@@ -244,7 +244,7 @@ Token = tuple[str, int, int, str]
 
 
 def _parsed(key: str) -> Token | None:
-    """Process, run, since when and identity of a token; None for one that is none of ours."""
+    """Process, run, start time and identity from a token; None if it is not of this form."""
     with contextlib.suppress(ValueError):
         _, process, run, since_ns, sender = key.split("/")
         return process, int(run), int(since_ns), sender

@@ -1,6 +1,6 @@
-"""Joining a rig's bus over Zenoh, and the router that it meets on.
+"""Connects to a rig's bus over Zenoh, and runs its router.
 
-Zenoh is slow to import and not needed on a bus in memory, so it is imported when it is used.
+Zenoh is slow to import and not needed for a bus in memory, so it is imported on first use.
 """
 
 from rigwatch.wire.bus.bus import Bus
@@ -20,12 +20,11 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
     Args:
         config: the rig's configuration.
         process: name of the process, such as "daq".
-        timeout: how long the router may take to be reached [s]; None waits for ever, so that
-            processes can be started in any order. Once reached, a lost router is found again
-            in the background.
+        timeout: longest wait for the router [s]; None waits indefinitely, so processes can be
+            started in any order. A router lost later is reconnected in the background.
 
     Raises:
-        BusError: the router was not reached within `timeout`, or its endpoint is wrong.
+        BusError: the router was not reached within `timeout`, or its endpoint is invalid.
     """
     from rigwatch.wire.bus.zenoh_transport import (
         ZenohTransport,  # slow to import, not needed in memory
@@ -37,10 +36,10 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
 
 
 def open_router(config: RigConfig) -> Close:
-    """Run the router of a rig's bus, until the returned function is called.
+    """Run the router of a rig's bus until the returned function is called.
 
     Raises:
-        BusError: the endpoint is not well formed or already taken.
+        BusError: the endpoint is malformed or already in use.
     """
     from rigwatch.wire.bus import zenoh_transport
 

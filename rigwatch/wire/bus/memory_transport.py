@@ -1,7 +1,6 @@
 """The bus within one process: the same bytes, queues and refusals as over Zenoh.
 
-All transports made from one `MemoryNetwork` hear each other. Payloads arrive in the thread that
-puts them.
+All transports of one `MemoryNetwork` are connected. Payloads are delivered in the sender's thread.
 """
 
 import fnmatch
@@ -18,7 +17,7 @@ _IDENTITIES = (f"process-{number}" for number in itertools.count(1))
 
 
 class MemoryNetwork:
-    """What the router is to Zenoh: everything put by one transport is heard by all."""
+    """Counterpart of Zenoh's router: delivers everything put by one transport to all."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
@@ -29,11 +28,11 @@ class MemoryNetwork:
         self.up = True
 
     def bus(self, rig: str, process: str) -> Bus:
-        """A process's place on this network."""
+        """A process's bus on this network."""
         return Bus(MemoryTransport(self), rig, process)
 
     def deliver(self, key: str, payload: bytes, sender: str, mark: bytes) -> None:
-        """Hand a payload to all who listen, unless it is too large or the network is down."""
+        """Deliver a payload to all subscribers, unless it is too large or the network is down."""
         with self.lock:
             receivers = tuple(self.listeners.get(key, ()))
         if self.up and len(payload) <= MAX_PAYLOAD:
@@ -41,7 +40,7 @@ class MemoryNetwork:
                 receive(payload, sender, mark)
 
     def tell(self, key: str, alive: bool) -> None:
-        """Tell the watchers of a token that it came or went."""
+        """Notify the watchers of a token that it appeared or vanished."""
         for pattern, changed in tuple(self.watchers):
             if matches(key, pattern):
                 changed(key, alive)
@@ -56,7 +55,7 @@ class MemoryTransport:
         self._closers: list[Close] = []
 
     def put(self, key: str, payload: bytes, mark: bytes = b"") -> None:
-        """Send to all who listen."""
+        """Send to all subscribers."""
         self._network.deliver(key, payload, self.identity, mark)
 
     def listen(self, key: str, receive: Callable[[bytes], None]) -> Close:
@@ -68,11 +67,11 @@ class MemoryTransport:
         return self._register(self._network.listeners.setdefault(key, []), receive)
 
     def serve(self, key: str, answer: Answer) -> Close:
-        """Answer questions to `key`."""
+        """Answer queries to `key`."""
         return self._register(self._network.servers.setdefault(key, []), answer)
 
     def ask(self, key: str, question: bytes, timeout: float) -> list[bytes]:  # noqa: ARG002
-        """The replies of all that serve `key`; one that fails does not reply."""
+        """The replies of all that serve `key`; a failing one does not reply."""
         with self._network.lock:
             servers = tuple(self._network.servers.get(key, ()))
         replies: list[bytes] = []
@@ -81,7 +80,7 @@ class MemoryTransport:
         return replies
 
     def declare_token(self, key: str) -> Close:
-        """Show a token until closed."""
+        """Declare a token until closed."""
         with self._network.lock:
             self._network.tokens.append(key)
         self._network.tell(key, True)
@@ -93,12 +92,12 @@ class MemoryTransport:
         self._network.tell(key, False)
 
     def tokens(self, pattern: str, timeout: float) -> list[str]:  # noqa: ARG002
-        """Keys of the tokens alive now."""
+        """Keys of the current tokens."""
         with self._network.lock:
             return [key for key in self._network.tokens if matches(key, pattern)]
 
     def watch_tokens(self, pattern: str, changed: Callable[[str, bool], None]) -> Close:
-        """Call `changed(key, alive)` for tokens that match, first for those there already."""
+        """Call `changed(key, alive)` for matching tokens, first for existing ones."""
         close = self._register(self._network.watchers, (pattern, changed))
         for key in self.tokens(pattern, 0.0):
             changed(key, True)
@@ -109,7 +108,7 @@ class MemoryTransport:
         return self._network.up
 
     def close(self) -> None:
-        """Take back all that was registered through this link."""
+        """Remove everything registered through this link."""
         for close in reversed(tuple(self._closers)):
             close()
 
@@ -119,7 +118,7 @@ class MemoryTransport:
         return self._closing(lambda: place.remove(thing))
 
     def _closing(self, undo: Close) -> Close:
-        """`undo`, done once however often it is called, and at the latest by `close`."""
+        """A function that runs `undo` once, at the latest in `close`."""
 
         def close() -> None:
             if close in self._closers:
@@ -131,6 +130,6 @@ class MemoryTransport:
 
 
 def matches(key: str, pattern: str) -> bool:
-    """Whether a key matches a pattern in which `*` stands for one part of the key."""
+    """Whether a key matches a pattern, in which `*` stands for one part of the key."""
     parts, wanted = key.split("/"), pattern.split("/")
     return len(parts) == len(wanted) and all(map(fnmatch.fnmatchcase, parts, wanted))

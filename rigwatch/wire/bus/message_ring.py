@@ -1,9 +1,9 @@
-"""What a process has said lately, numbered and kept for listeners that missed some of it.
+"""Recent messages of a process, numbered and stored for subscribers that missed some.
 
-Every message of a numbered topic goes into the ring before it is published, with the run of its
-process, drawn at the start, and its number in it. A token at
-`said/<process>/<run>/<since>/<identity>` shows who speaks; `ring/<process>/<topic>` answers for
-what was said.
+Every message of a numbered topic is stored in the ring before it is published, with the run of its
+process (a random number drawn at the start) and its number within the run. A liveliness token at
+`said/<process>/<run>/<since>/<identity>` identifies the sender; queries to `ring/<process>/<topic>`
+return stored messages.
 """
 
 import secrets
@@ -18,14 +18,14 @@ from rigwatch.wire.ordering import UNKNOWN, Ask, Numbered, RingReply
 
 SAID_KEY = "said"
 RING_BYTES = 32 << 20
-"""Kept of each topic [bytes]: two minutes of estimates, months of alarms."""
+"""Capacity per topic [bytes]: two minutes of estimates, months of alarms."""
 REPLY_BYTES = MAX_PAYLOAD // 2
 LARGEST_NUMBERED = MAX_PAYLOAD - 64
-"""Largest payload of a numbered message: a ring replies with it and its place [bytes]."""
+"""Largest payload of a numbered message [bytes]; a reply also holds its run and number."""
 
 
 def ring_key(process: str, topic: Topic) -> str:
-    """Where the ring of a process answers for a topic."""
+    """Key at which the ring of a process answers queries for a topic."""
     return f"ring/{process}/{topic.name}"
 
 
@@ -34,7 +34,7 @@ class MessageRing:
 
     Args:
         run: the process's run.
-        capacity: what their payloads may take [bytes].
+        capacity: total size of the stored payloads [bytes].
     """
 
     def __init__(self, run: int, capacity: int = RING_BYTES) -> None:
@@ -45,7 +45,7 @@ class MessageRing:
         self._lock = threading.Lock()
 
     def add(self, payload: bytes) -> Numbered:
-        """Number a payload and keep it, in place of the oldest."""
+        """Number and store a payload, replacing the oldest if full."""
         with self._lock:
             message = Numbered(self._run, self._next, payload)
             self._next += 1
@@ -56,7 +56,7 @@ class MessageRing:
             return message
 
     def reply(self, ask: Ask) -> RingReply[Numbered]:
-        """What is kept of the messages asked for, as far as one reply goes."""
+        """The requested messages still stored, as many as fit into one reply."""
         if ask.boot != self._run:
             return RingReply(ask.boot, UNKNOWN, ())
         with self._lock:
@@ -73,11 +73,11 @@ class MessageRing:
 
 
 class Outlet:
-    """The numbered topics of one process: whatever it says on them goes through here.
+    """The numbered topics of one process: all its messages on them are sent through here.
 
     Args:
-        transport: what carries the bytes.
-        rig, process: whose messages these are.
+        transport: carries the bytes.
+        rig, process: of the sender.
     """
 
     def __init__(self, transport: Transport, rig: str, process: str) -> None:
@@ -97,6 +97,6 @@ class Outlet:
         )
 
     def put(self, topic: Topic, payload: bytes) -> None:
-        """Keep a message, then send it."""
+        """Store a message, then send it."""
         message = self._rings[topic.name].add(payload)
         self._transport.put(bus_key(self._rig, topic.key), payload, message.mark)

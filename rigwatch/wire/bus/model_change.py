@@ -1,4 +1,4 @@
-"""Asking a running monitor to go on with another model, or to go back to the one before."""
+"""Requests to a running monitor to use another model, or to restore the previous one."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,18 +10,18 @@ from rigwatch.wire.errors import BusError
 
 KEY = "monitor/model"
 PATIENCE = 3.0
-"""Longest that a monitor takes to answer [s]."""
+"""Longest time in which a monitor replies [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What an operator wants.
+    """A model-change request.
 
     Attributes:
-        action: "promote" this model, or "rollback" to the version before.
+        action: "promote" this model, or "rollback" to the previous version.
         model: the model file's text; empty for a rollback.
-        user: who asks.
-        text: why, in words.
+        user: who makes the request.
+        text: the reason.
     """
 
     action: Literal["promote", "rollback"]
@@ -32,12 +32,12 @@ class Wish:
 
 @dataclass(frozen=True, slots=True)
 class Granted:
-    """What the monitor says.
+    """The monitor's reply.
 
     Attributes:
-        done: whether the other model is in force.
-        text: why not, or what is in force.
-        boot, seq: the first sample that is judged with it.
+        done: whether the new model is in force.
+        text: why not, or since when it is.
+        boot, seq: the first sample processed with it.
     """
 
     done: bool
@@ -47,7 +47,7 @@ class Granted:
 
 
 def ask_for_model(bus: Bus, wish: Wish, timeout: float = PATIENCE) -> Granted:
-    """Send the wish and wait for the answer.
+    """Send the request and wait for the reply.
 
     Raises:
         BusError: no monitor answers.

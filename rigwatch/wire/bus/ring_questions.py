@@ -1,4 +1,4 @@
-"""Asks rings for what is missing, in a thread of its own, so that reading never waits."""
+"""Queries rings for missing messages in a separate thread, so that reading never waits."""
 
 import contextlib
 import threading
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
 
 REPLY_TIMEOUT = 1.0
 END_TIMEOUT = 2.0
-"""How long the bus waits at its end for the thread that asks [s]."""
+"""Longest wait of the closing bus for the query thread [s]."""
 PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
-"""Waits before a question that nobody answered goes out again [s]."""
+"""Delays before an unanswered query is repeated [s]."""
 
 
 class RingQuestions:
-    """One reader's questions.
+    """One reader's queries.
 
     Args:
-        bus: where the rings answer.
-        answered: called in the thread that asks with each question's key, the question and the
-            replies, none where nobody replied.
+        bus: on which the rings reply.
+        answered: called in the query thread with each query's key, the query and its replies,
+            empty if there are none.
     """
 
     def __init__(self, bus: "Bus", answered: Callable[[str, Ask, list[bytes]], None]) -> None:
@@ -38,16 +38,16 @@ class RingQuestions:
         bus.at_close(self._end)
 
     def ask(self, key: str, ask: Ask) -> None:
-        """Put the question to the rings at `key`."""
+        """Send a query to the rings at `key`."""
         self._questions.put((key, ask))
 
     def close(self) -> None:
-        """Ask no more."""
+        """Stop querying."""
         self._closed = True
         self._questions.put(None)
 
     def _end(self) -> None:
-        # An interpreter that ends while a thread waits in Zenoh aborts the process (CPython 87135).
+        # If the interpreter ends while a thread waits in Zenoh, the process aborts (CPython 87135).
         self.close()
         self._thread.join(END_TIMEOUT)
 

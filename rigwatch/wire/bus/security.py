@@ -1,7 +1,7 @@
-"""Who may speak: mutual TLS, and for each role the topics that it may use; all else is denied.
+"""Access control: mutual TLS, and the topics allowed for each role; everything else is denied.
 
-The router admits the certificates that the register of its keys folder lists as valid, by their
-common names. Every role may listen to the rig; what it may say is in `_SAYS`.
+The router admits certificates by common name if the register of its keys folder lists them as
+valid. Every role may subscribe to the rig's topics; the topics it may publish are in `_SAYS`.
 """
 
 from pathlib import Path
@@ -50,7 +50,7 @@ _EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing")
 
 
 class Issued(msgspec.Struct, frozen=True):
-    """A certificate: whose, in which role, its number, its last day, and whether it is revoked."""
+    """A certificate: owner, role, serial number, expiry date, and whether it is revoked."""
 
     name: str
     role: str
@@ -60,12 +60,12 @@ class Issued(msgspec.Struct, frozen=True):
 
     @property
     def common_name(self) -> str:
-        """The name in the certificate; no two are the same."""
+        """The certificate's unique common name."""
         return f"{self.name}.{self.serial}"
 
 
 class Register(msgspec.Struct, frozen=True):
-    """What the authority of a rig has issued."""
+    """The certificates issued by a rig's authority."""
 
     rig: str
     issued: tuple[Issued, ...]
@@ -77,15 +77,15 @@ def authority_file(folder: Path) -> Path:
 
 
 def key_files(folder: Path, name: str) -> tuple[Path, Path]:
-    """Certificate and private key of a name."""
+    """Paths of the certificate and the private key of a name."""
     return folder / f"{name}.pem", folder / f"{name}.key"
 
 
 def check_exposure(bus: BusSection) -> None:
-    """Refuse a router that a network can reach and that asks nobody who he is.
+    """Refuse a router that is reachable from a network without authentication.
 
     Raises:
-        ConfigError: `bus.listen` is no loopback address and there are no keys.
+        ConfigError: `bus.listen` is not a loopback address and there are no keys.
     """
     address = endpoint_address(bus.listen)
     local = address is not None and address[0] in _LOOPBACK
@@ -98,7 +98,7 @@ def check_exposure(bus: BusSection) -> None:
 
 
 def certificate_name(bus: BusSection, process: str) -> str:
-    """The name whose certificate a process uses: its own, else the operator's of this machine."""
+    """The certificate name of a process: its own, otherwise that of this machine's operator."""
     names = {"structure": "monitor"} | {name: name for name in ROLES}
     return names.get(process, bus.security.operator)
 
@@ -127,7 +127,7 @@ def tls_settings(bus: BusSection, name: str, *, listens: bool = False) -> dict[s
 
 
 def access_settings(bus: BusSection, rig: str) -> dict[str, Any]:
-    """The router's list of who may do what; none without keys.
+    """The router's access settings; none without keys.
 
     Raises:
         KeysError: the register cannot be read.
@@ -143,7 +143,7 @@ def access_settings(bus: BusSection, rig: str) -> dict[str, Any]:
 
 
 def access_list(register: Register, rig: str) -> dict[str, Any]:
-    """Zenoh's access control list, everything denied that is not listed."""
+    """Zenoh's access control list; everything not listed is denied."""
     valid = [one for one in register.issued if not one.revoked]
     rules, subjects, policies = [_listening(rig)], [], []
     for role in _SAYS:
@@ -164,7 +164,7 @@ def access_list(register: Register, rig: str) -> dict[str, Any]:
 
 
 def _role_rules(role: str, rig: str) -> list[dict[str, Any]]:
-    """What a client of this role may send to the router."""
+    """Rules for what a client of this role may send to the router."""
     said = (*_EVERYBODY, *_SAYS[role])
     asked = (*_EVERYBODY_ASKS, *_ASKS.get(role, ()))
     tokens = (f"{ALIVE_KEY}/**", *_TOKENS.get(role, ()))
@@ -185,7 +185,7 @@ def _role_rules(role: str, rig: str) -> list[dict[str, Any]]:
 
 
 def _listening(rig: str) -> dict[str, Any]:
-    """What the router may send to any of them."""
+    """Rules for what the router may send to any client."""
     everything = [
         "put", "delete", "query", "reply", "declare_subscriber", "declare_queryable",
         "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",

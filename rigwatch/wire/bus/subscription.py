@@ -1,4 +1,4 @@
-"""Messages of one topic, waiting for a reader that may be slower than they come."""
+"""Messages of one topic, queued for a reader that may be slower than the sender."""
 
 import contextlib
 import time
@@ -11,15 +11,15 @@ from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import Topic, decode
 
 QUEUE_CAPACITY = 4096
-"""Messages a subscription holds for a slow reader before the oldest are dropped."""
+"""Number of messages queued for a slow reader before the oldest are dropped."""
 
 
 class Subscription:
-    """Messages of one topic, waiting in a bounded queue; the oldest are dropped when it is full.
+    """Messages of one topic in a bounded queue; the oldest are dropped when it is full.
 
     Attributes:
         dropped: messages dropped because the reader was slow.
-        rejected: payloads dropped because they were too large or no such message.
+        rejected: payloads dropped because they were too large or invalid.
     """
 
     def __init__(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> None:
@@ -34,7 +34,7 @@ class Subscription:
         return self._waiting.qsize()
 
     def receive(self, payload: bytes) -> None:
-        """Take one payload from the transport; never waits, never raises."""
+        """Accept one payload from the transport; never waits, never raises."""
         if len(payload) > MAX_PAYLOAD:
             self.rejected += 1
             return
@@ -45,10 +45,10 @@ class Subscription:
         self._waiting.put(payload)
 
     def get(self, timeout: float | None = None) -> Any:
-        """The next message of the topic's class, or None when none came within `timeout` [s].
+        """The next message of the topic's class, or None if none arrives within `timeout` [s].
 
         Args:
-            timeout: 0 does not wait, None waits for ever.
+            timeout: 0 does not wait, None waits indefinitely.
         """
         deadline = None if timeout is None else time.monotonic() + timeout
         while True:
@@ -62,7 +62,7 @@ class Subscription:
             self.rejected += 1
 
     def drain(self) -> list[Any]:
-        """All messages that wait now, oldest first."""
+        """All waiting messages, oldest first."""
         found = [self.get(timeout=0) for _ in range(self._waiting.qsize())]
         return [message for message in found if message is not None]
 
@@ -71,5 +71,5 @@ class Subscription:
             yield self.get()
 
     def close(self) -> None:
-        """Receive no more."""
+        """Stop receiving."""
         self._close()

@@ -1,14 +1,14 @@
-"""The bus over Zenoh: every process a client of one router, which is a Python session too.
+"""The bus over Zenoh: every process is a client of one router, which is also a Python session.
 
-What the settings are for:
+Reasons for the settings:
 
-* clients with an endpoint and no scouting: two peers behind one router exchange nothing, silently;
-* retries after 100 to 200 ms, for ever: a restarted router is found again within that time;
+* clients with an endpoint and no scouting: two peers behind one router silently exchange nothing;
+* endless retries after 100 to 200 ms: a restarted router is found again within that time;
 * congestion control DROP: with BLOCK one frozen reader stops the publisher for seconds;
-* `express` stays off: with it, Zenoh lost a quarter of the messages at high rates;
-* a filter on payload size in the router: what is larger than any message of ours goes no further;
-* one who connects to the router and says nothing is shown out after a second, so that a flood of
-  such connections keeps nobody waiting for long.
+* `express` is off: with it, Zenoh lost a quarter of the messages at high rates;
+* a limit on payload size in the router: payloads larger than any valid message are not forwarded;
+* a connection that sends nothing is closed after a second, so that a flood of them causes little
+  delay.
 """
 
 import contextlib
@@ -29,9 +29,9 @@ RETRY_MS = (100, 200)
 LEASE = 10.0
 """Silence after which a link counts as broken [s]."""
 ACCEPT_MS, MOST_PENDING = 1000, 1000
-"""How long the router waits for one who connects to say who he is, and for how many at a time."""
+"""Router's time limit for a connection to identify itself [ms], and number of pending ones."""
 ATTEMPT_MS = 300
-"""One attempt at reaching the router; short, since a signal is only seen between attempts [ms]."""
+"""Time of one connection attempt [ms]; short, since signals are handled only between attempts."""
 _log = logging.getLogger(__name__)
 
 
@@ -92,7 +92,7 @@ def _configured(settings: dict[str, Any], endpoint: str) -> Any:
 def open_router(
     endpoint: str, lease: float = LEASE, secured: Mapping[str, Any] | None = None
 ) -> Close:
-    """Run a router that listens at `endpoint`, until the returned function is called.
+    """Run a router that listens at `endpoint` until the returned function is called.
 
     Args:
         endpoint: such as tcp/127.0.0.1:7447.
@@ -113,7 +113,7 @@ def open_router(
 
 
 def _reach(endpoint: str, timeout: float | None, lease: float, secured: Mapping[str, Any]) -> Any:
-    """A session with the router at `endpoint`, tried again and again."""
+    """A session with the router at `endpoint`, with repeated attempts."""
     started, told = time.monotonic(), False
     while True:
         try:
@@ -146,9 +146,9 @@ class ZenohTransport:
         lease: float = LEASE,
         secured: Mapping[str, Any] | None = None,
     ) -> "ZenohTransport":
-        """A client of the router at `endpoint`, awaited for `timeout` [s], None for ever.
+        """A client of the router at `endpoint`, awaited for `timeout` [s], None: indefinitely.
 
-        A link that has been silent for `lease` [s] counts as broken; `secured` are the settings of
+        A link that is silent for `lease` [s] counts as broken; `secured` holds the settings of
         certificates, none without keys.
 
         Raises:
@@ -158,11 +158,11 @@ class ZenohTransport:
 
     @property
     def identity(self) -> str:
-        """The session's own number, which no other client can claim by Zenoh's own interface."""
+        """The session's id, which no other client can claim through Zenoh's interface."""
         return str(self._session.info.zid())
 
     def put(self, key: str, payload: bytes, mark: bytes = b"") -> None:
-        """Send without waiting; dropped where the link is full or down."""
+        """Send without waiting; dropped if the link is full or down."""
         publisher = self._publishers.get(key) or self._declare_publisher(key)
         with contextlib.suppress(zenoh.ZError):
             publisher[0].put(payload, source_info=publisher[1], attachment=mark or None)
@@ -189,7 +189,7 @@ class ZenohTransport:
         return self._keep(self._session.declare_subscriber(key, take))
 
     def serve(self, key: str, answer: Answer) -> Close:
-        """Answer questions to `key`, in a thread beside Zenoh's."""
+        """Answer queries to `key`, in a separate thread."""
 
         def reply(query: Any) -> None:
             with query:
@@ -199,7 +199,7 @@ class ZenohTransport:
         return self._keep(self._session.declare_queryable(key, reply))
 
     def ask(self, key: str, question: bytes, timeout: float) -> list[bytes]:
-        """The replies of all that serve `key`, as many as came within `timeout` [s]."""
+        """The replies of all that serve `key` received within `timeout` [s]."""
         try:
             replies = self._session.get(
                 key,
@@ -214,26 +214,26 @@ class ZenohTransport:
         return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
     def declare_token(self, key: str) -> Close:
-        """Show a token at `key` until closed or until this process dies."""
+        """Declare a token at `key`, valid until closed or until this process ends."""
         return self._keep(self._session.liveliness().declare_token(key))
 
     def tokens(self, pattern: str, timeout: float) -> list[str]:
-        """Keys of the tokens that are alive now."""
+        """Keys of the current tokens."""
         replies = self._session.liveliness().get(pattern, timeout=timeout)
         return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
 
     def watch_tokens(self, pattern: str, changed: Callable[[str, bool], None]) -> Close:
-        """Call `changed(key, alive)` for tokens that match, first for those there already."""
+        """Call `changed(key, alive)` for matching tokens, first for existing ones."""
         tell = _direct(lambda s: changed(str(s.key_expr), s.kind == zenoh.SampleKind.PUT))
         liveliness = self._session.liveliness()
         return self._keep(liveliness.declare_subscriber(pattern, tell, history=True))
 
     def connected(self) -> bool:
-        """Whether there is a link to the router now."""
+        """Whether there is currently a link to the router."""
         return not self._session.is_closed() and bool(self._session.info.routers_zid())
 
     def close(self) -> None:
-        """Close the session and all that was declared in it."""
+        """Close the session and everything declared in it."""
         self._session.close()
 
     def _keep(self, entity: Any) -> Close:
@@ -259,5 +259,5 @@ def _mark(sample: Any) -> bytes:
 
 
 def _direct(callback: Callable[[Any], None]) -> Any:
-    """A callback run in Zenoh's receiving thread itself: one thread switch less a message."""
+    """A callback that runs in Zenoh's receiving thread, which saves a thread switch per message."""
     return Callback(callback, indirect=False)

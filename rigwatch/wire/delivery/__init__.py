@@ -2,7 +2,7 @@
 
     publisher ──▶ Ring ◀──asks── SampleReader ──▶ SampleOrder ──▶ samples in order, losses counted
 
-The logic stands in `ordering`, which alarms and estimates take as well.
+The logic is in `ordering`, which is also used for alarms and estimates.
 """
 
 from rigwatch.wire.delivery.ring import SampleRing

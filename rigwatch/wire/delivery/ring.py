@@ -1,9 +1,8 @@
-"""The adapter's ring: the last samples, kept for readers that missed some.
+"""The adapter's ring: the latest samples, stored for readers that missed some.
 
-`RingStore` keeps the samples of one boot in arrays, sample `seq` in row `seq` modulo the ring's
-length, so that holes stay holes. `SampleRing` serves the present boot and the one before it on the
-bus, whose readers may still miss its end, and shows by a liveliness token which boot has
-control of the rig.
+`RingStore` stores the samples of one boot in arrays, sample `seq` in row `seq` modulo the ring's
+length, so gaps are preserved. `SampleRing` serves the current boot and the previous one, whose end
+readers may still need, and declares a liveliness token for the boot that has control of the rig.
 """
 
 import threading
@@ -17,18 +16,18 @@ from rigwatch.wire.messages import RING_KEY, Column, SampleBlock
 from rigwatch.wire.ordering import UNKNOWN, Ask, RingReply
 
 SOURCE_KEY = "source"
-"""Tokens of sources stand at `source/<boot>/<Unix time in ns since when>/<identity on the bus>`."""
+"""Key of source tokens: `source/<boot>/<start as Unix time in ns>/<identity on the bus>`."""
 SAMPLES_PER_REPLY = 1024
 RUNS_PER_REPLY = 64
-"""A reply is bounded so that answering one never holds up the publishing of samples."""
+"""Largest number of samples in a reply, so that replying never delays the publishing of samples."""
 
 
 class RingStore:
     """The last samples of one boot.
 
     Args:
-        head: a block of that boot, whose columns all others have too.
-        capacity: samples kept.
+        head: a block of that boot; all others have the same columns.
+        capacity: number of samples stored.
     """
 
     def __init__(self, head: SampleBlock, capacity: int) -> None:
@@ -43,7 +42,7 @@ class RingStore:
         self._quality = np.zeros((n, capacity), np.uint8)
 
     def add(self, block: SampleBlock) -> None:
-        """Keep the samples of a block, in place of those `capacity` before them."""
+        """Store the samples of a block, replacing those `capacity` earlier."""
         keep = slice(max(0, len(block) - self.capacity), len(block))
         seq = np.arange(block.seq, block.seq + len(block))[keep]
         rows = seq % self.capacity
@@ -59,10 +58,10 @@ class RingStore:
         self.newest = max(self.newest, block.seq + len(block) - 1)
 
     def reply(self, ask: Ask) -> RingReply[SampleBlock]:
-        """What is kept of the samples asked for, as far as one reply goes."""
+        """The requested samples still stored, as many as fit into one reply."""
         last = min(ask.last, self.newest)
         first = min(max(ask.first, self.newest - self.capacity + 1, 0), last + 1)
-        # Where the request reaches back further than the ring, what is too old is settled as well.
+        # Samples older than the ring are settled as well: they will never come.
         last = min(last, first + SAMPLES_PER_REPLY - 1)
         seq = np.arange(first, last + 1)
         runs = _runs(seq[self._seq[seq % self.capacity] == seq])
@@ -100,11 +99,11 @@ def _runs(seq: NDArray[np.int64]) -> list[NDArray[np.int64]]:
 
 
 class SampleRing:
-    """The rings of the present boot and of the one before, served on the bus.
+    """The rings of the current and the previous boot, served on the bus.
 
     Args:
-        bus: where readers ask.
-        capacity: samples kept of each boot.
+        bus: on which readers send queries.
+        capacity: number of samples stored per boot.
     """
 
     def __init__(self, bus: Bus, capacity: int) -> None:
@@ -116,7 +115,7 @@ class SampleRing:
         self._close = bus.serve(RING_KEY, self._answer)
 
     def add(self, block: SampleBlock) -> None:
-        """Keep a block; to be called before the block is published."""
+        """Store a block; to be called before the block is published."""
         if not len(block):
             return
         if not self._stores or self._stores[-1].boot != block.boot:
@@ -141,6 +140,6 @@ class SampleRing:
         return [reply.to_bytes()]
 
     def close(self) -> None:
-        """Serve no more and give up control."""
+        """Stop serving and give up control."""
         self._withdraw()
         self._close()

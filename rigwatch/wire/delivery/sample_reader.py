@@ -4,7 +4,7 @@
                               ▲            │ Ask
                               └──replies── questions, asked in a thread of their own
 
-All logic is in `sample_order.py`; a block in order goes straight through, in the thread that reads.
+All logic is in `sample_order.py`; a block in order passes straight through, in the reader's thread.
 """
 
 import contextlib
@@ -39,9 +39,9 @@ from rigwatch.wire.ordering import (
 )
 
 SILENCE = 1.0
-"""Time without a sample after which the ring is asked whether it has more [s]."""
+"""Time without a sample after which the ring is queried for more [s]."""
 CONTESTED = 1.0
-"""How long samples in the name of another are remembered [s]."""
+"""Time for which samples sent under another process's boot count as a conflict [s]."""
 
 Item = SampleBlock | Gap | Event
 _Incoming = (
@@ -50,21 +50,21 @@ _Incoming = (
 
 
 class SampleReader:
-    """One reader of the samples; not to be shared between threads.
+    """One reader of the samples; not thread-safe.
 
-    Gaps and events are returned by `read` in their place among the samples, and published too.
+    Gaps and events are returned by `read` in their place among the samples, and are also published.
 
     Args:
-        bus: where the samples are; `bus.process` is named in gaps and events.
-        resume_after: (boot, seq) of the last sample that an earlier run of this process has dealt
-            with, so that none after it goes missing.
-        history: samples before those (or before the first one heard) that are wanted too, as far as
-            the ring has them; that some are missing there is no gap.
-        capacity: messages that wait for a slow reader before further ones are left to the ring.
+        bus: source of the samples; `bus.process` is named in gaps and events.
+        resume_after: (boot, seq) of the last sample that an earlier run of this process has
+            processed, so that none after it is missed.
+        history: number of samples before those (or before the first received) that are also read
+            if the ring has them; missing ones are not a gap.
+        capacity: messages queued for a slow reader before further ones are left to the ring.
 
     Attributes:
         heard: whether a sample block was ever received.
-        rejected: payloads that were no sample blocks.
+        rejected: payloads that were not sample blocks.
         dropped: payloads left to the ring because the inbox was full.
     """
 
@@ -107,7 +107,7 @@ class SampleReader:
 
     @property
     def counters(self) -> Counters:
-        """What became of the samples so far."""
+        """Counts of delivered, recovered and lost samples so far."""
         return self._order.counters
 
     @property
@@ -117,19 +117,19 @@ class SampleReader:
 
     @property
     def contested(self) -> bool:
-        """Whether a second source sends samples beside the one that is read, or in its name."""
+        """Whether a second source sends samples besides the one that is read, or under its boot."""
         at = self._impostor_at
         impostor = at is not None and time.monotonic() - at < CONTESTED
         return impostor or self._order.sources.contested
 
     def silent_for(self) -> float:
-        """Time since a sample was received, or since the start [s]."""
+        """Time since the last sample, or since the start [s]."""
         return time.monotonic() - self._heard_at
 
     def read(self, timeout: float) -> list[Item]:
-        """What has come since the last call, in order; waits up to `timeout` [s] for something.
+        """Items received since the last call, in order; waits up to `timeout` [s] for the first.
 
-        Consecutive blocks are joined: one that is behind gets fewer and longer blocks.
+        Consecutive blocks are joined: a reader that is behind gets fewer and longer blocks.
         """
         deadline = time.monotonic() + timeout
         while not self._ready:
@@ -145,7 +145,7 @@ class SampleReader:
         return joined(items)
 
     def close(self) -> None:
-        """Read no more."""
+        """Stop reading."""
         for close in self._closers:
             close()
         self._questions.close()
@@ -197,12 +197,12 @@ class SampleReader:
         self._handle(self._order.on_block(block))
 
     def _refuse(self, block: SampleBlock) -> None:
-        """Samples in the name of a boot that another process owns."""
+        """Refuse samples of a boot that another process owns."""
         self.counters.foreign += len(block)
         self._refused_boot = block.boot
 
     def _notice_impostor(self, boot: int) -> None:
-        """The owner speaks on after samples in his name were refused: there are two indeed."""
+        """The owner still sends after foreign samples were refused: report the second sender."""
         if self._refused_boot != boot:
             return
         if not self.contested:
@@ -250,10 +250,10 @@ class SampleReader:
         self._ready.append(item)
         self._bus.publish(GAPS if isinstance(item, Gap) else EVENTS, item)
 
-    # ---- called in the thread that asks --------------------------------------------------
+    # ---- called in the query thread ------------------------------------------------------
 
     def _answered(self, _key: str, ask: Ask, found: list[bytes]) -> None:
-        """Take the reply of the ring that knows most; None where none replied."""
+        """Queue the most complete reply; None if there is none."""
         replies = []
         for data in found:
             with contextlib.suppress(MessageError):
@@ -263,7 +263,7 @@ class SampleReader:
 
 
 def joined(items: list[Item]) -> list[Item]:
-    """The same items with consecutive sample blocks joined."""
+    """The items with consecutive sample blocks joined."""
     done: list[Item] = []
     run: list[SampleBlock] = []
     for item in items:

@@ -1,8 +1,8 @@
-"""What comes next, what is missing, whom to believe: the logic of delivery, without clock or bus.
+"""Delivery logic without clock or bus: order, losses, and arbitration between sources.
 
-`sample_order` puts what arrives in order and says what is lost, `source_arbitration` decides which
-of several sources has control, `ownership` who may speak for it, and `ring_protocol` is what a
-reader asks of a ring. Samples and numbered messages go the same way.
+`sample_order` orders received samples and reports losses, `source_arbitration` decides which of
+several sources has control, `ownership` which process may send for it, and `ring_protocol` defines
+a reader's queries to a ring. Samples and numbered messages use the same logic.
 """
 
 from rigwatch.wire.ordering.numbered import Numbered

@@ -1,4 +1,4 @@
-"""A message with its place in what one process has said: run and number.
+"""A message with its run and its number within the messages of one process.
 
     bytes    run, number (int64, little endian), then the message's own bytes
 
@@ -28,22 +28,22 @@ class Numbered:
     seq: int
     payload: bytes
     t_ns: ClassVar[tuple[int]] = (0,)
-    """Runs show by their tokens which is the newer one; no time is compared."""
+    """Runs are ordered by their tokens; message times are not compared."""
 
     def __len__(self) -> int:
         return 1
 
     @property
     def mark(self) -> bytes:
-        """Run and number as they travel beside the message."""
+        """Run and number as bytes sent along with the message."""
         return _PLACE.pack(self.boot, self.seq)
 
     @classmethod
     def marked(cls, mark: bytes, payload: bytes) -> "Numbered":
-        """The message that came with `mark`.
+        """The message received with `mark`.
 
         Raises:
-            MessageError: the mark is none.
+            MessageError: the mark is invalid.
         """
         try:
             run, number = _PLACE.unpack(mark)
@@ -52,7 +52,7 @@ class Numbered:
         return cls(run, number, payload)
 
     def to_bytes(self) -> bytes:
-        """Place and message, as a ring replies with them."""
+        """Run, number and message, as in a ring's reply."""
         return self.mark + self.payload
 
     @classmethod
@@ -60,6 +60,6 @@ class Numbered:
         """The message in a ring's reply.
 
         Raises:
-            MessageError: the bytes are too few.
+            MessageError: there are too few bytes.
         """
         return cls.marked(data[: _PLACE.size], data[_PLACE.size :])

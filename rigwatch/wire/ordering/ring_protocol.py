@@ -1,11 +1,11 @@
-"""What a reader asks of a ring of recent samples or messages and what it gets, as bytes.
+"""Queries to a ring of recent samples or messages, and their replies, as bytes.
 
     question    boot, first, last                    three int64, little endian
     reply       boot, settled, blocks in order       two int64, then each block's length and bytes
 
-A reply settles the samples from `first` to `settled`: those not in its blocks will never come.
-Where `settled` is short of `last`, the reader asks again from there. A ring that does not know the
-boot replies with `settled` of -1 and no block.
+A reply settles the samples from `first` to `settled`: those not in its blocks will never come. If
+`settled` is less than `last`, the reader queries again from there. A ring that does not know the
+boot replies with `settled` = -1 and no block.
 """
 
 import struct
@@ -21,7 +21,7 @@ S = TypeVar("S", SampleBlock, Numbered)
 """What is put in order."""
 
 OPEN = 2**62
-"""As `last` of a question: whatever there is up to now."""
+"""As `last` of a query: everything available."""
 UNKNOWN = -1
 """As `settled` of a reply: the ring has nothing of that boot."""
 
@@ -32,22 +32,22 @@ _LENGTH = struct.Struct("<I")
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """The samples `first` to `last` of `boot`, both included, are wanted."""
+    """A query for samples `first` to `last` of `boot`, both inclusive."""
 
     boot: int
     first: int
     last: int
 
     def to_bytes(self) -> bytes:
-        """The question as it travels."""
+        """The query as bytes."""
         return _QUESTION.pack(self.boot, self.first, self.last)
 
     @classmethod
     def from_bytes(cls, data: bytes) -> "Ask":
-        """The question that `data` holds.
+        """The query in `data`.
 
         Raises:
-            MessageError: the bytes are no question.
+            MessageError: the bytes are not a query.
         """
         try:
             return cls(*_QUESTION.unpack(data))
@@ -58,14 +58,14 @@ class Ask:
 
 @dataclass(frozen=True, slots=True)
 class RingReply(Generic[S]):
-    """What a ring has of the samples asked for, and up to where that is all there is."""
+    """The requested samples that a ring has, and the number up to which they are complete."""
 
     boot: int
     settled: int
     blocks: tuple[S, ...]
 
     def to_bytes(self) -> bytes:
-        """The reply as it travels."""
+        """The reply as bytes."""
         parts = [_REPLY.pack(self.boot, self.settled)]
         for block in self.blocks:
             data = block.to_bytes() if isinstance(block, Numbered) else encode(block)
@@ -74,19 +74,19 @@ class RingReply(Generic[S]):
 
     @classmethod
     def from_bytes(cls, data: bytes) -> "RingReply[SampleBlock]":
-        """The reply with samples that `data` holds.
+        """The reply with samples in `data`.
 
         Raises:
-            MessageError: the bytes are no reply.
+            MessageError: the bytes are not a reply.
         """
         return _parsed(data, lambda part: decode(SampleBlock, part))
 
     @classmethod
     def of_messages(cls, data: bytes) -> "RingReply[Numbered]":
-        """The reply with messages that `data` holds.
+        """The reply with messages in `data`.
 
         Raises:
-            MessageError: the bytes are no reply.
+            MessageError: the bytes are not a reply.
         """
         return _parsed(data, Numbered.from_bytes)
 

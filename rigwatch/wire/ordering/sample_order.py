@@ -1,15 +1,15 @@
-"""Samples in order, none twice, none silently missing: the logic of a reader, without clock or bus.
+"""Samples in order, none twice, none silently missing: a reader's logic, without clock or bus.
 
-Numbered messages take the same way: below, a sample may be a message as well.
+Numbered messages use the same logic: below, a sample may also be a message.
 
-Blocks may come late, twice, in any order, or not at all; replies of the ring fill the holes. Each
-sample of the source in control leaves as exactly one of
+Blocks may arrive late, twice, in any order, or not at all; replies of the ring fill the gaps. Each
+sample of the source in control is output as exactly one of
 
     SampleBlock    delivered, in the order of `seq`, boot after boot
-    Loss           known to be gone for ever
+    Loss           permanently lost
 
-beside which the logic asks for what it misses (`Ask`) and remarks on what happened (`Remark`). A
-block that comes in order leaves in the same call: only those wait that stand behind a hole.
+In addition the logic outputs queries for missing samples (`Ask`) and remarks (`Remark`). A block in
+order is output in the same call; only blocks behind a gap wait.
 """
 
 from collections import deque
@@ -22,16 +22,16 @@ from rigwatch.wire.ordering.ring_protocol import OPEN, UNKNOWN, Ask, RingReply, 
 from rigwatch.wire.ordering.source_arbitration import Sources
 
 LARGEST_SEQ = 2**53
-"""No device counts so far: a number beyond it is a lie."""
+"""Largest plausible sample number; larger ones are invalid."""
 SUSPECT = 256
-"""Old samples after which the ring is asked whether it is the reader that is ahead."""
+"""Number of old samples after which the ring is queried whether the reader's position is wrong."""
 TRIES = 5
-"""Questions left unanswered, while newer samples come, before a hole is given up."""
+"""Number of unanswered queries, while newer samples arrive, before a gap is given up."""
 
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """Samples `first` to `last` of a boot will never come; `last` below `first`: unknown number."""
+    """Samples `first` to `last` of a boot are lost; if `last` < `first`, the number is unknown."""
 
     boot: int
     first: int
@@ -41,7 +41,7 @@ class Loss:
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """Something worth a line in the log."""
+    """An entry for the log."""
 
     severity: Severity
     code: str
@@ -49,21 +49,21 @@ class Remark:
 
 
 FORGED = "FORGED SAMPLES"
-"""Code of the remark that samples came which the source never sent."""
+"""Code of the remark that samples arrived which the source never sent."""
 POSITION_WRONG = "POSITION SET ASIDE"
-"""Code of the remark that the position to go on from was beyond all that the source has sent."""
+"""Code of the remark that the resume position was beyond the newest sample of the source."""
 Outcome: TypeAlias = S | Loss | Ask | Remark
 
 
 @dataclass(slots=True)
 class Counters:
-    """What became of the samples so far.
+    """Counts of samples so far.
 
     Attributes:
-        delivered: samples delivered, recovered ones among them.
-        recovered: samples that the ring had to give.
-        lost: samples known to be gone.
-        duplicates: samples dropped because they had been delivered or given up before.
+        delivered: samples delivered, including recovered ones.
+        recovered: samples recovered from the ring.
+        lost: samples known to be lost.
+        duplicates: samples dropped because they were already delivered or given up.
         foreign: samples dropped because their source has no control.
     """
 
@@ -75,12 +75,12 @@ class Counters:
 
 
 class Stream(Generic[S]):
-    """The samples of one boot: what comes next, and blocks that wait for those before them.
+    """The samples of one boot: the next number, and blocks waiting for earlier ones.
 
     Attributes:
-        next: number of the sample that is due.
-        promised_from: a sample before this one that is missing is no loss, the reader only tried.
-        ended: another boot has control, so that this one only has an end to be asked for.
+        next: number of the next sample.
+        promised_from: a missing sample before this one is not a loss, as it was optional.
+        ended: another boot has control; only the end of this one is still queried.
     """
 
     def __init__(self, boot: int, next_seq: int, promised_from: int = 0) -> None:
@@ -92,32 +92,32 @@ class Stream(Generic[S]):
         self.samples_waiting = 0
 
     def hold(self, block: S) -> None:
-        """Keep a block until its turn; of two with the same start the longer."""
+        """Store a block until its turn; of two with the same start the longer."""
         known = self.waiting.get(block.seq)
         if known is None or len(known) < len(block):
             self.samples_waiting += len(block) - (len(known) if known else 0)
             self.waiting[block.seq] = block
 
     def first_waiting(self) -> int:
-        """The lowest number among the waiting blocks; OPEN where none waits."""
+        """The lowest number among the waiting blocks; OPEN if there are none."""
         return min(self.waiting, default=OPEN)
 
     def take(self) -> S:
-        """The waiting block with the lowest number."""
+        """Remove and return the waiting block with the lowest number."""
         block = self.waiting.pop(min(self.waiting))
         self.samples_waiting -= len(block)
         return block
 
 
 class SampleOrder(Generic[S]):
-    """Turns what arrives into samples in order and reported losses.
+    """Turns received blocks into ordered samples and reported losses.
 
     Args:
-        resume_after: (boot, seq) of the last sample that an earlier run has dealt with: everything
-            after it is delivered, recovered or reported.
-        history: samples before those that are asked for too, as many of them as the ring still has;
-            on joining without `resume_after`, samples before the first one heard.
-        capacity: samples that may wait behind a hole before it is given up.
+        resume_after: (boot, seq) of the last sample processed by an earlier run: everything after
+            it is delivered, recovered or reported.
+        history: number of samples before those that are also queried, if the ring still has them;
+            without `resume_after`, samples before the first one received.
+        capacity: samples that may wait behind a gap before it is given up.
     """
 
     def __init__(
@@ -138,13 +138,13 @@ class SampleOrder(Generic[S]):
         self._stale = 0
         self._out: list[Outcome[S]] = []
         if resume_after is not None:
-            # Taken for alive until the tokens that are there have been listed.
+            # Assumed alive until the existing tokens have been listed.
             self.sources.appeared(resume_after[0], 0)
             boot, seq = resume_after[0], resume_after[1] + 1
             self._control(Stream(boot, max(0, seq - history), promised_from=seq))
 
     def on_block(self, block: S) -> list[Outcome[S]]:
-        """A block was received from the bus."""
+        """Process a block received from the bus."""
         if 0 <= block.seq <= LARGEST_SEQ - len(block):
             if len(block):
                 self._admit(block)
@@ -153,7 +153,7 @@ class SampleOrder(Generic[S]):
         return self._outcomes()
 
     def on_reply(self, ask: Ask, reply: RingReply[S] | None) -> list[Outcome[S]]:
-        """The ring replied to `ask`, or nobody did (None)."""
+        """Process the ring's reply to `ask`; None if there was none."""
         if ask == self._asked:
             self._asked = None
             if reply is None:
@@ -163,7 +163,7 @@ class SampleOrder(Generic[S]):
         return self._outcomes()
 
     def on_token(self, boot: int, since_ns: int, alive: bool) -> list[Outcome[S]]:
-        """A source's liveliness token came or went."""
+        """Process the appearance or end of a source's liveliness token."""
         if alive:
             self.sources.appeared(boot, since_ns)
         else:
@@ -171,13 +171,13 @@ class SampleOrder(Generic[S]):
         return self._outcomes()
 
     def follow(self, boot: int) -> list[Outcome[S]]:
-        """A source that is there while the one in control is gone is heard from its first on."""
+        """Follow a live source from its first sample if the one in control is gone."""
         if self.sources.current != boot and not self.sources.is_alive(self.sources.current or 0):
             self._change_control((boot, 0))
         return self._outcomes()
 
     def on_silence(self) -> list[Outcome[S]]:
-        """Nothing has come for a while: what was missed at the end has no successor to show it."""
+        """Handle silence: lost samples at the end are not revealed by a successor."""
         self._change_control(self.sources.fell_silent())
         if self._line and self._asked is None and not self._line[0].ended:
             self._ask(Ask(self._line[0].boot, self._line[0].next, OPEN))
@@ -185,7 +185,7 @@ class SampleOrder(Generic[S]):
 
     @property
     def position(self) -> tuple[int, int] | None:
-        """(boot, seq) of the last sample dealt with; None before the first."""
+        """(boot, seq) of the last processed sample; None before the first."""
         return (self._line[0].boot, self._line[0].next - 1) if self._line else None
 
     # ---- which source -------------------------------------------------------------------
@@ -231,7 +231,7 @@ class SampleOrder(Generic[S]):
         self._control(Stream(boot, max(seq, resumed)))
 
     def _resumed_at(self, boot: int) -> int:
-        """Where a boot that had control before left off; 0 for a new one."""
+        """Next sample of a boot that had control before; 0 for a new one."""
         stream = self._stream(boot)
         if stream is None:
             return self._settled_boots.pop(boot, 0)
@@ -266,7 +266,7 @@ class SampleOrder(Generic[S]):
             stream.hold(fresh)
 
     def _suspect_itself(self) -> None:
-        """Old samples only, for long: perhaps the position is wrong, which the ring can tell."""
+        """Query the ring after many old samples, as the position may be wrong."""
         front = self._line[0]
         if self._stale >= SUSPECT and self._asked is None and not front.ended:
             self._stale = 0
@@ -302,7 +302,7 @@ class SampleOrder(Generic[S]):
                 return
 
     def _release(self, front: Stream[S]) -> None:
-        """Deliver the waiting blocks whose turn it is, or that have become too many."""
+        """Deliver the waiting blocks that are next, or that exceed the capacity."""
         while front.waiting:
             if front.samples_waiting > self._capacity:
                 self._skip(front, front.first_waiting() - 1, "too many samples waited behind them")
@@ -340,9 +340,9 @@ class SampleOrder(Generic[S]):
             self._leave(front)
 
     def _disbelieve(self, front: Stream[S]) -> None:
-        """Every sample is in the ring before it is published: what the ring has not seen is forged.
+        """Drop forged samples: every sample is in the ring before it is published.
 
-        A sample that came while the ring was asked is dropped as well, and recovered from it.
+        A sample that arrived during the query is also dropped, and recovered from the ring.
         """
         self.counters.foreign += front.samples_waiting
         front.waiting.clear()
@@ -351,7 +351,7 @@ class SampleOrder(Generic[S]):
         self._out.append(Remark("error", FORGED, text))
 
     def _set_back(self, front: Stream[S], seq: int) -> None:
-        """The position lies behind the newest sample of the source: it was never right."""
+        """Correct a position beyond the newest sample of the source."""
         told = f"sample {front.next - 1} of boot {front.boot} lies beyond its newest, {seq - 1}"
         self._out.append(Remark("error", POSITION_WRONG, f"{told}; reading continues from there"))
         self._lose(front.boot, seq, seq - 1, "the position to go on from was wrong")
@@ -367,7 +367,7 @@ class SampleOrder(Generic[S]):
         return front.next > ask.first or bool(front.waiting)
 
     def _skip(self, front: Stream[S], last: int, reason: str) -> None:
-        """Everything up to `last` that does not wait here is lost."""
+        """Report everything up to `last` that is not waiting as lost."""
         while front.next <= last:
             hole_end = min(last, front.first_waiting() - 1)
             if front.next <= hole_end:
@@ -381,7 +381,7 @@ class SampleOrder(Generic[S]):
         front.next = last + 1
 
     def _nobody_replied(self, ask: Ask) -> None:
-        # Silence all round is a broken link: the ring is still there when it heals.
+        # Without any samples the link is down: the ring is available again once it recovers.
         alone = not self._heard_since_ask and self.sources.is_alive(ask.boot)
         self._unanswered += 0 if alone else 1
         if self._unanswered < TRIES and (ask.last != OPEN or self._line[0].ended):
@@ -403,14 +403,14 @@ class SampleOrder(Generic[S]):
 
 
 def _rest(block: S, next_seq: int) -> S | None:
-    """What of a block is due from `next_seq` on, None for nothing."""
+    """The part of a block from `next_seq` on, None if there is none."""
     if isinstance(block, Numbered):
         return block if block.seq >= next_seq else None
     return unseen(block, next_seq)
 
 
 def _up_to(block: S, last: int) -> S:
-    """The block without what comes after `last`, which is not before its first."""
+    """The part of a block up to `last`, which is not before its first sample."""
     if isinstance(block, Numbered):
         return block
     return cut(block, 0, min(len(block), last + 1 - block.seq))

@@ -1,10 +1,10 @@
-"""Which of several sources of samples has control of a rig: the first, until it is gone.
+"""Arbitration between sources of samples: the first has control of a rig until it is gone.
 
-A source is one boot of the device. Its liveliness token says since when it has been there. While
-the source in control lives, samples of another are refused and the conflict is remarked on; when it
-is gone, the other takes over. A restarted device looks the same for some milliseconds, if its first
-sample overtakes the news of the old token's end: then nothing of the new boot is skipped, because
-no sample of the old one came in between.
+A source is one boot of the device. Its liveliness token gives its start time. While the source in
+control is alive, samples of another are refused and the conflict is reported; when it is gone, the
+other takes over. A restarted device looks the same for some milliseconds if its first sample
+arrives before the end of the old token is known. In that case nothing of the new boot is skipped,
+because no sample of the old one arrived in between.
 """
 
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ from rigwatch.wire.messages import SampleBlock
 from rigwatch.wire.ordering.numbered import Numbered
 
 OLD_NS = 5_000_000_000
-"""A new boot without a token whose samples are older than the last by this is a replay [ns]."""
+"""Age of samples, relative to the last, from which a new boot without token is a replay [ns]."""
 
 
 @dataclass(slots=True)
 class Rival:
-    """A source without control: numbers of its samples seen so far.
+    """A source without control: numbers of its samples received so far.
 
     Attributes:
-        first: its first sample seen.
-        last: its latest sample seen.
-        from_seq: what to begin with should it take over.
-        told: the conflict has been remarked on.
+        first: its first sample received.
+        last: its latest sample received.
+        from_seq: the sample to start with if it takes over.
+        told: the conflict has been reported.
     """
 
     first: int
@@ -35,14 +35,14 @@ class Rival:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """About one block: take control beginning with sample `control_from`, and what to tell."""
+    """Decision on one block: take control from sample `control_from` on, and a remark."""
 
     control_from: int | None = None
     remark: str = ""
 
 
 class Sources:
-    """The sources heard of, and which of them has control."""
+    """The known sources, and the one in control."""
 
     def __init__(self) -> None:
         self.current: int | None = None
@@ -53,28 +53,27 @@ class Sources:
         self._rivals: dict[int, Rival] = {}
 
     def is_alive(self, boot: int) -> bool:
-        """Whether the boot's token is there now."""
+        """Whether the boot's token exists."""
         return boot in self._alive
 
     @property
     def contested(self) -> bool:
-        """Whether a second source sends samples beside the one in control."""
+        """Whether a second source sends samples besides the one in control."""
         return any(
             rival.told and (boot in self._alive or boot not in self._had_token)
             for boot, rival in self._rivals.items()
         )
 
     def appeared(self, boot: int, since_ns: int) -> None:
-        """The boot's token is there, put up at `since_ns`."""
+        """The boot's token has appeared, declared at `since_ns`."""
         self._alive[boot] = since_ns
         self._had_token.add(boot)
 
     def vanished(self, boot: int, since_ns: int) -> tuple[int, int] | None:
-        """The boot's token is gone; returns the samples skipped of it if it never had control."""
+        """The boot's token has vanished; returns its skipped samples if it never had control."""
         if self._alive.get(boot, since_ns) != since_ns:
-            return (
-                None  # the same boot came back with a newer token before the old one's end was told
-            )
+            # The same boot returned with a newer token before the end of the old one was reported.
+            return None
         self._alive.pop(boot, None)
         rival = self._rivals.get(boot)
         if rival is None or self._released():
@@ -83,19 +82,19 @@ class Sources:
         return rival.first, rival.last
 
     def fell_silent(self) -> tuple[int, int] | None:
-        """Nothing has come for a while; returns who takes over, as `successor`."""
+        """Handle silence; returns the boot that takes over, as `successor`."""
         self._silent = True
         return self.successor()
 
     def successor(self) -> tuple[int, int] | None:
-        """(boot, first sample) of the rival that takes over, where control is free."""
+        """(boot, first sample) of the rival that takes over, if control is free."""
         if not self._rivals or not self._released():
             return None
         boot = min(self._rivals, key=lambda b: self._alive.get(b, 2**63))
         return boot, self._rivals[boot].from_seq
 
     def take_control(self, boot: int) -> None:
-        """From now on `boot` has control."""
+        """Give control to `boot`."""
         self.current = boot
         self._silent = False
         self._rivals.pop(boot, None)
@@ -106,7 +105,7 @@ class Sources:
         return max(resumed, rival.first) if rival and rival.from_seq > 0 else resumed
 
     def judge(self, block: SampleBlock | Numbered) -> Verdict:
-        """What a block means for who has control."""
+        """Decide whether a block changes control."""
         if block.boot == self.current:
             return self._current_spoke(block)
         if self.current is None:
@@ -135,7 +134,7 @@ class Sources:
         return Verdict(remark=self._conflict(boot)) if certain and not rival.told else Verdict()
 
     def _is_past(self, block: SampleBlock | Numbered) -> bool:
-        """A straggler of a source that is gone, or a recording of one."""
+        """Whether a block is a late one of a source that is gone, or a recording."""
         return block.boot in self._had_token or int(block.t_ns[0]) < self._latest_ns - OLD_NS
 
     def _conflict(self, boot: int) -> str:

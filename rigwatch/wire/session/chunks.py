@@ -105,20 +105,27 @@ def _scan_records(file: BinaryIO, magic: bytes, size: int) -> Iterator[Chunk | D
         yield Damage(0, offset, problem)
         file.seek(offset)
     unpacker = zstandard.ZstdDecompressor()
+    unread = offset
     while offset < size:
         head = file.read(_RECORD.size)
         if head == MAGIC and offset + len(MAGIC) == size:
             return
         try:
             body = _body(file, head, size - offset)
+            end = offset + _RECORD.size + len(body)
             if head[0] == _CHUNK:
                 yield Chunk(offset, _records(body, unpacker))
+                unread = end
             else:
                 _check_other(head[0], body)
-            offset += _RECORD.size + len(body)
+                _check_length(file, offset, body, size)
+            offset = end
         except _DamagedError as damage:
-            found = _next_chunk(file, offset + 1, size)
-            yield Damage(offset, found - offset, str(damage))
+            # No checksum protects what lies between chunks: a record there may end too late.
+            unread = offset + 1 if head[0] == _CHUNK else unread
+            found = _next_chunk(file, unread, size)
+            start = offset if found > offset else unread
+            yield Damage(start, found - start, str(damage))
             file.seek(found)
             offset = found
 
@@ -178,6 +185,15 @@ def _check_other(opcode: int, body: bytes) -> None:
         raise _DamagedError("a damaged index")
 
 
+def _check_length(file: BinaryIO, offset: int, body: bytes, size: int) -> None:
+    """Raise if a whole chunk begins within a record, which its length must not span."""
+    inside = list(_candidates(body, offset + _RECORD.size))
+    if any(_chunk_at(file, candidate, size) for candidate in inside if candidate > offset):
+        raise _DamagedError("a record of a damaged length")
+    if inside:
+        file.seek(offset + _RECORD.size + len(body))
+
+
 def _next_chunk(file: BinaryIO, start: int, size: int) -> int:
     """Offset of the next whole chunk from `start` on, `size` where there is none."""
     position = start
@@ -185,14 +201,19 @@ def _next_chunk(file: BinaryIO, start: int, size: int) -> int:
     while position < size:
         file.seek(position)
         window = file.read(_STEP + overlap)
-        at = window.find(_ZSTD)
-        while at >= 0:
-            candidate = position + at - _BEFORE_ZSTD
+        for candidate in _candidates(window, position):
             if candidate >= start and _chunk_at(file, candidate, size):
                 return candidate
-            at = window.find(_ZSTD, at + 1)
         position += _STEP
     return size
+
+
+def _candidates(data: bytes, offset: int) -> Iterator[int]:
+    """Where chunks may begin in `data`, which lies at `offset`."""
+    at = data.find(_ZSTD)
+    while at >= 0:
+        yield offset + at - _BEFORE_ZSTD
+        at = data.find(_ZSTD, at + 1)
 
 
 def _chunk_at(file: BinaryIO, offset: int, size: int) -> bool:

@@ -1,7 +1,7 @@
-"""Reads TOML that may come from anyone: what it may cost is bounded before it is parsed.
+"""Reads TOML from untrusted sources: its cost is bounded before it is parsed.
 
-A few kilobytes can ask for much: an integer of thousands of digits, tables within tables, a key of
-ten thousand parts. No file of ours comes near these bounds.
+A few kilobytes can be expensive: an integer of thousands of digits, deeply nested tables, a key of
+ten thousand parts. Valid files are far below these bounds.
 """
 
 import re
@@ -9,11 +9,11 @@ import tomllib
 from typing import Any
 
 LARGEST_TEXT = 1 << 24
-"""Characters of one TOML text."""
+"""Largest length of a TOML text [characters]."""
 DEEPEST = 32
-"""Tables and arrays within one another, and parts of a dotted key."""
+"""Largest nesting depth of tables and arrays, and number of parts of a dotted key."""
 LONGEST_NUMBER = 128
-"""Characters of a number."""
+"""Largest length of a number [characters]."""
 
 _OPAQUE = re.compile(
     r'"""(?:[^\\]|\\.)*?"""|\'\'\'.*?\'\'\'|"(?:[^"\\\n]|\\.)*+"|\'[^\'\n]*+\'|\#[^\n]*+', re.DOTALL
@@ -27,7 +27,7 @@ def loads(text: str) -> dict[str, Any]:
     """The TOML `text` as a mapping.
 
     Raises:
-        TOMLDecodeError: it is not TOML, or larger, deeper or longer than any file needs.
+        TOMLDecodeError: it is not TOML, or exceeds a bound.
     """
     if problem := _excess(text):
         raise tomllib.TOMLDecodeError(problem)
@@ -40,10 +40,10 @@ def loads(text: str) -> dict[str, Any]:
 
 
 def _excess(text: str) -> str:
-    """What is beyond the bounds, in words; "" for nothing."""
+    """The bound that is exceeded, in words; "" if none is."""
     if len(text) > LARGEST_TEXT:
         return f"{len(text)} characters, more than {LARGEST_TEXT}"
-    # Strings and comments may hold anything; in their place stands a name.
+    # Strings and comments may contain anything and are replaced by a name.
     plain = _OPAQUE.sub(lambda match: "" if match[0][0] == "#" else "s", text)
     if _depth(plain) > DEEPEST:
         return f"tables or arrays more than {DEEPEST} deep"
@@ -55,7 +55,7 @@ def _excess(text: str) -> str:
 
 
 def _depth(plain: str) -> int:
-    """How deep the brackets go."""
+    """Nesting depth of the brackets."""
     depth = deepest = 0
     for match in _BRACKET.finditer(plain):
         depth += 1 if match[0] in "[{" else -1

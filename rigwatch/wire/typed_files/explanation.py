@@ -1,4 +1,4 @@
-"""Turns a complaint of msgspec about a TOML file into the line that its author needs.
+"""Turns a validation error of msgspec into one line for the author of a TOML file.
 
 msgspec names the place as a path such as `$.channels[0].gain`, with `[...]` for a key of a mapping.
 The path is followed through the data and the schema together, so that the error can show what was
@@ -30,7 +30,7 @@ def explained(
     text: str,
     file: Path | str,
 ) -> ConfigError:
-    """The error to show for what msgspec says about `raw`, read from `text` of `file`."""
+    """The error for msgspec's message about `raw`, read from `text` of `file`."""
     complaint = str(error)
     place = _PLACE.search(complaint)
     reason = complaint[: place.start()] if place else complaint
@@ -71,7 +71,7 @@ def _near(key: str, schema: Any, value: Any) -> str:
 
 
 def _follow(pattern: str, value: Any, kind: type[msgspec.Struct]) -> tuple[str, Any, Any]:
-    """The dotted path that `pattern` means in the data, the value there and its schema."""
+    """The dotted path of `pattern` in the data, the value there and its schema."""
     schema: Any = msgspec.inspect.type_info(kind)
     path = ""
     for name, index in _STEP.findall(pattern):
@@ -82,7 +82,7 @@ def _follow(pattern: str, value: Any, kind: type[msgspec.Struct]) -> tuple[str, 
             key = _refused(value, schema)
             path, value = _below(path, key), value.get(key)
         else:
-            # The tag of a choice of structs is no field: the choice itself is what it selects.
+            # The tag of a union of structs is not a field: it selects the struct.
             schema = _plain(_fields(schema, value).get(name, schema))
             path, value = _below(path, name), value.get(name)
     return path, value, schema
@@ -116,7 +116,7 @@ def _structs(schema: Any) -> list[Any]:
 
 
 def _fields(schema: Any, value: Any) -> dict[str, Any]:
-    """Schemas by key of the struct that `value` claims to be by its tag."""
+    """Schemas by key of the struct selected by the tag of `value`."""
     structs = _structs(schema)
     tagged = [s for s in structs if s.tag is not None and value.get(s.tag_field) == s.tag]
     chosen = tagged or [struct for struct in structs if struct.tag is None]
@@ -124,7 +124,7 @@ def _fields(schema: Any, value: Any) -> dict[str, Any]:
 
 
 def _line(text: str, path: str) -> int | None:
-    """The line on which the key at `path` stands, where plain TOML lets it be found."""
+    """The line of the key at `path`, if it can be found by a plain search."""
     table, _, key = path.rpartition(".")
     here, counts = "", Counter[str]()
     for number, line in enumerate(text.splitlines(), start=1):

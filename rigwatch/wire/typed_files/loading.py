@@ -26,7 +26,7 @@ def load(path: Path | str, kind: type[S]) -> S:
     """The file at `path` as a struct of class `kind`.
 
     Raises:
-        ConfigError: the file cannot be read, is not TOML, or does not fit `kind`.
+        ConfigError: the file cannot be read, is not TOML, or is not a valid `kind`.
     """
     return parse(read_text(Path(path)), kind, path)
 
@@ -35,7 +35,7 @@ def parse(text: str, kind: type[S], file: Path | str) -> S:
     """The TOML `text` as a struct of class `kind`; `file` is named in errors.
 
     Raises:
-        ConfigError: the text is not TOML or does not fit `kind`.
+        ConfigError: the text is not TOML or is not a valid `kind`.
     """
     try:
         raw = loads(text)
@@ -48,7 +48,7 @@ def parse(text: str, kind: type[S], file: Path | str) -> S:
 
 
 def read_text(path: Path) -> str:
-    """What a file says.
+    """The text of a file.
 
     Raises:
         ConfigError: it cannot be read, or is not UTF-8.

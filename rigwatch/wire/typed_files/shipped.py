@@ -1,7 +1,7 @@
 """The example files that come with rigwatch: rigs, scenarios, studies, mappings, structures.
 
-They lie in the folder `configs` of the checkout, which the wheel brings as package data. A command
-takes one by its path or by its name: `--template emps` is `configs/studies/emps.toml`.
+They are in the folder `configs` of the checkout, which the wheel contains as package data. Commands
+accept a path or a name: `--template emps` is `configs/studies/emps.toml`.
 """
 
 import difflib
@@ -15,14 +15,14 @@ KINDS = ("imports", "plants", "rigs", "scenarios", "structures", "studies")
 
 
 def shipped_folders() -> tuple[Path, ...]:
-    """Where `configs` may be: here, in the checkout, as the wheel brought it; those that exist."""
+    """Existing `configs` folders: in the working folder, the checkout, or the installed wheel."""
     package = Path(__file__).parents[2]
     roots = (Path(), package.parent, package)
     return tuple(root / FOLDER for root in roots if (root / FOLDER).is_dir())
 
 
 def find_config(name: str) -> Path:
-    """The file `name` of the folder `configs`.
+    """The file `name` in the folder `configs`.
 
     Raises:
         ConfigError: there is none.
@@ -40,14 +40,14 @@ def shipped_names(kind: str) -> list[str]:
 
 
 def find_file(given: Path | str, kind: str) -> Path:
-    """A user's own file, or else the shipped one of that path or name.
+    """A user's own file, otherwise the shipped one of that path or name.
 
     Args:
-        given: what was typed; a path that is nowhere comes back as it is.
-        kind: folder of `configs` that a name is looked for in.
+        given: path or name; a path that does not exist is returned unchanged.
+        kind: folder of `configs` that is searched for a name.
 
     Raises:
-        ConfigError: a name, without folder and ending, is not known; near ones are told.
+        ConfigError: a name, without folder and suffix, is unknown; the message suggests near ones.
     """
     path = Path(given)
     if path.is_file():
@@ -65,10 +65,10 @@ def find_file(given: Path | str, kind: str) -> Path:
 
 
 def copy_out(folder: Path) -> tuple[list[Path], list[Path]]:
-    """Copy all of them into `folder`/configs; those copied, and those that were there and stay.
+    """Copy all of them to `folder`/configs; returns those copied, and existing ones that are kept.
 
     Raises:
-        ConfigError: rigwatch's own are not found, or the folder cannot be written.
+        ConfigError: the shipped files are not found, or the folder cannot be written.
     """
     target = folder / FOLDER
     sources = [own for own in shipped_folders() if own.resolve() != target.resolve()]

@@ -7,7 +7,7 @@ import msgspec
 
 
 def as_toml(tree: Mapping[str, Any], prefix: str = "") -> str:
-    """A tree of plain values as TOML, without None."""
+    """A tree of plain values as TOML text; None is omitted."""
     return "\n".join(_lines(tree, prefix)) + "\n"
 
 

@@ -1,8 +1,8 @@
-"""Units as people write them: their dimension, and how their values become SI.
+"""Units in common notation: their dimension, and conversion of values to SI.
 
 "N s/m", "kN/mm", "m/s^2", "N/(m/s)" and "l/min" are units: products by a space, * or ·, quotients
-by /, which holds for the next factor only, powers by ^. Every file is converted at the border with
-the same table; inside, all numbers are SI. A temperature that stands alone is absolute (degC has an
+by /, which applies to the next factor only, powers by ^. All files are converted on reading with
+the same table; internally all numbers are SI. A temperature on its own is absolute (degC has an
 offset); within a product it is a difference.
 """
 
@@ -30,11 +30,11 @@ _SAME = str.maketrans({"μ": "µ", "Ω": "Ω", "·": "*", "⋅": "*", "×": "*",
 
 
 class UnitError(RigwatchError, ValueError):
-    """A unit is unknown or malformed; a ValueError, too, so that msgspec adds the place to it.
+    """A unit is unknown or malformed; also a ValueError, so that msgspec adds its location.
 
     Args:
-        found: what stands there.
-        expected: what should stand there.
+        found: the text found.
+        expected: the text expected.
     """
 
     def __init__(self, found: str, expected: str) -> None:
@@ -47,7 +47,7 @@ class Unit:
     """A unit.
 
     Attributes:
-        si: the SI unit that its values become.
+        si: the SI unit of converted values.
         dimension: exponents of the base units.
         factor: SI value of one unit, exact.
         offset: SI value of its zero.
@@ -60,11 +60,11 @@ class Unit:
 
     @property
     def plain(self) -> bool:
-        """Whether values are SI as they stand."""
+        """Whether values are SI without conversion."""
         return self.factor == 1 and self.offset == 0
 
     def to_si(self, value: float) -> float:
-        """The value in SI: 5.1 bar are 510000 Pa; a value that is SI already stays to the bit."""
+        """The value in SI: 5.1 bar are 510000 Pa; SI values are unchanged to the bit."""
         if self.plain or not math.isfinite(value):
             return value
         return float(Fraction(repr(float(value))) * self.factor + self.offset)
@@ -94,7 +94,7 @@ def unit_of(text: str) -> Unit:
 
 
 def _plainly(text: str) -> str:
-    """The text with superscripts and look-alike characters written plainly."""
+    """The text with superscripts and look-alike characters replaced by plain ones."""
     raised = re.sub("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda m: "^" + m[0].translate(_RAISED), text.strip())
     return raised.translate(_SAME)
 
@@ -135,7 +135,7 @@ def _token(match: re.Match[str], text: str) -> _Token:
 
 
 def _si_text(tokens: Sequence[_Token]) -> str:
-    """The same product in SI units."""
+    """The product in SI units."""
     found, before = "", ""
     for token in tokens:
         si = token.entry.si if token.entry else token.name
@@ -150,7 +150,7 @@ def _si_text(tokens: Sequence[_Token]) -> str:
 
 
 def _product(tokens: list[_Token], unit: str, depth: int) -> tuple[Dimension, Fraction]:
-    """Left to right; a division holds for the next factor only, which may stand in brackets."""
+    """The product, left to right; a division applies to the next factor or bracket only."""
     dimension, factor, sign = NONE, Fraction(1), 1
     while tokens:
         token = tokens.pop(0)
@@ -211,5 +211,5 @@ def describe(dim: Dimension) -> str:
 
 
 def names_gram(text: str) -> bool:
-    """Whether a unit names the gram by its symbol, which many read as standard gravity."""
+    """Whether a unit contains the symbol of the gram, often misread as standard gravity."""
     return bool(re.search(r"(?<![A-Za-z])m?g(?![A-Za-z0-9])", text))

@@ -1,9 +1,9 @@
-"""The table of units: what each one measures, and its factor to SI.
+"""The table of units: quantity and factor to SI of each.
 
 SI value = factor · value + offset
 
-Factors are exact fractions, so that a unit that is SI already changes no bit of a value. `g` is the
-gram; standard gravity is `g0` (or `gn`).
+Factors are exact fractions, so an SI unit does not change a bit of a value. `g` is the gram;
+standard gravity is `g0` (or `gn`).
 """
 
 import math
@@ -39,7 +39,7 @@ RANKINE = Fraction(5, 9)
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One kind of quantity and the units that it may be written in.
+    """One kind of quantity and its units.
 
     Attributes:
         name: in words.
@@ -121,7 +121,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     ),
     Quantity("kinematic viscosity", "m^2/s", {"m": 2, "s": -1}, {"cSt": Fraction(1, 10**6)}),
 )  # fmt: skip
-"""Every unit that files may name; products, quotients and powers of them are units, too."""
+"""All units that files may use, as well as their products, quotients and powers."""
 
 IN_OTHER_WORDS = {
     "sec": "s", "second": "s", "seconds": "s", "hour": "h", "minute": "min", "meter": "m",
@@ -130,7 +130,7 @@ IN_OTHER_WORDS = {
     "watt": "W", "degree": "deg", "degrees": "deg", "radian": "rad", "kelvin": "K",
     "celsius": "degC", "fahrenheit": "degF", "rps": "rev/s", "lpm": "l/min", "kph": "km/h",
 }  # fmt: skip
-"""What units are called elsewhere: the errors name the word that is meant."""
+"""Other names of units, for which errors suggest the right one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,7 +68,7 @@ class Watched:
 
     def __init__(self, config: Path) -> None:
         self._bus = connect(load_rig(config), "observer", 60.0)
-        self._estimates = self._bus.overhear(ESTIMATES)
+        self._estimates = self._bus.subscribe_lossy(ESTIMATES)
         self._blocks: list[EstimateBlock] = []
 
     def last(self) -> int:

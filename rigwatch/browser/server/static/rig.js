@@ -60,9 +60,9 @@ function alarms(found) {
     item.append(acts);
     return item;
   });
-  $("alarms").replaceChildren(...(items.length ? items : [element("p", "No alarm was heard of.", { class: "note" })]));
+  $("alarms").replaceChildren(...(items.length ? items : [element("p", "No alarms received.", { class: "note" })]));
   const standing = found.filter((one) => one.state !== "normal").map((one) => one.name.replaceAll("_", " "));
-  say(standing.length ? `alarms: ${standing.join(", ")}` : "no alarm stands");
+  say(standing.length ? `alarms: ${standing.join(", ")}` : "no standing alarms");
 }
 
 async function look() {

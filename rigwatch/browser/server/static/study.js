@@ -67,7 +67,7 @@ function draw({ keep = true } = {}) {
 
 function legend() {
   const entries = [["measured", "measured"], ["model", "modelled"], ["rest", "residual"], ["floor", "noise floor (band)"]];
-  if (chosen) entries.push(["held", `what would be left with ${chosen.split("@")[0].replaceAll("_", " ")} (dashed)`]);
+  if (chosen) entries.push(["held", `predicted residual with ${chosen.split("@")[0].replaceAll("_", " ")} (dashed)`]);
   $("legend").replaceChildren(...entries.map(([colour, words]) => {
     const span = document.createElement("span");
     const mark = document.createElement("i");
@@ -217,7 +217,7 @@ const acts = {
   explain: () => ask("explain"),
   undo: () => ask("undo"),
   preview: () => { if (candidate()) ask("preview", candidate()); else move(1); },
-  add: () => { if (candidate()) ask("add", candidate()); else remark("choose a candidate first (j, k)"); },
+  add: () => { if (candidate()) ask("add", candidate()); else remark("select a candidate first (j, k)"); },
   cancel: () => attempt(() => post(`/api/cancel/${path}`)),
   report: async () => { wanted = "report"; await ask("report"); },
   rehearse: () => ask("rehearse"),
@@ -260,7 +260,7 @@ function sort(explained) {
     body.append(one);
   }
   $("place-note").hidden = false;
-  $("place-note").textContent = "Sorted by what each explains of the residual in the chosen place.";
+  $("place-note").textContent = "Sorted by the share of the residual that each explains in the selected region.";
 }
 
 function leavePlace() {

@@ -1,0 +1,378 @@
+"""The verdict on rankings whose errors are put in by hand: what is named, and what with it."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rigwatch.physics.engine.equations import Placement
+from rigwatch.physics.engine.fit import Fit
+from rigwatch.physics.engine.search import Convergence
+from rigwatch.workbench.data import NoiseFloor
+from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
+from rigwatch.workbench.explain.verdict_calibration import CLEAR, doubt
+from rigwatch.workbench.fit import Fitted
+from rigwatch.workbench.ranking import Ranked
+
+WINDOWS = 40
+TURNS = np.where(np.arange(WINDOWS) % 2, 1.0, -1.0)
+JITTER = 0.01
+PERIODS = NoiseFloor(np.ones(1), "periods")
+"""Errors up to 1.1 are noise."""
+MOTION = NoiseFloor(np.ones(1), "healthy motion")
+QUIET = NoiseFloor(np.ones(1), "quiet band")
+
+
+def leaving(squares: np.ndarray) -> Fitted:
+    """A fit that leaves these mean squares in the windows held out."""
+    residuals = np.sqrt(squares)[:, None, None] * np.ones((1, 4, 1))
+    unused: Any = None
+    fit = Fit(unused, unused, unused, unused, residuals, np.ones(1), unused, unused)
+    return Fitted((), fit, fit, 1, 1)
+
+
+def base(error: float = 3.0) -> Fitted:
+    return leaving(np.full(WINDOWS, error**2))
+
+
+def row(
+    label: str,
+    error: float = 1.0,
+    behind: float = 0.0,
+    *,
+    cosines: dict[str, float] | None = None,
+    alike: tuple[str, ...] = (),
+    kind: str = "force",
+    free: int = 1,
+    family: str = "",
+    refines: str = "",
+    sampled: bool = False,
+    gain: float | None = 1.0,
+    accepted: bool = True,
+    fitted: bool = True,
+    jitter: float = JITTER,
+) -> Ranked:
+    """An effect with a held-out error, worse than a steady one of it by standard deviations."""
+    name, port = label.split("@")
+    effect: Any = SimpleNamespace(free=free, family=family, refines=refines, sampled=sampled)
+    found = Ranked(
+        Placement(name, effect, port), kind, 0.0, 0.5, {}, list(alike), cosines or {}, {}
+    )
+    if fitted:
+        worse = behind * JITTER / np.sqrt(WINDOWS - 1)
+        found.fitted = leaving(error**2 + worse + jitter * TURNS)
+        found.gain, found.accepted = gain, accepted
+    return found
+
+
+def best(label: str = "coulomb@load", error: float = 1.0, **more: Any) -> Ranked:
+    """An effect whose error is the same in every window."""
+    return row(label, error, jitter=0.0, **more)
+
+
+# ---- where nothing helps ----------------------------------------------------------------------
+
+
+def test_nothing_is_missing_where_the_error_is_noise() -> None:
+    found = judge(base(1.1), [row("a@x", accepted=False)], PERIODS)
+    text = "the held-out error is 1.10 times the noise floor, and no effect lowers it"
+    assert found == Verdict("nothing_missing", None, (), (), text)
+
+
+def test_what_no_effect_lowers_is_unknown() -> None:
+    found = judge(base(2.0), [], PERIODS)
+    text = "the held-out error is 2.00 times the noise floor, and no known effect lowers it"
+    assert found == Verdict("unknown_effect", None, (), (), text)
+
+
+def ended(converged: bool, undetermined: tuple[str, ...] = ()) -> Convergence:
+    return Convergence(converged, 0.0, 1, 1, undetermined, (), "start", "stuck")
+
+
+def test_a_verdict_is_not_built_on_a_fit_that_did_not_converge() -> None:
+    found = not_converged({"one": None, "two": ended(True), "the base": ended(False)})
+    text = "the fit of the base did not converge: stuck"
+    assert found == Verdict("model_inadequate", None, (), (), text)
+    found = not_converged({"it": ended(False, ("m", "c"))})
+    assert found is not None
+    assert found.text == ("the fit of it did not converge: stuck; the data do not determine m, c")
+    assert not_converged({"one": None, "two": ended(True, ("m",))}) is None
+
+
+# ---- one effect -------------------------------------------------------------------------------
+
+
+def test_the_only_effect_that_helps_is_missing() -> None:
+    only = best(error=1.05)
+    found = judge(base(3.0), [only, row("b@x", accepted=False, cosines={})], PERIODS)
+    assert (found.word, found.best, found.members) == ("missing_effect", only, ("coulomb@load",))
+    assert (found.rivals, found.second) == ((), ())
+    assert found.text == ("coulomb@load is missing: the held-out error falls from 3 to 1.05")
+    assert found.evidence.left == pytest.approx((1.05**2 - 1) / (3**2 - 1))
+    assert found.doubt == doubt("missing_effect", found.evidence)
+
+
+def test_the_margin_is_to_the_nearest_that_it_is_not_confused_with() -> None:
+    known = best(cosines={"same@load": 1.0})
+    rows = [
+        known,
+        row("far@x", behind=9.0),
+        row("near@x", behind=4.0, accepted=False),
+        row("same@load", behind=1.0),
+        row("unfitted@x", fitted=False),
+    ]
+    found = judge(base(), rows, PERIODS)
+    assert found.members == ("coulomb@load", "same@load")
+    assert found.evidence.margin == pytest.approx(4.0, rel=1e-6)
+    alone = judge(base(), [known], PERIODS)
+    assert alone.evidence.margin == CLEAR
+
+
+def test_what_else_lowers_the_error_is_mentioned() -> None:
+    found = judge(base(), [best(), row("b@x", behind=5.0), row("c@x", 1.02, 5.0)], PERIODS)
+    assert found.word == "missing_effect"
+    assert found.text.endswith("; accepted as well: b@x (1), c@x (1.02)")
+
+
+def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
+    found = judge(base(3.0), [best(error=2.0)], PERIODS)
+    assert found.word == "unknown_effect"
+    assert found.text == (
+        "the best known effect, coulomb@load, leaves much of the error above the noise floor"
+        "; 38% of the error's energy stays, 2 times the noise floor"
+    )
+    assert judge(base(3.0), [best(error=2.0)], QUIET).word == "missing_effect"
+    assert judge(base(3.0), [best(error=2.7)], QUIET).word == "unknown_effect"
+
+
+# ---- its own kind -----------------------------------------------------------------------------
+
+
+def members(other: Ranked, known: Ranked | None = None) -> tuple[str, ...]:
+    return judge(base(), [known or best(), other], PERIODS).members[1:]
+
+
+def same(label: str = "stribeck@load", cosine: float = 1.0, **more: Any) -> Ranked:
+    return best(cosines={label: cosine}, **more)
+
+
+@pytest.mark.parametrize(
+    ("cosine", "behind", "joins"),
+    [(0.9996, 1.9, True), (0.9996, 2.1, False), (0.9994, 0.0, False)],
+)
+def test_what_looks_the_same_and_does_as_well_is_of_its_class(
+    cosine: float, behind: float, joins: bool
+) -> None:
+    other = row("stribeck@load", behind=behind)
+    assert members(other, same(cosine=cosine)) == ("stribeck@load",) * joins
+
+
+def test_what_was_not_fitted_is_of_its_class_only_if_it_is_the_same() -> None:
+    other = row("stribeck@load", fitted=False, family="friction")
+    assert members(other, same(cosine=0.9996)) == ("stribeck@load",)
+    assert members(other, same(cosine=0.9994, family="friction")) == ()
+    assert members(other) == ()
+
+
+def test_a_family_says_the_same_in_other_words() -> None:
+    other = row("stribeck@load", behind=1.9, family="friction")
+    assert members(other, best(family="friction")) == ("stribeck@load",)
+    assert members(other, best(family="backlash")) == ()
+    assert members(row("stribeck@load", behind=1.9), best()) == ()
+
+
+def test_what_failed_its_own_test_is_of_no_class() -> None:
+    assert members(row("stribeck@load", accepted=False), same()) == ()
+
+
+def test_a_refinement_needs_a_reason_of_its_own() -> None:
+    assert members(row("stribeck@load", free=2), same()) == ()
+    assert members(row("stribeck@load", refines="coulomb"), same()) == ()
+    assert members(row("stribeck@load", refines="viscous"), same()) == ("stribeck@load",)
+    alike = same(alike=("viscous@load",))
+    assert members(row("stribeck@load", refines="viscous"), alike) == ()
+    assert members(row("stribeck@load", free=1), same(free=2)) == ()
+
+
+def test_errors_that_differ_by_where_the_fits_stopped_are_equal() -> None:
+    for error, joins in ((1.00009, True), (1.00011, False)):
+        other = row("stribeck@load", error, jitter=0.0)
+        assert members(other, same()) == ("stribeck@load",) * joins
+
+
+# ---- other physics ----------------------------------------------------------------------------
+
+
+def rivals(other: Ranked, cosine: float, floor: NoiseFloor = PERIODS, **known: Any) -> bool:
+    """Whether `other` is named as a rival of the best, with which it has this cosine."""
+    first = best(cosines={other.label: cosine}, **known)
+    found = judge(base(8.0), [first, other], floor)
+    assert found.best is first
+    if found.rivals:
+        assert found.rivals == (other.label,)
+        words = f"{first.label} and {other.label} explain this recording equally well"
+        assert found.word == "undetermined"
+        assert found.text.startswith(words)
+    return bool(found.rivals)
+
+
+@pytest.mark.parametrize(
+    ("cosine", "behind", "accepted", "expected"),
+    [
+        (0.81, 1.9, True, True),
+        (0.79, 1.9, True, False),
+        (0.81, 2.1, True, False),
+        (0.99, 2.1, True, False),
+        (0.99, 0.0, False, False),
+    ],
+)
+def test_similar_physics_that_does_as_well_is_a_rival(
+    cosine: float, behind: float, accepted: bool, expected: bool
+) -> None:
+    other = row("lag@drive", behind=behind, accepted=accepted)
+    assert rivals(other, cosine) == expected
+
+
+@pytest.mark.parametrize(
+    ("port", "cosine", "behind", "expected"),
+    [
+        ("load", 0.96, 0.0, True),
+        ("load", 0.94, 0.0, False),
+        ("load", 0.96, 0.5, False),
+        ("drive", 0.96, 0.5, True),
+        ("drive", 0.94, 0.5, False),
+        ("drive", 0.96, 2.5, False),
+        ("load", 0.81, -1.5, True),
+        ("load", 0.79, -1.5, False),
+        ("load", 0.81, -0.9, False),
+    ],
+)
+def test_with_more_parameters_a_rival_must_do_no_worse(
+    port: str, cosine: float, behind: float, expected: bool
+) -> None:
+    assert rivals(row(f"lag@{port}", behind=behind, free=2), cosine) == expected
+
+
+@pytest.mark.parametrize(
+    ("cosine", "error", "expected"),
+    [(0.96, 2.99, True), (0.96, 3.01, False), (0.94, 2.5, False), (0.81, 2.0, True)],
+)
+def test_where_more_is_left_what_looks_alike_stays_a_rival(
+    cosine: float, error: float, expected: bool
+) -> None:
+    assert rivals(row("lag@load", error), cosine, error=2.0) == expected
+
+
+def test_where_more_is_left_further_parameters_are_no_argument() -> None:
+    assert not rivals(row("lag@drive", 2.0, free=2), 0.99, error=2.0)
+    assert not rivals(row("lag@load", 2.0, -1.5, free=2), 0.99, error=2.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({}, True),
+        ({"kind": "force"}, False),
+        ({"error": 3.01}, False),
+        ({"gain": 0.79}, False),
+        ({"gain": None}, False),
+        ({"accepted": False}, False),
+        ({"cosine": 0.79}, False),
+    ],
+)
+def test_along_a_healthy_motion_a_late_drive_may_be_a_late_sensor(
+    change: dict[str, Any], expected: bool
+) -> None:
+    given = {"kind": "sensor", "error": 2.9, "gain": 0.81, "cosine": 0.81, **change}
+    cosine = given.pop("cosine")
+    assert rivals(row("lag@x", **given), cosine, MOTION, error=2.0) == expected
+    assert not rivals(row("lag@x", **given), cosine, PERIODS, error=2.0)
+
+
+def test_a_rival_is_named_once() -> None:
+    other = row("lag@x", 2.0, kind="sensor")
+    first = best(error=2.0, cosines={"lag@x": 0.99})
+    assert judge(base(8.0), [first, other], MOTION).rivals == ("lag@x",)
+
+
+def test_what_explains_the_rest_too_little_is_unknown_whatever_its_rivals() -> None:
+    first, other = best(error=2.5, cosines={"lag@x": 0.99}), row("lag@x", 2.5)
+    assert judge(base(3.0), [first, other], PERIODS).word == "unknown_effect"
+
+
+# ---- which of equals --------------------------------------------------------------------------
+
+
+def name_of(*rows: Ranked, error: float = 3.0, floor: NoiseFloor = PERIODS) -> str:
+    found = judge(base(error), rows, floor).best
+    assert found is not None
+    return found.label
+
+
+def test_the_smallest_error_is_named_where_it_is_clearly_smaller() -> None:
+    assert name_of(row("a@x", behind=3.0), best("b@x", free=3)) == "b@x"
+    assert name_of(best("b@x", free=3), row("a@x", behind=3.0)) == "b@x"
+
+
+def test_of_equals_the_one_with_fewest_parameters_is_named() -> None:
+    assert name_of(best("b@x", free=3), row("a@x", behind=1.9, free=2)) == "a@x"
+
+
+def test_of_equals_a_computers_effect_is_named_last() -> None:
+    sampled = best("hold@x", sampled=True)
+    assert name_of(sampled, row("a@x", behind=1.0)) == "a@x"
+    assert name_of(sampled, row("a@x", behind=1.0, free=2)) == "hold@x"
+
+
+def test_of_equals_with_as_many_parameters_the_better_is_named() -> None:
+    assert name_of(row("a@x", behind=1.0), best("b@x")) == "b@x"
+
+
+@pytest.mark.parametrize(
+    ("level", "ratio", "named"),
+    [(2.0, 1.009, "a@x"), (2.0, 1.011, "b@x"), (1.05, 1.009, "b@x")],
+)
+def test_while_more_is_missing_a_little_less_is_no_reason_for_a_parameter(
+    level: float, ratio: float, named: str
+) -> None:
+    rows = best("b@x", error=level, free=2), row("a@x", level * ratio, jitter=0.001)
+    assert name_of(*rows) == named
+
+
+def test_a_little_less_is_a_reason_between_effects_of_as_many_parameters() -> None:
+    assert name_of(row("a@x", 2.01, jitter=0.001), best("b@x", error=2.0)) == "b@x"
+
+
+def orders(level: float, share: float | None, lower: float = 1.2) -> tuple[Ranked, Ranked]:
+    """An effect of higher order, and the one that it refines with a share of its gain."""
+    cubic = best("cubic@x", error=level, refines="spring", gain=1.0)
+    return cubic, row("spring@x", level * lower, gain=share)
+
+
+@pytest.mark.parametrize(
+    ("level", "share", "named"),
+    [
+        (2.0, 0.76, "spring@x"),
+        (2.0, 0.74, "cubic@x"),
+        (2.0, None, "cubic@x"),
+        (1.05, 0.99, "cubic@x"),
+    ],
+)
+def test_while_more_is_missing_the_lower_order_goes_first(
+    level: float, share: float | None, named: str
+) -> None:
+    assert name_of(*orders(level, share)) == named
+
+
+def test_the_higher_order_is_named_where_it_alone_explains_the_error() -> None:
+    assert name_of(*orders(2.0, 0.9), error=12.0) == "spring@x", "both explain it"
+    assert name_of(*orders(2.0, 0.9, lower=1.5), error=9.0) == "cubic@x", "it alone does"
+    assert name_of(*orders(2.0, 0.9, lower=1.5), error=5.0) == "spring@x", "neither does"
+
+
+def test_a_higher_order_without_a_lower_one_is_named() -> None:
+    cubic = best("cubic@x", error=2.0, refines="spring")
+    assert name_of(cubic, row("gap@x", 2.4, gain=0.99)) == "cubic@x"
+    unaccepted = row("spring@x", 2.4, gain=0.99, accepted=False)
+    assert name_of(cubic, unaccepted) == "cubic@x"
