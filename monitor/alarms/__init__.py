@@ -5,7 +5,7 @@ every alarm with its severity, cause, guidance and default settings.
 """
 
 from monitor.alarms.journal import AlarmJournal, last_records, read_journal
-from monitor.alarms.kinds import ALARM_KINDS, AlarmKind, check_settings
+from monitor.alarms.kinds import ALARM_KINDS, AlarmKind, check_settings, settings_of
 from monitor.alarms.manager import AlarmManager, Announcement
 from monitor.alarms.operator import LONGEST_NAME, LONGEST_TEXT, bounded
 from monitor.alarms.quality import quality_conditions
@@ -27,4 +27,5 @@ __all__ = [
     "last_records",
     "quality_conditions",
     "read_journal",
+    "settings_of",
 ]

@@ -170,6 +170,30 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "window; commission anew if it repeats.",
         _AT_ONCE,
     ),
+    # The wiring, checked over the first seconds of motion.
+    AlarmKind(
+        "wiring_sign",
+        "critical",
+        "position and acceleration have opposite signs; nothing is judged",
+        "Reverse the sensor or its gain in the configuration, then restart the monitor.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "wiring_scale",
+        "critical",
+        "the acceleration is not as large as the motion of the position; nothing is judged",
+        "Check unit, gain and range of both channels (mm or m, g or m/s^2, range of the "
+        "amplifier), then restart the monitor.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
+        "wiring_swapped",
+        "critical",
+        "position and acceleration do not show the same motion; nothing is judged",
+        "Look for swapped channels, a reversed sensor behind a filter, or a sensor on another "
+        "part, then restart the monitor.",
+        _AT_ONCE,
+    ),
     # The sensors: one alarm per channel.
     AlarmKind(
         "sensor_non_finite",

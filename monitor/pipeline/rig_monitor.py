@@ -1,7 +1,8 @@
 """The complete monitor, for live use and replay: samples in, estimates and alarms out.
 
     SampleBlock ─▶ pipeline ──▶ conditions ─▶ alarms ─▶ announcements
-                ├▶ detectors ─▶ conditions ─┘
+                ├▶ detectors ─▶ conditions ─┤
+                ├▶ wiring ────▶ conditions ─┤     (silences the two above)
                 └▶ quality ───▶ conditions ─┘
 
 It is pure: no clock, bus or file, and the same samples give the same results for any division into
@@ -13,12 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from monitor.alarms import AlarmManager, Announcement, quality_conditions
+from monitor.alarms import AlarmManager, Announcement, quality_conditions, settings_of
 from monitor.detectors import Detector
 from monitor.model import EquationsPlant, RigModel
 from monitor.pipeline.observer_pipeline import ObserverMonitor
 from monitor.pipeline.pipeline import Monitor
 from monitor.signals import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition
+from monitor.wiring import WIRING, WiringCheck
+from rigwatch.wire.arrays import BoolArray
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, cut
 from rigwatch.wire.rig_config import AlarmSection
 
@@ -61,6 +64,8 @@ class RigMonitor:
         self._friction = friction
         self._pipeline = scheme_of(model)
         self._detectors = tuple(detectors)
+        checked = any(settings_of(name, settings or {}).enabled for name in WIRING)
+        self._wiring = WiringCheck(model) if checked else None
 
     def update(self, block: SampleBlock) -> Watched | None:
         """Process the next block; None if it contains nothing new.
@@ -80,8 +85,7 @@ class RigMonitor:
         result = self._pipeline.update(block)
         if result is None:
             return None
-        at = result.estimates
-        fresh = cut(block, at.seq - block.seq, len(block))
+        at, fresh = result.estimates, _fresh(block, result.estimates)
         found = [detector.update(fresh) for detector in self._detectors]
         columns = at.columns + tuple(column for columns, _ in found for column in columns)
         more = tuple(condition for _, conditions in found for condition in conditions)
@@ -89,7 +93,13 @@ class RigMonitor:
         own = result.conditions
         if not self._friction:
             own = tuple(c for c in own if c.name.partition(".")[0] in OF_SAMPLES)
-        return replace(at, columns=columns), (*own, *more, *quality)
+        if self._wiring is None:
+            return replace(at, columns=columns), (*own, *more, *quality)
+        wrong, wiring = self._wiring.update(fresh)
+        if wrong.any():
+            columns = tuple(_disarmed(column, wrong) for column in columns)
+            own, more = (tuple(_silenced(c, wrong) for c in part) for part in (own, more))
+        return replace(at, columns=columns), (*own, *more, *wiring, *quality)
 
     def announce(self, at: EstimateBlock, conditions: tuple[Condition, ...]) -> list[Announcement]:
         """Messages of the alarms for conditions, in order."""
@@ -110,9 +120,30 @@ class RigMonitor:
 
     def learn(self, block: SampleBlock) -> None:
         """Process a block that an earlier run has published: update the state, publish nothing."""
-        self._pipeline.update(block)
+        result = self._pipeline.update(block)
         for detector in self._detectors:
             detector.update(block)
+        if result is not None and self._wiring is not None:
+            self._wiring.update(_fresh(block, result.estimates))
+
+
+def _fresh(block: SampleBlock, judged: EstimateBlock) -> SampleBlock:
+    """The part of a block that has been judged now, without samples seen before."""
+    return cut(block, judged.seq - block.seq, len(block))
+
+
+def _disarmed(column: Column, wrong: BoolArray) -> Column:
+    """The column `armed` with 0 where the wiring is wrong; other columns unchanged."""
+    if column.name != "armed":
+        return column
+    return replace(column, values=np.where(wrong, 0.0, column.values))
+
+
+def _silenced(condition: Condition, wrong: BoolArray) -> Condition:
+    """The condition, not active where the wiring is wrong, unless it is one of the samples."""
+    if condition.name.partition(".")[0] in OF_SAMPLES:
+        return condition
+    return replace(condition, active=np.where(wrong, 0, condition.active).astype(np.uint8))
 
 
 def scheme_of(model: RigModel) -> Monitor | ObserverMonitor:

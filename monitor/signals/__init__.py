@@ -10,6 +10,7 @@ from monitor.signals.admission import (
     Admission,
     Admitted,
     Codes,
+    usable,
 )
 from monitor.signals.conditions import (
     DEPARTURE,
@@ -73,4 +74,5 @@ __all__ = [
     "conditions",
     "joined",
     "modelled_acceleration",
+    "usable",
 ]

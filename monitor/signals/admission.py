@@ -112,12 +112,12 @@ class Admission:
         for place, name in enumerate(self._channels):
             column = block.channel(name)
             values[padding:, place] = column.values[seen:]
-            good[padding:, place] = _usable(column, stuck_counts=place != 1)[seen:]
+            good[padding:, place] = usable(column, stuck_counts=place != 1)[seen:]
         values[~good] = 0.0
         return values, good
 
 
-def _usable(column: Column, stuck_counts: bool) -> NDArray[np.bool_]:
+def usable(column: Column, stuck_counts: bool) -> NDArray[np.bool_]:
     """Finite and of good quality; a constant position may be stiction, so it counts as good."""
     finite = np.isfinite(column.values)
     if column.quality.size == 0:

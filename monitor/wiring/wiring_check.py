@@ -1,0 +1,123 @@
+"""Checks the wiring over the first seconds of motion, before anything is judged.
+
+    samples ─▶ windows of one second ─▶ motion ratio ─▶ passed
+                                                     └▶ failed, after two windows in a row
+
+One good window passes until the device or the monitor starts again. After a failure nothing is
+judged until then: what was learnt with wrong wiring would count as healthy.
+"""
+
+import numpy as np
+
+from monitor.model import RigModel
+from monitor.signals import Condition, above, usable
+from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
+from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.wire.messages import SampleBlock
+
+WINDOW = 1.0
+"""Length of a window [s]."""
+FAILURES = 2
+"""Windows in a row that must fail."""
+GAIN, PHASE = 3.0, 60.0
+"""Largest factor and phase [deg] that sensors which show the same motion may differ by."""
+REVERSED = 15.0
+"""Largest phase that a reversed sensor may have beside its 180° [deg]; further off, swapped
+channels are as likely.
+"""
+SIGN, SCALE, SWAPPED = "wiring_sign", "wiring_scale", "wiring_swapped"
+WIRING = (SIGN, SCALE, SWAPPED)
+
+
+class WiringCheck:
+    """The check of one rig; it does nothing unless one channel is in m and one in m/s^2.
+
+    Args:
+        model: of the rig.
+    """
+
+    def __init__(self, model: RigModel) -> None:
+        self._rate, self._channels = model.sample_rate, model.channels
+        self._length = round(WINDOW * model.sample_rate)
+        self._boot = self._next = -1
+        self._restart()
+
+    def _restart(self) -> None:
+        self._passed, self._failed, self._fails = False, "", 0
+        self._window: list[FloatArray] = []
+        self._gain = self._phase = np.nan
+
+    def update(self, block: SampleBlock) -> tuple[BoolArray, tuple[Condition, ...]]:
+        """Whether the wiring is wrong at each sample, shape (n,), and the conditions that say why.
+
+        Args:
+            block: new samples; a gap before it discards the window.
+        """
+        if block.boot != self._boot:
+            self._restart()
+        elif block.seq != self._next:
+            self._window = []
+        self._boot, self._next = block.boot, block.seq + len(block)
+        wrong = np.zeros(len(block), np.bool_)
+        if not self._passed:
+            wrong[self._first_failed(block) :] = True
+        return wrong, tuple(
+            above(name, wrong & (name == self._failed), np.full(len(block), value), limit)
+            for name, value, limit in (
+                (SIGN, abs(self._phase), 180 - REVERSED),
+                (SCALE, self._gain, GAIN),
+                (SWAPPED, abs(self._phase), PHASE),
+            )
+            if self._failed == name
+        )
+
+    def _first_failed(self, block: SampleBlock) -> int:
+        """The first sample at which the wiring counts as wrong; the block's length if none."""
+        if self._failed:
+            return 0
+        signals = self._signals(block)
+        if signals is None:
+            self._passed = True
+            return len(block)
+        known: BoolArray = np.isfinite(signals.sum(axis=1))
+        for at, valid in enumerate(known):
+            if not valid:
+                self._window = []
+                continue
+            self._window.append(signals[at])
+            if len(self._window) == self._length:
+                self._judge(np.array(self._window))
+                self._window = []
+                if self._passed or self._failed:
+                    return len(block) if self._passed else at
+        return len(block)
+
+    def _signals(self, block: SampleBlock) -> FloatArray | None:
+        """Position and acceleration, NaN where invalid, shape (n, 2); None without such a pair."""
+        known = [column for column in block.channels if column.name in self._channels]
+        pair = [[c for c in known if c.unit == unit] for unit in ("m", "m/s^2")]
+        if any(len(found) != 1 for found in pair):
+            return None
+        columns = [found[0] for found in pair]
+        return np.stack(
+            [np.where(usable(c, stuck_counts=True), c.values, np.nan) for c in columns], axis=1
+        )
+
+    def _judge(self, window: FloatArray) -> None:
+        found = motion_ratio(window[:, 0], window[:, 1], self._rate)
+        if found is None:
+            return
+        reason = _wrong(found)
+        self._passed, self._fails = not reason, self._fails + 1 if reason else 0
+        if self._fails == FAILURES:
+            self._failed, self._gain, self._phase = reason, found.gain, found.phase
+
+
+def _wrong(found: MotionRatio) -> str:
+    """What is wrong with the wiring; empty if it is right."""
+    sized, turned = 1 / GAIN < found.gain < GAIN, abs(found.phase)
+    if sized and turned > 180 - REVERSED:
+        return SIGN
+    if turned > PHASE:
+        return SWAPPED
+    return "" if sized else SCALE

@@ -1,0 +1,125 @@
+"""The wiring check at the start: what is wired wrongly is told with its reason, and not judged."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from monitor.model.model_file import RigModel
+from monitor.pipeline.rig_monitor import RigMonitor
+from rigwatch.wire.messages.message_types import Alarm, EstimateBlock
+from rigwatch.wire.rig_config import AlarmSection
+from sim_plant.excitation import Chirp, Multisine, Shape, Sine, Square
+from tests.monitor import monitor_rig, observed_rig
+from tests.monitor.monitor_rig import RATE, SINE, block, fault, friction, run
+
+Channels = dict[str, np.ndarray]
+JUDGED = {"departure", "dry_friction", "stiction", "other_fault"}
+# Volts, metres and m/s^2 of one code: a channel in another's place shows its codes.
+VOLT, METRE, ACCELERATION = 3.05e-4, 7.75e-7, 1.496e-2
+SCHEMES = {"transfer": monitor_rig.model, "equations": observed_rig.model}
+
+
+def watched(
+    channels: Channels, model: RigModel, lengths: int = 0, **settings: AlarmSection
+) -> tuple[dict[str, float], list[EstimateBlock]]:
+    """Time of each alarm [s] and the estimates, of a recording cut into blocks."""
+    monitor, times, estimates = RigMonitor(model, settings), dict[str, float](), []
+    count = len(channels["voltage"])
+    for first in range(0, count, lengths or count):
+        found = monitor.update(block(channels, first, min(first + (lengths or count), count)))
+        assert found is not None
+        estimates.append(found.estimates)
+        for said in found.announcements:
+            if isinstance(said, Alarm):
+                times.setdefault(said.name, said.seq / RATE)
+    return times, estimates
+
+
+def swapped_drive(c: Channels) -> None:
+    c["voltage"], c["position"] = c["position"] * VOLT / METRE, c["voltage"] * METRE / VOLT
+
+
+def swapped_sensors(c: Channels) -> None:
+    c["position"], c["acceleration"] = (
+        c["acceleration"] * METRE / ACCELERATION,
+        c["position"] * ACCELERATION / METRE,
+    )
+
+
+def reversed_position(c: Channels) -> None:
+    c["position"] = -c["position"]
+
+
+def in_g(c: Channels) -> None:
+    c["acceleration"] = c["acceleration"] / 9.80665
+
+
+def in_millimetres(c: Channels) -> None:
+    c["position"] = 1000.0 * c["position"]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize(
+    ("tamper", "alarm"),
+    [
+        (swapped_drive, "wiring_swapped"),
+        (swapped_sensors, "wiring_scale"),
+        (reversed_position, "wiring_sign"),
+        (in_g, "wiring_scale"),
+        (in_millimetres, "wiring_scale"),
+    ],
+)
+def test_wrong_wiring_is_told_and_nothing_is_judged_after_it(
+    scheme: str, tamper: Callable[[Channels], None], alarm: str
+) -> None:
+    channels = run(SINE, 12.0, friction(8.0))
+    tamper(channels)
+    times, estimates = watched(channels, SCHEMES[scheme]())
+    assert times[alarm] <= 2.0
+    assert not {name for name in JUDGED & times.keys() if times[name] > times[alarm]}
+    armed = np.concatenate([block.column("armed").values for block in estimates])
+    assert not armed[round(times[alarm] * RATE) :].any()
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [SINE, Sine(amplitude=1.0, frequency=1.5), Square(amplitude=1.4, frequency=8.0),
+     Chirp(amplitude=0.7, start=0.5, stop=20.0, length_s=14.0),
+     Multisine(amplitude=2.5, start=0.5, stop=12.0, period=1024, seed=1)],
+    ids=lambda drive: type(drive).__name__,
+)  # fmt: skip
+def test_right_wiring_passes_under_any_drive(drive: Shape) -> None:
+    times, _ = watched(run(drive, 8.0), monitor_rig.model())
+    assert not {name for name in times if name.startswith("wiring")}
+
+
+@pytest.mark.parametrize("effect", ["acceleration_gain", "acceleration_lag"])
+def test_a_sensor_that_fails_later_is_a_fault_and_no_wiring(effect: str) -> None:
+    values = {"acceleration_gain": 4.0, "acceleration_lag": 0.05}
+    times, _ = watched(run(SINE, 10.0, fault(effect, values[effect], 6.0)), monitor_rig.model())
+    assert not {name for name in times if name.startswith("wiring")}
+    assert JUDGED & times.keys()
+
+
+def test_the_cut_into_blocks_changes_no_alarm_and_no_estimate() -> None:
+    channels = run(SINE, 6.0)
+    in_g(channels)
+    channels["position"][300] = np.nan
+    whole = watched(channels, monitor_rig.model())
+    for length in (1, 37):
+        times, estimates = watched(channels, monitor_rig.model(), length)
+        assert times == whole[0]
+        for name in ("armed", "residual"):
+            cut = np.concatenate([block.column(name).values for block in estimates])
+            np.testing.assert_array_equal(cut, whole[1][0].column(name).values)
+
+
+def test_a_person_may_say_that_the_wiring_is_as_it_is_to_be() -> None:
+    channels = run(SINE, 10.0)
+    in_g(channels)
+    off = {name: AlarmSection(enabled=False) for name in
+           ("wiring_sign", "wiring_scale", "wiring_swapped")}  # fmt: skip
+    times, estimates = watched(channels, monitor_rig.model(), **off)
+    assert not {name for name in times if name.startswith("wiring")}
+    assert estimates[0].column("armed").values[-1] == 1.0
