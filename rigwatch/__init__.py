@@ -1,4 +1,4 @@
-"""Watches a test rig against a model of it and tells its people what the model is missing.
+"""Monitors a test rig against a model of it, and finds the effects that the model lacks.
 
 The workbench from Python, and in a notebook, where results display themselves:
 
@@ -7,7 +7,7 @@ The workbench from Python, and in a notebook, where results display themselves:
     study.explain()
     study.add("coulomb")
 
-Names are loaded when they are first used, so that no command waits for what it does not need.
+Names are loaded on first use, so that commands do not wait for modules that they do not need.
 """
 
 from importlib import import_module

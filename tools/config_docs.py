@@ -21,14 +21,14 @@ TARGET = Path(__file__).parent.parent / "docs" / "configuration.md"
 PAGES: tuple[tuple[str, str, type[Section]], ...] = (
     (
         "Configuration of a rig",
-        "One TOML file that every process of a rig reads: `rigwatch up CONFIG`. Relative paths are "
+        "One TOML file read by all processes of a rig: `rigwatch up CONFIG`. Relative paths are "
         "relative to the folder in which the command runs. A key that is misspelt, missing or out "
         "of range stops the command with one line that names file, line and key.",
         RigConfig,
     ),
     (
         "Scenario of the simulated rig",
-        "What `plant.scenario` names: the rig, what drives it and what happens to it.",
+        "The file named by `plant.scenario`: the rig, its excitation and its events.",
         Scenario,
     ),
 )

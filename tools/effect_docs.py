@@ -12,13 +12,14 @@ HEAD = """<!-- Printed by `make docs` from rigwatch/physics/effects. -->
 # Effects of the library
 
 {count} effects, each an expression at a port of a model ([models](models.md#ports)). `rigwatch
-effects NAME` says everything about one and draws it: force against position and speed, response to
-a step. "Looks like" names effects that may explain the same recording; `rigwatch explain` says
-when it cannot tell them apart.
+effects NAME` describes and draws one: force against position and speed, response to a step. "Looks
+like" names effects that may explain the same recording; `rigwatch explain` reports when it cannot
+distinguish them.
 
-At a force port the expression is what is added, in the port's variables: `x` and `v` motion, `L`
-load, `p` pressure or level, `T` temperature, `i` current, `psi` flux linkage. At a signal it is
-what leaves, of `u` that arrives. An effect is tried only where its port has all that it names.
+At a force port the expression is the added force as a function of the port's variables: `x` and `v`
+motion, `L` load, `p` pressure or level, `T` temperature, `i` current, `psi` flux linkage. At a
+signal it is the output signal as a function of the input signal `u`. An effect is tried only at
+ports that have all its variables.
 [Own effects](workbench.md#own-effects)
 
 """

@@ -37,7 +37,7 @@ FILES: tuple[tuple[str, str, type[Section]], ...] = (
     ),
     (
         "Study",
-        "`study.toml` in the folder of a study; `rigwatch study new` makes it from a template. "
+        "`study.toml` in the folder of a study; `rigwatch study new` creates it from a template. "
         "Examples: `configs/studies/`, [study files](workbench.md#study-files).",
         StudyFile,
     ),

@@ -12,12 +12,12 @@ HEAD = """<!-- Printed by `make docs` from the table in the code. -->
 
 # Units
 
-Models, effects, studies and imports take the same units. Values are SI inside: they are converted
-where a file is read, and `compare`, `explain`, `add`, `report` and `study.toml` have a parameter in
-the unit that its model or effect is written in (`shown = "mm"` beside `unit` takes another one).
+Models, effects, studies and imports accept the same units. Internally all values are SI: they are
+converted when a file is read, and `compare`, `explain`, `add`, `report` and `study.toml` give a
+parameter in the unit of its model or effect file (`shown = "mm"` next to `unit` selects another).
 Equations compute in SI. The errors of an output are in its SI unit.
 
-* Products by a space, `*` or `·`; quotients by `/`, which holds for the next factor only: `N s/m`,
+* Products by a space, `*` or `·`; quotients by `/`, which applies to the next factor only: `N s/m`,
   `m/(s V)`, `kN/mm`. Powers by `^`, also broken ones: `m/s^2`, `l/(min bar^0.5)`; `m/s2` and `m/s²`
   are read, too. In equations a power is `**`.
 * `g` is the gram; standard gravity is `g0` or `gn`. Accelerometers are often labelled g, so an

@@ -108,7 +108,7 @@ def every_command(
 def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rigwatch",
-        description="Monitors a test rig against a model of it and says what the model is missing.",
+        description="Monitors a test rig against its model and finds what the model lacks.",
     )
     parser.add_argument("--version", action="version", version=f"rigwatch {__version__}")
     parser.set_defaults(json=False)

@@ -1,4 +1,4 @@
-"""The recorder process: everything on the bus that is worth keeping goes into session files."""
+"""The recorder process: writes the recorded topics of the bus to session files."""
 
 from rigwatch.recorder.process import run
 

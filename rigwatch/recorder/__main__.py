@@ -1,4 +1,4 @@
-"""`python -m rigwatch.recorder CONFIG`: the recording process by itself."""
+"""`python -m rigwatch.recorder CONFIG`: runs the recording process."""
 
 import sys
 

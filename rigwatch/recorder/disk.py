@@ -1,4 +1,4 @@
-"""How full the disk is that the session goes to, and when to say so."""
+"""Free space on the session's disk, and when to report it."""
 
 import math
 import os
@@ -16,9 +16,9 @@ _LEVELS: tuple[tuple[float, Severity, str], ...] = (
 
 
 def free_share(folder: Path) -> float:
-    """Share of the disk of `folder` that is free to us, 0 to 1; NaN where nobody can tell.
+    """Share of the disk of `folder` available to this process, 0 to 1; NaN if unknown.
 
-    The folder need not exist yet: the nearest one above it is asked.
+    If the folder does not exist yet, its nearest existing parent is used.
     """
     for place in (folder, *folder.absolute().parents):
         try:
@@ -30,18 +30,18 @@ def free_share(folder: Path) -> float:
 
 
 class DiskWatch:
-    """Says once when the disk gets nearly full, and once when there is room again."""
+    """Reports once when the disk is nearly full, and once when there is space again."""
 
     def __init__(self) -> None:
         self._level = len(_LEVELS)
 
     @property
     def short(self) -> bool:
-        """Whether there is too little room."""
+        """Whether there is too little space."""
         return self._level < len(_LEVELS)
 
     def update(self, share: float, t_ns: int) -> list[Event]:
-        """What is to be told now that `share` of the disk is free; NaN changes nothing."""
+        """Events for a free share of the disk; NaN is ignored."""
         if math.isnan(share):
             return []
         level = next(

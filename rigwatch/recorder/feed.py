@@ -1,4 +1,4 @@
-"""Everything on the bus that is worth keeping: samples without a hole, the rest as it comes."""
+"""The recorded topics of the bus: complete samples and numbered messages, others as received."""
 
 from rigwatch.recorder.positions import Positions
 from rigwatch.wire.bus import Bus, CompleteSubscription, Subscription
@@ -12,10 +12,10 @@ class Feed:
     """The recorded topics of the bus.
 
     Args:
-        bus: where they are; what `bus.process` itself says is not taken from there.
-        resume_after: (boot, seq) of the last sample that an earlier run of this recorder has kept,
-            so that those in between are fetched from the ring.
-        positions: the same of numbered topics.
+        bus: source of the messages; those of `bus.process` itself are ignored.
+        resume_after: (boot, seq) of the last sample stored by an earlier run of this recorder;
+            later ones are fetched from the ring.
+        positions: the same for numbered topics.
 
     Attributes:
         samples: samples delivered.
@@ -41,7 +41,7 @@ class Feed:
         self._others: list[Subscription] = [*others, *self._numbered.values()]
 
     def take(self) -> list[Message]:
-        """What has come since the last call; does not wait."""
+        """Messages received since the last call; does not wait."""
         found: list[Message] = list(self._reader.read(0.0))
         for item in found:
             if isinstance(item, SampleBlock):
@@ -55,31 +55,31 @@ class Feed:
         return found
 
     def positions(self) -> Positions:
-        """How far the numbered topics have been taken."""
+        """Positions in the numbered topics."""
         return {name: listened.positions() for name, listened in self._numbered.items()}
 
     def lost(self, topic: str) -> int:
-        """Messages of a numbered topic that are known to be gone."""
+        """Messages of numbered topics known to be lost."""
         return self._numbered[topic].lost
 
     def _is_own(self, message: Message) -> bool:
-        """Gaps and events that the reader published, and returned above as well."""
+        """Whether a message was published by this reader, which also returned it."""
         if isinstance(message, Gap):
             return message.reporter == self._name
         return isinstance(message, Event) and message.source == self._name
 
     @property
     def rejected(self) -> int:
-        """Payloads that were no messages of their topic."""
+        """Payloads that were not valid messages of their topic."""
         return self._reader.rejected + sum(item.rejected for item in self._others)
 
     @property
     def dropped(self) -> int:
-        """Messages other than samples that came faster than they were taken."""
+        """Messages, other than samples, dropped because the recorder was slow."""
         return sum(item.dropped for item in self._others)
 
     def close(self) -> None:
-        """Take no more."""
+        """Stop receiving."""
         self._reader.close()
         for subscription in self._others:
             subscription.close()

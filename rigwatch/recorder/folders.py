@@ -1,9 +1,9 @@
-"""Where a recording goes: a new session folder, or on with the last one after a short break.
+"""Chooses the folder of a recording: a new session, or the last one after a short interruption.
 
     <recorder.folder>/<rig>-20260501T120000Z/000001.mcap, 000002.mcap, …
 
-A recorder that was killed and started again continues in the same folder and asks the ring for what
-it missed.
+A recorder that was killed and restarted continues in the same folder and queries the ring for
+missed samples.
 """
 
 from dataclasses import dataclass, field
@@ -16,16 +16,16 @@ from rigwatch.wire.messages import RunInfo
 from rigwatch.wire.session import SUFFIX, Session, open_session
 
 LONGEST_BREAK = 120.0
-"""Break after which a recorder begins a new session [s]."""
+"""Interruption after which a recorder starts a new session [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The folder to record to, and what it ends with.
+    """The folder to record to, and its last messages.
 
     Attributes:
-        last: (boot, seq) of the last sample in it, None in a new one.
-        positions: the same of numbered messages.
+        last: (boot, seq) of the last sample in it, None for a new one.
+        positions: the same for numbered messages.
     """
 
     folder: Path
@@ -34,7 +34,7 @@ class Place:
 
 
 def choose(root: Path, run: RunInfo) -> Place:
-    """The folder for a recording that begins at `run.t_ns`."""
+    """The folder for a recording that starts at `run.t_ns`."""
     going_on = _interrupted(root, run)
     if going_on is not None:
         return going_on
@@ -52,7 +52,7 @@ def _unused(folder: Path) -> Path:
 
 
 def _interrupted(root: Path, run: RunInfo) -> Place | None:
-    """The newest session of this rig, where it was made with the same configuration just now."""
+    """The newest session of this rig if it is recent and has the same configuration."""
     try:
         folders = [path for path in root.glob(f"{run.rig}-*Z*") if any(path.glob(f"*{SUFFIX}"))]
         newest = max(folders, key=lambda path: max(f.stat().st_mtime for f in path.iterdir()))

@@ -1,7 +1,7 @@
-"""How far a recording has come in what processes said, kept beside its segments.
+"""Position of a recording in the numbered topics, stored beside its segments.
 
-A recorder that was killed and started again asks their rings from there on. The file is written
-after the segment: a kill in between repeats messages of half a second, and loses none.
+A recorder that was killed and restarted queries the rings from there on. The file is written after
+the segment: a kill in between repeats messages of half a second but loses none.
 """
 
 import contextlib
@@ -13,11 +13,11 @@ from rigwatch.wire.bus import Place
 
 FILE = "positions.json"
 Positions = dict[str, dict[str, Place]]
-"""Of each numbered topic and process: run and number of the last message kept."""
+"""For each numbered topic and process: run and number of the last stored message."""
 
 
 def save_positions(folder: Path, positions: Positions) -> None:
-    """Write them; a disk that cannot take them is told of by the segments."""
+    """Write the positions; a disk that cannot be written is reported by the segments."""
     new = folder / f"{FILE}.new"
     with contextlib.suppress(OSError):
         new.write_bytes(msgspec.json.encode(positions))
@@ -25,7 +25,7 @@ def save_positions(folder: Path, positions: Positions) -> None:
 
 
 def load_positions(folder: Path) -> Positions:
-    """What stands in `folder`; nothing where nothing can be read."""
+    """The positions stored in `folder`; empty if they cannot be read."""
     try:
         return msgspec.json.decode((folder / FILE).read_bytes(), type=Positions)
     except (OSError, msgspec.DecodeError, ValueError):

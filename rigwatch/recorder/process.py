@@ -24,7 +24,7 @@ from rigwatch.wire.session import run_info
 PROCESS = "recorder"
 HEALTH_EVERY = 1.0
 _OF_FLUSH = 0.8
-"""Share of the flush time that a turn of the loop waits, the rest is for the disk."""
+"""Share of the flush time that one loop iteration waits; the rest is for the disk."""
 
 
 class Recorder:
@@ -32,8 +32,8 @@ class Recorder:
 
     Args:
         config: the rig's configuration.
-        run: is written at the head of every segment.
-        bus: where the messages are.
+        run: description written at the head of every segment.
+        bus: source of the messages.
     """
 
     def __init__(self, config: RigConfig, run: RunInfo, bus: Bus) -> None:
@@ -49,7 +49,7 @@ class Recorder:
         bus.publish(RUN, run)
 
     def turn(self, now: float, t_ns: int) -> None:
-        """Keep what has come; `now` is a monotonic clock's time [s], `t_ns` Unix time [ns]."""
+        """Store received messages; `now` is monotonic time [s], `t_ns` Unix time [ns]."""
         for message in self.feed.take():
             self.store.add(message)
         self._flush(now, t_ns)
@@ -93,12 +93,12 @@ class Recorder:
         return Health(PROCESS, t_ns, state, self.store.failure, counters)
 
     def close(self, now: float, t_ns: int) -> None:
-        """Write what waits and close the session."""
+        """Write waiting messages and close the session."""
         for message in self.feed.take():
             self.store.add(message)
         self.feed.close()
         self._tell(self.store.close(now, t_ns))
-        # An orderly stop is no failure: whoever watches the recording stops expecting one.
+        # An orderly stop is not a failure: supervisors no longer expect a recording.
         self._bus.publish(HEALTH, Health(PROCESS, t_ns, "stopped", "", {}))
 
 
@@ -116,7 +116,7 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event) -> 
 
 
 def describe_run(path: Path | str, config: RigConfig, notes: str = "") -> RunInfo:
-    """What is written at the head of a recording made with the configuration at `path`."""
+    """The description at the head of a recording made with the configuration at `path`."""
     text = Path(path).read_text(encoding="utf-8")
     return run_info(
         config.rig.id,
@@ -131,8 +131,8 @@ def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path:
     """Record the rig whose configuration is at `path`, until `stop` is set; the session's folder.
 
     Raises:
-        ConfigError: the configuration is wrong.
-        BusError: the router's endpoint is wrong.
+        ConfigError: the configuration is invalid.
+        BusError: the router's endpoint is invalid.
     """
     config = load_rig(path)
     bus = connect(config, PROCESS)

@@ -16,7 +16,7 @@ from rigwatch.wire.session import SUFFIX, topic_counts
 DAY = 86_400.0
 GIGABYTE = 1e9
 EVERY = 60.0
-"""Time between two looks at the folder [s]."""
+"""Time between checks of the folder [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,8 @@ class Retention:
     """The rules of one rig.
 
     Args:
-        settings: section [recorder]; a limit of 0 is none.
-        rig: whose sessions in the folder are meant.
+        settings: section [recorder]; a limit of 0 disables it.
+        rig: the rig whose sessions are managed.
     """
 
     def __init__(self, settings: RecorderSection, rig: str) -> None:
@@ -43,12 +43,12 @@ class Retention:
         self._due = 0.0
 
     def update(self, now: float, t_ns: int, current: Path) -> list[Event]:
-        """Remove what is due, at most once a minute, and report it.
+        """Remove expired segments, at most once a minute, and report them.
 
         Args:
-            now: time on a monotonic clock [s].
+            now: monotonic time [s].
             t_ns: Unix time [ns].
-            current: folder that is being recorded to; its newest segment stays.
+            current: folder being recorded to; its newest segment is kept.
         """
         if now < self._due:
             return []

@@ -1,10 +1,10 @@
-"""Keeps a session on the disk whatever the disk does: in segments, or in memory meanwhile.
+"""Writes a session in segments; messages wait in memory while the disk cannot be written.
 
     add → waiting (bounded, oldest dropped and counted) → flush → segment 000001.mcap, 000002.mcap,
     …
 
-Where the disk is full, gone or read-only, messages wait in memory and the store tries again once a
-second, in a new segment. Nothing here raises for that: what happened is told as events.
+If the disk is full, gone or read-only, messages wait in memory and the store retries once a second,
+in a new segment. These faults are not raised but returned as events.
 """
 
 from collections import deque
@@ -16,17 +16,17 @@ from rigwatch.wire.session import SUFFIX, SessionWriter, merge_pending
 
 SOURCE = "recorder"
 RAM_BYTES = 64 << 20
-"""Memory for messages that wait for the disk, about a quarter of an hour of them [bytes]."""
+"""Memory for waiting messages, enough for about a quarter of an hour [bytes]."""
 COMPACTED = 256
-"""Length of the blocks that samples are merged into while they wait [samples]."""
+"""Length of the blocks into which waiting samples are merged [samples]."""
 RETRY_AFTER = 1.0
-"""Time between attempts to write again [s]."""
+"""Time between write attempts [s]."""
 _PLAIN_MESSAGE = 500
 _PER_VALUE = 9
 
 
 def weight(message: Message) -> int:
-    """About how much memory the message takes [bytes]."""
+    """Approximate memory of a message [bytes]."""
     if isinstance(message, SampleBlock):
         return _PLAIN_MESSAGE + len(message) * _PER_VALUE * (len(message.channels) + 2)
     if isinstance(message, EstimateBlock):
@@ -35,20 +35,20 @@ def weight(message: Message) -> int:
 
 
 class Store:
-    """One session folder being written; `now` is a monotonic clock's time [s] throughout.
+    """One session folder being written; `now` is monotonic time [s] throughout.
 
     Args:
-        folder: the session's folder, made with the first segment.
-        run: is written at the head of each segment.
+        folder: the session's folder, created with the first segment.
+        run: description written at the head of each segment.
         segment: length of a segment [s].
-        ram_bytes: memory for messages that wait [bytes].
+        ram_bytes: memory for waiting messages [bytes].
 
     Attributes:
         samples: samples on the disk.
-        dropped_samples: samples given up because the disk was away for too long.
-        dropped_messages: other messages given up.
-        segment_count: segments begun.
-        failure: why the disk cannot be written, empty while it can.
+        dropped_samples: samples dropped because the disk was unavailable for too long.
+        dropped_messages: other messages dropped.
+        segment_count: number of segments started.
+        failure: why the disk cannot be written, empty otherwise.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Store:
         self._events: list[Event] = []
 
     def add(self, message: Message) -> None:
-        """Take a message for the next flush; the oldest is dropped where memory is used up."""
+        """Queue a message for the next flush; the oldest is dropped if memory is exhausted."""
         self._waiting.append(message)
         self._waiting_bytes += weight(message)
         while self._waiting_bytes > self._ram_bytes:
@@ -81,7 +81,7 @@ class Store:
             self.dropped_messages += 1
 
     def flush(self, now: float, t_ns: int) -> list[Event]:
-        """Write what waits, if the disk lets us; returns what happened (`t_ns`: time of events)."""
+        """Write waiting messages if possible; returns events (`t_ns`: their time)."""
         if self._waiting and now >= self._retry_at:
             try:
                 self._flush(now)
@@ -126,13 +126,13 @@ class Store:
         self.samples += samples
 
     def _fail(self, reason: str, now: float, t_ns: int) -> None:
-        """Take back what did not reach the disk, and begin a new segment later."""
+        """Requeue messages that did not reach the disk, and start a new segment later."""
         self._retry_at = now + RETRY_AFTER
         if self._writer is not None:
             self._waiting.extendleft(reversed(self._writer.pending))
             self._writer.abandon()
             self._writer = None
-        # Single samples take a hundred times the memory of the same samples in one block.
+        # Single samples need a hundred times the memory of the same samples in one block.
         self._waiting = deque(merge_pending(self._waiting, COMPACTED))
         self._waiting_bytes = sum(map(weight, self._waiting))
         if not self.failure:
@@ -153,13 +153,13 @@ class Store:
         self._events.append(Event(SOURCE, t_ns, severity, code, text))
 
     def _finish(self) -> None:
-        """Close the segment; its data are on the disk whether or not the index fits."""
+        """Close the segment; its data are on the disk even if the index cannot be written."""
         writer, self._writer = self._writer, None
         if writer is not None:
             writer.close()
 
     def close(self, now: float, t_ns: int) -> list[Event]:
-        """Write what waits and close the segment; what cannot be written is counted as dropped."""
+        """Write waiting messages and close the segment; unwritten ones count as dropped."""
         self._retry_at = now
         events = self.flush(now, t_ns)
         try:

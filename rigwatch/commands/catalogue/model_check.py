@@ -61,14 +61,14 @@ def _value(text: str) -> tuple[str, float]:
 
 
 def _lines(name: str, report: "ModelReport") -> list[str]:
-    lines = [f"{name}: equations and units fit, every port stands in an equation"]
+    lines = [f"{name}: equations and units are consistent, every port is used in an equation"]
     said = (
-        (report.unused, "stands in no equation and at no port"),
-        (report.unseen, "no output depends on it, so that no recording can tell it"),
-        (report.tied, "the outputs cannot tell it from another of these"),
+        (report.unused, "used in no equation and at no port"),
+        (report.unseen, "no output depends on it, so no recording can determine it"),
+        (report.tied, "the outputs cannot distinguish it from another of these"),
         (
             report.start,
-            "no channel shows it: a fit finds its start from the outputs",
+            "no channel measures it: a fit estimates its initial value from the outputs",
         ),
     )
     lines += [f"  {one}: {what}" for names, what in said for one in names]

@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--take",
         metavar="NAMES",
-        help="write these variants to the study, with commas between them; `enough`: what the"
-        " healthy recordings speak for; `none`: the model as it was written",
+        help="write these variants, separated by commas, to the study; `enough`: those that the"
+        " healthy recordings support; `none`: the unmodified model",
     )
 
 

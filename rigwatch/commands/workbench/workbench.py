@@ -30,12 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="name by which people reach a proxy in front of it that does TLS",
+        help="host name of a reverse proxy in front of it that terminates TLS",
     )
     parser.add_argument(
-        "--most-upload", type=int, default=1024, metavar="MB", help="largest file that is taken"
+        "--most-upload", type=int, default=1024, metavar="MB", help="largest upload"
     )
-    parser.add_argument("--open", action="store_true", help="open it in the browser here")
+    parser.add_argument("--open", action="store_true", help="open it in this machine's browser")
 
 
 def run(arguments: argparse.Namespace) -> int:
