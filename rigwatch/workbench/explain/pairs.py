@@ -140,10 +140,10 @@ def _fitted(bench: Bench, pairs: Sequence[Pair], progress: Progress) -> list[tup
 def _enough(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pair, Fitted]]:
     """Pairs that leave so little that they are worth naming.
 
-    Nothing but noise, as two wrong ones together explain much. Along the measured motion the model
-    leaves more, since what it leaves on a healthy rig changes with the fault.
+    Nothing but noise, as two wrong ones together explain much. A rough model, and any model along
+    the measured motion, leaves more, since what it leaves on a healthy rig changes with the fault.
     """
-    floor, tolerant = bench.floor, bench.data.along_motion
+    floor, tolerant = bench.floor, bench.data.along_motion or bench.study.model.rough
     return [
         (pair, fitted)
         for pair, fitted in fits

@@ -13,7 +13,7 @@ from rigwatch.simulated import write_session
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.fit import healthy_remainder
+from rigwatch.workbench.fit import learning
 from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_products
 from rigwatch.workbench.study.study import Study, create
 from sim_plant.excitation import Multisine
@@ -48,7 +48,7 @@ def test_what_is_learned_holds_under_an_excitation_that_was_not_learned(
     record(tmp_path, "rig", 2, phases=2)
     opened = study(tmp_path)
     taught = open_bench(opened)
-    monkeypatch.setattr(healthy_remainder, "STEPS", {})
+    monkeypatch.setattr(learning, "TERMS", {})
     bare = open_bench(opened)
     assert taught.floor.rms[0] < bare.floor.rms[0]
     assert taught.base.held_out_error < bare.base.held_out_error

@@ -33,9 +33,9 @@ PRIOR = 0.3
 SPREAD = 0.6
 """Standard deviation of the starts about the centre, in logarithms."""
 STARTS = 5
-"""Searches beside the one from the given values, where that ends above `GOOD`."""
+"""Searches beside the one from the given values, if not told."""
 GOOD = 1.3
-"""Error over the channels' noise from which no other start is tried."""
+"""Error over the channels' noise up to which no other start is tried."""
 NEAR = 3.0
 """Error over the channels' noise from which another search must lead to the same end."""
 LOOK, POLISH = 25, 60
@@ -77,9 +77,11 @@ class WholeRuns:
         start: all parameters to begin with and to hold to, shape (n_p,); the model's own if None.
         pull: deviations of noise that a free parameter may cost when it is off by a factor of e,
             or by its size, shape (m,); `PRIOR` if None.
+        sizes: how far one unit moves a free parameter, shape (m,), see `unknowns`.
         initial: states to begin with, shape (recordings, states); as channels show them if None.
         robust: deviations of noise from which a residual counts less than by its square.
         substeps: Runge-Kutta steps between samples.
+        starts: searches beside the one from the given values, where that ends above `GOOD`.
     """
 
     def __init__(
@@ -90,15 +92,18 @@ class WholeRuns:
         *,
         start: FloatArray | None = None,
         pull: FloatArray | None = None,
+        sizes: FloatArray | None = None,
         initial: FloatArray | None = None,
         robust: float = ROBUST,
         substeps: int = 2,
+        starts: int = STARTS,
     ) -> None:
         self._compiled, self._recordings, self._scale = compiled, recordings, scale
-        self._robust, self._substeps = robust, substeps
+        self._robust, self._substeps, self._starts = robust, substeps, starts
         self._begin = compiled.parameters if start is None else start
         self._problem = self._posed(initial)
         self._m, first = len(self._problem.free), self._problem.initial
+        self._sizes = np.full(self._m, np.nan) if sizes is None else sizes
         self._unknowns = self._about(first)
         held = np.full(self._m, PRIOR) if pull is None else pull
         self._pull = np.concatenate([held, np.full(first.size, PRIOR)])
@@ -120,12 +125,14 @@ class WholeRuns:
         ends = [*(system.parameters[name] for name in system.free), *states]
         centre = np.concatenate([self._begin[self._problem.free], first.ravel()])
         low, high = (np.array([getattr(each, end) for each in ends]) for end in ("low", "high"))
-        return unknowns(centre, low, high, positive=self._m)
+        told = np.concatenate([self._sizes, np.full(first.size, np.nan)])
+        return unknowns(centre, low, high, positive=self._m, sizes=told)
 
     def attempts(self) -> Iterator[Callable[[], Attempt]]:
         """The given values; then the best of several about them."""
         yield lambda: self._attempt("the values to start from", np.zeros(self._unknowns.size.size))
-        yield lambda: self._attempt("the best of several starts", self._drawn())
+        if self._starts:
+            yield lambda: self._attempt("the best of several starts", self._drawn())
 
     def enough(self, found: Sequence[Attempt]) -> bool:
         """Whether little more than noise is left, or nothing can be moved."""
@@ -149,9 +156,10 @@ class WholeRuns:
         parts = [beginning(each, PART) for each in self._recordings]
         part = WholeRuns(
             self._compiled, parts, self._scale, start=self._begin, pull=self._pull[: self._m],
-            initial=self._problem.initial, robust=self._robust, substeps=self._substeps,
+            sizes=self._sizes, initial=self._problem.initial, robust=self._robust,
+            substeps=self._substeps,
         )  # fmt: skip
-        spread = SPREAD * np.random.default_rng(0).standard_normal((STARTS, self._m))
+        spread = SPREAD * np.random.default_rng(0).standard_normal((self._starts, self._m))
         looks = [part._run(part._begun(z), LOOK) for z in spread]
         return self._begun(min(looks, key=lambda look: look.cost).z[: self._m])
 
