@@ -1,7 +1,8 @@
 """What a rough model learns from a healthy recording: terms that windows not fitted gain by.
 
 Every set of terms (`learned_terms.py`) is fitted for itself to one part of the recording, the
-smaller ones first, and each from the best that it contains; the rest of the recording decides. Of
+smaller ones first, and each from the best that it contains or, where that leads nowhere, from the
+model without terms; the rest of the recording decides. Of
 those that leave as little as any the one with the fewest kinds of terms is taken, so that no order
 in which terms are tried matters.
 
@@ -9,7 +10,7 @@ A set is taken only if its fit has converged, and if the model stays where it be
 hold several equilibria, and one that nobody has seen is met by the next recording.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -78,7 +79,7 @@ def learn(study: Study, healthy: Recording, horizon: int) -> Learned:
     """
     bare = _loose(study.model)
     both = _split(healthy, horizon)
-    first = fit_whole(study, bare, both, [study.file.start], SEARCHES)
+    first = fit_whole(study, bare, both, study.file.start, SEARCHES)
     test = Staying(first, healthy)
     models: dict[tuple[str, ...], Model] = {(): bare}
     fits: dict[tuple[str, ...], Fitted] = {(): first}
@@ -96,7 +97,7 @@ def learn(study: Study, healthy: Recording, horizon: int) -> Learned:
         found = _usable(study, models[chosen], whole, [fits[chosen]], test)
         if found is not None:
             return Learned(models[chosen], found, chosen)
-    return Learned(bare, fit_whole(study, bare, whole, [first.train.values()]), ())
+    return Learned(bare, fit_whole(study, bare, whole, first.train.values()), ())
 
 
 def _sets() -> list[tuple[str, ...]]:
@@ -127,16 +128,20 @@ def _best_first(fits: Mapping[tuple[str, ...], Fitted]) -> list[tuple[str, ...]]
 
 
 def _usable(
-    study: Study, model: Model, data: Data, begin: list[Fitted], test: "Staying"
+    study: Study, model: Model, data: Data, begin: Sequence[Fitted], test: "Staying"
 ) -> Fitted | None:
-    """A model's fit; None where it diverges, does not converge, or the model does not stay."""
-    starts = [fitted.train.values() for fitted in begin]
-    try:
-        found = fit_whole(study, model, data, starts)
-    except ModelError:
-        return None
-    converged = found.convergence is not None and found.convergence.converged
-    return found if converged and test.stays(found) else None
+    """A model's fit from the first of several fits that leads to a usable one; None if none does.
+
+    One that diverges, has not converged, or does not stay where it belongs is not used.
+    """
+    for start in begin:
+        try:
+            found = fit_whole(study, model, data, start.train.values())
+        except ModelError:
+            continue
+        if found.convergence is not None and found.convergence.converged and test.stays(found):
+            return found
+    return None
 
 
 class Staying:

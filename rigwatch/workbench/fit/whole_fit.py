@@ -1,4 +1,4 @@
-"""A rough model along the measured motion, fitted to whole recordings from several starts.
+"""A rough model along the measured motion, fitted to whole recordings.
 
 What runs along the motion forgets its beginning, so that a whole recording is one run, and a value
 at which it blows up costs so much that the search steps back. A parameter without bounds has no
@@ -6,11 +6,10 @@ size that a search could move it by: it gets one from what it does to the output
 coefficient of any unit moves as easily as another, and a direction in which the recording says
 nothing is held by a prior and freezes no other.
 
-A fit that has not converged goes on from where it is, and one that does not converge at all gives
-way to one from another start.
+A fit that has not converged goes on from where it is.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from rigwatch.physics.engine.equations import Model, compose
 from rigwatch.physics.engine.fit import Fit, Recording, bounds, evaluate
 from rigwatch.physics.engine.search import Convergence, WholeRuns, fit_from_afar
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, quiet_scale
 from rigwatch.workbench.fit.fitted_model import Fitted
 from rigwatch.workbench.study import Study
@@ -31,11 +29,7 @@ CARRIED_ON = 4
 
 
 def fit_whole(
-    study: Study,
-    model: Model,
-    data: Data,
-    starts: Sequence[Mapping[str, float]],
-    searches: int = 0,
+    study: Study, model: Model, data: Data, start: Mapping[str, float], searches: int = 0
 ) -> Fitted:
     """A model along the measured motion, fitted to the training recording in one run.
 
@@ -43,27 +37,15 @@ def fit_whole(
         study: how finely is integrated.
         model: along the motion; what is free in it is fitted.
         data: recordings along the motion.
-        starts: values by name, the likeliest first; a later one is tried where an earlier one does
-            not lead to a fit that has converged.
-        searches: drawn starts beside the first.
+        start: values by name, the model's own where there are none.
+        searches: drawn starts beside that.
 
     Raises:
         ModelError: the simulation diverges from every start (NaN or infinite).
     """
     compiled = compile_system(compose(model))
-    found: list[tuple[Fit, Convergence]] = []
-    trouble: ModelError | None = None
-    for start in starts:
-        own = {name: value for name, value in start.items() if name in model.parameters}
-        try:
-            found.append(_carried_on(study, compiled, data.train, compiled.vector(own), searches))
-        except ModelError as error:
-            trouble = trouble or error
-        if found and found[-1][1].converged:
-            break
-    if not found:
-        raise trouble or ModelError(f"{model.name}: found no start for the fit")
-    fit, ended = min(found, key=lambda each: (not each[1].converged, float(each[0].rms.sum())))
+    own = {name: value for name, value in start.items() if name in model.parameters}
+    fit, ended = _carried_on(study, compiled, data.train, compiled.vector(own), searches)
     judged = evaluate(fit, data.held_out, len(data.held_out), study.file.substeps)
     return Fitted((), fit, judged, study.file.substeps, len(data.train), None, ended)
 
