@@ -2,29 +2,25 @@
 
 Every set of terms (`learned_terms.py`) is fitted for itself to one part of the recording, the
 smaller ones first, and each from the best that it contains or, where that leads nowhere, from the
-model without terms; the rest of the recording decides. Of
-those that leave as little as any the one with the fewest kinds of terms is taken, so that no order
-in which terms are tried matters.
+model without terms; the rest of the recording decides. Of those that leave as little as any the one
+with the fewest kinds of terms is taken, so that no order in which terms are tried matters.
 
-A set is taken only if its fit has converged, and if the model stays where it belongs: products may
-hold several equilibria, and one that nobody has seen is met by the next recording.
+A set is taken only if its fit has converged and the model stays where it belongs (`staying.py`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-import numpy as np
 from msgspec import structs
 
-from rigwatch.physics.engine.compile import compile_system
-from rigwatch.physics.engine.equations import Model, Output, compose
+from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Recording
-from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, port_sizes
+from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit.fitted_model import Fitted
 from rigwatch.workbench.fit.learned_terms import with_friction, with_products
+from rigwatch.workbench.fit.staying import Sizes, Staying
 from rigwatch.workbench.fit.whole_fit import fit_whole
 from rigwatch.workbench.study import Study
 
@@ -34,14 +30,7 @@ WORTH = 0.03
 """Share by which the error of windows that were not fitted must fall for more terms."""
 SEARCHES = 5
 """Drawn starts of the model without terms, beside its own values."""
-LARGER = 1.2
-"""Motion over the healthy one under which a model must still stay bounded."""
-FAR = 3.0
-"""States that a run begins in, over their own sizes."""
-TOGETHER, BOUNDED = 0.02, 3.0
-"""How far runs may be apart at last, and how large they may become, in sizes of the output."""
 
-Sizes = Mapping[str, Mapping[str, float]]
 Term = Callable[[Model, Sizes], Model]
 TERMS: Mapping[str, Term] = {
     "friction": with_friction,
@@ -128,7 +117,7 @@ def _best_first(fits: Mapping[tuple[str, ...], Fitted]) -> list[tuple[str, ...]]
 
 
 def _usable(
-    study: Study, model: Model, data: Data, begin: Sequence[Fitted], test: "Staying"
+    study: Study, model: Model, data: Data, begin: Sequence[Fitted], test: Staying
 ) -> Fitted | None:
     """A model's fit from the first of several fits that leads to a usable one; None if none does.
 
@@ -142,78 +131,6 @@ def _usable(
         if found.convergence is not None and found.convergence.converged and test.stays(found):
             return found
     return None
-
-
-class Staying:
-    """Whether models stay where they belong under a motion larger than any that was fitted.
-
-    Runs from different states must come together, as those of the model without terms do, which is
-    linear and stable; and they must stay as large as the output.
-
-    Args:
-        bare: the model without terms.
-        healthy: recording of a healthy rig.
-
-    Attributes:
-        sizes: of each port's variables, those of hidden states as the model without terms has them.
-    """
-
-    def __init__(self, bare: Fitted, healthy: Recording) -> None:
-        self._healthy = healthy
-        model = bare.compiled.system.model
-        self._states = _state_sizes(bare, healthy)
-        self.sizes = _of_states(model, port_sizes(model, healthy), self._states)
-        self._apart = self._run(bare)[0]
-
-    def stays(self, fitted: Fitted) -> bool:
-        """Whether one does."""
-        size = np.nanstd(self._healthy.outputs, axis=0)
-        apart, reached = self._run(fitted)
-        together = apart < TOGETHER * size + 2 * self._apart
-        return bool(np.all(together) and np.all(reached < BOUNDED * size))
-
-    def _run(self, fitted: Fitted) -> tuple[FloatArray, FloatArray]:
-        """How far runs are apart at last, and how large they become; each (outputs,)."""
-        healthy = self._healthy
-        far = FAR * np.array(list(self._states.values()))
-        run = fitted.compiled.simulate(
-            LARGER * healthy.inputs, healthy.dt, np.zeros(3, np.int64), len(healthy),
-            initial=np.stack([0 * far, far, -far]), parameters=fitted.train.parameters,
-            substeps=fitted.substeps,
-        )  # fmt: skip
-        later = run.outputs[:, len(healthy) // 2 :]
-        apart = np.sqrt(np.mean((later[1:] - later[:1]) ** 2, axis=(0, 1)))
-        return apart, np.sqrt(np.mean(later**2, axis=(0, 1)))
-
-
-def _state_sizes(fitted: Fitted, recording: Recording) -> dict[str, float]:
-    """Root mean squares of the hidden states that a model simulates, by name."""
-    model, values = fitted.compiled.system.model, fitted.train.values()
-    parameters = {
-        name: structs.replace(p, value=values[name], fixed=True, kept=False)
-        for name, p in model.parameters.items()
-    }
-    ports = {name: port for name, port in model.ports.items() if port.kind != "sensor"}
-    outputs = {name: Output(unit=s.unit, expression=name) for name, s in model.states.items()}
-    shown = structs.replace(model, parameters=parameters, ports=ports, outputs=outputs)
-    compiled = compile_system(compose(shown))
-    run = compiled.simulate(
-        recording.inputs, recording.dt, np.zeros(1, np.int64), len(recording),
-        initial=np.zeros((1, len(model.states))), parameters=compiled.parameters,
-        substeps=fitted.substeps,
-    )  # fmt: skip
-    sizes = np.sqrt(np.mean(run.outputs[0, len(recording) // 4 :] ** 2, axis=0))
-    return dict(zip(model.states, sizes.tolist(), strict=True))
-
-
-def _of_states(model: Model, sizes: Sizes, states: Mapping[str, float]) -> Sizes:
-    """Sizes of the ports' variables, those of hidden states replaced."""
-    found = {port: dict(own) for port, own in sizes.items()}
-    for port, own in found.items():
-        for name, variable in model.ports[port].variables.items():
-            if variable.expression in states:
-                own[name] = states[variable.expression] or 1.0
-    return found
 
 
 def _split(healthy: Recording, horizon: int) -> Data:
