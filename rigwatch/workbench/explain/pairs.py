@@ -140,10 +140,11 @@ def _fitted(bench: Bench, pairs: Sequence[Pair], progress: Progress) -> list[tup
 def _enough(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pair, Fitted]]:
     """Pairs whose residual is small enough for them to be named.
 
-    The residual must be at the noise floor, since two wrong effects together explain much. Along
-    the measured motion more is tolerated, since a fault changes the model's own residual.
+    The residual must be at the noise floor, since two wrong effects together explain much. A rough
+    model, and any model along the measured motion, is allowed more, since a fault changes the
+    model's own residual.
     """
-    floor, tolerant = bench.floor, bench.data.along_motion
+    floor, tolerant = bench.floor, bench.data.along_motion or bench.study.model.rough
     return [
         (pair, fitted)
         for pair, fitted in fits

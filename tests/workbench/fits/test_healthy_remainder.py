@@ -9,17 +9,14 @@ from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.measured_motion import along_measured_motion
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import compose
-from rigwatch.simulated import write_session
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.fit import healthy_remainder
+from rigwatch.workbench.fit import learning
 from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_products
-from rigwatch.workbench.study.study import Study, create
-from sim_plant.excitation import Multisine
-from sim_plant.scenario import Scenario
+from tests.workbench.black_box import TEMPLATE, study
+from tests.workbench.black_box import record as multisine
 
-TEMPLATE = Path(__file__).parents[3] / "configs" / "studies" / "rig_black_box.toml"
 SIZES = {
     "load": {"x": 0.01, "v": 0.3},
     "remainder": {"push": 3.0, "flow": 0.3, "speed": 0.3, "place": 0.01},
@@ -27,18 +24,8 @@ SIZES = {
 
 
 def record(folder: Path, name: str, noise: int, phases: int, **effects: float) -> None:
-    shape = Multisine(amplitude=2.5, start=0.5, stop=12.0, period=1000 + phases, seed=phases)
-    scenario = Scenario(
-        name=name, duration_s=24.0, lead_in_s=8.0, excitation=shape, effects=effects
-    )
-    write_session(folder / f"{name}.mcap", scenario, seed=noise)
-
-
-def study(folder: Path, cut: str = "") -> Study:
-    text = TEMPLATE.read_text(encoding="utf-8")
-    template = folder / "template.toml"
-    template.write_text(text.split(cut)[0] if cut else text, encoding="utf-8")
-    return create(folder / "study", template)
+    """Excitations of which neither the phases nor the periods are the same."""
+    multisine(folder, name, noise, phases, period=1000 + phases, **effects)
 
 
 def test_what_is_learned_holds_under_an_excitation_that_was_not_learned(
@@ -48,7 +35,7 @@ def test_what_is_learned_holds_under_an_excitation_that_was_not_learned(
     record(tmp_path, "rig", 2, phases=2)
     opened = study(tmp_path)
     taught = open_bench(opened)
-    monkeypatch.setattr(healthy_remainder, "STEPS", {})
+    monkeypatch.setattr(learning, "TERMS", {})
     bare = open_bench(opened)
     assert taught.floor.rms[0] < bare.floor.rms[0]
     assert taught.base.held_out_error < bare.base.held_out_error
@@ -73,7 +60,7 @@ def test_without_a_healthy_recording_it_says_what_is_needed(tmp_path: Path) -> N
     record(tmp_path, "healthy", 1, phases=1)
     record(tmp_path, "rig", 2, phases=2)
     with pytest.raises(ModelError, match="found no healthy recording"):
-        open_bench(study(tmp_path, "[[healthy]]"))
+        open_bench(study(tmp_path, TEMPLATE.read_text(encoding="utf-8").split("[[healthy]]")[0]))
 
 
 def test_products_leave_hidden_states_bounded_whatever_their_coefficients() -> None:

@@ -4,32 +4,18 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.simulated import write_session
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.study.study import Accepted, Study, create
-from sim_plant.excitation import Multisine
-from sim_plant.scenario import Scenario
-
-TEMPLATE = Path(__file__).parents[3] / "configs" / "studies" / "rig_black_box.toml"
-
-
-def record(folder: Path, name: str, noise: int, phases: int = 1, **effects: float) -> None:
-    shape = Multisine(amplitude=2.5, start=0.5, stop=12.0, period=1024, seed=phases)
-    scenario = Scenario(
-        name=name, duration_s=24.0, lead_in_s=8.0, excitation=shape, effects=effects
-    )
-    write_session(folder / f"{name}.mcap", scenario, seed=noise)
-
+from rigwatch.workbench.study.study import Accepted, Study
+from tests.workbench.black_box import TEMPLATE, record
+from tests.workbench.black_box import study as made
 
 FREE = 'prediction = "free"\n' + TEMPLATE.read_text(encoding="utf-8")
 
 
 def study(folder: Path, text: str = FREE) -> Study:
-    template = folder / "template.toml"
-    template.write_text(text, encoding="utf-8")
-    return create(folder / "study", template)
+    return made(folder, text)
 
 
 def test_a_healthy_rig_has_nothing_missing(tmp_path):
@@ -78,7 +64,6 @@ def test_a_period_must_hold_whole_horizons(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.xfail(reason="leakage is named alone, where lag and viscous friction hide")
 def test_two_faults_at_once_are_named_whichever_is_found_first(tmp_path):
     record(tmp_path, "healthy", 1)
     record(tmp_path, "rig", 2, viscous=0.15, acceleration_lag=0.002)

@@ -46,16 +46,26 @@ class Unknowns:
         return np.clip(z, self.low + INSIDE, self.high - INSIDE)
 
 
-def unknowns(centre: FloatArray, low: FloatArray, high: FloatArray, positive: int) -> Unknowns:
+def unknowns(
+    centre: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    positive: int,
+    sizes: FloatArray | None = None,
+) -> Unknowns:
     """Unknowns about their centre.
 
     Args:
         centre, low, high: shape (unknowns,).
         positive: number of leading unknowns of which nonnegative ones are logarithmic.
+        sizes: units of the other unknowns, shape (unknowns,); the default of `_sizes` if NaN, or
+            None for all.
     """
     centre = np.clip(centre, low, high)
     logarithmic = (low >= 0) & (centre > 0) & (np.arange(len(centre)) < positive)
     size = _sizes(centre, low, high)
+    if sizes is not None:
+        size = np.where(np.isfinite(sizes), sizes, size)
     with np.errstate(divide="ignore", invalid="ignore"):
         least = np.log(np.maximum(low, LEAST * centre) / centre)
         most = np.log(high / centre)

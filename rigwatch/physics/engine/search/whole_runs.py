@@ -32,7 +32,7 @@ PRIOR = 0.3
 SPREAD = 0.6
 """Standard deviation of the starts around the centre, in natural logarithms."""
 STARTS = 5
-"""Number of further searches if the one from the given values ends above `GOOD`."""
+"""Default number of further searches if the one from the given values ends above `GOOD`."""
 GOOD = 1.3
 """Ratio of error to noise below which no other start is tried."""
 NEAR = 3.0
@@ -77,9 +77,11 @@ class WholeRuns:
             None.
         pull: prior cost of a free parameter that is off by a factor of e, or by its size, in
             standard deviations of noise, shape (m,); `PRIOR` if None.
+        sizes: units of the free parameters, shape (m,), see `unknowns`.
         initial: initial states, shape (recordings, states); from the channels if None.
         robust: transition of the robust loss to linear [standard deviations of noise].
         substeps: Runge-Kutta steps between samples.
+        starts: searches beside the one from the given values, where that ends above `GOOD`.
     """
 
     def __init__(
@@ -90,15 +92,18 @@ class WholeRuns:
         *,
         start: FloatArray | None = None,
         pull: FloatArray | None = None,
+        sizes: FloatArray | None = None,
         initial: FloatArray | None = None,
         robust: float = ROBUST,
         substeps: int = 2,
+        starts: int = STARTS,
     ) -> None:
         self._compiled, self._recordings, self._scale = compiled, recordings, scale
-        self._robust, self._substeps = robust, substeps
+        self._robust, self._substeps, self._starts = robust, substeps, starts
         self._begin = compiled.parameters if start is None else start
         self._problem = self._posed(initial)
         self._m, first = len(self._problem.free), self._problem.initial
+        self._sizes = np.full(self._m, np.nan) if sizes is None else sizes
         self._unknowns = self._about(first)
         held = np.full(self._m, PRIOR) if pull is None else pull
         self._pull = np.concatenate([held, np.full(first.size, PRIOR)])
@@ -120,12 +125,14 @@ class WholeRuns:
         ends = [*(system.parameters[name] for name in system.free), *states]
         centre = np.concatenate([self._begin[self._problem.free], first.ravel()])
         low, high = (np.array([getattr(each, end) for each in ends]) for end in ("low", "high"))
-        return unknowns(centre, low, high, positive=self._m)
+        told = np.concatenate([self._sizes, np.full(first.size, np.nan)])
+        return unknowns(centre, low, high, positive=self._m, sizes=told)
 
     def attempts(self) -> Iterator[Callable[[], Attempt]]:
         """The given values; then the best of several around them."""
         yield lambda: self._attempt("the values to start from", np.zeros(self._unknowns.size.size))
-        yield lambda: self._attempt("the best of several starts", self._drawn())
+        if self._starts:
+            yield lambda: self._attempt("the best of several starts", self._drawn())
 
     def enough(self, found: Sequence[Attempt]) -> bool:
         """Whether the error is near the noise, or there is no free parameter."""
@@ -149,9 +156,10 @@ class WholeRuns:
         parts = [beginning(each, PART) for each in self._recordings]
         part = WholeRuns(
             self._compiled, parts, self._scale, start=self._begin, pull=self._pull[: self._m],
-            initial=self._problem.initial, robust=self._robust, substeps=self._substeps,
+            sizes=self._sizes, initial=self._problem.initial, robust=self._robust,
+            substeps=self._substeps,
         )  # fmt: skip
-        spread = SPREAD * np.random.default_rng(0).standard_normal((STARTS, self._m))
+        spread = SPREAD * np.random.default_rng(0).standard_normal((self._starts, self._m))
         looks = [part._run(part._begun(z), LOOK) for z in spread]
         return self._begun(min(looks, key=lambda look: look.cost).z[: self._m])
 
