@@ -84,14 +84,13 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "stale",
         "critical",
         "no samples arrive although the line is open",
-        "Look whether the device runs and whether daq does (rigwatch "
-        "doctor). Do not trust the last values.",
+        "Check that device and daq are running (rigwatch doctor). Do not trust the last values.",
         _AT_ONCE,
     ),
     AlarmKind(
         "duplicate_source",
         "critical",
-        "a second publisher speaks for this device; the first one is believed",
+        "a second publisher sends samples of this device; those of the first are used",
         "Find and stop the second daq process, or give it a rig id of its own.",
         _AT_ONCE,
     ),
@@ -222,8 +221,8 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "sensor_jumped",
         "error",
-        "the {channel} signal has jumped as no motion of the rig can",
-        "Check the sensor's mounting, wiring and zero, and whether somebody has touched it. Dry "
+        "the {channel} signal has jumped faster than any motion of the rig",
+        "Check the sensor's mounting, wiring and zero, and whether it has been touched. Dry "
         "friction is not named from the samples after a jump.",
         _AT_ONCE,
     ),

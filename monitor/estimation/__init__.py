@@ -1,4 +1,4 @@
-"""Windowed sums behind the estimates (5.33)-(5.39), exact whatever the length of the run."""
+"""Windowed sums behind the estimates (5.33)-(5.39), exact for any length of the run."""
 
 from monitor.estimation.energies import (
     Energies,

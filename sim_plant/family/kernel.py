@@ -102,7 +102,7 @@ def flow(  # noqa: PLR0917
     """Flow times R T0 from pressure `a` to `b` [Pa m^3/s] through a conductance `c` [m^3/s].
 
     `laminar` is the pressure drop, as a share of the upstream pressure, below which flow is
-    laminar and so takes away the infinite slope at a = b.
+    laminar, which avoids the infinite slope at a = b.
     """
     up, down = max(a, b), max(min(a, b), 1.0)
     r = down / up

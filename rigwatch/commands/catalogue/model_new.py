@@ -1,4 +1,4 @@
-"""`rigwatch model new`: a file of one's own, begun from a model that ships."""
+"""`rigwatch model new`: a user's own file, copied from a shipped model."""
 
 import argparse
 from pathlib import Path

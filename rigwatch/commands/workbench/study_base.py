@@ -1,4 +1,4 @@
-"""`rigwatch study base`: which variants of the model the healthy recordings speak for."""
+"""`rigwatch study base`: which variants of the model the healthy recordings support."""
 
 import argparse
 from collections.abc import Sequence

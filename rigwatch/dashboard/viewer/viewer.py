@@ -144,7 +144,7 @@ class Viewer:
 
 
 class ForeignViewer:
-    """A viewer started by somebody else on this machine.
+    """A viewer that another process on this machine has started.
 
     Args:
         port: its data port.

@@ -61,7 +61,7 @@ def _doubts(errors: FloatArray, scale: FloatArray) -> tuple[str, ...]:
     """Why the solution is a wrong minimum (its residual is not noise), empty if it is not.
 
     Errors of consecutive samples are independent if only noise is left. If the model's trajectory
-    differs from the record's they are correlated, whatever their size.
+    differs from the record's they are correlated, regardless of their size.
     """
     share = float(np.sqrt(np.nanmean((errors / scale) ** 2)))
     along = np.nan_to_num(errors / scale)

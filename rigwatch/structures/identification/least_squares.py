@@ -13,7 +13,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
 FOUR_DIGITS = 1e-4
-"""Smallest error of a signal that is believed, as a share of its rms, whatever the fit says."""
+"""Smallest plausible error of a signal, as a share of its rms, regardless of the fit."""
 BLIND = 1e-9
 """Share of the largest singular value below which a combination of unknowns is undetermined."""
 

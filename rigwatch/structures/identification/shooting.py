@@ -1,6 +1,6 @@
 """Multiple shooting with exact sensitivities: short windows first, the whole record last.
 
-Over a short window a trajectory cannot diverge from the record, whatever the guess: there the fit
+Over a short window a trajectory cannot diverge from the record for any guess: there the fit
 is almost linear in the unknowns. Each window's initial states are free and projected out. The
 estimate is the guess for windows four times as long, and so on. The last window is the whole record
 (`whole_record.py`).

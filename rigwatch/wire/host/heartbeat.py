@@ -7,7 +7,7 @@ process uses one protocol for either parent, and none if it was started by hand.
     WATCHDOG=1              samples advanced since the last notification: only this feeds a watchdog
     X_RIGWATCH_COUNT=n      its loop runs; n samples passed since it started
     STATUS=text             one line for people
-    STOPPING=1              it has begun to stop
+    STOPPING=1              it is stopping
 
 A loop that runs without samples is alive but does not feed the watchdog: the supervisor can tell a
 process that hangs from one that waits for its source.

@@ -1,6 +1,6 @@
 """Session files: MCAP recordings that survive kill -9 and report what is missing.
 
-`SessionWriter` writes, `SessionReader` reads and salvages, `edit` trims and recovers, `summary`
+`SessionWriter` writes, `open_session` opens and salvages, `edit` trims and recovers, `summary`
 describes.
 """
 

@@ -65,7 +65,7 @@ class Losses:
             self._reported.setdefault(message.boot, []).append((message.first, message.last))
 
     def missing(self, boots: Iterable[int] | None = None) -> list[Span]:
-        """Where samples of these boots are missing; None for all that were heard of."""
+        """Where samples of these boots are missing; None for all known boots."""
         asked = {**self._present, **self._reported} if boots is None else boots
         return [span for boot in asked for span in self._missing_of(boot)]
 

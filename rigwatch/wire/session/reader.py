@@ -5,7 +5,7 @@
     for span in session.lost: …
 
 All intact data are delivered, every checksum is verified, and unreadable parts are listed in
-`lost`. Memory use is one chunk and one merged block, whatever the length of the recording.
+`lost`. Memory use is one chunk and one merged block, for any length of the recording.
 """
 
 from collections.abc import Iterable, Iterator

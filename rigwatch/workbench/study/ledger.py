@@ -113,8 +113,8 @@ def commit(before: Study, after: Study, step: str, /, **content: Any) -> dict[st
     with locked(before.folder) as ledger:
         if read_text(before.folder / FILE) != before.text:
             raise ModelError(
-                f"{before.folder}: the study has been changed by somebody else since this step"
-                " began, which was tried on another model; nothing was written"
+                f"{before.folder}: the study has been changed since this step was tried;"
+                " nothing was written"
             )
         write_step(before.folder, ledger, msgspec.json.encode(line) + b"\n", text)
     return line

@@ -183,7 +183,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Study:
-    """An open study; parameter values are in SI, in whatever units its file gives them.
+    """An open study; parameter values are in SI, regardless of the units in its file.
 
     Attributes:
         folder: the study's folder.

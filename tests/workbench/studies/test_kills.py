@@ -119,7 +119,7 @@ def test_a_step_that_was_tried_on_another_study_is_refused(study: Study) -> None
     mine, other = open_study(study.folder), open_study(study.folder)
     commit(other, append_effect(other, EFFECT), "add")
     before = (study.folder / FILE).read_bytes(), (study.folder / LEDGER).read_bytes()
-    with pytest.raises(ModelError, match="changed by somebody else"):
+    with pytest.raises(ModelError, match="changed since this step"):
         commit(mine, append_effect(mine, EFFECT), "add")
     assert ((study.folder / FILE).read_bytes(), (study.folder / LEDGER).read_bytes()) == before
 
