@@ -132,7 +132,7 @@ def test_the_margin_is_to_the_nearest_that_it_is_not_confused_with() -> None:
 def test_what_else_lowers_the_error_is_mentioned() -> None:
     found = judge(base(), [best(), row("b@x", behind=5.0), row("c@x", 1.02, 5.0)], PERIODS)
     assert found.word == "missing_effect"
-    assert found.text.endswith("; accepted as well: b@x (1), c@x (1.02)")
+    assert found.text.endswith("; also accepted: b@x (1), c@x (1.02)")
 
 
 def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
@@ -140,7 +140,7 @@ def test_an_effect_that_leaves_most_is_not_the_answer() -> None:
     assert found.word == "unknown_effect"
     assert found.text == (
         "the best known effect, coulomb@load, leaves much of the error above the noise floor"
-        "; 38% of the error's energy stays, 2 times the noise floor"
+        "; 38% of the error's energy remains, 2 times the noise floor"
     )
     assert judge(base(3.0), [best(error=2.0)], QUIET).word == "missing_effect"
     assert judge(base(3.0), [best(error=2.7)], QUIET).word == "unknown_effect"
