@@ -229,6 +229,17 @@ def test_a_ring_that_replies_with_later_samples_only_has_lost_the_hole() -> None
     bench.ledger.assert_complete(7, 0, 5)
 
 
+def test_a_sample_that_comes_while_the_ring_is_asked_counts_though_the_ring_has_lost_it() -> None:
+    bench = Bench()
+    for seq in (0, 10, 5):
+        bench.send(block(seq))
+    ask = bench.asks.popleft()
+    bench.take(bench.order.on_reply(ask, RingReply(7, 9, ())))
+    reason = "the ring no longer has them"
+    assert bench.losses == [Loss(7, 1, 4, reason), Loss(7, 6, 9, reason)]
+    bench.ledger.assert_complete(7, 0, 10)
+
+
 def test_the_reply_to_another_question_is_ignored() -> None:
     bench = Bench()
     bench.send(block(0))
