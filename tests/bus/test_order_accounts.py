@@ -145,6 +145,7 @@ def test_a_listener_follows_who_is_there_from_its_first_message_on() -> None:
     assert order.on_block(said(8, 1)) == [Ask(8, 0, 0)]
     found = order.on_reply(Ask(8, 0, 0), RingReply(8, 0, (said(8, 0),)))
     assert found == [said(8, 0), said(8, 1)]
+    assert order.on_block(said(8, 0)) == [], "it was heard already"
 
 
 def test_one_who_has_heard_nobody_follows_the_first_that_is_there() -> None:
@@ -339,6 +340,31 @@ def test_capacity_counts_a_block_that_waits_twice_once() -> None:
     assert bench.order.position == (7, 102)
 
 
+def test_too_many_waiting_samples_give_up_one_hole_and_keep_asking_for_the_next() -> None:
+    bench = Bench(SampleOrder(capacity=100))
+    bench.send(block(0))
+    bench.send(block(2))
+    bench.send(block(4, 100))
+    assert bench.losses == [Loss(7, 1, 1, "too many samples waited behind them")]
+    assert bench.order.position == (7, 2)
+    assert bench.asks[-1] == Ask(7, 3, 3)
+    bench.keep(block(3))
+    bench.reply_all()
+    assert bench.order.position == (7, 103)
+    assert len(bench.losses) == 1
+
+
+def test_history_before_a_resumed_position_is_taken_as_far_as_the_ring_has_it() -> None:
+    bench = Bench(SampleOrder(resume_after=(7, 41), history=10), capacity=16)
+    tokens(bench, 7)
+    bench.keep(block(0, 52))
+    bench.send(block(52))
+    assert list(bench.asks) == [Ask(7, 32, 51)]
+    bench.reply_all()
+    bench.ledger.assert_complete(7, 37, 52)
+    assert bench.losses == []
+
+
 @pytest.mark.parametrize("restart", [False, True])
 def test_a_hole_that_the_ring_does_not_know_is_lost_with_its_reason(restart: bool) -> None:
     bench = restarted(end=4) if restart else Bench()
@@ -434,4 +460,7 @@ def test_a_fresh_sample_ends_the_suspicion() -> None:
     for seq in range(4, 4 + 2 * SUSPECT):
         bench.take(bench.order.on_block(block(0, 3)))
         bench.send(block(seq))
+    hear_old(bench, SUSPECT - 1)
     assert not bench.asks
+    hear_old(bench, 1)
+    assert len(bench.asks) == 1
