@@ -233,6 +233,38 @@ def test_a_departure_that_follows_its_name_is_journalled_and_not_announced():
     assert said[1].seq == 2
 
 
+def test_a_departure_that_was_named_after_a_restart_of_the_device_left_at_the_new_boot():
+    alarms = AlarmManager()
+    alarms.report("departure", at(10), active=True)
+    departure, _ = alarms.report("dry_friction", replace(at(3), boot=8), active=True)
+    assert (departure.state, departure.boot, departure.seq) == ("normal", 8, 3)
+
+
+def test_a_name_that_goes_by_itself_leaves_the_departure_at_that_instant():
+    alarms = AlarmManager({"dry_friction": AlarmSection(latch=False)})
+    named(alarms)
+    alarms.command(order("dry_friction", "acknowledge", at=30))
+    said = alarms.report("dry_friction", at(40), active=False)
+    assert news(said) == [
+        ("dry_friction", "normal", time_of(40), ""),
+        ("departure", "unacknowledged", time_of(40), ""),
+    ]
+    (seen,) = alarms.command(order("departure", "acknowledge", at=50))
+    assert seen.state == "acknowledged"
+
+
+def test_a_departure_is_judged_anew_after_one_that_was_named():
+    alarms = AlarmManager()
+    named(alarms)
+    for name in ("departure", "dry_friction"):
+        alarms.report(name, at(30), active=False)
+    for action in ("acknowledge", "reset"):
+        alarms.command(order("dry_friction", action, at=31))
+    alarms.report("departure", at(40), active=True)
+    (seen,) = alarms.command(order("departure", "acknowledge", at=41))
+    assert (seen.name, seen.state) == ("departure", "acknowledged")
+
+
 def test_a_disabled_name_hides_no_departure():
     alarms = AlarmManager({"dry_friction": AlarmSection(enabled=False)})
     alarms.report("dry_friction", at(1), active=True)
@@ -301,7 +333,8 @@ def test_what_comes_off_the_shelf_in_peace_is_journalled_with_who_did_it():
     (record,) = alarms.take_changes()
     assert (record.alarm.user, record.text, record.alarm.t_ns) == ("ann", "mended", time_of(9))
     assert record.shelved_until_ns == 0
-    assert steps(alarms.report("gap", at(10), active=True)) == [("gap", "unacknowledged", 10)]
+    (raised,) = alarms.report("gap", at(10), active=True)
+    assert (raised.name, raised.state, raised.seq) == ("gap", "unacknowledged", 10)
 
 
 def test_the_shelf_is_over_before_a_command_of_that_time_is_obeyed():
