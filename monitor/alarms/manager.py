@@ -146,7 +146,7 @@ class AlarmManager:
         alarm.superseded = record.active and said.state == "normal" and not record.shelved_until_ns
         alarm.occasion = Occasion(
             said.device, said.boot, said.seq, said.t_ns, said.value, said.low, said.high,
-            said.onset_seq, record.text,
+            said.onset_seq, alarm.added_to(said.cause),
         )  # fmt: skip
         self._debouncer(said.name).level = record.active
         if said.first_out and said.state != "normal":

@@ -89,6 +89,16 @@ class AlarmInstance:
         return self.kind.severity == "info"
 
     @property
+    def cause(self) -> str:
+        """What is probably wrong, with the channel's name filled in."""
+        return self.kind.cause.format(channel=split(self.name)[1])
+
+    def added_to(self, cause: str) -> str:
+        """What a published `cause` says beyond the alarm's own; "" for nothing."""
+        own = f"{self.cause}: "
+        return cause.removeprefix(own) if cause.startswith(own) else ""
+
+    @property
     def may_flap(self) -> bool:
         """Whether chattering is counted; names of one fault replace each other instead."""
         return not self.kind.refines and self.kind.name not in REFINED
@@ -140,14 +150,13 @@ class AlarmInstance:
     def message(self, user: str = "", t_ns: int | None = None) -> Alarm:
         """The alarm as published; changed at `t_ns` [ns] by `user`, otherwise by its occasion."""
         at = self.occasion
-        cause = self.kind.cause.format(channel=split(self.name)[1])
         counted = f"came {self.flaps.count} times" if self.flaps.holding else ""
         text = "; ".join(filter(None, (at.text, counted)))
         return Alarm(
             name=self.name,
             state=self.state,
             severity=self.kind.severity,
-            cause=f"{cause}: {text}" if text else cause,
+            cause=f"{self.cause}: {text}" if text else self.cause,
             guidance=self.kind.guidance,
             device=at.device,
             boot=at.boot,

@@ -105,7 +105,9 @@ def test_a_source_that_comes_back_before_its_end_was_told_continues_where_it_was
     gone(bench, 8)
     bench.send(block(8))
     bench.reply_all()
-    bench.ledger.assert_complete(7, 0, 8)
+    bench.send(block(9))
+    bench.reply_all()
+    bench.ledger.assert_complete(7, 0, 9)
     bench.ledger.assert_complete(8, 0, 0)
     assert bench.order.counters.lost == 0
     assert bench.order.counters.duplicates == 0
@@ -143,14 +145,15 @@ def test_a_listener_follows_who_is_there_from_its_first_message_on() -> None:
     assert order.on_block(said(8, 1)) == [Ask(8, 0, 0)]
     found = order.on_reply(Ask(8, 0, 0), RingReply(8, 0, (said(8, 0),)))
     assert found == [said(8, 0), said(8, 1)]
+    assert order.on_block(said(8, 0)) == [], "it was heard already"
 
 
 def test_one_who_has_heard_nobody_follows_the_first_that_is_there() -> None:
     order: SampleOrder[Numbered] = SampleOrder()
-    order.on_token(8, 2, True)
-    order.follow(8)
-    assert order.position == (8, -1)
-    assert order.on_block(said(8, 0)) == [said(8, 0)]
+    order.on_token(1, 2, True)
+    order.follow(1)
+    assert order.position == (1, -1)
+    assert order.on_block(said(1, 0)) == [said(1, 0)]
 
 
 # ---- what is counted ------------------------------------------------------------------------
@@ -225,6 +228,17 @@ def test_a_ring_that_replies_with_later_samples_only_has_lost_the_hole() -> None
     bench.take(bench.order.on_reply(ask, RingReply(7, 9, (block(8, 2),))))
     assert bench.losses == [Loss(7, 1, 4, "the ring no longer has them")]
     bench.ledger.assert_complete(7, 0, 5)
+
+
+def test_a_sample_that_comes_while_the_ring_is_asked_counts_though_the_ring_has_lost_it() -> None:
+    bench = Bench()
+    for seq in (0, 10, 5):
+        bench.send(block(seq))
+    ask = bench.asks.popleft()
+    bench.take(bench.order.on_reply(ask, RingReply(7, 9, ())))
+    reason = "the ring no longer has them"
+    assert bench.losses == [Loss(7, 1, 4, reason), Loss(7, 6, 9, reason)]
+    bench.ledger.assert_complete(7, 0, 10)
 
 
 def test_the_reply_to_another_question_is_ignored() -> None:
@@ -326,6 +340,31 @@ def test_capacity_counts_a_block_that_waits_twice_once() -> None:
     assert bench.order.position == (7, 102)
 
 
+def test_too_many_waiting_samples_give_up_one_hole_and_keep_asking_for_the_next() -> None:
+    bench = Bench(SampleOrder(capacity=100))
+    bench.send(block(0))
+    bench.send(block(2))
+    bench.send(block(4, 100))
+    assert bench.losses == [Loss(7, 1, 1, "too many samples waited behind them")]
+    assert bench.order.position == (7, 2)
+    assert bench.asks[-1] == Ask(7, 3, 3)
+    bench.keep(block(3))
+    bench.reply_all()
+    assert bench.order.position == (7, 103)
+    assert len(bench.losses) == 1
+
+
+def test_history_before_a_resumed_position_is_taken_as_far_as_the_ring_has_it() -> None:
+    bench = Bench(SampleOrder(resume_after=(7, 41), history=10), capacity=16)
+    tokens(bench, 7)
+    bench.keep(block(0, 52))
+    bench.send(block(52))
+    assert list(bench.asks) == [Ask(7, 32, 51)]
+    bench.reply_all()
+    bench.ledger.assert_complete(7, 37, 52)
+    assert bench.losses == []
+
+
 @pytest.mark.parametrize("restart", [False, True])
 def test_a_hole_that_the_ring_does_not_know_is_lost_with_its_reason(restart: bool) -> None:
     bench = restarted(end=4) if restart else Bench()
@@ -381,7 +420,7 @@ def test_forged_samples_are_dropped_counted_and_told_each_time() -> None:
 
 
 def test_a_position_beyond_the_newest_sample_is_set_back_to_it() -> None:
-    bench = Bench(SampleOrder(resume_after=(7, 20)))
+    bench = Bench(SampleOrder(resume_after=(7, 20), capacity=10))
     tokens(bench, 7)
     bench.keep(block(0, 20))
     bench.take(bench.order.on_silence())
@@ -390,7 +429,11 @@ def test_a_position_beyond_the_newest_sample_is_set_back_to_it() -> None:
     assert bench.remarks == [Remark("error", POSITION_WRONG, told)]
     assert bench.losses == [Loss(7, 20, 19, "the position to go on from was wrong")]
     bench.send(block(20))
-    bench.ledger.assert_complete(7, 20, 20)
+    bench.send(block(22, 10))
+    assert len(bench.losses) == 1, "ten may wait"
+    bench.keep(block(21))
+    bench.reply_all()
+    bench.ledger.assert_complete(7, 20, 31)
 
 
 def hear_old(bench: Bench, count: int) -> None:
@@ -417,4 +460,7 @@ def test_a_fresh_sample_ends_the_suspicion() -> None:
     for seq in range(4, 4 + 2 * SUSPECT):
         bench.take(bench.order.on_block(block(0, 3)))
         bench.send(block(seq))
+    hear_old(bench, SUSPECT - 1)
     assert not bench.asks
+    hear_old(bench, 1)
+    assert len(bench.asks) == 1
