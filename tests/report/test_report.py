@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -11,6 +12,8 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.page.scale import Scale, limits
 from rigwatch.page.svg import Plot
+from rigwatch.workbench.report.html_report import gather
+from rigwatch.workbench.report.sections import headline
 from rigwatch.workbench.study.study import Study
 from tests.report.style import COLOURS, WORDS
 
@@ -105,6 +108,22 @@ def test_it_tells_the_story(page: tuple[str, Page]) -> None:
     assert "stribeck@load refused" in parsed.text["errors"]
     assert "stribeck@load" in parsed.text["ranking"]
     assert "constant_force@load" in parsed.text["ledger"]
+
+
+@pytest.mark.parametrize(
+    ("rivals", "said"),
+    [(["stribeck@load"], "cannot tell lag at drive from stribeck"),
+     ([], "cannot tell whether lag at drive is missing")],
+)  # fmt: skip
+def test_an_undetermined_verdict_is_a_whole_sentence(
+    study: Study, rivals: list[str], said: str
+) -> None:
+    material = gather(study)
+    best = replace(material.explanation.ranking[0], effect="lag", port="drive")
+    found = replace(
+        material.explanation, verdict="undetermined", rivals=rivals, also=[], ranking=[best]
+    )
+    assert headline(replace(material, explanation=found)).endswith(said)
 
 
 def test_an_output_that_cannot_be_written(
