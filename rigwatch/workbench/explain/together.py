@@ -4,6 +4,8 @@ One effect that does not explain all takes a part of what others do, and the mor
 parameters it has. So it is judged beside the others: of the sets of effects that explain the error
 best, one is taken, and each of its effects is ranked against all others with the rest of the set in
 the model. It is missing where it wins there, and where no other set that does as well goes without.
+Where no set leaves nothing but noise, something else is missing too, and the verdict is that on one
+effect.
 """
 
 from collections.abc import Sequence
@@ -67,7 +69,7 @@ def several_effects(
         progress: told what begins.
     """
     every = combinations(bench, rows, progress, _most_free(bench, verdict.best))
-    if not every:
+    if not any(len(each.rows) > 1 and leaves_noise(bench, each.fitted) for each in every):
         return verdict
     best = _best(every)
     parts: list[_Part] = []
@@ -191,9 +193,9 @@ def _said(
     """The verdict on the set: one of its effects in front, the next of them as well."""
     alone = {row.label: row for row in rows}
     known = [part for part in parts if part.verdict.best and part.row.label in alone]
-    # What also counts alone goes first, as it can be added first.
+    # What is accepted alone goes first, as it can be added first; of these what leaves least alone.
     order = sorted(known, key=lambda part: (
-        not part.certain, not alone[part.row.label].accepted, -(part.row.gain or 0.0)
+        not part.certain, not alone[part.row.label].accepted, alone[part.row.label].held_out_error
     ))  # fmt: skip
     if not order or order[0].verdict.word == "unknown_effect":
         return _unsupported(verdict, best)
@@ -206,10 +208,15 @@ def _said(
     return replace(
         found,
         best=row,
-        text=f"beside {', '.join(sorted(best.labels - {row.label}))}: {found.text}",
+        text=f"beside {', '.join(sorted(best.labels - {row.label}))}: {found.text}{_how(row)}",
         second=second,
         evidence=Evidence(left, found.evidence.margin),
     )
+
+
+def _how(row: Ranked) -> str:
+    """How to add an effect that is not accepted alone; empty where it is."""
+    return "" if row.accepted else "; alone it is refused: add it with --anyway, then the others"
 
 
 def _unsupported(verdict: Verdict, best: Combination) -> Verdict:

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rigwatch.workbench.explain.combinations import combinations, leaves_noise
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.together import several_effects
 from rigwatch.workbench.explain.verdict import judge
@@ -44,12 +43,6 @@ def test_one_of_three_hidden_effects_is_named_with_another(three, rows):
     assert found.evidence.left < 0.02
 
 
-def test_the_search_ends_with_the_set_that_leaves_noise(three, rows):
-    every = combinations(three, rows, unheard)
-    reached = [each.labels for each in every if leaves_noise(three, each.fitted)]
-    assert reached == [LABELS]
-
-
 def test_without_the_truth_among_them_no_effect_is_named_with_confidence(three, rows):
     known = {"quadratic_drag", "dead_band", "lag", "delay", "digital_smoothing", "moving_average"}
     rest = {n: e for n, e in three.study.effects.items() if n not in known}
@@ -66,9 +59,8 @@ def test_two_simple_effects_are_not_taken_for_one_with_a_shape():
     assert "stribeck@load" not in verdict.members
 
 
-def test_one_effect_alone_stays_as_it_was_judged():
-    bench = hiding("stribeck")
-    rows = rank(bench.study, bench.data, bench.base, bench.floor)
-    alone = judge(bench.base, rows, bench.floor)
-    assert several_effects(bench, rows, alone, unheard) is alone
-    assert "stribeck@load" in alone.members
+def test_an_effect_with_a_shape_of_its_own_is_not_taken_for_two_simple_ones():
+    _, verdict = ranking(hiding("stribeck"))
+    assert verdict.word == "missing_effect"
+    assert "stribeck@load" in verdict.members
+    assert verdict.second == ()
