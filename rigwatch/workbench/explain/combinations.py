@@ -8,14 +8,18 @@ recordings held out are asked once, at the end. It ends where a set leaves nothi
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from rigwatch.physics.engine.fit import Fit
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import NoiseFloor, from_residual
+from rigwatch.workbench.explain.verdict import LITTLE_MORE, MUCH_WORSE
 from rigwatch.workbench.fit import Fitted, fit_model
 from rigwatch.workbench.ranking import (
+    STEP,
     Progress,
     Ranked,
     accepted_from,
     candidates,
+    difference,
     refit,
     scored,
     worth_a_fit,
@@ -146,3 +150,27 @@ def without(bench: Bench, whole: Combination, left_out: Ranked) -> Combination |
             return None
         fitted, rows = own.fitted, [*rows, own]
     return Combination(tuple(rows))
+
+
+def fewest_of_the_best(every: Sequence[Combination]) -> Combination:
+    """Of those that do as well as the one that leaves least, the one with the fewest parameters."""
+    least = min(every, key=lambda each: each.fitted.held_out_error)
+    equals = [each for each in every if as_good(each, least)]
+    return min(equals, key=lambda each: (each.free, each.fitted.held_out_error))
+
+
+def as_good(each: Combination, best: Combination) -> bool:
+    """Whether neither side tells that the other one is better.
+
+    What happens seldom on one side, such as a drive at rest, may show on the other alone.
+    """
+    one, other = each.fitted, best.fitted
+    sides = ((one.train, other.train), (one.held_out, other.held_out))
+    return each is best or not any(_worse(*fits) for fits in sides)
+
+
+def _worse(one: Fit, other: Fit) -> bool:
+    """Whether one leaves more than the other, beyond chance or beyond all measure."""
+    found = difference(one, other)
+    beyond_measure = found.relative > 1 - 1 / MUCH_WORSE
+    return beyond_measure or (found.p_falls < STEP and found.relative > LITTLE_MORE)

@@ -11,25 +11,24 @@ effect.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from rigwatch.physics.engine.fit import Fit
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.combinations import (
     ANY,
     Combination,
+    as_good,
     combinations,
+    fewest_of_the_best,
     leaves_noise,
     own_floor,
     with_rows,
     without,
 )
-from rigwatch.workbench.explain.verdict import LITTLE_MORE, MUCH_WORSE, Verdict, judge
+from rigwatch.workbench.explain.verdict import Verdict, judge
 from rigwatch.workbench.explain.verdict_calibration import Evidence
 from rigwatch.workbench.ranking import (
     EXPLAINED,
-    STEP,
     Progress,
     Ranked,
-    difference,
     left_over,
     rank,
     refit,
@@ -71,7 +70,7 @@ def several_effects(
     every = combinations(bench, rows, progress, _most_free(bench, verdict.best))
     if not any(len(each.rows) > 1 and leaves_noise(bench, each.fitted) for each in every):
         return verdict
-    best = _best(every)
+    best = fewest_of_the_best(every)
     parts: list[_Part] = []
     for _ in range(ROUNDS):
         if len(best.rows) == 1:
@@ -80,7 +79,7 @@ def several_effects(
         if better is None:
             break
         every, best = [*every, better], better
-    others = [each for each in every if _as_good(each, best) and len(each.rows) <= len(best.rows)]
+    others = [each for each in every if as_good(each, best) and len(each.rows) <= len(best.rows)]
     return _said(bench, rows, verdict, best, [_doubted(part, best, others) for part in parts])
 
 
@@ -117,7 +116,7 @@ def _not_simpler(verdict: Verdict, best: Combination, every: Sequence[Combinatio
         if len(each.rows) > 1
         and each.free <= best.free
         and not each.labels & named
-        and _as_good(each, best)
+        and as_good(each, best)
     ]
     if not instead or verdict.word != "missing_effect":
         return verdict
@@ -126,30 +125,6 @@ def _not_simpler(verdict: Verdict, best: Combination, every: Sequence[Combinatio
     text = f"{verdict.text}; {together} explains it as well"
     rivals = (*verdict.rivals, *(row.label for row in least.rows))
     return replace(verdict, word="undetermined", rivals=rivals, text=text)
-
-
-def _best(every: Sequence[Combination]) -> Combination:
-    """Of those that do as well as the one that leaves least, the one with the fewest parameters."""
-    least = min(every, key=lambda each: each.fitted.held_out_error)
-    equals = [each for each in every if _as_good(each, least)]
-    return min(equals, key=lambda each: (each.free, each.fitted.held_out_error))
-
-
-def _as_good(each: Combination, best: Combination) -> bool:
-    """Whether neither side tells that the other one is better.
-
-    What happens seldom on one side, such as a drive at rest, may show on the other alone.
-    """
-    one, other = each.fitted, best.fitted
-    sides = ((one.train, other.train), (one.held_out, other.held_out))
-    return each is best or not any(_worse(*fits) for fits in sides)
-
-
-def _worse(one: Fit, other: Fit) -> bool:
-    """Whether one leaves more than the other, beyond chance or beyond all measure."""
-    found = difference(one, other)
-    beyond_measure = found.relative > 1 - 1 / MUCH_WORSE
-    return beyond_measure or (found.p_falls < STEP and found.relative > LITTLE_MORE)
 
 
 def _judged_in_turn(
