@@ -67,7 +67,7 @@ docs: $(STAMPS)/run  ## write the pages, tables and pictures that are made by th
 	@python -m tools.alarm_docs
 	@python -m tools.unit_docs
 	@python -m tools.pictures
-	@python -m benchmarks.results_page
+	@python -m tools.benchmark_page
 
 mutate: $(STAMPS)/mutation  ## change the code a little and see which changes no test notices (MUTATE names some)
 	@mutmut run --max-children $(WORKERS) $(MUTATE)

@@ -11,13 +11,12 @@ import os
 import platform
 import sys
 import time
-import traceback
 from dataclasses import asdict
 from pathlib import Path
 
 import benchmarks
-from benchmarks import results_page
-from benchmarks.table import Row, as_markdown, as_text, failed
+from tools import benchmark_page
+from tools.benchmark_table import Row, as_markdown, as_text, rows_of
 
 
 def modules() -> dict[str, str]:
@@ -51,14 +50,10 @@ def _processor() -> str:
 
 
 def measure(name: str, quick: bool) -> list[Row]:
-    """A benchmark's rows; one that fails is a row that misses its bar, and the others still run."""
+    """A benchmark's rows; what it takes is said."""
     started = time.perf_counter()
     print(f"{name} ...", end=" ", file=sys.stderr, flush=True)
-    try:
-        rows: list[Row] = importlib.import_module(modules()[name]).run(quick)
-    except Exception as error:
-        traceback.print_exc()
-        rows = [failed(name, error)]
+    rows = rows_of(name, lambda: importlib.import_module(modules()[name]).run(quick))
     print(f"{time.perf_counter() - started:.1f} s", file=sys.stderr)
     return rows
 
@@ -75,7 +70,7 @@ def main() -> int:
     print("measured on " + ", ".join(f"{key} {value}" for key, value in machine().items()) + "\n")
     print(as_markdown(rows) if arguments.markdown else as_text(rows))
     if arguments.page and not arguments.quick:
-        results_page.write(results_page.keep(results, machine()))
+        benchmark_page.write(benchmark_page.keep(results, machine()))
     if arguments.json:
         as_dicts = {name: [asdict(row) for row in found] for name, found in results.items()}
         text = {"machine": machine(), "results": as_dicts}

@@ -2,15 +2,10 @@
 
 What a user does is played: the log becomes a study, the workbench is asked, what it names is added,
 it is asked again, until it says that nothing is missing. Where it cannot tell rivals apart and the
-truth is among them, the user's next experiment tells, so the truth is added. Each step is judged:
+truth is among them, the user's next experiment tells, so the truth is added. Each step is judged as
+`sim_plant/machines/answers.py` says.
 
-    right       what is named is hidden and not found yet, or cannot be told from what is
-    undecided   rivals are named, the truth among them
-    unknown     no known effect explains the error: nothing is named
-    astray      rivals are named, the truth not among them
-    wrong       with confidence: an effect that is not there, or nothing missing where more is
-
-    python -m benchmarks.explaining.chains --quick
+    python -m benchmarks chains --quick
     python -m benchmarks.explaining.chains --results chains.jsonl --machine motor --minutes 10
 
 Machines are `sim_plant.machines`, which share no equations with the models. How often a verdict is
@@ -20,124 +15,56 @@ wrong is calibrated on the other machines than the one that it is judged on.
 import sys
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmarks.explaining.hidden import asked, collected, share_row
-from benchmarks.explaining.machine_studies import RIGHT, machine_study
-from benchmarks.table import Row, as_text
+from benchmarks.explaining.chain_rows import Case, Outcome, Step, chain_rows
+from benchmarks.explaining.hidden import asked, collected
+from benchmarks.explaining.machine_studies import machine_study
 from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.verdict import Verdict
-from rigwatch.workbench.explain.verdict_calibration import LEANING, Evidence, cell_of
 from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.steps import whole
 from rigwatch.workbench.study import Study
+from sim_plant.machines import RIGHT, Answer, judged
+from tools.benchmark_table import Row, as_text
 
-CHAINS: dict[str, tuple[tuple[tuple[str, float], ...], ...]] = {
-    "oscillator": (
-        (("coulomb", 0.1), ("cubic_stiffness", 0.1)),
-        (("quadratic_drag", 0.1), ("dead_band", 0.1), ("acceleration_lag", 0.1)),
-    ),
-    "motor": (
-        (("coulomb", 0.1), ("fan", 0.1)),
-        (("saturation", 0.1), ("coulomb", 0.1), ("drag_by_direction", 0.1)),
-    ),
-    "pendulum": (
-        (("coulomb", 0.1), ("air_drag", 0.1)),
-        (("late_drive", 0.2), ("coulomb", 0.1), ("imbalance", 0.1)),
-    ),
-    "damper": (
-        (("slider", 0.1), ("hardening", 0.1)),
-        (("joint", 0.1), ("orifice", 0.1), ("preload", 0.1)),
-    ),
-    "tanks": (
-        (("leak", 0.3), ("dead_band", 0.5)),
-        (("saturation", 0.3), ("late_pump", 0.3), ("inlet", 0.3)),
-    ),
+CHAINS = {
+    "oscillator": "coulomb+cubic_stiffness quadratic_drag+dead_band+acceleration_lag",
+    "motor": "coulomb+fan saturation+coulomb+drag_by_direction",
+    "pendulum": "coulomb+air_drag late_drive+coulomb+imbalance",
+    "damper": "slider+hardening joint+orifice+preload",
+    "tanks": "leak+dead_band saturation+late_pump+inlet",
 }
-"""What is hidden in each machine at once, and by what share it changes the outputs alone."""
+"""What is hidden in each machine at once."""
+SHARE = 0.1
+"""Share by which each changes the outputs alone, but for these."""
+SHARES = {
+    "pendulum": {"late_drive": 0.2},
+    "tanks": {"leak": 0.3, "dead_band": 0.5, "saturation": 0.3, "late_pump": 0.3, "inlet": 0.3},
+}
 NOISES = (0.002, 0.005, 0.02)
 """Standard deviation of the sensors' noise over the rms of what they read."""
-SEEDS = 5
+SEEDS, FIRST = 5, 101
+"""Seeds, and the first of them: the rules of verdicts were chosen on others below it."""
 MORE = 2
 """Steps beyond the hidden effects after which a chain is broken off."""
-CONFIDENT = 0.05
-"""Probability of being wrong up to which a verdict counts as given with confidence."""
 
 
-@dataclass(frozen=True)
-class Case:
-    """One machine with a chain hidden in it.
-
-    Attributes:
-        machine: its name.
-        hidden: names of what is hidden.
-        noise: of the sensors, over the rms of what they read.
-        seed: of excitation and noise.
-    """
-
-    machine: str
-    hidden: tuple[str, ...]
-    noise: float
-    seed: int
-
-
-@dataclass(frozen=True)
-class Step:
-    """One question and its answer.
-
-    Attributes:
-        judged: right, undecided, unknown, astray or wrong; "ended" or "more" once all are found.
-        word: the verdict.
-        named: labels that are named, the best first.
-        added: what the user added.
-        evidence: what the verdict rests on.
-        seconds: of one explanation.
-    """
-
-    judged: str
-    word: str
-    named: tuple[str, ...]
-    added: str
-    evidence: Evidence
-    seconds: float
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A chain, step by step."""
-
-    case: Case
-    steps: tuple[Step, ...] = field(default_factory=tuple)
-
-    @property
-    def good(self) -> bool:
-        """Whether each step was right or honestly undecided until all was found."""
-        on_the_way = [step for step in self.steps if step.judged not in ("ended", "more")]
-        return self.complete and all(s.judged in ("right", "undecided") for s in on_the_way)
-
-    @property
-    def complete(self) -> bool:
-        """Whether all that is hidden was found."""
-        return self.steps[-1].judged in ("ended", "more")
-
-
-def cases(*, quick: bool) -> Iterator[Case]:
+def cases(*, quick: bool, first: int = FIRST) -> Iterator[Case]:
     """All cases, seed by seed, so that a part of them is a fair sample."""
-    for seed in range(1, 2 if quick else SEEDS + 1):
+    for seed in range(first, first + (1 if quick else SEEDS)):
         for noise in NOISES[1:2] if quick else NOISES:
             for machine, chains in CHAINS.items():
-                for chain in chains:
-                    yield Case(machine, tuple(name for name, _ in chain), noise, seed)
+                for chain in chains.split():
+                    yield Case(machine, tuple(chain.split("+")), noise, seed)
 
 
 def shares(case: Case) -> dict[str, float]:
     """What share each hidden effect of a case changes the outputs by."""
-    every = (dict(chain) for chain in CHAINS[case.machine])
-    return next(chain for chain in every if tuple(chain) == case.hidden)
+    own = SHARES.get(case.machine, {})
+    return {name: own.get(name, SHARE) for name in case.hidden}
 
 
 def solve(case: Case) -> Outcome:
@@ -159,35 +86,15 @@ def _asked(study: Study, machine: str, left: list[str]) -> tuple[Step, Ranked | 
     begin = time.perf_counter()
     rows, verdict = ranking(open_bench(study))
     seconds = time.perf_counter() - begin
-    judged, found = judged_step(machine, left, verdict)
+    said = Answer(verdict.word, verdict.members, verdict.rivals, verdict.second)
+    how_good, found = judged(machine, left, said)
     chosen = None
-    if judged in ("right", "undecided"):
+    if how_good in ("right", "undecided"):
         left.remove(found)
         chosen = _chosen(rows, verdict, RIGHT[machine][found])
     named = (*verdict.members, *verdict.rivals, *(f"+{label}" for label in verdict.second))
     added = chosen.label if chosen else ""
-    return Step(judged, verdict.word, named, added, verdict.evidence, seconds), chosen
-
-
-def judged_step(machine: str, left: Sequence[str], verdict: Verdict) -> tuple[str, str]:
-    """How good a verdict is where `left` is still hidden, and which of it is found."""
-    if not left:
-        return ("ended" if verdict.word == "nothing_missing" else "more"), ""
-    named = {"missing_effect": verdict.members, "undetermined": verdict.members + verdict.rivals}
-    labels = set(named.get(verdict.word, ()))
-    found = next((name for name in left if labels & set(RIGHT[machine][name])), "")
-    others = [name for name in left if name != found]
-    beside = any(set(verdict.second) & set(RIGHT[machine][name]) for name in others)
-    true = bool(found) and (beside or not verdict.second)
-    match verdict.word:
-        case "missing_effect":
-            return ("right" if true else "wrong"), found
-        case "undetermined":
-            return ("undecided" if true else "astray"), found
-        case "nothing_missing":
-            return "wrong", ""
-        case _:
-            return "unknown", ""
+    return Step(how_good, verdict.word, named, added, verdict.evidence, seconds), chosen
 
 
 def _chosen(rows: Sequence[Ranked], verdict: Verdict, right: Sequence[str]) -> Ranked | None:
@@ -199,76 +106,7 @@ def _chosen(rows: Sequence[Ranked], verdict: Verdict, right: Sequence[str]) -> R
 
 def run(quick: bool) -> list[Row]:
     """Chains found again, and what was said with confidence and was wrong."""
-    return rows_of([solve(case) for case in cases(quick=quick)])
-
-
-def rows_of(outcomes: Sequence[Outcome]) -> list[Row]:
-    """The rows of the table."""
-    steps = [s for o in outcomes for s in o.steps if s.judged not in ("ended", "more")]
-    ends = [o.steps[-1].judged == "ended" for o in outcomes if o.complete and o.good]
-    wrong = [step.judged == "wrong" for step in steps]
-    counts = Counter(step.judged for step in steps)
-    seconds = sorted(s.seconds for o in outcomes for s in o.steps)
-    return [
-        share_row("chains: every step right or honestly undetermined",
-                  [o.good for o in outcomes], 0.9, _parts(outcomes)),
-        Row("chains: steps wrong with confidence", f"{sum(wrong)}/{len(wrong)}"
-            f" = {sum(wrong) / max(len(wrong), 1):.1%}", "≤ 2%", "",
-            ", ".join(f"{word}: {count}" for word, count in counts.most_common()),
-            sum(wrong) <= 0.02 * len(wrong)),
-        share_row("chains: nothing missing after the last right step", ends, 0.95, ""),
-        *_left_out(outcomes),
-        Row("chains: one explanation, median", f"{seconds[len(seconds) // 2]:.1f} s", "", "", "",
-            None),
-    ]  # fmt: skip
-
-
-def _parts(outcomes: Sequence[Outcome]) -> str:
-    """Good chains by machine and by noise."""
-
-    def part(name: str, chosen: Sequence[Outcome]) -> str:
-        return f"{name} {sum(o.good for o in chosen)}/{len(chosen)}"
-
-    machines = dict.fromkeys(o.case.machine for o in outcomes)
-    noises = sorted({o.case.noise for o in outcomes})
-    return ", ".join([
-        *(part(m, [o for o in outcomes if o.case.machine == m]) for m in machines),
-        *(part(f"noise {n:.1%}", [o for o in outcomes if o.case.noise == n]) for n in noises),
-    ])  # fmt: skip
-
-
-def _left_out(outcomes: Sequence[Outcome]) -> list[Row]:
-    """Wrong verdicts as the other machines promise them and as they came."""
-    rows = []
-    for machine in dict.fromkeys(o.case.machine for o in outcomes):
-        told = _named_steps([o for o in outcomes if o.case.machine != machine])
-        own = _named_steps([o for o in outcomes if o.case.machine == machine])
-        doubts = [_doubt(step, told) for step in own]
-        sure = [s for s, doubt in zip(own, doubts, strict=True) if doubt <= CONFIDENT]
-        rows.append(Row(
-            f"chains: wrong verdicts on {machine}, promised by the others and found",
-            f"{sum(doubts):.1f} and {sum(_is_wrong(s) for s in own)} of {len(own)}", "", "",
-            f"of {len(sure)} with at most {CONFIDENT:.0%} promised"
-            f" {sum(map(_is_wrong, sure))} wrong", None,
-        ))  # fmt: skip
-    return rows
-
-
-def _named_steps(outcomes: Sequence[Outcome]) -> list[Step]:
-    return [step for outcome in outcomes for step in outcome.steps]
-
-
-def _is_wrong(step: Step) -> bool:
-    return step.judged in ("wrong", "astray", "more")
-
-
-def _doubt(step: Step, told: Sequence[Step]) -> float:
-    """Probability that a verdict is wrong, as counted on steps of other machines."""
-    same = [s for s in told if s.word == step.word]
-    rate = (sum(map(_is_wrong, same)) + 1) / (len(same) + 2)
-    cell = cell_of(step.word, step.evidence)
-    alike = [s for s in same if cell_of(s.word, s.evidence) == cell]
-    return (sum(map(_is_wrong, alike)) + LEANING * rate) / (len(alike) + LEANING)
+    return chain_rows([solve(case) for case in cases(quick=quick)])
 
 
 def main() -> int:
@@ -276,17 +114,18 @@ def main() -> int:
     parser = asked(__doc__)
     parser.add_argument("--machine", action="append", help="this machine alone, may be repeated")
     parser.add_argument("--noise", type=float, action="append", help="this noise alone")
+    parser.add_argument("--first", type=int, default=FIRST, help="seed to begin with")
     chosen = parser.parse_args()
     tried = (
         case
-        for case in cases(quick=False)
+        for case in cases(quick=False, first=chosen.first)
         if (not chosen.machine or case.machine in chosen.machine)
         and (not chosen.noise or case.noise in chosen.noise)
         and (not chosen.seed or case.seed in chosen.seed)
         and (not chosen.effect or "+".join(case.hidden) in chosen.effect)
     )
     found = collected(chosen.results, Outcome, tried, solve, said=_line, minutes=chosen.minutes)
-    print(as_text(rows_of(found)))
+    print(as_text(chain_rows(found)))
     return 0
 
 

@@ -24,7 +24,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.explaining.hidden_effects import NOISE, excitation, explained, noisy
-from benchmarks.table import Row
 from rigwatch.physics.engine.equations.effect import load_effects
 from rigwatch.physics.engine.score.significance import corrected_p_values
 from rigwatch.workbench.compare.compare import comparison
@@ -35,6 +34,7 @@ from rigwatch.workbench.ranking.refitting import refit
 from rigwatch.workbench.ranking.scoring import rank_only, score_all
 from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.simulated import HORIZON, study
+from tools.benchmark_table import Row
 
 CANDIDATES = 30
 SEED = 11

@@ -1,33 +1,29 @@
 """Fits from afar: does the fitting driver reach the noise floor from wherever it is told to begin?
 
-A mass on a spring, in closed form: the force is a line between samples or held, so that the exact
-step from sample to sample is a matrix exponential, which shares nothing with the engine. The plant
-is drawn too (mass over four decades, resonance 1 to 12 Hz, damping 2 to 50 %), starts are drawn
-log-uniformly over six decades around the truth, horizons from 0.25 to 4 s. A fit reaches the floor
-where its error is at most 1.1 times the noise; one that does not is called out by its convergence,
-or a verdict would be built on it.
+A mass on a spring in closed form (`sim_plant/specimens/exact_mass.py`), which shares nothing with
+the engine, is drawn too (mass over four decades, resonance 1 to 12 Hz, damping 2 to 50 %), starts
+are drawn log-uniformly over six decades around the truth, horizons from 0.25 to 4 s. A fit reaches
+the floor where its error is at most 1.1 times the noise; one that does not is called out by its
+convergence, or a verdict would be built on it.
 
     python -m benchmarks fits_from_afar --quick
 """
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 from msgspec import structs
-from scipy.linalg import expm
 
 from benchmarks.explaining.hidden import share_row
-from benchmarks.table import Row
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.model import Hold, Model, shipped_models
 from rigwatch.physics.engine.equations.system import compose
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.search.fit_from_afar import fit_from_afar
 from rigwatch.physics.engine.search.short_horizons import ShortHorizons
-from rigwatch.wire.arrays import FloatArray
+from sim_plant.specimens.exact_mass import RATE, Mass, excitation, moved
+from tools.benchmark_table import Row
 
-RATE, SAMPLES = 256.0, 5120
 NOISE = 2e-3
 """Standard deviation of the noise over the rms of what a sensor reads."""
 HORIZONS = (64, 128, 256, 512, 1024)
@@ -37,49 +33,11 @@ SEED = 2000
 """First seed: none below was used while the driver was written."""
 
 
-@dataclass(frozen=True)
-class Plant:
-    """A mass on a spring: mass [kg], damper [N s/m], spring [N/m]."""
-
-    m: float
-    c: float
-    k: float
-
-    @property
-    def values(self) -> FloatArray:
-        """In the order of the model's parameters."""
-        return np.array([self.m, self.c, self.k])
-
-
-def drawn_plant(generator: np.random.Generator) -> Plant:
+def drawn_plant(generator: np.random.Generator) -> Mass:
     """A plant with a resonance that the excitation reaches."""
     mass = 10 ** generator.uniform(-2, 2)
     omega = 2 * np.pi * 10 ** generator.uniform(0.0, np.log10(12.0))
-    return Plant(mass, 2 * 10 ** generator.uniform(-1.7, -0.3) * mass * omega, mass * omega**2)
-
-
-def moved(plant: Plant, force: FloatArray, hold: Hold) -> FloatArray:
-    """Position [m] and acceleration [m/s^2] at the samples, from rest; shape (n, 2)."""
-    whole = np.zeros((4, 4))
-    whole[0, 1] = 1.0
-    whole[1, :3] = -plant.k / plant.m, -plant.c / plant.m, 1 / plant.m
-    whole[2, 3] = 1.0
-    step = expm(whole / RATE)[:2]
-    slope = np.diff(force, append=force[-1]) * RATE * (hold == "linear")
-    state, states = np.zeros(2), np.empty((len(force), 2))
-    for index, pushed in enumerate(zip(force, slope, strict=True)):
-        states[index] = state
-        state = step @ np.concatenate([state, pushed])
-    balance = force - plant.c * states[:, 1] - plant.k * states[:, 0]
-    return np.column_stack([states[:, 0], balance / plant.m])
-
-
-def excitation(generator: np.random.Generator) -> FloatArray:
-    """Force with lines from 0.25 to 16 Hz, rms 4 N."""
-    lines, seconds = np.arange(0.25, 16, 0.25), np.arange(SAMPLES) / RATE
-    phases = generator.uniform(0, 2 * np.pi, len(lines))
-    waves = np.cos(2 * np.pi * np.outer(seconds, lines) + phases).sum(axis=1)
-    return np.asarray(4 * waves / np.sqrt(len(lines) / 2))
+    return Mass(mass, 2 * 10 ** generator.uniform(-1.7, -0.3) * mass * omega, mass * omega**2)
 
 
 def position_alone(model: Model) -> Model:
@@ -96,7 +54,7 @@ def solved(seed: int, *, alone: bool) -> tuple[bool, bool, float]:
     generator = np.random.default_rng(seed)
     hold: Hold = "zero" if seed % 2 else "linear"
     plant, force = drawn_plant(generator), excitation(generator)
-    read = moved(plant, force, hold)
+    read = moved(plant, force, held=hold == "zero")
     noise = NOISE * read.std(axis=0)
     read = read + noise * generator.normal(size=read.shape)
     model = structs.replace(shipped_models()["mass-spring-damper"], hold=hold)

@@ -11,8 +11,8 @@ from typing import Any, Protocol, TypeVar
 
 import msgspec
 
-from benchmarks.table import Row
 from rigwatch.wire.errors import RigwatchError
+from tools.benchmark_table import Row
 
 
 class Judged(Protocol):

@@ -23,7 +23,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.explaining.hidden import asked, collected, confusion, counted, share_row, wanted
-from benchmarks.table import Row, as_text
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.preparation import Bench, bench_of
@@ -45,6 +44,7 @@ from sim_plant.oscillator import (
     strength_for,
 )
 from tests.workbench.simulated import HORIZON, multisine, recorded, size_of, study
+from tools.benchmark_table import Row, as_text
 
 SAMPLES = 5120
 NOISE = 2e-3

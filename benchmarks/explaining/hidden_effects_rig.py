@@ -38,7 +38,6 @@ from benchmarks.explaining.rig_hidden import (
     recorded,
     settings,
 )
-from benchmarks.table import Row, as_text
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
@@ -51,6 +50,7 @@ from rigwatch.workbench.fit.healthy_parameters import commissioned
 from rigwatch.workbench.fit.healthy_reference import referenced
 from rigwatch.workbench.ranking.ranked import Ranked, accepted_from
 from rigwatch.workbench.study.study import Span, Study, StudyFile
+from tools.benchmark_table import Row, as_text
 
 HORIZON = 128
 MODELS = {"analytic": "servo-pneumatic", "black box": "fourth-order"}

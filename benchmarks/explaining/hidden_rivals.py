@@ -18,10 +18,10 @@ import numpy as np
 from benchmarks.explaining.hidden import counted, share_row
 from benchmarks.explaining.hidden_effects import RIGHT, Case, explained, simulated
 from benchmarks.explaining.rivals import NOTHING, TERMS, pysindy_names, sysidentpy_names
-from benchmarks.table import Row
 from rigwatch.workbench.data.signals import Data
 from sim_plant.oscillator import UNKNOWN
 from tests.workbench.simulated import study
+from tools.benchmark_table import Row
 
 POLYNOMIAL = ("constant_force", "quadratic_stiffness", "cubic_stiffness")
 """Effects that a polynomial NARX model can name."""

@@ -22,42 +22,6 @@ STUDIES = {
 """What the study of each machine says beside its recordings."""
 WITH_HEALTHY = ("oscillator",)
 """Machines of which a recording with nothing wrong can be had."""
-RIGHT: dict[str, dict[str, tuple[str, ...]]] = {
-    "oscillator": {
-        "coulomb": ("coulomb@load",),
-        "cubic_stiffness": ("cubic_stiffness@load",),
-        "quadratic_drag": ("quadratic_drag@load",),
-        "dead_band": ("dead_band@drive",),
-        "acceleration_lag": ("lag@acceleration_sensor", "delay@acceleration_sensor"),
-    },
-    "motor": {
-        "coulomb": ("coulomb@shaft",),
-        "fan": ("quadratic_drag@shaft",),
-        "saturation": ("saturation@drive",),
-        "drag_by_direction": ("viscous_by_direction@shaft",),
-    },
-    "pendulum": {
-        "coulomb": ("coulomb@shaft",),
-        "air_drag": ("quadratic_drag@shaft",),
-        "late_drive": ("delay@drive", "lag@drive"),
-        "imbalance": ("constant_force@shaft", "offset@drive"),
-    },
-    "damper": {
-        "slider": ("jenkins@rod",),
-        "hardening": ("cubic_stiffness@rod",),
-        "joint": ("bouc_wen@rod",),
-        "orifice": ("quadratic_drag@rod",),
-        "preload": ("constant_force@rod", "offset@force_sensor"),
-    },
-    "tanks": {
-        "leak": ("orifice@upper",),
-        "dead_band": ("dead_band@pump",),
-        "saturation": ("saturation@pump",),
-        "late_pump": ("lag@pump", "delay@pump"),
-        "inlet": ("constant_force@lower",),
-    },
-}
-"""What the library calls each hidden effect; several where they are one on any recording."""
 
 
 def machine_study(

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.explaining.hidden_effects import RIGHT, SAMPLES, explained
-from benchmarks.table import Row
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import explanation
 from rigwatch.workbench.explain.next_experiment import excitation
 from sim_plant.oscillator import RATE, Hidden, strength_for
 from tests.workbench.simulated import HORIZON, recorded, size_of, study
+from tools.benchmark_table import Row
 
 NOISE = 0.02
 """Standard deviation of the sensors' noise over the rms of what they read under the sine."""

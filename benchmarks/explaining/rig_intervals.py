@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from benchmarks.explaining.hidden import counted, share_row
 from benchmarks.explaining.hidden_effects_rig import Case, simulated, study_of
 from benchmarks.explaining.rig_hidden import settings
-from benchmarks.table import Row
 from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.compare.uncertainty_budget import beyond
 from rigwatch.workbench.data.noise_floor import quiet_scale
@@ -20,6 +19,7 @@ from rigwatch.workbench.fit.intervals import values
 from rigwatch.workbench.ranking.candidates import shapes_of
 from rigwatch.workbench.ranking.refitting import refit
 from rigwatch.workbench.ranking.scoring import rank_only
+from tools.benchmark_table import Row
 
 STRENGTHS = {
     "viscous": ("viscous", "load", "d"),

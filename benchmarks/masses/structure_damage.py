@@ -16,7 +16,6 @@ import msgspec
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from benchmarks.table import Row
 from rigwatch.structures.damage.examination import Examination, Settings, examine
 from rigwatch.structures.damage.spring_model import SpringModel, split
 from rigwatch.structures.damage.threshold import false_alarm, threshold_for
@@ -27,6 +26,7 @@ from rigwatch.structures.records.record import Record
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
 from sim_plant.structure import Damage, simulate, with_noise
+from tools.benchmark_table import Row
 
 FILE = Path(__file__).parents[2] / "configs" / "structures" / "kabe_antenna.toml"
 DT, DURATION, INSTANT, NOISE = 0.01, 10.0, 5.0, 0.05

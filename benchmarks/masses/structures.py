@@ -15,7 +15,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from benchmarks.table import Row
 from rigwatch.structures.identification.identify import Identification, identify, solved
 from rigwatch.structures.identification.problem import problem_of
 from rigwatch.structures.model.checks import load_structure
@@ -27,6 +26,7 @@ from sim_plant.structure import simulate, with_noise
 from tests.structures.extreme import Extreme
 from tests.structures.published import NAMES, NOISE, ROWS, Published
 from tests.structures.thesis_record import thesis_record
+from tools.benchmark_table import Row
 
 FILE = Path(__file__).parents[2] / "configs" / "structures" / "kabe_antenna.toml"
 DURATION = 10.0

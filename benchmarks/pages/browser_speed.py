@@ -12,11 +12,11 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 
-from benchmarks.table import Row
 from rigwatch.browser.signals import write_trace
 from rigwatch.browser.work import RESULTS, signal_key
 from rigwatch.workbench.study import append_effect, commit, drop_effect, open_study
 from rigwatch.workbench.study.study import Accepted, Study
+from tools.benchmark_table import Row
 
 SAMPLES = 5_000_000
 CHANNELS = ("position", "acceleration")

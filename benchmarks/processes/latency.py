@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.processes.live_rig import LiveRig, live_rig
-from benchmarks.table import Row
 from rigwatch.wire.host.realtime import MONITOR, prepare_for_real_time, raise_priority
+from tools.benchmark_table import Row
 
 if TYPE_CHECKING:
     from sim_plant.serve.serial_server import SerialServer

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.processes.live_rig import LiveRig, live_rig
-from benchmarks.table import Row
+from tools.benchmark_table import Row
 
 if TYPE_CHECKING:
     from rigwatch.wire.messages.message_types import Gap, SampleBlock

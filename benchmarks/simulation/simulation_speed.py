@@ -23,12 +23,12 @@ from benchmarks.simulation.simulation_rivals import (
     in_scipy,
 )
 from benchmarks.simulation.simulation_task import Result, Simulator, Task
-from benchmarks.table import Row
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, System, compose
 from rigwatch.wire.arrays import FloatArray
+from tools.benchmark_table import Row
 
 LENGTH = 256
 BAR = 1.5

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.table import Row
 from benchmarks.watching.rig import (
     RATE,
     active,
@@ -29,6 +28,7 @@ from monitor.signals.conditions import (
 )
 from sim_plant.excitation import Chirp, Excitation, Multisine, Recorded
 from sim_plant.scenario import Event, Scenario
+from tools.benchmark_table import Row
 
 HOURS, QUICK_HOURS = 24.0, 1.0
 SEEDS, QUICK_SEEDS = 20, 4

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from msgspec import structs
 
-from benchmarks.table import Row
 from monitor.commissioning.commission import commission
 from monitor.detectors import DETECTORS
 from monitor.detectors.selection import detectors_of
@@ -19,6 +18,7 @@ from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.signals.recordings import recording_of
 from rigwatch.wire.messages.message_types import Alarm, Column, SampleBlock
 from sim_plant.scenario import Event, Scenario, ScenarioRun, load_scenario
+from tools.benchmark_table import Row
 
 SCENARIOS = Path(__file__).parents[2] / "configs" / "scenarios"
 RATE = 256.0

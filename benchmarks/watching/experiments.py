@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.table import Row
 from benchmarks.watching.rig import RATE, active, delay, scenario, watched
 from monitor.signals.conditions import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION
 from sim_plant.scenario import Experiment, ScenarioRun
+from tools.benchmark_table import Row
 
 SEEDS = 20
 

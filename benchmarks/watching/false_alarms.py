@@ -5,11 +5,11 @@ trade against.
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.table import Row
 from benchmarks.watching.rig import RATE, blocks, commissioned, scenario
 from monitor.decision.decision_rules import rules_for
 from monitor.pipeline.pipeline import Monitor
 from monitor.signals.conditions import CONDITION_KINDS, SENSOR_CLIPPED, Condition
+from tools.benchmark_table import Row
 
 HOURS, QUICK_HOURS = 24.0, 0.1
 FACTORS = (3.0, 4.0, 5.0, 6.0, 7.0, 7.85, 9.0)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.table import Row
 from monitor.commissioning.friction_filter import (
     GAMMAS,
     VALIDATION_ORDERS,
@@ -22,6 +21,7 @@ from monitor.estimation.window import new_window, windowed_least_squares
 from rigwatch.physics.transfer.transfer_function import TransferFunction
 from rigwatch.wire.arrays import FloatArray
 from sim_plant.second_order import FAULT_TIME, NOISE, STEP, Validation, validation
+from tools.benchmark_table import Row
 
 WINDOW, HOP = 300, 20
 HEAD, TAIL = 100, 200

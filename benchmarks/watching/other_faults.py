@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from msgspec import structs
 
-from benchmarks.table import Row
 from benchmarks.watching.rig import clipped, delay, scenario, watched
 from monitor.signals.conditions import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION
 from sim_plant.effects import EFFECTS, Effect
 from sim_plant.scenario import Event, Scenario
+from tools.benchmark_table import Row
 
 ONSET, LENGTH = 3.0, 10.0
 EXCITATIONS = (2, 3, 4, 5, 6, 7)

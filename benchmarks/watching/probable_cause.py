@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from msgspec import structs
 
-from benchmarks.table import Row
 from benchmarks.watching.rig import RATE, blocks, commissioned, scenario
 from monitor.diagnosis.background_ranking import WAIT
 from monitor.diagnosis.fault_candidates import LEVEL, Evidence, Suspect, suspects
@@ -19,6 +18,7 @@ from monitor.signals.conditions import DEPARTURE
 from rigwatch.physics.engine.equations.effect import library
 from sim_plant.effects import EFFECTS
 from sim_plant.scenario import Event
+from tools.benchmark_table import Row
 
 ONSET, LENGTH = 5.0, 9.0
 RIGHT: dict[str, tuple[str, ...]] = {

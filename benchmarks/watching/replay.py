@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from benchmarks.table import Row
 from monitor.model.model_file import load_model
 from monitor.pipeline.rig_monitor import RigMonitor, compile_kernels
 from rigwatch.replay.cases import load_cases, replayed
@@ -21,6 +20,7 @@ from rigwatch.wire.messages.blocks import pieces
 from rigwatch.wire.messages.message_types import SampleBlock
 from rigwatch.wire.messages.protobuf import encode
 from rigwatch.wire.session import SessionWriter, open_session, run_info
+from tools.benchmark_table import Row
 
 ROOT = Path(__file__).parents[2]
 SCENARIO = ROOT / "configs" / "scenarios" / "healthy_sine_8hz_1v4.toml"

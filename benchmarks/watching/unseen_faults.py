@@ -13,7 +13,6 @@ from functools import cache
 import numpy as np
 from msgspec import structs
 
-from benchmarks.table import Row
 from benchmarks.watching.other_faults import value_of
 from benchmarks.watching.rig import RATE, active, blocks, clipped, delay, record_of, scenario
 from monitor.commissioning.commission import commission
@@ -32,6 +31,7 @@ from sim_plant.effects import EFFECTS, Effect
 from sim_plant.excitation import Sine, Square, Triangle
 from sim_plant.parameters import RigParameters
 from sim_plant.scenario import Event, Scenario
+from tools.benchmark_table import Row
 
 LENGTH = 20.0
 DRIVES: tuple[Sine | Triangle | Square, ...] = (

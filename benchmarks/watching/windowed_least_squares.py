@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.table import Row
 from monitor.estimation.window import new_window, windowed_least_squares
+from tools.benchmark_table import Row
 
 Floats = NDArray[np.float64]
 WINDOW = 300

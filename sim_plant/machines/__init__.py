@@ -7,6 +7,7 @@ fitted to it. Inputs are held between samples, sensors have noise and steps, and
     table = log(motor, {"coulomb": strength_for(motor, "coulomb", 0.1, seed=1)}, 0.002, seed=1)
 """
 
+from sim_plant.machines.answers import RIGHT, Answer, judged
 from sim_plant.machines.machine import MACHINES, Machine, log, strength_for
 
-__all__ = ["MACHINES", "Machine", "log", "strength_for"]
+__all__ = ["MACHINES", "RIGHT", "Answer", "Machine", "judged", "log", "strength_for"]

@@ -85,6 +85,17 @@ def test_no_folder_holds_more_files_than_one_reads_at_a_glance():
     assert {f"{f.relative_to(ROOT)}: {n}" for f, n in sizes.items() if n > MOST_FILES} == set()
 
 
+def test_no_test_imports_a_benchmark():
+    """Benchmarks stand on the tests' helpers and on the plants, never the other way round."""
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in (ROOT / "tests").rglob("*.py")
+        for line, name in _imported(path)
+        if name.split(".")[0] == "benchmarks"
+    ]
+    assert found == []
+
+
 def _house(name: str) -> str:
     """The package of a process, or of a subject of rigwatch."""
     parts = name.split(".")

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from benchmarks.explaining.fits_from_afar import SAMPLES, Plant, excitation, moved, position_alone
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.system import compose
@@ -17,9 +16,22 @@ from rigwatch.physics.engine.search.fit_from_afar import fit_from_afar
 from rigwatch.physics.engine.search.short_horizons import ShortHorizons, growing_horizons
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.typed_files.loading import parse
+from sim_plant.specimens.exact_mass import SAMPLES, Mass, excitation, moved
 
-PLANT = Plant(1.0, 4.0, 400.0)
+PLANT = Mass(1.0, 4.0, 400.0)
 DT = 1 / 256
+SEEN_BY_POSITION = """
+name = "mass"
+summary = "a mass on a spring, seen by its position alone"
+hold = "zero"
+inputs.force = { unit = "N" }
+states.x = { unit = "m", derivative = "v", measured = "position" }
+states.v = { unit = "m/s", derivative = "(force - k*x - c*v)/m", rate_of = "position" }
+parameters.m = { value = 1.0, unit = "kg", low = 1e-6 }
+parameters.c = { value = 1.0, unit = "N s/m", low = 0.0 }
+parameters.k = { value = 1.0, unit = "N/m", low = 0.0 }
+outputs.position = { unit = "m", expression = "x" }
+"""
 HIDDEN_STATE = """
 name = "filtered"
 summary = "a gain behind a lag that no channel shows, read with a gain of its own"
@@ -36,7 +48,7 @@ outputs.y = { unit = "V", expression = "h*x" }
 def recorded(hold="zero", seed=1):
     generator = np.random.default_rng(seed)
     force = excitation(generator)
-    read = moved(PLANT, force, hold)
+    read = moved(PLANT, force, held=hold == "zero")
     noise = 2e-3 * read.std(axis=0)
     made = Recording(DT, force[:, None], read + noise * generator.normal(size=read.shape))
     return made, noise
@@ -84,7 +96,8 @@ def test_the_equations_balance_along_the_measured_motion():
 def test_without_an_accelerometer_the_rate_of_the_position_is_balanced():
     recording, _ = recorded()
     alone = Recording(DT, recording.inputs, recording.outputs[:, :1])
-    starts = equation_error_starts(compiled_with(change=position_alone), alone, np.ones(3))
+    seen = compile_system(compose(parse(SEEN_BY_POSITION, Model, "mass")))
+    starts = equation_error_starts(seen, alone, np.ones(3))
     best = min(starts, key=lambda each: abs(each[0] - 1.0))
     assert best == pytest.approx(PLANT.values, rel=0.1)
 

@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from benchmarks.__main__ import measure
-from benchmarks.results_page import keep, page, read
-from benchmarks.table import Row, as_markdown, as_text, failed
+from tools.benchmark_page import keep, page, read
+from tools.benchmark_table import Row, as_markdown, as_text, failed, rows_of
 
 GOOD = Row("replay speed", "2 400 × real time", "2 000 ×", "", "one core", passed=True)
 BAD = Row("false alarms", "1 in 24 h", "0", "none", "", passed=False)
@@ -31,8 +30,12 @@ def test_markdown_has_a_line_a_row_and_no_stray_column() -> None:
 
 
 def test_a_benchmark_that_fails_is_a_row_that_misses_its_bar() -> None:
-    rows = measure("no_such_benchmark", quick=True)
-    assert [row.passed for row in rows] == [False]
+    def broken() -> list[Row]:
+        raise OSError("no room")
+
+    rows = rows_of("replay", broken)
+    assert [(row.what, row.passed) for row in rows] == [("replay", False)]
+    assert rows_of("replay", lambda: [GOOD]) == [GOOD]
 
 
 def test_a_run_replaces_the_rows_of_what_ran_and_keeps_the_others(tmp_path: Path) -> None:

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import results_page
-from tools import alarm_docs, format_docs, pictures
+from tools import alarm_docs, benchmark_page, format_docs, pictures
 
 ROOT = Path(__file__).parents[2]
 CODE = ("benchmarks", "daq", "monitor", "rigwatch", "sim_plant", "tests")
@@ -36,7 +35,7 @@ def test_the_page_of_file_formats_says_what_the_code_says() -> None:
 
 
 def test_the_page_of_the_benchmarks_shows_the_figures_that_are_kept() -> None:
-    assert text_of(results_page.PAGE) == results_page.page(), "run `make docs`"
+    assert text_of(benchmark_page.PAGE) == benchmark_page.page(), "run `make docs`"
 
 
 @pytest.mark.parametrize("source", sorted(PICTURES.glob("*.txt")), ids=lambda path: path.stem)

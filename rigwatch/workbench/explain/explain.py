@@ -11,6 +11,7 @@ from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import leaves_much, modest, not_alone
+from rigwatch.workbench.explain.together import alone_is_not_enough, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.explain.verdict_calibration import seen
 from rigwatch.workbench.fit import Value, as_written, values
@@ -97,12 +98,10 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = believed(bench, rows)
     along = bench.data.along_motion
-    much = verdict.word == "unknown_effect" or (
-        along and leaves_much(bench.base, bench.floor, verdict)
-    )
-    if much and verdict.best is not None:
-        progress(f"{verdict.best.label} leaves a large residual: trying two effects at once")
-        verdict = two_effects(bench, rows, verdict, progress)
+    if along:
+        verdict = _along_motion(bench, rows, verdict, progress)
+    elif alone_is_not_enough(bench, verdict):
+        verdict = several_effects(bench, rows, verdict, progress)
     verdict = with_motion_sensor(bench, verdict)
     if along and bench.study.model.rough:
         verdict = modest(bench.base, rows, bench.floor, verdict)
@@ -112,6 +111,17 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
+
+
+def _along_motion(
+    bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Progress
+) -> Verdict:
+    """The verdict after trying pairs, if one effect alone leaves a large residual."""
+    much = verdict.word == "unknown_effect" or leaves_much(bench.base, bench.floor, verdict)
+    if not much or verdict.best is None:
+        return verdict
+    progress(f"{verdict.best.label} leaves a large residual: trying two effects at once")
+    return two_effects(bench, rows, verdict, progress)
 
 
 def _stopped(bench: Bench) -> Verdict | None:

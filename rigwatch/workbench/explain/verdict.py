@@ -151,11 +151,32 @@ def _undistinguished(
             continue
         cosine = best.cosines.get(row.label, 0.0)
         if cosine > SAME or _kin(best, row):
-            if _equal(best, row, cosine) and _earns(best, row):
+            if _one_with(best, row, cosine, trusted=trusted):
                 members.append(row.label)
         elif _rivals(best, row, cosine, trusted=trusted):
             rivals.append(row.label)
+    rivals += _looking_like(rows, rivals, {*members, *rivals})
     return tuple(members), tuple(rivals)
+
+
+def _looking_like(rows: Sequence[Ranked], rivals: Sequence[str], known: set[str]) -> list[str]:
+    """Labels of what was not fitted, as it looks the same as a rival that was."""
+    return [
+        row.label
+        for row in rows
+        if row.fitted is None
+        and row.label not in known
+        and any(row.cosines.get(rival, 0.0) > SAME for rival in rivals)
+    ]
+
+
+def _one_with(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
+    """Whether what looks the same, or is of the same kind, cannot be told from the best."""
+    if _equal(best, row, cosine):
+        # At another place it is no refinement, whatever its shape needs.
+        return _earns(best, row) or (cosine > SAME and row.port != best.port)
+    near = row.held_out_error < MUCH_WORSE * best.held_out_error
+    return not trusted and row.accepted and cosine > ALIKE and near and _earns(best, row)
 
 
 def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:

@@ -17,7 +17,14 @@ from rigwatch.workbench.fit.healthy_parameters import commissioned, loosely_told
 from rigwatch.workbench.fit.healthy_reference import referenced
 from rigwatch.workbench.fit.healthy_remainder import learns_from_healthy, with_healthy_remainder
 from rigwatch.workbench.fit.input_hold import held_as, with_hold
-from rigwatch.workbench.fit.intervals import Value, as_written, covariance, shown, values
+from rigwatch.workbench.fit.intervals import (
+    Value,
+    as_written,
+    covariance,
+    interval_with_held,
+    shown,
+    values,
+)
 from rigwatch.workbench.fit.profile import profile
 
 __all__ = [
@@ -34,6 +41,7 @@ __all__ = [
     "fit_twice",
     "free_run",
     "held_as",
+    "interval_with_held",
     "learns_from_healthy",
     "loosely_told",
     "loosened",

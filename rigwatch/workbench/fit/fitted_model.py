@@ -121,9 +121,11 @@ def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
     """The accepted effects, with bounds scaled to the recording's signals."""
     sizes = port_sizes(study.model, recording)
     return tuple(
-        Placement(a.effect, study.effect_at(a.effect, a.port).scaled(sizes[a.port]), a.port)
+        Placement(
+            a.effect, study.effect_at(a.effect, a.port).scaled(sizes[a.port]), a.port, a.ahead
+        )
         if a.port in sizes
-        else Placement(a.effect, study.effect(a.effect), a.port)
+        else Placement(a.effect, study.effect(a.effect), a.port, a.ahead)
         for a in study.file.effects
     )
 

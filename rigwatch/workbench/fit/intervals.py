@@ -11,7 +11,7 @@ with N = JᵀJ, Nb = JbᵀJb and gb = Jbᵀrb of B blocks, and Student's t for B
 and m parameters.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -113,6 +113,25 @@ def values(fitted: Fit, beyond: Mapping[str, float] | None = None) -> dict[str, 
         parameter = system.parameters[name]
         found[name] = Value(value, parameter.unit, interval, notes.get(name, ""))
     return found
+
+
+def interval_with_held(fitted: Fit, name: str, held: Collection[str]) -> tuple[float, float] | None:
+    """Interval of one parameter where some others stay at their values; None if it is not fitted.
+
+    Args:
+        fitted: the fit.
+        name: the parameter.
+        held: those that stay.
+    """
+    free = fitted.compiled.system.free
+    if name not in free:
+        return None
+    kept = [index for index, other in enumerate(free) if other not in held]
+    matrix, degrees = covariance(replace(fitted, jacobian=fitted.jacobian[..., kept]))
+    at = kept.index(free.index(name))
+    width = float(student.ppf(0.5 + CONFIDENCE / 2, degrees) * np.sqrt(matrix[at, at]))
+    value = fitted.values()[name]
+    return value - width, value + width
 
 
 def identifiability(fitted: Fit) -> dict[str, str]:

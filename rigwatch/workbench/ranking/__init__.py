@@ -10,7 +10,8 @@ from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from
 from rigwatch.workbench.ranking.refitting import Progress, refit, unheard
-from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all
+from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
+from rigwatch.workbench.ranking.worth_a_fit import worth_a_fit
 
 __all__ = [
     "EXPLAINED",
@@ -29,6 +30,8 @@ __all__ = [
     "rank_only",
     "refit",
     "score_all",
+    "scored",
     "shapes_of",
     "unheard",
+    "worth_a_fit",
 ]

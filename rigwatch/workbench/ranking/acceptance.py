@@ -4,8 +4,13 @@ The held-out error must fall by more than chance and by a material amount, and t
 show that the effect's strength differs from zero.
 """
 
+from functools import cache
+
+import sympy
+
+from rigwatch.physics.engine.equations import Effect, names_in, parse, symbol
 from rigwatch.workbench.data import NoiseFloor
-from rigwatch.workbench.fit import Fitted, Value, values
+from rigwatch.workbench.fit import Fitted, interval_with_held
 from rigwatch.workbench.ranking.paired_test import Difference, difference
 from rigwatch.workbench.ranking.ranked import Ranked
 
@@ -45,21 +50,39 @@ def _refused(found: Difference) -> str:
 
 
 def _vague(row: Ranked) -> str | None:
-    """Reason if the strength's interval contains its neutral value, otherwise None."""
+    """Reason if the strength's interval contains its neutral value, otherwise None.
+
+    Shape parameters that vanish with the effect are held: a strength correlated with them alone is
+    imprecise, but not neutral.
+    """
     assert row.fitted is not None
-    name = row.placement.effect.strength
-    p, value = row.placement.effect.parameters[name], _strength(row)
-    if p.role == "switch" or value is None or value.interval is None:
+    effect, prefix = row.placement.effect, row.placement.prefix
+    name = effect.strength
+    shape = [prefix + other for other in _gone_without(effect)]
+    interval = interval_with_held(row.fitted.train, prefix + name, shape)
+    p = effect.parameters[name]
+    if p.role == "switch" or interval is None or not interval[0] <= p.neutral <= interval[1]:
         return None
-    low, high = value.interval
-    if not low <= p.neutral <= high:
-        return None
-    return f"the training does not determine its strength: {name} = {low:.3g} … {high:.3g}"
+    return (
+        "the training does not determine its strength:"
+        f" {name} = {interval[0]:.3g} … {interval[1]:.3g}"
+    )
 
 
-def _strength(row: Ranked) -> Value | None:
-    assert row.fitted is not None
-    return values(row.fitted.train).get(row.placement.prefix + row.placement.effect.strength)
+def _gone_without(effect: Effect) -> list[str]:
+    """Parameters of which nothing is left in the expression where the strength is neutral."""
+    neutral = effect.parameters[effect.strength].neutral
+    left = {effect.strength, *_left_at(effect.expression, effect.strength, neutral)}
+    return [name for name in effect.parameters if name not in left]
+
+
+@cache
+def _left_at(expression: str, strength: str, neutral: float) -> frozenset[str]:
+    """Names that an expression still holds once its strength is neutral."""
+    names = {name: symbol(name) for name in names_in(expression, "effect")}
+    value = sympy.nsimplify(neutral)
+    rest = parse(expression, names, "effect").subs(symbol(strength), value)
+    return frozenset(each.name for each in rest.free_symbols)
 
 
 def left_over(base: Fitted, row: Ranked, floor: NoiseFloor, *, tolerant: bool = False) -> float:

@@ -120,7 +120,8 @@ def accepted_from(row: Ranked) -> Accepted:
         for name, value in row.fitted.train.values().items()
         if name.startswith(prefix)
     }
-    return Accepted(effect=row.effect, port=row.port, parameters=values)
+    ahead = row.fitted.placements[-1].ahead
+    return Accepted(effect=row.effect, port=row.port, parameters=values, ahead=ahead)
 
 
 def in_order(rows: Sequence[Ranked]) -> list[Ranked]:

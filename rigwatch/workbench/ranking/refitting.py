@@ -1,7 +1,9 @@
 """Fits the model with an effect in it, and judges the fit on the recordings held out."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
+from rigwatch.physics.engine.equations import Placement
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit import Fitted, fit_again, fit_model, fit_twice, may_be_better
@@ -27,13 +29,29 @@ def refit(
         row: the effect; its fit and the decision are stored in it.
         fitting: `fit_model` accepts the first minimum, `fit_twice` also searches elsewhere.
     """
-    placements, start = (*base.placements, row.placement), base.train.values() | row.begin()
-    try:
-        row.fitted = fitting(study, data, placements, start, base.train.scale, base=base)
-    except ModelError as error:
-        row.reason, row.trouble = "cannot be fitted", str(error)
+    start, fits, troubles = base.train.values() | row.begin(), list[Fitted](), list[str]()
+    for placement in _orders(base, row):
+        placements = (*base.placements, placement)
+        try:
+            fits.append(fitting(study, data, placements, start, base.train.scale, base=base))
+        except ModelError as error:
+            troubles.append(str(error))
+    if not fits:
+        row.reason, row.trouble = "cannot be fitted", troubles[0]
         return
+    row.fitted = min(fits, key=lambda fitted: fitted.train_error)
     judge_fit(base, row)
+
+
+def _orders(base: Fitted, row: Ranked) -> list[Placement]:
+    """The effect behind those at its port and, where a signal passes them in turn, ahead of them.
+
+    A drive that is late and then saturates is another one than a drive that saturates first.
+    """
+    others = any(placement.port == row.port for placement in base.placements)
+    if row.kind == "force" or not others:
+        return [row.placement]
+    return [row.placement, replace(row.placement, ahead=True)]
 
 
 def fit_each(  # noqa: PLR0917 -- they belong together

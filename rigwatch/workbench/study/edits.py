@@ -23,6 +23,7 @@ def append_effect(study: Study, accepted: Accepted) -> Study:
     """The study with one more effect in its file, values in the parameters' units."""
     written = converted(study, accepted, "from_si")
     table = f'effect = "{accepted.effect}"\nport = "{accepted.port}"\n'
+    table += "ahead = true\n" if accepted.ahead else ""
     table += f"parameters = {_inline(written.parameters)}\n"
     if written.model:
         table += f"model = {_inline(written.model)}\n"

@@ -87,6 +87,10 @@ class Accepted(Section, frozen=True, kw_only=True):
         dict[str, float],
         Meta(description="initial values of the rest of the model, from its accepted fit"),
     ] = field(default_factory=dict)
+    ahead: Annotated[
+        bool,
+        Meta(description="whether a signal passes it before the effects that are listed earlier"),
+    ] = False
 
 
 class StudyFile(Section, frozen=True, kw_only=True):

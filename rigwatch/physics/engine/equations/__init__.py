@@ -45,6 +45,7 @@ from rigwatch.physics.engine.equations.system import (
     Placement,
     System,
     compose,
+    passed_in_turn,
     units_at,
 )
 from rigwatch.physics.engine.equations.variants import excludes, with_variants
@@ -87,6 +88,7 @@ __all__ = [
     "names_in",
     "offered",
     "parse",
+    "passed_in_turn",
     "predicted_outputs",
     "shipped_models",
     "spelt_out",

@@ -2,7 +2,7 @@
 
 Parameters and states of an effect are prefixed by its port and name, such as `load_coulomb_Fc`, so
 the same effect can be at two ports. Effects at a force port are added; effects at a signal port are
-applied in sequence, in the order of placement.
+applied in sequence, in the order of placement unless they are placed ahead.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,11 +33,17 @@ Its symbol in a system is `UNTIL`, so a model can use the name `left` itself.
 
 @dataclass(frozen=True)
 class Placement:
-    """The effect named `name`, at a port."""
+    """The effect named `name`, at a port.
+
+    Attributes:
+        name, effect, port: the effect and its port.
+        ahead: at a signal port, apply it before the effects placed there earlier.
+    """
 
     name: str
     effect: Effect
     port: str
+    ahead: bool = False
 
     @property
     def prefix(self) -> str:
@@ -79,6 +85,15 @@ class System:
     def free(self) -> tuple[str, ...]:
         """Names of the free parameters."""
         return tuple(name for name, p in self.parameters.items() if not p.fixed)
+
+
+def passed_in_turn(placements: Sequence[Placement], port: str) -> list[Placement]:
+    """The effects at a port in the order in which its signal passes them."""
+    found: list[Placement] = []
+    for placement in placements:
+        if placement.port == port:
+            found.insert(0 if placement.ahead else len(found), placement)
+    return found
 
 
 def compose(model: Model, placements: Sequence[Placement] = ()) -> System:
@@ -200,10 +215,9 @@ class _Composer:
         unit = self._port_unit(name, port)
         signal = port.kind != "force"
         value = self._scope.meanings[port.signal] if signal else sympy.Integer(0)
-        for placement in self._placements:
-            if placement.port == name:
-                change = self._effect_value(placement, port, value, unit)
-                value = change if signal else value + change
+        for placement in passed_in_turn(self._placements, name):
+            change = self._effect_value(placement, port, value, unit)
+            value = change if signal else value + change
         return value
 
     def _effect_value(

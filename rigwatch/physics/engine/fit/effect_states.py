@@ -27,6 +27,7 @@ from rigwatch.physics.engine.equations import (
     State,
     System,
     parse,
+    passed_in_turn,
     symbol,
 )
 from rigwatch.wire.arrays import FloatArray
@@ -62,15 +63,28 @@ class Memory:
         self._first = np.array([[state.start for state in effect.states.values()]])
         self._spacing, self._rows = spacing, rows
 
-    def run(self, values: Mapping[str, float]) -> Signals:
-        """Each state by name, shape (nodes,), for given values of the effect's parameters."""
+    def run(self, values: Mapping[str, float], arriving: Signals | None = None) -> Signals:
+        """Each state by name, shape (nodes,).
+
+        Args:
+            values: of the effect's parameters.
+            arriving: signals that replace those given at construction.
+        """
         parameters = self._compiled.vector(dict(values))
         names = list(self._system.states)
+        driving = self._driven_by(arriving) if arriving else self._driving
         run = self._compiled.simulate(
-            self._driving, self._spacing, np.zeros(1, np.int64), len(self._driving),
+            driving, self._spacing, np.zeros(1, np.int64), len(driving),
             initial=self._first, parameters=parameters, substeps=1, rows=self._rows,
         )  # fmt: skip
         return dict(zip(names, run.outputs[0].T, strict=True))
+
+    def _driven_by(self, arriving: Signals) -> FloatArray:
+        columns = [
+            arriving.get(name, own)
+            for name, own in zip(self._system.model.inputs, self._driving.T, strict=True)
+        ]
+        return np.stack(columns, axis=-1)
 
 
 def held_at(model: Model, port: str) -> Hold:
@@ -110,11 +124,51 @@ def _alone(effect: Effect, inputs: list[str], hold: Hold, late: float) -> System
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """The states of one placement and their columns."""
+    """The states of one placement and their columns.
+
+    Attributes:
+        placement: the effect.
+        memory: its states.
+        columns: their indices among the system's states.
+        signals: at the port, before any effect there.
+        before: effects applied to the signal first; their own states are neglected.
+    """
 
     placement: Placement
     memory: Memory
     columns: list[int]
+    signals: Signals
+    before: list[Placement]
+
+    @property
+    def follows_memory(self) -> bool:
+        """Whether what arrives depends on what another effect remembers."""
+        return any(placement.effect.states for placement in self.before)
+
+    def arriving(self, values: Mapping[str, float], dt: float) -> Signals:
+        """The signal as it arrives, with its rate; nothing where no effect stands before."""
+        if not self.before:
+            return {}
+        passed = self.signals["u"]
+        for placement in self.before:
+            if not placement.effect.states:
+                own = _own(placement, values)
+                known = self.signals | {"u": passed}
+                passed = evaluated(placement.effect.expression, known, own, str(placement))
+        return {"u": passed, RATE: np.asarray(np.gradient(passed, dt), np.float64)}
+
+
+def _own(placement: Placement, values: Mapping[str, float]) -> dict[str, float]:
+    """An effect's parameters by its own names."""
+    return {name: values[placement.prefix + name] for name in placement.effect.parameters}
+
+
+def _before(system: System, placement: Placement) -> list[Placement]:
+    """Effects that a signal passes before this one; none at a force, where effects add up."""
+    if system.model.ports[placement.port].kind == "force":
+        return []
+    order = passed_in_turn(system.placements, placement.port)
+    return order[: order.index(placement)]
 
 
 class Recall:
@@ -142,28 +196,23 @@ class Recall:
     ) -> None:
         self._names = list(system.parameters)
         values = dict(zip(self._names, parameters.tolist(), strict=True))
-        order = list(system.states)
-        self._kept = [
-            _Kept(
-                placement,
-                Memory(
-                    placement.effect,
-                    seen(system, placement, inputs, states, dt, values),
-                    dt,
-                    held_at(system.model, placement.port),
-                    late=late_at(system.model, placement.port),
-                ),
-                [order.index(placement.prefix + name) for name in placement.effect.states],
-            )
-            for placement in system.placements
-            if placement.effect.states
-        ]
+        order, self._dt = list(system.states), dt
+        self._kept = []
+        for placement in (each for each in system.placements if each.effect.states):
+            signals = seen(system, placement, inputs, states, dt, values)
+            memory = Memory(
+                placement.effect, signals, dt, held_at(system.model, placement.port),
+                late=late_at(system.model, placement.port),
+            )  # fmt: skip
+            columns = [order.index(placement.prefix + name) for name in placement.effect.states]
+            before = _before(system, placement)
+            self._kept.append(_Kept(placement, memory, columns, signals, before))
         kinds = {name: port.kind for name, port in system.model.ports.items()}
         self.columns = [c for kept in self._kept for c in kept.columns]
         self.exact = [
             c
             for kept in self._kept
-            if kinds[kept.placement.port] == "actuator"
+            if kinds[kept.placement.port] == "actuator" and not kept.follows_memory
             for c in kept.columns
         ]
 
@@ -172,9 +221,9 @@ class Recall:
         values = dict(zip(self._names, parameters.tolist(), strict=True))
         found: dict[int, FloatArray] = {}
         for kept in self._kept:
-            prefix = kept.placement.prefix
-            own = {name: values[prefix + name] for name in kept.placement.effect.parameters}
-            found |= dict(zip(kept.columns, kept.memory.run(own).values(), strict=True))
+            own = _own(kept.placement, values)
+            led = kept.memory.run(own, kept.arriving(values, self._dt))
+            found |= dict(zip(kept.columns, led.values(), strict=True))
         return found
 
 

@@ -1,7 +1,8 @@
 """One row of the table that `make bench` prints, and the table."""
 
 import textwrap
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 HEADINGS = ("", "what", "measured", "bar", "published")
@@ -35,6 +36,15 @@ class Row:
     def verdict(self) -> str:
         """ok, MISS, or nothing where there is no bar."""
         return {True: "ok", False: "MISS", None: ""}[self.passed]
+
+
+def rows_of(name: str, run: Callable[[], list[Row]]) -> list[Row]:
+    """The rows of a benchmark; one that fails is a row that misses its bar."""
+    try:
+        return run()
+    except Exception as error:
+        traceback.print_exc()
+        return [failed(name, error)]
 
 
 def failed(name: str, error: Exception) -> Row:

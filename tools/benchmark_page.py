@@ -10,11 +10,11 @@ from pathlib import Path
 
 import msgspec
 
-from benchmarks.table import Row, as_markdown, ran
+from tools.benchmark_table import Row, as_markdown, ran
 
-HERE = Path(__file__).parent
-RESULTS = HERE / "results.json"
-PAGE = HERE.parent / "docs" / "benchmarks.md"
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "benchmarks" / "results.json"
+PAGE = ROOT / "docs" / "benchmarks.md"
 
 SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     (
@@ -47,6 +47,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         (
             "hidden_effects",
             "hidden_rivals",
+            "chains",
             "hidden_effects_rig",
             "rig_intervals",
             "next_experiment",

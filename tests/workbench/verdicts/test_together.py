@@ -1,0 +1,66 @@
+"""Several effects at once: each is judged beside the others, and what takes their place is said."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.explain.together import several_effects
+from rigwatch.workbench.explain.verdict import judge
+from rigwatch.workbench.ranking.rank import rank
+from rigwatch.workbench.ranking.refitting import unheard
+from sim_plant.oscillator import Hidden, strength_for
+from tests.workbench.simulated import fitted, multisine
+
+FORCE = multisine(np.arange(0.25, 8.0, 0.25), 4.0)
+HIDDEN = ("quadratic_drag", "dead_band", "acceleration_lag")
+LABELS = {"quadratic_drag@load", "dead_band@drive", "lag@acceleration_sensor"}
+
+
+def hiding(*names: str, share: float = 0.1):
+    return fitted(FORCE, tuple(Hidden(n, strength_for(n, FORCE, share)) for n in names), 2e-3)
+
+
+@pytest.fixture(scope="module")
+def three():
+    return hiding(*HIDDEN)
+
+
+@pytest.fixture(scope="module")
+def rows(three):
+    return rank(three.study, three.data, three.base, three.floor)
+
+
+def test_one_of_three_hidden_effects_is_named_with_another(three, rows):
+    alone = judge(three.base, rows, three.floor)
+    assert alone.word == "unknown_effect"
+    found = several_effects(three, rows, alone, unheard)
+    assert found.word == "missing_effect"
+    assert set(found.members) & LABELS
+    assert set(found.second) & LABELS - set(found.members)
+    assert found.best in rows
+    assert found.evidence.left < 0.02
+
+
+def test_without_the_truth_among_them_no_effect_is_named_with_confidence(three, rows):
+    known = {"quadratic_drag", "dead_band", "lag", "delay", "digital_smoothing", "moving_average"}
+    rest = {n: e for n, e in three.study.effects.items() if n not in known}
+    study = dataclasses.replace(three.study, effects=rest)
+    _, verdict = ranking(dataclasses.replace(three, study=study))
+    assert verdict.word in ("unknown_effect", "undetermined")
+
+
+def test_two_simple_effects_are_not_taken_for_one_with_a_shape():
+    bench = hiding("coulomb", "quadratic_drag")
+    _, verdict = ranking(bench)
+    assert verdict.word == "missing_effect"
+    assert {*verdict.members, *verdict.second} & {"coulomb@load", "quadratic_drag@load"}
+    assert "stribeck@load" not in verdict.members
+
+
+def test_an_effect_with_a_shape_of_its_own_is_not_taken_for_two_simple_ones():
+    _, verdict = ranking(hiding("stribeck"))
+    assert verdict.word == "missing_effect"
+    assert "stribeck@load" in verdict.members
+    assert verdict.second == ()
