@@ -372,7 +372,8 @@ def flooded(count: int = 15) -> AlarmManager:
 
 def test_a_flood_says_how_many_and_what_was_first():
     alarms = flooded(10)
-    said = alarms.report("sensor_stuck.ch10", at(2560), active=True)
+    judged = at(2560, value=3.0, low=-2.0, high=2.0)
+    said = alarms.report("sensor_stuck.ch10", judged, active=True)
     (flood,) = (one for one in said if isinstance(one, Alarm))
     assert (flood.name, flood.seq, flood.value, flood.high) == ("alarm_flood", 2560, 11.0, 10.0)
     assert isnan(flood.low)
@@ -583,6 +584,18 @@ def test_after_a_restart_a_flood_still_knows_what_was_first():
         said += new.report(f"sensor_stuck.ch{i}", at(10 + i), active=True)
     flood = next(one for one in said if isinstance(one, Alarm) and one.name == "alarm_flood")
     assert flood.cause.endswith("first out was loss")
+
+
+def test_a_flood_whose_first_alarm_is_not_known_names_none():
+    old = AlarmManager()
+    old.report("loss", at(1), active=True)
+    old.report("disk", at(2), active=True)
+    new = AlarmManager()
+    new.restore(old.take_changes()[-1:])
+    for i in range(11):
+        new.report(f"sensor_stuck.ch{i}", at(10 + i), active=True)
+    (flood,) = (one for one in new.standing() if one.name == "alarm_flood")
+    assert flood.cause == kind_of("alarm_flood").cause
 
 
 def test_nothing_stays_on_the_shelf_longer_than_a_shift_from_the_restart():

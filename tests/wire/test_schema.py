@@ -145,7 +145,7 @@ def described(message: descriptor_pb2.DescriptorProto) -> list[str]:
     lines = [f"{message.name}{' (entry of a map)' * message.options.map_entry}"]
     for field in message.field:
         word = kinds.Label.Name(field.label)[6:].lower()
-        kind = field.type_name or kinds.Type.Name(field.type)[5:].lower()
+        kind = f"{kinds.Type.Name(field.type)[5:].lower()} {field.type_name}".strip()
         lines.append(f"    {field.number} {field.name}: {word} {kind}")
     return lines + [f"    {line}" for part in message.nested_type for line in described(part)]
 

@@ -196,9 +196,9 @@ def test_a_refinement_needs_a_reason_of_its_own() -> None:
 
 
 def test_errors_that_differ_by_where_the_fits_stopped_are_equal() -> None:
-    for error, joins in ((1.00009, True), (1.00011, False)):
-        other = row("stribeck@load", error, jitter=0.0)
-        assert members(other, same()) == ("stribeck@load",) * joins
+    for ratio, joins in ((1.00009, True), (1.00011, False)):
+        other = row("stribeck@load", 1.05 * ratio, jitter=0.0)
+        assert members(other, same(error=1.05)) == ("stribeck@load",) * joins
 
 
 # ---- other physics ----------------------------------------------------------------------------
@@ -288,6 +288,20 @@ def test_along_a_healthy_motion_a_late_drive_may_be_a_late_sensor(
     cosine = given.pop("cosine")
     assert rivals(row("lag@x", **given), cosine, MOTION, error=2.0) == expected
     assert not rivals(row("lag@x", **given), cosine, PERIODS, error=2.0)
+
+
+def test_a_late_drive_must_gain_nearly_as_much_and_look_similar() -> None:
+    late = row("lag@x", 2.5, kind="sensor", gain=1.5)
+    assert not rivals(late, 0.81, MOTION, error=2.0, gain=2.0)
+    assert rivals(late, 0.81, MOTION, error=2.0, gain=1.8)
+    assert judge(base(8.0), [best(error=2.0), late], MOTION).rivals == (), "it looks like nothing"
+
+
+def test_all_rivals_are_named() -> None:
+    first = best(cosines={"lag@x": 0.9, "gap@y": 0.9})
+    found = judge(base(), [first, row("lag@x"), row("gap@y")], PERIODS)
+    assert found.rivals == ("lag@x", "gap@y")
+    assert found.text == "coulomb@load and lag@x, gap@y explain this recording equally well"
 
 
 def test_a_rival_is_named_once() -> None:
