@@ -110,7 +110,8 @@ def test_run_info_is_signed_by_this_version_and_dated_now() -> None:
     assert (run.rig, run.sample_rate_hz, run.notes) == ("rig", 128.0, "n")
     assert (run.configuration, run.configuration_sha256) == ("a = 1", "ab")
     assert run.software == f"rigwatch {__version__}"
-    plain = run_info("rig", 128.0)
+    plain = run_info("rig", 128.0, t_ns=5)
+    assert plain.t_ns == 5
     assert (plain.notes, plain.configuration, plain.configuration_sha256) == ("", "", "")
 
 
@@ -189,9 +190,9 @@ def test_many_waiting_samples_are_flushed_without_being_told(tmp_path: Path) -> 
             assert writer.pending == []
 
 
-@pytest.mark.parametrize(("sync", "waits"), [(True, 3), (False, 0)])
+@pytest.mark.parametrize(("told", "waits"), [({}, 3), ({"sync": True}, 3), ({"sync": False}, 0)])
 def test_each_flush_waits_for_the_disk_unless_told_otherwise(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sync: bool, waits: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: dict[str, bool], waits: int
 ) -> None:
     synced: list[int] = []
     whole, fsync = tmp_path / "a.mcap", os.fsync
@@ -201,7 +202,7 @@ def test_each_flush_waits_for_the_disk_unless_told_otherwise(
         synced.append(whole.stat().st_size)
 
     monkeypatch.setattr(os, "fsync", watched)
-    with SessionWriter(whole, RUN, sync=sync) as writer:
+    with SessionWriter(whole, RUN, **told) as writer:
         writer.write(samples(0, 8))
         writer.flush()
     assert len(synced) == waits
@@ -224,6 +225,17 @@ def _fail_while_writing(path: Path) -> None:
     with SessionWriter(path, RUN) as writer:
         writer.write(samples(0, 8))
         raise ZeroDivisionError
+
+
+def test_a_closed_file_is_given_back_to_the_kernel(tmp_path: Path) -> None:
+    def held() -> set[str]:
+        return {os.readlink(one) for one in Path("/proc/self/fd").iterdir() if one.is_symlink()}
+
+    path = tmp_path / "a.mcap"
+    writer = SessionWriter(path, RUN)
+    assert str(path) in held()
+    writer.close()
+    assert str(path) not in held()
 
 
 def test_others_may_read_a_session_and_not_write_it(tmp_path: Path) -> None:
