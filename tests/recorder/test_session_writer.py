@@ -229,7 +229,7 @@ def _fail_while_writing(path: Path) -> None:
 
 def test_a_closed_file_is_given_back_to_the_kernel(tmp_path: Path) -> None:
     def held() -> set[str]:
-        return {os.readlink(one) for one in Path("/proc/self/fd").iterdir() if one.is_symlink()}
+        return {str(one.readlink()) for one in Path("/proc/self/fd").iterdir() if one.is_symlink()}
 
     path = tmp_path / "a.mcap"
     writer = SessionWriter(path, RUN)
