@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from rigwatch.demo.rig_file import write_rig_file
-from rigwatch.wire.host.ports import endpoint_address
+from rigwatch.wire.host.ports import endpoint_address, free_port
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.typed_files.shipped import find_config
 from tests.waiting import eventually
@@ -79,9 +79,18 @@ def config(tmp_path: Path) -> Path:
     return write_rig_file(find_config("demo.toml"), tmp_path, "web")
 
 
+def on_a_port_of_its_own(config: Path) -> Path:
+    """The rig where no other test's demo is: a demo takes its usual port if that is free."""
+    bus = endpoint_address(load_rig(config).bus.listen)
+    assert bus is not None
+    text = config.read_text(encoding="utf-8").replace(str(bus[1]), str(free_port()))
+    config.write_text(text, encoding="utf-8")
+    return config
+
+
 @pytest.fixture
 def rig(config: Path) -> Iterator[Rig]:
-    running = Rig(config, *WITHOUT)
+    running = Rig(on_a_port_of_its_own(config), *WITHOUT)
     yield running
     if running.process.poll() is None:
         running.process.terminate()

@@ -98,8 +98,9 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = believed(bench, rows)
     along = bench.data.along_motion
-    if along:
-        verdict = _along_motion(bench, rows, verdict, progress)
+    # Sets of effects are judged by whether only noise is left, which a rough model never reaches.
+    if along or bench.study.model.rough:
+        verdict = _by_pairs(bench, rows, verdict, progress)
     elif alone_is_not_enough(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
     verdict = with_motion_sensor(bench, verdict)
@@ -113,11 +114,11 @@ def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], V
     return rows, verdict
 
 
-def _along_motion(
-    bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Progress
-) -> Verdict:
+def _by_pairs(bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Progress) -> Verdict:
     """The verdict after trying pairs, if one effect alone leaves a large residual."""
-    much = verdict.word == "unknown_effect" or leaves_much(bench.base, bench.floor, verdict)
+    much = verdict.word == "unknown_effect" or (
+        bench.data.along_motion and leaves_much(bench.base, bench.floor, verdict)
+    )
     if not much or verdict.best is None:
         return verdict
     progress(f"{verdict.best.label} leaves a large residual: trying two effects at once")
