@@ -12,6 +12,7 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.page.scale import Scale, limits
 from rigwatch.page.svg import Plot
+from rigwatch.workbench.explain.verdict_calibration import LATER, later_doubt
 from rigwatch.workbench.report.html_report import gather
 from rigwatch.workbench.report.sections import headline
 from rigwatch.workbench.study.study import Study
@@ -124,6 +125,12 @@ def test_an_undetermined_verdict_is_a_whole_sentence(
         material.explanation, verdict="undetermined", rivals=rivals, also=[], ranking=[best]
     )
     assert headline(replace(material, explanation=found)).endswith(said)
+
+
+def test_the_doubt_of_a_later_step_is_that_of_later_steps(study: Study) -> None:
+    found = gather(study).explanation
+    assert found.like_this == LATER
+    assert found.wrong_probability == later_doubt()
 
 
 def test_an_output_that_cannot_be_written(

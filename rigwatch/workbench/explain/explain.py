@@ -13,7 +13,7 @@ from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import leaves_much, modest, not_alone
 from rigwatch.workbench.explain.together import alone_is_not_enough, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
-from rigwatch.workbench.explain.verdict_calibration import seen
+from rigwatch.workbench.explain.verdict_calibration import LATER, later_doubt, seen
 from rigwatch.workbench.fit import Value, as_written, values
 from rigwatch.workbench.ranking import Progress, Ranked, rank, rank_all, unheard
 from rigwatch.workbench.study import Study
@@ -149,6 +149,12 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     told = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
     ]
+    probability: float | None = verdict.doubt
+    similar = seen(verdict.word, verdict.evidence)
+    if bench.data.along_motion:
+        probability, similar = None, (0, 0)
+    elif bench.study.file.effects:
+        probability, similar = later_doubt(), LATER
     return Explanation(
         verdict.word,
         verdict.text,
@@ -157,8 +163,8 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         rivals,
         list(verdict.second),
         experiment,
-        None if bench.data.along_motion else verdict.doubt,
-        (0, 0) if bench.data.along_motion else seen(verdict.word, verdict.evidence),
+        probability,
+        similar,
     )
 
 
