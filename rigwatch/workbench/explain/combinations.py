@@ -14,6 +14,7 @@ from rigwatch.workbench.data import NoiseFloor, from_residual
 from rigwatch.workbench.explain.verdict import LITTLE_MORE, MUCH_WORSE
 from rigwatch.workbench.fit import Fitted, fit_model
 from rigwatch.workbench.ranking import (
+    MATERIAL,
     STEP,
     Progress,
     Ranked,
@@ -97,7 +98,8 @@ def combinations(
         free: parameters that a fit of a set may move.
     """
     found = [Combination((row,)) for row in rows if row.fitted is not None]
-    level = _carried_on([each for each in found if each.free < free])
+    first = [each for each in found if each.free < free and _lowers(each.fitted, bench.base)]
+    level = _carried_on(first)
     for size in range(2, MOST + 1):
         if not level:
             break
@@ -107,6 +109,11 @@ def combinations(
         if any(leaves_noise(bench, each.fitted) for each in level):
             break
     return found
+
+
+def _lowers(larger: Fitted, smaller: Fitted) -> bool:
+    """Whether an effect lowers the training error by as much as it must to be accepted."""
+    return larger.train_error <= (1 - MATERIAL) * smaller.train_error
 
 
 def _carried_on(level: Sequence[Combination]) -> list[Combination]:
@@ -122,7 +129,7 @@ def _larger(bench: Bench, level: Sequence[Combination], free: int) -> list[Combi
             if known.labels | {row.label} in found or known.free + row.free > free:
                 continue
             fit_beside(bench, known, row)
-            if row.fitted is not None:
+            if row.fitted is not None and _lowers(row.fitted, known.fitted):
                 found[known.labels | {row.label}] = Combination((*known.rows, row))
     return list(found.values())
 

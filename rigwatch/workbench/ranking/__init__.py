@@ -4,7 +4,7 @@
 (`refitting`) and judged by the held-out error (`acceptance`). `rank` runs all of these.
 """
 
-from rigwatch.workbench.ranking.acceptance import EXPLAINED, STEP, judge_fit, left_over
+from rigwatch.workbench.ranking.acceptance import EXPLAINED, MATERIAL, STEP, judge_fit, left_over
 from rigwatch.workbench.ranking.candidates import candidates, shapes_of
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import rank
@@ -15,6 +15,7 @@ from rigwatch.workbench.ranking.worth_a_fit import worth_a_fit
 
 __all__ = [
     "EXPLAINED",
+    "MATERIAL",
     "SAME",
     "SIMILAR",
     "STEP",
