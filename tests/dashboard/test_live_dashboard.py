@@ -14,12 +14,13 @@ import pytest
 
 from rigwatch.dashboard.board import palette
 from rigwatch.dashboard.feed import Feed
-from rigwatch.dashboard.viewer.viewer import answers, free_port
+from rigwatch.dashboard.viewer.viewer import answers
 from rigwatch.wire.bus.alarm_list import serve_alarm_list
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.bus.zenoh_transport import open_router
+from rigwatch.wire.host.ports import free_port
 from rigwatch.wire.messages.message_types import Alarm, EstimateBlock, Health, SampleBlock
 from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, HEALTH, SAMPLES
 from rigwatch.wire.rig_config import RigConfig, load_rig

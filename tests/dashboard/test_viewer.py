@@ -13,7 +13,8 @@ import pytest
 
 from rigwatch.commands import main
 from rigwatch.dashboard.viewer.opening import open_viewer
-from rigwatch.dashboard.viewer.viewer import Viewer, ViewerError, answers, free_port
+from rigwatch.dashboard.viewer.viewer import Viewer, ViewerError, answers
+from rigwatch.wire.host.ports import free_port
 from rigwatch.wire.rig_config import DashboardSection
 from tests.waiting import eventually
 

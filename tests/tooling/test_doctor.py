@@ -10,7 +10,7 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.doctor.machine import check_disk, check_kernels, check_machine
 from rigwatch.doctor.rig import check_rig, check_serial
-from rigwatch.wire.host.ports import endpoint_address, free_port, is_free
+from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 
 RIG = """
 [rig]
@@ -110,3 +110,4 @@ def test_endpoints_are_taken_apart(endpoint: str, address: tuple[str, int] | Non
 def test_free_and_taken_ports_are_told_apart(taken_port: int) -> None:
     assert not is_free("127.0.0.1", taken_port)
     assert is_free("127.0.0.1", free_port())
+    assert len(set(free_ports(200))) == 200

@@ -18,6 +18,7 @@ from typing import IO, Literal, Self
 
 from rigwatch.dashboard.viewer.viewer_page import HOST, Page
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.host import free_ports
 
 _PICTURE = "1600x1000"
 _START_TIMEOUT = 30.0
@@ -63,11 +64,12 @@ class Viewer:
         self, kind: Kind, port: int = 0, web_port: int = 0, memory: Memory = LIVE_MEMORY
     ) -> None:
         self.kind, self._memory = kind, memory
-        self.port = port or free_port()
-        self.web_port = (web_port or free_port()) if kind == "web" else 0
+        free = free_ports(3, HOST)
+        self.port = port or free[0]
+        self.web_port = (web_port or free[1]) if kind == "web" else 0
         for taken in filter(answers, filter(None, (self.port, self.web_port))):
             raise ViewerError(f"port {taken} is taken: end what listens there or configure another")
-        self._page_source = free_port() if kind == "web" else 0
+        self._page_source = free[2] if kind == "web" else 0
         self._page: Page | None = None
         self._words: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
         self._process = subprocess.Popen(
@@ -172,13 +174,6 @@ def answers(port: int) -> bool:
     with socket.socket() as probe:
         probe.settimeout(0.5)
         return probe.connect_ex((HOST, port)) == 0
-
-
-def free_port() -> int:
-    """A free port of this machine."""
-    with socket.socket() as probe:
-        probe.bind((HOST, 0))
-        return int(probe.getsockname()[1])
 
 
 def _binary() -> Path:

@@ -2,7 +2,7 @@
 
 from rigwatch.wire.host.ending import set_at_signal
 from rigwatch.wire.host.heartbeat import Heartbeat
-from rigwatch.wire.host.ports import endpoint_address, free_port, is_free
+from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
 from rigwatch.wire.host.whole_file import replace_file, write_through
 
@@ -13,6 +13,7 @@ __all__ = [
     "Heartbeat",
     "endpoint_address",
     "free_port",
+    "free_ports",
     "is_free",
     "prepare_for_real_time",
     "raise_priority",
