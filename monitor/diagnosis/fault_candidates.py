@@ -16,6 +16,7 @@ from monitor.diagnosis.rig_ports import RigPorts, rig_ports
 from monitor.model import RigModel
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Effect, Port, compose
+from rigwatch.physics.engine.fit import filled
 from rigwatch.physics.engine.score import (
     Candidate,
     Projector,
@@ -127,13 +128,7 @@ def _counted(evidence: Evidence, model: RigModel) -> NDArray[np.bool_]:
 
 
 def _bridged(signals: FloatArray) -> FloatArray:
-    at = np.arange(len(signals))
-    bridged = np.zeros_like(signals)
-    for column, signal in zip(bridged.T, signals.T, strict=True):
-        good = np.isfinite(signal)
-        if good.any():
-            column[:] = np.interp(at, at[good], signal[good])
-    return bridged
+    return np.stack([filled(signal) for signal in signals.T], axis=1)
 
 
 def _candidates(ports: RigPorts, effects: Mapping[str, Effect], model: RigModel) -> list[Candidate]:

@@ -2,6 +2,7 @@
 
 from rigwatch.commands.common import watched
 from rigwatch.commands.common.drawing import ready_to_draw, show_until_closed
+from rigwatch.commands.common.log_arguments import add_log_columns
 from rigwatch.commands.common.marks import marks_of
 from rigwatch.commands.common.session_files import (
     add_session_and_target,
@@ -17,6 +18,7 @@ from rigwatch.commands.common.session_files import (
 from rigwatch.commands.common.shipped_argument import file_or_name
 
 __all__ = [
+    "add_log_columns",
     "add_session_and_target",
     "add_span",
     "check_folder",

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import file_or_name, print_json, say
+from rigwatch.commands.common import add_log_columns, file_or_name, print_json, say
 
 if TYPE_CHECKING:
     from rigwatch.wire.exchange import ImportMapping
@@ -26,15 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TOML",
         help="column mapping, or the name of a shipped one",
     )
-    parser.add_argument(
-        "--map",
-        action="append",
-        default=[],
-        metavar="CHANNEL=COLUMN[UNIT]",
-        help="a channel, its column and the column's unit; also COLUMN*FACTOR+OFFSET[UNIT]",
-    )
-    parser.add_argument("--time", metavar="COLUMN[UNIT]", help="time column")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="sample rate, without a time")
+    add_log_columns(parser)
     parser.add_argument("--device", help="the device's name in the session")
     parser.add_argument("--rig", help="the rig's id in the session")
     parser.add_argument(
@@ -42,9 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--delimiter", help="separator of CSV cells: auto, whitespace, or a character"
-    )
-    parser.add_argument(
-        "--columns", metavar="A,B,…", help="column names, if there is no header line"
     )
     parser.add_argument("--start", metavar="TIME", help="ISO time of zero in the time column")
     parser.add_argument(

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import file_or_name, print_json, say
+from rigwatch.commands.common import add_log_columns, file_or_name, print_json, say
 
 if TYPE_CHECKING:
     from rigwatch.workbench.steps import Logs
@@ -43,18 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="a parameter of the model that you know, in its unit",
     )
-    parser.add_argument(
-        "--map",
-        action="append",
-        default=[],
-        metavar="CHANNEL=COLUMN[UNIT]",
-        help="a channel, its column and unit, where headers do not tell",
-    )
-    parser.add_argument("--time", metavar="COLUMN[UNIT]", help="the column of the time")
-    parser.add_argument("--rate", type=float, metavar="HZ", help="sample rate, without a time")
-    parser.add_argument(
-        "--columns", metavar="A,B,…", help="names of columns, without a header line"
-    )
+    add_log_columns(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

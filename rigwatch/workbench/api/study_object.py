@@ -37,7 +37,7 @@ from rigwatch.workbench.steps import (
     try_undo,
 )
 from rigwatch.workbench.study import Study as Opened
-from rigwatch.workbench.study import create, ledger, open_study
+from rigwatch.workbench.study import create, ledger, open_study, stands_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -138,7 +138,7 @@ class Study:
 
     def signals(self, *, held_out: bool = True) -> NamedArrays:
         """Time [s], and for each output what was measured, modelled, and the residual."""
-        stage = self._stages()[-1]
+        stage = self._current()
         found = signals(stage, held_out=held_out)
         columns = NamedArrays(time=found.time)
         for index, name in enumerate(stage.bench.study.model.outputs):
@@ -162,13 +162,13 @@ class Study:
         """Measured and modelled output, and the residual below with the noise floor."""
         from rigwatch.workbench.api import plots
 
-        return plots.signals(self._stages()[-1], channel)
+        return plots.signals(self._current(), channel)
 
     def plot_where(self, channel: str = "") -> "Figure":
         """Mean residual over position and velocity, or over time if the model has no motion."""
         from rigwatch.workbench.api import plots
 
-        return plots.where(self._stages()[-1], channel)
+        return plots.where(self._current(), channel)
 
     def plot_steps(self) -> "Figure":
         """Errors of each step against the noise floor."""
@@ -179,8 +179,13 @@ class Study:
     def _opened(self) -> Opened:
         return open_study(self.folder)
 
+    def _current(self) -> Stage:
+        study = self._opened()
+        return Stage("", self._warm.bench(study), self._warm.comparison(study))
+
     def _stages(self) -> list[Stage]:
-        return stages(self._opened())
+        study = self._opened()
+        return self._warm.get(("stages", stands_on(study)), lambda: stages(study))
 
     def __repr__(self) -> str:
         file = self._opened().file

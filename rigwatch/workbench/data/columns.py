@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rigwatch.physics.engine.fit import filled
 from rigwatch.wire.arrays import FloatArray
 
 
@@ -27,9 +28,5 @@ class Columns:
 
 
 def bridged(signal: FloatArray) -> FloatArray:
-    """The signal with gaps (NaN) interpolated linearly."""
-    good = np.isfinite(signal)
-    if good.all() or not good.any():
-        return signal
-    at = np.arange(len(signal))
-    return np.interp(at, at[good], signal[good])
+    """The signal with gaps (NaN) interpolated linearly; unchanged if it has no valid sample."""
+    return filled(signal) if np.isfinite(signal).any() else signal

@@ -128,7 +128,7 @@ def _larger(bench: Bench, level: Sequence[Combination], free: int) -> list[Combi
         for row in beside(bench, known):
             if known.labels | {row.label} in found or known.free + row.free > free:
                 continue
-            fit_beside(bench, known, row)
+            _fit_beside(bench, known.rows, known.fitted, row)
             if row.fitted is not None and _lowers(row.fitted, known.fitted):
                 found[known.labels | {row.label}] = Combination((*known.rows, row))
     return list(found.values())
@@ -141,9 +141,9 @@ def beside(bench: Bench, known: Combination) -> list[Ranked]:
     return worth_a_fit(every, "dynamic" if study.model.states else "static")[:BRANCHES]
 
 
-def fit_beside(bench: Bench, known: Combination, row: Ranked) -> None:
-    """Fit an effect beside a set."""
-    refit(with_rows(bench.study, known.rows), bench.data, known.fitted, row, fit_model)
+def _fit_beside(bench: Bench, rows: Sequence[Ranked], fitted: Fitted, row: Ranked) -> None:
+    """Fit an effect beside others, from the fit with these."""
+    refit(with_rows(bench.study, rows), bench.data, fitted, row, fit_model)
 
 
 def without(bench: Bench, whole: Combination, left_out: Ranked) -> Combination | None:
@@ -152,7 +152,7 @@ def without(bench: Bench, whole: Combination, left_out: Ranked) -> Combination |
     fitted, rows = bench.base, list[Ranked]()
     for row in rest:
         own = replace(row)
-        refit(with_rows(bench.study, rows), bench.data, fitted, own, fit_model)
+        _fit_beside(bench, rows, fitted, own)
         if own.fitted is None:
             return None
         fitted, rows = own.fitted, [*rows, own]

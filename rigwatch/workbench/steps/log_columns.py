@@ -60,15 +60,17 @@ def matched(columns: Sequence[str], model: Model, given: Mapping[str, str]) -> M
         if not column.units:
             remarks.append(f"{column.column}: no unit in its header, assumed {unit}")
     measured = {s.channel or name: s for name, s in signals.items() if name not in missing}
-    rates = {s.channel or name: _rate(s, measured) for name, s in missing.items()}
+    rates = dict[str, tuple[str, int]]()
     for name, signal in missing.items():
-        if rates[signal.channel or name] is None:
-            raise ModelError(_unknown(name, signal.channel or name, signal, columns))
+        channel = signal.channel or name
+        made = _rate(signal, measured)
+        if made is None:
+            raise ModelError(_unknown(name, channel, signal, columns))
+        rates[channel] = made
     if time is not None and not time.units:
         remarks.append(f"{time.column}: no unit in its header, assumed s")
     told = f"{time.column}[{_time_unit(time)}]" if time else ""
-    made = {channel: rate for channel, rate in rates.items() if rate is not None}
-    return Matched(found, told, made, tuple(remarks))
+    return Matched(found, told, rates, tuple(remarks))
 
 
 def _time_unit(time: Header) -> str:

@@ -38,6 +38,9 @@ from rigwatch.workbench.study import (
 
 WORSE = 1.01
 """Largest ratio of the refit's held-out error to the accepted fit's at which both are the same."""
+KEPT = 0.9
+"""Smallest share of the accepted fit's gain that a refit must keep. Parameters that come from a
+healthy recording are determined anew with the effect; a short one leaves them a little loose."""
 
 
 @dataclass(frozen=True)
@@ -114,30 +117,37 @@ def try_add(
     bench, before = warm.bench(study), warm.comparison(study)
     row = try_effect(study, effect, where, progress, warm)
     assert row.fitted is not None
-    errors = (row.fitted.train_error, row.fitted.held_out_error)
-    words = (
-        f"{row.label}: held-out error {before.held_out_error:.4g} → {errors[1]:.4g} {before.unit}"
-    )
+    found = row.fitted.held_out_error
     if not row.accepted and not anyway:
-        return _refused(study, row, before, f"{words}: {row.reason}")
+        return _refused(study, row, before, f"{_falls(row, before, found)}: {row.reason}")
     accepted = whole(row)
     # Hold and horizon are kept, so that errors before and after refer to the same inputs.
     held = with_horizon_of(held_as(study, bench.study.holds), bench.study)
     changed = append_effect(keep_holds(held), accepted)
     progress(f"refitting with {row.label}")
     after = warm.comparison(changed)
-    if not (led_back(errors[1], after.held_out_error, after.noise_floor) or anyway):
-        reason = f"refitted, it leaves {after.held_out_error:.4g} {after.unit}"
-        row = replace(row, reason=reason)
-        return _refused(study, row, before, f"{words}, but {row.reason}")
+    again = after.held_out_error
+    if not (keeps_gain(before.held_out_error, found, again, after.noise_floor) or anyway):
+        row = replace(row, reason=f"refitted, it leaves {again:.4g} {after.unit}")
+        return _refused(study, row, before, f"{_falls(row, before, found)}, but {row.reason}")
     line = {"parameters": accepted.parameters, "model_parameters": accepted.model}
-    change = Change("add", effect, where, before, after, errors, words)
+    errors = (after.train_error, again)
+    change = Change("add", effect, where, before, after, errors, _falls(row, before, again))
     return Trial(study, changed, change, _which(change) | line | _numbers(after))
 
 
-def led_back(accepted: float, again: float, floor: float) -> bool:
-    """Whether a refit matches the accepted fit, or ends below the noise floor."""
-    return again <= max(WORSE * accepted, floor)
+def _falls(row: Ranked, before: Comparison, after: float) -> str:
+    return f"{row.label}: held-out error {before.held_out_error:.4g} → {after:.4g} {before.unit}"
+
+
+def keeps_gain(before: float, accepted: float, again: float, floor: float) -> bool:
+    """Whether a refit keeps the gain of the accepted fit, or ends below the noise floor.
+
+    Args:
+        before, accepted, again: held-out errors without the effect, with it, and refitted with it.
+        floor: the noise floor, in the same unit.
+    """
+    return again <= max(WORSE * accepted, before - KEPT * (before - accepted), floor)
 
 
 def try_undo(study: Study, progress: Progress = unheard, warm: Warm | None = None) -> Trial:

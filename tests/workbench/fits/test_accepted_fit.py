@@ -11,7 +11,7 @@ from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.ranking.ranked import accepted_from
 from rigwatch.workbench.steps.change import add, undo
 from rigwatch.workbench.steps.ledger_replay import replay
-from rigwatch.workbench.steps.trial import led_back
+from rigwatch.workbench.steps.trial import keeps_gain
 from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.machine import studied
 
@@ -77,10 +77,21 @@ def test_a_step_that_gets_worse_when_it_is_fitted_again_is_refused(
     assert (study.folder / "study.toml").read_bytes() == before
 
 
-@pytest.mark.parametrize(("left", "same"), [(1.009, True), (1.02, False)])
-def test_a_fit_that_leaves_more_than_noise_must_be_found_again(left: float, same: bool) -> None:
-    assert led_back(1.0, left, floor=0.5) is same
-    assert led_back(1.0, left, floor=1.1)
+@pytest.mark.parametrize(("left", "kept"), [(1.009, True), (1.09, True), (1.2, False)])
+def test_a_refit_must_keep_the_gain_or_end_below_the_floor(left: float, kept: bool) -> None:
+    assert keeps_gain(2.0, 1.0, left, floor=0.5) is kept
+    assert keeps_gain(2.0, 1.0, left, floor=1.3)
+
+
+def test_a_refit_of_a_small_gain_may_differ_by_rounding() -> None:
+    assert keeps_gain(1.04, 1.0, 1.009, floor=0.5)
+    assert not keeps_gain(1.04, 1.0, 1.03, floor=0.5)
+
+
+def test_the_step_tells_the_error_of_the_model_that_it_keeps(study: Study) -> None:
+    change = add(study, "constant_force")
+    assert change.tried == (change.after.train_error, change.after.held_out_error)
+    assert f"→ {change.after.held_out_error:.4g} " in change.text
 
 
 def test_an_elective_effect_is_not_ranked_and_may_be_added(study: Study) -> None:

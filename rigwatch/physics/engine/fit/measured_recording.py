@@ -21,7 +21,7 @@ from rigwatch.physics.engine.equations import (
     predicted_outputs,
 )
 from rigwatch.physics.engine.fit.decimation import Thinning
-from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.physics.engine.fit.recording import Recording, filled
 from rigwatch.physics.engine.fit.smoothing import best_width, flat_to, smoothed
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
@@ -79,7 +79,7 @@ def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ())
         longest = max(np.split(channels[channel], cut), key=len)
         if not np.isfinite(longest).any():
             raise ModelError(f"{model.name}: found no valid sample of {channel!r}")
-        found[channel] = best_width(_bridged(longest), order)
+        found[channel] = best_width(filled(longest), order)
     return found
 
 
@@ -135,19 +135,8 @@ def _channels(model: Model, recording: Recording) -> dict[str, FloatArray]:
 def _smoothed_parts(
     signal: FloatArray, dt: float, width: int, order: int, cut: Sequence[int]
 ) -> FloatArray:
-    pieces = [smoothed(_bridged(piece), dt, width, order) for piece in np.split(signal, cut)]
+    pieces = [smoothed(filled(piece), dt, width, order) for piece in np.split(signal, cut)]
     return np.concatenate(pieces)
-
-
-def _bridged(signal: FloatArray) -> FloatArray:
-    """The signal with gaps interpolated linearly; zeros if it has no valid sample."""
-    good = np.isfinite(signal)
-    if good.all():
-        return signal
-    if not good.any():
-        return np.zeros_like(signal)
-    at = np.arange(len(signal))
-    return np.interp(at, at[good], signal[good])
 
 
 def _whole_kernel(signal: FloatArray, width: int, cut: Sequence[int]) -> BoolArray:

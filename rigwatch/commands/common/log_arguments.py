@@ -1,0 +1,19 @@
+"""Options of every command that reads a foreign log."""
+
+import argparse
+
+
+def add_log_columns(parser: argparse.ArgumentParser) -> None:
+    """How columns of a log become channels: `map`, `time`, `rate` and `columns`."""
+    parser.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        metavar="CHANNEL=COLUMN[UNIT]",
+        help="a channel, its column and the column's unit; also COLUMN*FACTOR+OFFSET[UNIT]",
+    )
+    parser.add_argument("--time", metavar="COLUMN[UNIT]", help="time column")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="sample rate, without a time")
+    parser.add_argument(
+        "--columns", metavar="A,B,…", help="column names, if there is no header line"
+    )
