@@ -60,15 +60,16 @@ class Explained:
 def explained(rig: RigFolder, model: str) -> Explained:
     """Explains every recording of `explain` with the base `model` and counts."""
     found = Explained()
-    rig.session("explain", "healthy")
     for name, told in rig.truth("explain").items():
         if told["what"] != "healthy":
-            rig.session("explain", name)
-            _judge(found, name, told, *_explanation(rig, name, model))
+            _judge(found, name, told, *explanation(rig, name, model))
     return found
 
 
-def _explanation(rig: RigFolder, name: str, model: str) -> tuple[dict[str, Any], str]:
+def explanation(rig: RigFolder, name: str, model: str) -> tuple[dict[str, Any], str]:
+    """What `rigwatch explain` says of a recording; a failure in words if it says nothing."""
+    rig.session("explain", "healthy")
+    rig.session("explain", name)
     folder = rig.work / "explain"
     study, template = folder / f"study_{name}_{model}", folder / f"{name}_{model}.toml"
     shutil.rmtree(study, ignore_errors=True)
@@ -77,6 +78,12 @@ def _explanation(rig: RigFolder, name: str, model: str) -> tuple[dict[str, Any],
     if made.returncode:
         return {}, made.stderr.strip()[-200:]
     return answer("explain", study)
+
+
+def named(said: dict[str, Any]) -> tuple[dict[str, Any], str]:
+    """The first of the ranking, and the names of it, its class and of what acts beside it."""
+    top = said["ranking"][0] if said["ranking"] else {"effect": "", "port": "", "class": []}
+    return top, " ".join([f"{top['effect']}@{top['port']}", *top["class"], *said["also"]])
 
 
 def is_right(what: str, verdict: str, names: str) -> bool:
@@ -101,8 +108,7 @@ def _judge(
         found.tally.count("right", right=False)
         found.lines.append(f"BAD {name:26s} {failed}")
         return
-    top = said["ranking"][0] if said["ranking"] else {"effect": "", "port": "", "class": []}
-    names = " ".join([f"{top['effect']}@{top['port']}", *top["class"], *said["also"]])
+    top, names = named(said)
     right = is_right(what, said["verdict"], names)
     found.tally.count("right", right)
     found.wrong += said["verdict"] == "missing_effect" and not right
@@ -117,11 +123,21 @@ def _judge(
 
 def _strength(found: Explained, told: dict[str, Any], top: dict[str, Any]) -> str:
     """Counts whether the strength is close to the truth and in its interval, and says it."""
+    strength = strength_of(told, top)
+    if strength is None:
+        return ""
+    key, true, value, low, high = strength
+    found.tally.count("strength close", abs(value / true - 1.0) <= CLOSE)
+    found.tally.count("strength in interval", low <= true <= high)
+    return f"{key} {value:.3g} ({low:.3g} to {high:.3g}), truth {true:.3g}"
+
+
+def strength_of(
+    told: dict[str, Any], top: dict[str, Any]
+) -> tuple[str, float, float, float, float] | None:
+    """What was hidden, its strength, the strength that was found, and its interval."""
     for key, true in told.get("hidden", {}).items():
         for symbol, figure in top.get("parameters", {}).items():
             if symbol.rpartition(".")[2] == STRENGTHS.get(key):
-                low, high = figure["interval"]
-                found.tally.count("strength close", abs(figure["value"] / true - 1.0) <= CLOSE)
-                found.tally.count("strength in interval", low <= true <= high)
-                return f"{key} {figure['value']:.3g} ({low:.3g} to {high:.3g}), truth {true:.3g}"
-    return ""
+                return key, true, figure["value"], *figure["interval"]
+    return None

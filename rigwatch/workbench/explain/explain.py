@@ -13,7 +13,13 @@ from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import leaves_much, modest, not_alone
 from rigwatch.workbench.explain.together import alone_is_not_enough, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
-from rigwatch.workbench.explain.verdict_calibration import LATER, later_doubt, seen
+from rigwatch.workbench.explain.verdict_calibration import (
+    LATER,
+    doubt_along,
+    later_doubt,
+    seen,
+    seen_along,
+)
 from rigwatch.workbench.fit import Value, as_written, values
 from rigwatch.workbench.ranking import Progress, Ranked, rank, rank_all, unheard
 from rigwatch.workbench.study import Study
@@ -58,7 +64,7 @@ class Explanation:
         next_experiment: an excitation that separates the rivals; None if there are none, or if
             none is found.
         wrong_probability: probability that the verdict is wrong, calibrated on simulated cases;
-            None for a model along its measured motion, as all simulated cases were free runs.
+            None if a later step is judged along the measured motion, or if no case was like it.
         like_this: number of simulated cases with a similar verdict, and how many were wrong.
     """
 
@@ -149,12 +155,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     told = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
     ]
-    probability: float | None = verdict.doubt
-    similar = seen(verdict.word, verdict.evidence)
-    if bench.data.along_motion:
-        probability, similar = None, (0, 0)
-    elif bench.study.file.effects:
-        probability, similar = later_doubt(), LATER
+    probability, similar = _reliability(bench, verdict)
     return Explanation(
         verdict.word,
         verdict.text,
@@ -166,6 +167,18 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         probability,
         similar,
     )
+
+
+def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[int, int]]:
+    """Probability that the verdict is wrong, and how many similar cases were, of how many."""
+    later, rough = bool(bench.study.file.effects), bench.study.model.rough
+    if bench.data.along_motion and later:
+        return None, (0, 0)
+    if bench.data.along_motion:
+        return doubt_along(verdict.word, rough=rough), seen_along(verdict.word, rough=rough)
+    if later:
+        return later_doubt(), LATER
+    return verdict.doubt, seen(verdict.word, verdict.evidence)
 
 
 def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None) -> Row:

@@ -9,6 +9,11 @@ the verdicts of each cell on simulated plants and how many were wrong. With k of
 where K of N verdicts with the same word were wrong over all cells (P. S. Laplace's rule of
 succession, 1774). The rate r weighs as much as s = 2 cases, so a cell with few cases relies on the
 others. `benchmarks/explaining/hidden_effects` writes the file and evaluates it on held-out seeds.
+
+Verdicts along the measured motion are counted apart, in `calibration_along.toml`, by word and by
+whether the model is rough: there the share that is left holds the model's own error.
+`benchmarks/family/along_calibration` counts them on simulated rigs and evaluates them on rigs of
+other equations.
 """
 
 from dataclasses import dataclass
@@ -28,6 +33,7 @@ MARGIN = (3.0, 6.0)
 LEANING = 2.0
 """Number of cases that a word's rate over all cells weighs in each cell."""
 FILE = "calibration.toml"
+ALONG_FILE = "calibration_along.toml"
 LATER = (78, 4)
 """Number of verdicts on later steps, after an effect was added, and how many were wrong: chains of
 two and three hidden effects on five simulated machines (`benchmarks/explaining/chains`). Later
@@ -63,9 +69,24 @@ class Cell(Section, frozen=True, kw_only=True):
 
 
 class Calibration(Section, frozen=True, kw_only=True):
-    """The file."""
+    """The file of free runs."""
 
     cells: list[Cell]
+
+
+class AlongCell(Section, frozen=True, kw_only=True):
+    """Counts of verdicts along the measured motion."""
+
+    word: Annotated[str, Meta(description="the verdict")]
+    rough: Annotated[bool, Meta(description="whether the model is rough")]
+    cases: Annotated[int, Meta(ge=0, description="simulated cases with such a verdict")]
+    wrong: Annotated[int, Meta(ge=0, description="those where it was wrong")]
+
+
+class AlongCalibration(Section, frozen=True, kw_only=True):
+    """The file of models along the measured motion."""
+
+    cells: list[AlongCell]
 
 
 def cell_of(word: str, evidence: Evidence) -> tuple[str, int, int]:
@@ -85,6 +106,17 @@ def later_doubt() -> float:
     return (wrong + 1) / (cases + 2)
 
 
+def seen_along(word: str, *, rough: bool) -> tuple[int, int]:
+    """Number of verdicts with the same word along the measured motion, and how many were wrong."""
+    return _along_counts().get((rough, word), (0, 0))
+
+
+def doubt_along(word: str, *, rough: bool) -> float | None:
+    """Probability that a verdict along the measured motion is wrong; None without such a case."""
+    cases, wrong = seen_along(word, rough=rough)
+    return (wrong + 1) / (cases + 2) if cases else None
+
+
 def doubt(word: str, evidence: Evidence) -> float:
     """Probability that the verdict is wrong; 0.5 if its cell has no simulated case."""
     cases, wrong = seen(word, evidence)
@@ -97,6 +129,15 @@ def doubt(word: str, evidence: Evidence) -> float:
 
 @cache
 def _counts() -> dict[tuple[str, int, int], tuple[int, int]]:
-    text = (resources.files("rigwatch.workbench.explain") / FILE).read_text("utf-8")
-    cells = parse(text, Calibration, FILE).cells
+    cells = parse(_text(FILE), Calibration, FILE).cells
     return {(c.word, c.left, c.margin): (c.cases, c.wrong) for c in cells}
+
+
+@cache
+def _along_counts() -> dict[tuple[bool, str], tuple[int, int]]:
+    cells = parse(_text(ALONG_FILE), AlongCalibration, ALONG_FILE).cells
+    return {(c.rough, c.word): (c.cases, c.wrong) for c in cells}
+
+
+def _text(name: str) -> str:
+    return (resources.files("rigwatch.workbench.explain") / name).read_text("utf-8")

@@ -128,8 +128,8 @@ def doubt_of(found: Explanation) -> str:
     cases, wrong = found.like_this
     if found.wrong_probability is None:
         return (
-            "the probability of being wrong is not calibrated for models along the measured"
-            " motion: the simulated cases are free runs"
+            "the probability of being wrong is not calibrated for this verdict of a model along the"
+            " measured motion"
         )
     if not cases:
         return "the probability of being wrong is unknown: no simulated case is similar to this one"
