@@ -6,9 +6,9 @@ from rigwatch.workbench.compare.locate import Region, locate, motion, sample_num
 from rigwatch.workbench.compare.preparation import (
     Bench,
     bench_of,
+    determined_by_healthy,
     open_bench,
     prepared,
-    told_by_healthy,
 )
 from rigwatch.workbench.compare.uncertainty_budget import apparent_strength, beyond
 from rigwatch.workbench.compare.warm import Warm
@@ -23,11 +23,11 @@ __all__ = [
     "beyond",
     "compare",
     "comparison",
+    "determined_by_healthy",
     "locate",
     "motion",
     "open_bench",
     "prepared",
     "sample_numbers",
-    "told_by_healthy",
     "with_horizon_of",
 ]

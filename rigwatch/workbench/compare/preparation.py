@@ -66,10 +66,10 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     """
     check_data(study)
     study = with_horizon(study)
-    return told_by_healthy(study, prepare(study))
+    return determined_by_healthy(study, prepare(study))
 
 
-def told_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:
+def determined_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:
     """`prepared` for recordings in memory, for the study's unmodified model.
 
     Raises:
@@ -103,7 +103,7 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
     if healthy is None:
         floor = from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
         return Bench(study, data, base, floor, None)
-    bare = fit_model(study, healthy, (), study.file.start, base.train.scale, from_afar=True)
+    bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)
     return Bench(study, data, base, _of_healthy(study, healthy, base, bare), bare)
 
 

@@ -5,17 +5,25 @@ from dataclasses import dataclass, field
 
 from rigwatch.workbench.compare import Bench, Comparison, beyond, comparison, open_bench
 from rigwatch.workbench.explain.adequacy import inadequate, unchecked, with_base_offered
-from rigwatch.workbench.explain.believed import believed
+from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
-from rigwatch.workbench.explain.rough_verdict import leaves_much, modest, not_alone
-from rigwatch.workbench.explain.together import alone_is_not_enough, several_effects
+from rigwatch.workbench.explain.rough_verdict import (
+    leaves_much,
+    limited_verdict,
+    undetermined_if_much_left,
+)
+from rigwatch.workbench.explain.several_effects import may_need_several, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
-from rigwatch.workbench.explain.verdict_calibration import LATER, later_doubt, seen
+from rigwatch.workbench.explain.verdict_calibration import (
+    LATER_COUNTS,
+    cases_seen,
+    later_probability_wrong,
+)
 from rigwatch.workbench.fit import Value, as_written, values
-from rigwatch.workbench.ranking import Progress, Ranked, rank, rank_all, unheard
+from rigwatch.workbench.ranking import Progress, Ranked, no_progress, rank, rank_all
 from rigwatch.workbench.study import Study
 
 
@@ -73,7 +81,7 @@ class Explanation:
     like_this: tuple[int, int] = (0, 0)
 
 
-def explain(study: Study, progress: Progress = unheard) -> Explanation:
+def explain(study: Study, progress: Progress = no_progress) -> Explanation:
     """Rank every effect at every port and judge.
 
     Args:
@@ -89,25 +97,25 @@ def explain(study: Study, progress: Progress = unheard) -> Explanation:
     return explanation(bench, rows, verdict)
 
 
-def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], Verdict]:
+def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked], Verdict]:
     """The ranking, with the effect named by the verdict first, and the verdict."""
     stopped = _stopped(bench)
     if stopped is not None:
         rows = rank_all(bench.study, bench.data, bench.base)
         return rows, with_base_offered(bench.study, stopped)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
-    verdict = believed(bench, rows)
+    verdict = credible_verdict(bench, rows)
     along = bench.data.along_motion
     # Sets of effects are judged by whether only noise is left, which a rough model never reaches.
     if along or bench.study.model.rough:
         verdict = _by_pairs(bench, rows, verdict, progress)
-    elif alone_is_not_enough(bench, verdict):
+    elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
     verdict = with_motion_sensor(bench, verdict)
     if along and bench.study.model.rough:
-        verdict = modest(bench.base, rows, bench.floor, verdict)
+        verdict = limited_verdict(bench.base, rows, bench.floor, verdict)
     elif along:
-        verdict = not_alone(bench.base, bench.floor, verdict)
+        verdict = undetermined_if_much_left(bench.base, bench.floor, verdict)
     verdict = with_base_offered(bench.study, unchecked(bench, verdict))
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
@@ -149,12 +157,12 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     told = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
     ]
-    probability: float | None = verdict.doubt
-    similar = seen(verdict.word, verdict.evidence)
+    probability: float | None = verdict.probability_wrong
+    similar = cases_seen(verdict.word, verdict.evidence)
     if bench.data.along_motion:
         probability, similar = None, (0, 0)
     elif bench.study.file.effects:
-        probability, similar = later_doubt(), LATER
+        probability, similar = later_probability_wrong(), LATER_COUNTS
     return Explanation(
         verdict.word,
         verdict.text,

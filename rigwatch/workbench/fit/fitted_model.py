@@ -23,7 +23,7 @@ from rigwatch.physics.engine.search import (
     ShortHorizons,
     WholeRuns,
     convergence,
-    fit_from_afar,
+    multi_start_fit,
 )
 from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
@@ -147,14 +147,14 @@ def fit_base(
     try:
         if not afar and study.file.effects and study.file.effects[-1].model:
             return _kept(fit_model(study, data, placements, start, scale))
-        return fit_twice(study, data, placements, start, scale, from_afar=True)
+        return fit_twice(study, data, placements, start, scale, multi_start=True)
     except ModelError:
         if not placements:
             raise
-    found = fit_model(study, data, (), start, scale, from_afar=True)
+    found = fit_model(study, data, (), start, scale, multi_start=True)
     for count in range(1, len(placements) + 1):
         begin = start | found.train.values()
-        found = fit_twice(study, data, placements[:count], begin, scale, from_afar=True)
+        found = fit_twice(study, data, placements[:count], begin, scale, multi_start=True)
     return found
 
 
@@ -173,10 +173,10 @@ def fit_twice(
     scale: FloatArray | None = None,
     *,
     base: Fitted | None = None,
-    from_afar: bool = False,
+    multi_start: bool = False,
 ) -> Fitted:
     """`fit_model`, repeated if it may have ended in a local minimum."""
-    found = fit_model(study, data, placements, start, scale, base=base, from_afar=from_afar)
+    found = fit_model(study, data, placements, start, scale, base=base, multi_start=multi_start)
     if scale is None or not may_be_better(study, data, found, start):
         return found
     return fit_again(study, data, found, start)
@@ -211,7 +211,7 @@ def fit_model(
     *,
     base: Fitted | None = None,
     by_way_of_short: bool = False,
-    from_afar: bool = False,
+    multi_start: bool = False,
 ) -> Fitted:
     """Fit the study's model with `placements` from `start`.
 
@@ -223,7 +223,7 @@ def fit_model(
         base: a fit with fewer effects, whose initial states are used as start.
         by_way_of_short: start from a fit over short horizons, since stick-slip has many local
             minima over long ones.
-        from_afar: whether `start` may be far from the optimum, so that other starts are tried.
+        multi_start: whether `start` may be far from the optimum, so that other starts are tried.
 
     Raises:
         ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
@@ -236,11 +236,11 @@ def fit_model(
     search: ShortHorizons | WholeRuns | None = None
     if data.along_motion and len(compiled.system.free) >= FROM_AFAR and scale is not None:
         search = WholeRuns(compiled, [data.train], scale, start=begin, substeps=substeps)
-    elif from_afar and not data.along_motion:
+    elif multi_start and not data.along_motion:
         noise = quiet_scale(data.train) if scale is None else scale
         search = ShortHorizons(compiled, data.train, horizon, begin, scale, noise, first, substeps)
     if search:
-        found, ended = fit_from_afar(search)
+        found, ended = multi_start_fit(search)
         found = _settled(study, data, found, horizon, substeps)
         return _judged(study, data, placements, found, horizon, later, ended)
     free_run = study.model.states and not data.along_motion

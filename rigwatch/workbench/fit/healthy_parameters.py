@@ -47,7 +47,7 @@ def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> S
     if healthy is None or not kept:
         return study
     loose = replace(study, model=loosened(study.model))
-    found = fit_model(loose, healthy, (), study.file.start, scale, from_afar=True)
+    found = fit_model(loose, healthy, (), study.file.start, scale, multi_start=True)
     places = [found.compiled.system.free.index(name) for name in kept]
     uncertain = covariance(found.train)[0][np.ix_(places, places)]
     told = Kept(tuple(kept), uncertain, found.convergence)

@@ -68,7 +68,7 @@ def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> tup
             " as this model leaves much unexplained on a healthy rig, too"
         )
     # Without the accepted effects: the healthy recording has nothing for them to explain.
-    bare = fit_model(study, alone, (), study.file.start, scale, from_afar=True)
+    bare = fit_model(study, alone, (), study.file.start, scale, multi_start=True)
     periods = _matching(study, bare, data.train, data, "train")
     beside = _matching(study, bare, data.held_out, data, "held_out")
     remark = f"{name}: its mean residual over {len(beside.left)} healthy periods is added to it"

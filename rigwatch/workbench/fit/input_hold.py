@@ -128,7 +128,7 @@ def _tried(  # noqa: PLR0917 -- they belong together
     model = holding(study.model, dict.fromkeys(study.model.unheld(), (hold, late)))
     fitted = fit_model(
         replace(study, model=model), data, placements, start, scale,
-        base=base, from_afar=base is None,
+        base=base, multi_start=base is None,
     )  # fmt: skip
     return _Tried(hold, late, fitted)
 

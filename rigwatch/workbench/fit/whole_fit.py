@@ -16,7 +16,7 @@ import numpy as np
 from rigwatch.physics.engine.compile import CompiledSystem, compile_system
 from rigwatch.physics.engine.equations import Model, compose
 from rigwatch.physics.engine.fit import Fit, Recording, bounds, evaluate
-from rigwatch.physics.engine.search import Convergence, WholeRuns, fit_from_afar
+from rigwatch.physics.engine.search import Convergence, WholeRuns, multi_start_fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data, quiet_scale
 from rigwatch.workbench.fit.fitted_model import Fitted
@@ -62,7 +62,7 @@ def _carried_on(
             sizes=sizes_shown(compiled, recording, start, substeps), initial=initial,
             robust=np.inf, substeps=substeps, starts=searches,
         )  # fmt: skip
-        fit, ended = fit_from_afar(search)
+        fit, ended = multi_start_fit(search)
         if ended.converged:
             break
         start, initial, searches = fit.parameters, fit.initial, 0
