@@ -1,10 +1,10 @@
-"""Multi-start fits: does the fitting driver reach the noise floor from wherever it is told to begin?
+"""Multi-start fits: does the fitting driver reach the noise floor from any initial values?
 
 A mass on a spring in closed form (`sim_plant/specimens/exact_mass.py`), which shares nothing with
-the engine, is drawn too (mass over four decades, resonance 1 to 12 Hz, damping 2 to 50 %), starts
-are drawn log-uniformly over six decades around the truth, horizons from 0.25 to 4 s. A fit reaches
-the floor where its error is at most 1.1 times the noise; one that does not is called out by its
-convergence, or a verdict would be built on it.
+the engine, is drawn at random (mass over four decades, resonance 1 to 12 Hz, damping 2 to 50 %),
+starts are drawn log-uniformly over six decades around the truth, horizons from 0.25 to 4 s. A fit
+reaches the floor if its error is at most 1.1 times the noise; one that does not must be reported as
+not converged, since a verdict would rely on it.
 
     python -m benchmarks multi_start_fits --quick
 """

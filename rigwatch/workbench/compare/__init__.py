@@ -10,7 +10,7 @@ from rigwatch.workbench.compare.preparation import (
     open_bench,
     prepared,
 )
-from rigwatch.workbench.compare.uncertainty_budget import apparent_strength, beyond
+from rigwatch.workbench.compare.uncertainty_budget import added_variances, apparent_strength
 from rigwatch.workbench.compare.warm import Warm
 
 __all__ = [
@@ -18,9 +18,9 @@ __all__ = [
     "Comparison",
     "Region",
     "Warm",
+    "added_variances",
     "apparent_strength",
     "bench_of",
-    "beyond",
     "compare",
     "comparison",
     "determined_by_healthy",

@@ -19,12 +19,12 @@ from rigwatch.workbench.data import (
 )
 from rigwatch.workbench.fit import (
     Fitted,
-    commissioned,
     fit_base,
     fit_model,
     learns_from_healthy,
-    loosely_told,
-    referenced,
+    poorly_determined,
+    with_healthy_parameters,
+    with_healthy_reference,
     with_healthy_remainder,
     with_hold,
 )
@@ -82,12 +82,12 @@ def determined_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatA
     several = data.train.outputs.shape[1] > 1 or data.along_motion
     scale = quiet_scale(data.train) if several else None
     study = with_hold(study, data, scale)
-    study = commissioned(study, data, scale)
+    study = with_healthy_parameters(study, data, scale)
     if study.kept is not None and data.healthy is not None:
         seconds = len(data.healthy) * data.healthy.dt
-        loose = loosely_told(study.kept, study.model, seconds)
+        loose = poorly_determined(study.kept, study.model, seconds)
         data = replace(data, remarks=(*data.remarks, *loose))
-    return *referenced(study, data, scale), scale
+    return *with_healthy_reference(study, data, scale), scale
 
 
 def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench:
@@ -115,6 +115,6 @@ def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> Nois
     """
     fits = [bare]
     if base.placements:
-        fits.append(fit_base(study, healthy, base.train.scale, afar=True))
+        fits.append(fit_base(study, healthy, base.train.scale, multi_start=True))
     method = "healthy motion" if healthy.along_motion else "healthy"
     return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).held_out.rms, method)

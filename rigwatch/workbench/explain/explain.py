@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rigwatch.workbench.compare import Bench, Comparison, beyond, comparison, open_bench
+from rigwatch.workbench.compare import Bench, Comparison, added_variances, comparison, open_bench
 from rigwatch.workbench.explain.adequacy import inadequate, unchecked, with_base_offered
 from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.excitation import unexcited
@@ -153,7 +153,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
     more: dict[str, float] = {}
     if verdict.best is not None and verdict.best.fitted is not None:
-        more = beyond(bench.study, bench.data, bench.bare, verdict.best.fitted)
+        more = added_variances(bench.study, bench.data, bench.bare, verdict.best.fitted)
     told = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
     ]

@@ -9,7 +9,7 @@ full. An effect is accepted only if the held-out error falls, over blocks, by mo
 from collections.abc import Sequence
 
 from rigwatch.workbench.data import Data, NoiseFloor
-from rigwatch.workbench.fit import Fitted, fit_model, fit_twice
+from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.ranked import SAME, Ranked, in_order
@@ -52,10 +52,10 @@ def rank(
         refit_elsewhere(study, data, base, likely, progress)
     while spare := _substitute_of_failed(rows):
         progress(f"fitting {spare.label}, as the effect it resembles cannot be fitted")
-        refit(study, data, base, spare, fit_model if enough else fit_twice)
+        refit(study, data, base, spare, fit_model if enough else fit_with_retry)
     while similar := _unfitted_similar(rows, floor):
         progress(f"fitting {similar.label}, which resembles the best")
-        refit(study, data, base, similar, fit_model if enough else fit_twice)
+        refit(study, data, base, similar, fit_model if enough else fit_with_retry)
     return in_order(rows)
 
 

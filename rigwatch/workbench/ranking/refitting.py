@@ -6,7 +6,13 @@ from dataclasses import replace
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor
-from rigwatch.workbench.fit import Fitted, fit_again, fit_model, fit_twice, may_be_better
+from rigwatch.workbench.fit import (
+    Fitted,
+    fit_model,
+    fit_with_retry,
+    may_be_local_minimum,
+    refit_from_short_horizons,
+)
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, judge_fit, leaves_nothing
 from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
 from rigwatch.workbench.study import Study
@@ -20,14 +26,14 @@ def no_progress(_: str) -> None:
 
 
 def refit(
-    study: Study, data: Data, base: Fitted, row: Ranked, fitting: Fitting = fit_twice
+    study: Study, data: Data, base: Fitted, row: Ranked, fitting: Fitting = fit_with_retry
 ) -> None:
     """Fit the model with the row's effect and judge it on the recordings held out.
 
     Args:
         study, data, base: the study, its recordings and the fitted model.
         row: the effect; its fit and the decision are stored in it.
-        fitting: `fit_model` accepts the first minimum, `fit_twice` also searches elsewhere.
+        fitting: `fit_model` accepts the first minimum, `fit_with_retry` also searches elsewhere.
     """
     start, fits, failures = base.train.values() | row.begin(), list[Fitted](), list[str]()
     for placement in _orders_at_port(base, row):
@@ -84,8 +90,8 @@ def refit_elsewhere(
     """Refit the rows that may have ended in a local minimum."""
     for row in rows:
         start = base.train.values() | row.begin()
-        if row.fitted is None or not may_be_better(study, data, row.fitted, start):
+        if row.fitted is None or not may_be_local_minimum(study, data, row.fitted, start):
             continue
         progress(f"fitting {row.label} again, starting from short horizons")
-        row.fitted = fit_again(study, data, row.fitted, start)
+        row.fitted = refit_from_short_horizons(study, data, row.fitted, start)
         judge_fit(base, row)
