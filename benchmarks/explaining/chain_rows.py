@@ -10,7 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from benchmarks.explaining.hidden import share_row
-from rigwatch.workbench.explain.verdict_calibration import LEANING, Evidence, cell_of, doubt
+from rigwatch.workbench.explain.verdict_calibration import (
+    PRIOR_CASES,
+    Evidence,
+    cell_of,
+    probability_wrong,
+)
 from tools.benchmark_table import Row
 
 CONFIDENT = 0.05
@@ -129,7 +134,7 @@ def _shipped(outcomes: Sequence[Outcome]) -> list[Row]:
     }
     return [
         _promised(f"at {which}, as the shipped calibration promises", own,
-                  [doubt(step.word, step.evidence) for step in own])
+                  [probability_wrong(step.word, step.evidence) for step in own])
         for which, own in steps.items()
     ]  # fmt: skip
 
@@ -168,4 +173,4 @@ def _doubt(step: Step, told: Sequence[Step]) -> float:
     rate = (sum(map(_is_wrong, same)) + 1) / (len(same) + 2)
     cell = cell_of(step.word, step.evidence)
     alike = [s for s in same if cell_of(s.word, s.evidence) == cell]
-    return (sum(map(_is_wrong, alike)) + LEANING * rate) / (len(alike) + LEANING)
+    return (sum(map(_is_wrong, alike)) + PRIOR_CASES * rate) / (len(alike) + PRIOR_CASES)

@@ -105,7 +105,7 @@ def comparing(data: Data) -> str:
     row = rank_only(of, data, bench.base, found)
     refit(of, data, bench.base, row)
     if row.fitted is None:
-        raise RuntimeError(row.trouble)
+        raise RuntimeError(row.failure)
     before = comparison(bench).held_out_error
     after = comparison(replace(bench, study=of, base=row.fitted)).held_out_error
     return f"held-out error from {before:.2f} to {after:.2f} noise floors: {row.reason}"

@@ -332,8 +332,10 @@ def _mistaken(outcomes: Sequence[Outcome]) -> str:
 
 def _calibration_row(outcomes: Sequence[Outcome]) -> Row:
     """Wrong verdicts as promised and as they came, on seeds that did not make the calibration."""
-    promised = sum(calibration.doubt(o.word, o.evidence) for o in outcomes)
-    spread = sum(d * (1 - d) for o in outcomes for d in [calibration.doubt(o.word, o.evidence)])
+    promised = sum(calibration.probability_wrong(o.word, o.evidence) for o in outcomes)
+    spread = sum(
+        d * (1 - d) for o in outcomes for d in [calibration.probability_wrong(o.word, o.evidence)]
+    )
     came = sum(o.wrong for o in outcomes)
     within = abs(promised - came) <= 2 * np.sqrt(spread) if outcomes else None
     return Row("wrong verdicts on other seeds, promised and found",

@@ -46,8 +46,8 @@ from rigwatch.workbench.data.noise_floor import quiet_scale
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.verdict import Verdict
-from rigwatch.workbench.fit.healthy_parameters import commissioned
-from rigwatch.workbench.fit.healthy_reference import referenced
+from rigwatch.workbench.fit.healthy_parameters import with_healthy_parameters
+from rigwatch.workbench.fit.healthy_reference import with_healthy_reference
 from rigwatch.workbench.ranking.ranked import Ranked, accepted_from
 from rigwatch.workbench.study.study import Span, Study, StudyFile
 from tools.benchmark_table import Row, as_text
@@ -155,7 +155,7 @@ def study_of(model: str, seed: int) -> tuple[Study, Recording]:
     bare = Study(Path(), file, shipped_models()[name], library(), frozenset())
     healthy = recorded({}, seed, 100 * seed + 3)
     data = Data(healthy, healthy, healthy, HORIZON, ())
-    return commissioned(bare, data, quiet_scale(healthy)), healthy
+    return with_healthy_parameters(bare, data, quiet_scale(healthy)), healthy
 
 
 def solve(case: Case) -> Outcome:
@@ -193,7 +193,7 @@ def simulated(case: Case, effects: Mapping[str, float], healthy: Recording) -> D
 def explained(study: Study, data: Data) -> tuple[Bench, Verdict]:
     """The workbench's steps without its files; the healthy recording has been read before."""
     scale = quiet_scale(data.train)
-    study, data = referenced(study, data, scale)
+    study, data = with_healthy_reference(study, data, scale)
     bench = bench_of(study, data, scale)
     return bench, ranking(bench)[1]
 

@@ -13,7 +13,7 @@ from benchmarks.explaining.hidden import counted, share_row
 from benchmarks.explaining.hidden_effects_rig import Case, simulated, study_of
 from benchmarks.explaining.rig_hidden import settings
 from rigwatch.workbench.compare.preparation import bench_of
-from rigwatch.workbench.compare.uncertainty_budget import beyond
+from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.data.noise_floor import quiet_scale
 from rigwatch.workbench.fit.intervals import values
 from rigwatch.workbench.ranking.candidates import shapes_of
@@ -57,7 +57,7 @@ def covers(case: Case) -> bool:
     row = rank_only(study, data, bench.base, found)
     refit(study, data, bench.base, row)
     assert row.fitted is not None
-    more = beyond(study, data, bench.bare, row.fitted)
+    more = added_variances(study, data, bench.bare, row.fitted)
     interval = values(row.fitted.train, more)[row.placement.prefix + parameter].interval
     assert interval is not None
     return interval[0] <= true <= interval[1]

@@ -102,7 +102,7 @@ def calibrated(outcomes: Sequence[Outcome]) -> str:
 def _rows(outcomes: Sequence[Outcome]) -> Iterator[Row]:
     for model, rough in MODELS.items():
         own = [o for o in outcomes if o.judges and o.case.model == model]
-        doubts = [verdict_calibration.doubt_along(o.word, rough=rough) for o in own]
+        doubts = [verdict_calibration.probability_wrong_along(o.word, rough=rough) for o in own]
         known = [(d, o) for d, o in zip(doubts, own, strict=True) if d is not None]
         promised = sum(d for d, _ in known)
         spread = 2 * float(np.sqrt(sum(d * (1 - d) for d, _ in known)))

@@ -23,7 +23,7 @@ from monitor.observer import (
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Model, System, compose
 from rigwatch.physics.engine.fit import Recording, Thinning
-from rigwatch.physics.engine.search import WholeRuns, fit_from_afar
+from rigwatch.physics.engine.search import WholeRuns, multi_start_fit
 from rigwatch.wire.arrays import FloatArray
 
 SPREAD, UNBOUND = 0.15, 2.0
@@ -86,7 +86,7 @@ def fit_healthy(
     count = sum(len(each) - 2 * judged.edge for each in recordings)
     still = [_still(model, each.inputs[0], rate) for each in recordings]
     begun = [balanced(compiled, start, rows, 1.0 / rate) for rows in still]
-    found, _ = fit_from_afar(
+    found, _ = multi_start_fit(
         WholeRuns(
             compiled, recordings, np.array([noise]), start=start,
             pull=PULL * np.sqrt(count) / _spreads(system), initial=np.array(begun),

@@ -11,7 +11,7 @@ from monitor.alarms import LONGEST_NAME, LONGEST_TEXT
 from monitor.model import RigModel, model_text, parse_model
 from monitor.model import model_versions as versions
 from monitor.pipeline import RigMonitor, check_can_follow
-from rigwatch.wire.bus import KEY, PATIENCE, Bus, Granted, Wish
+from rigwatch.wire.bus import KEY, PATIENCE, Bus, ModelReply, ModelRequest
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages import ModelChange
 
@@ -20,10 +20,10 @@ from rigwatch.wire.messages import ModelChange
 class _Waiting:
     """A request whose sender waits for the answer."""
 
-    wish: Wish
+    wish: ModelRequest
     withdrawn: bool = False
     answered: threading.Event = field(default_factory=threading.Event)
-    answer: Granted = field(default_factory=lambda: Granted(False, "the monitor is busy"))
+    answer: ModelReply = field(default_factory=lambda: ModelReply(False, "the monitor is busy"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +60,12 @@ class ModelDesk:
             try:
                 found.append(self._grant(one.wish, place))
                 text = f"in force from sample {place.seq} of boot {place.boot} on"
-                one.answer = Granted(True, text, place.boot, place.seq)
+                one.answer = ModelReply(True, text, place.boot, place.seq)
             except RigwatchError as error:
-                one.answer = Granted(False, str(error))
+                one.answer = ModelReply(False, str(error))
             except (OSError, ValueError, ArithmeticError, RecursionError, MemoryError) as error:
                 # An unusable model must not stop the monitor.
-                one.answer = Granted(False, f"the new model cannot be used: {error}")
+                one.answer = ModelReply(False, f"the new model cannot be used: {error}")
             one.answered.set()
         return found
 
@@ -76,14 +76,14 @@ class ModelDesk:
     def _take(self, question: bytes) -> list[bytes]:
         """In a thread of the bus: queue the request and wait."""
         try:
-            one = _Waiting(_bounded(msgspec.json.decode(question, type=Wish)))
+            one = _Waiting(_bounded(msgspec.json.decode(question, type=ModelRequest)))
         except (msgspec.DecodeError, RecursionError) as error:
-            return [msgspec.json.encode(Granted(False, f"not a wish for a model: {error}"))]
+            return [msgspec.json.encode(ModelReply(False, f"not a wish for a model: {error}"))]
         self._waiting.put(one)
         one.withdrawn = not one.answered.wait(0.8 * PATIENCE)
         return [msgspec.json.encode(one.answer)]
 
-    def _grant(self, wish: Wish, place: Place) -> ModelChange:
+    def _grant(self, wish: ModelRequest, place: Place) -> ModelChange:
         """Apply one request; the file is written first, so the model survives a restart."""
         previous = self._rig.model
         model = self._wanted(wish)
@@ -104,12 +104,12 @@ class ModelDesk:
             model_text(previous),
         )
 
-    def _wanted(self, wish: Wish) -> RigModel:
+    def _wanted(self, wish: ModelRequest) -> RigModel:
         if wish.action == "rollback":
             return parse_model(versions.version_before(self._path), str(self._path))
         return parse_model(wish.model, "the new model")
 
 
-def _bounded(wish: Wish) -> Wish:
+def _bounded(wish: ModelRequest) -> ModelRequest:
     """The request with user and reason limited in length for the version records."""
     return replace(wish, user=wish.user[:LONGEST_NAME], text=wish.text[:LONGEST_TEXT])

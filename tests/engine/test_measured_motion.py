@@ -28,7 +28,7 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.smoothing import best_width, smoothed
 from rigwatch.physics.engine.fit.windowed_fit import Fit, fit
 from rigwatch.physics.engine.search.convergence import Convergence
-from rigwatch.physics.engine.search.fit_from_afar import fit_from_afar
+from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
 from rigwatch.physics.engine.search.whole_runs import WholeRuns
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -241,7 +241,7 @@ def _fitted_from_afar(t_high: float) -> tuple[Fit, Convergence]:
         {"k": 2 * SPRING, "c": DAMPER / 2, "K": 2 * FORCE_A_VOLT, "T": LATE / 2}
     )
     noise = 0.01 * recording.outputs[:, 1:].std(axis=0)
-    return fit_from_afar(WholeRuns(compiled, [motion], noise, start=start))
+    return multi_start_fit(WholeRuns(compiled, [motion], noise, start=start))
 
 
 def test_fit_along_the_motion_says_that_it_converged() -> None:

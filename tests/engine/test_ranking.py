@@ -47,10 +47,10 @@ def test_cosines_have_a_sign_by_how_both_explain_the_residual_and_a_class_has_no
     near = AXES[0] + 0.1 * AXES[3]
     scores = scored(AXES[0], -near, AXES[0] - 2 * AXES[1], residual=RESIDUAL)
     rows = ranked(["a", "near", "against"], scores)
-    assert rows["a"].turned["near"] == pytest.approx(1 / np.hypot(1, 0.1))
+    assert rows["a"].signed_cosines["near"] == pytest.approx(1 / np.hypot(1, 0.1))
     assert rows["a"].alike == ["near"]
     assert rows["near"].alike == ["a"]
-    assert rows["a"].turned["against"] == pytest.approx(-1 / np.sqrt(5))
+    assert rows["a"].signed_cosines["against"] == pytest.approx(-1 / np.sqrt(5))
     assert rows["a"].cosines["against"] == pytest.approx(1 / np.sqrt(5))
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from monitor.alarms import Occasion
 from monitor.process.cursor import Cursor
-from rigwatch.wire.bus.model_change import Granted, Wish, ask_for_model
+from rigwatch.wire.bus.model_change import ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.messages import ALARMS, COMMANDS, ESTIMATES, AlarmCommand
 from tests.bus.publisher import wave
 from tests.bus.rig import PATIENCE
@@ -26,9 +26,9 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     made.monitor.close()
 
 
-def asked(bench: Bench, wish: Wish) -> Granted:
+def asked(bench: Bench, wish: ModelRequest) -> ModelReply:
     """The answer to a wish, while the monitor's loop turns."""
-    answers: list[Granted] = []
+    answers: list[ModelReply] = []
     asker = threading.Thread(target=lambda: answers.append(ask_for_model(bench.observer, wish)))
     asker.start()
 
@@ -43,7 +43,7 @@ def asked(bench: Bench, wish: Wish) -> Granted:
 
 @pytest.mark.parametrize("model", [f"sample_rate = {'9' * 5000}", "a = " + "[" * 50_000])
 def test_a_model_that_is_a_bomb_is_refused_and_watching_goes_on(bench: Bench, model: str) -> None:
-    granted = asked(bench, Wish("promote", model, "eve", "x" * 100_000))
+    granted = asked(bench, ModelRequest("promote", model, "eve", "x" * 100_000))
     assert not granted.done
     assert len(granted.text) < 400
     bench.send(wave(0, 64, 7, time.time_ns()))

@@ -8,8 +8,8 @@ import pytest
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
-from rigwatch.physics.engine.equations.system import Placement, compose, passed_in_turn
-from rigwatch.physics.engine.fit.effect_states import Recall
+from rigwatch.physics.engine.equations.system import Placement, compose, signal_order
+from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
 
 MODEL = shipped_models()["motor"]
 TAU, LIMIT, COMMAND, DT = 0.05, 4.0, 10.0, 0.01
@@ -29,15 +29,17 @@ def led(*placements: Placement) -> np.ndarray:
     system = compose(MODEL, placements)
     parameters = compile_system(system).vector(VALUES)
     inputs = np.full((100, 1), COMMAND)
-    recall = Recall(system, inputs, np.zeros((100, len(system.states))), DT, parameters)
+    recall = RecordedEffectStates(
+        system, inputs, np.zeros((100, len(system.states))), DT, parameters
+    )
     (column,) = recall.columns
     return recall.at(parameters)[column]
 
 
 def test_an_effect_ahead_is_passed_before_those_placed_earlier():
-    assert passed_in_turn([LAG, CLIPS], "drive") == [LAG, CLIPS]
-    assert passed_in_turn([LAG, AHEAD], "drive") == [AHEAD, LAG]
-    assert passed_in_turn([LAG, AHEAD], "shaft") == []
+    assert signal_order([LAG, CLIPS], "drive") == [LAG, CLIPS]
+    assert signal_order([LAG, AHEAD], "drive") == [AHEAD, LAG]
+    assert signal_order([LAG, AHEAD], "shaft") == []
 
 
 def test_a_system_depends_on_the_order_and_not_on_when_an_effect_was_placed():
@@ -61,7 +63,7 @@ def test_a_lag_remembers_what_the_effects_before_it_let_through(placements, arri
 def test_what_follows_another_memory_is_not_led_by_the_inputs_alone():
     system = compose(MODEL, (LAG, placed("rate_limit")))
     inputs = np.full((100, 1), COMMAND)
-    recall = Recall(
+    recall = RecordedEffectStates(
         system, inputs, np.zeros((100, len(system.states))), DT, compile_system(system).parameters
     )
     names = list(system.states)

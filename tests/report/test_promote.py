@@ -17,7 +17,7 @@ from rigwatch.commands import main
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.bus.model_change import Granted, Wish, ask_for_model
+from rigwatch.wire.bus.model_change import ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.messages.blocks import concatenate, cut, pieces
 from rigwatch.wire.messages.message_types import EstimateBlock, ModelChange, SampleBlock
@@ -81,9 +81,9 @@ class Bench:
             self.monitor.take(item)
         self.monitor.look_around()
 
-    def ask(self, wish: Wish) -> Granted:
+    def ask(self, wish: ModelRequest) -> ModelReply:
         """Ask from a thread of its own, as an operator does, while the loop turns."""
-        answers: list[Granted] = []
+        answers: list[ModelReply] = []
         asking = threading.Thread(target=lambda: answers.append(ask_for_model(self.observer, wish)))
         asking.start()
         while asking.is_alive():
@@ -98,8 +98,8 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     made.monitor.close()
 
 
-def wish_of(study: Study) -> Wish:
-    return Wish("promote", promotion(study, MODEL).text, "ann", "friction is known")
+def wish_of(study: Study) -> ModelRequest:
+    return ModelRequest("promote", promotion(study, MODEL).text, "ann", "friction is known")
 
 
 def rms(estimates: EstimateBlock, first: int, last: int) -> float:
@@ -130,7 +130,7 @@ def test_the_residual_of_a_running_monitor_falls_and_rises_again(
     assert granted.seq == 2000
     bench.send(cut(samples, 2000, 4000))
     assert load_model(bench.model).promoted is not None
-    assert bench.ask(Wish("rollback", "", "ann", "")).done
+    assert bench.ask(ModelRequest("rollback", "", "ann", "")).done
     bench.send(cut(samples, 4000, 6000))
     whole = concatenate(bench.estimates.drain())
     assert len(whole) == 6000
@@ -167,13 +167,16 @@ def test_a_replay_gives_the_same_to_the_last_bit(
 @pytest.mark.parametrize(
     ("wish", "words"),
     [
-        (Wish("rollback", "", "ann", ""), "no version before"),
-        (Wish("promote", "mass = 1", "ann", ""), "the new model"),
-        (Wish("promote", model_text(structs.replace(MODEL, sample_rate=256.0)), "a", ""), "rate"),
+        (ModelRequest("rollback", "", "ann", ""), "no version before"),
+        (ModelRequest("promote", "mass = 1", "ann", ""), "the new model"),
+        (
+            ModelRequest("promote", model_text(structs.replace(MODEL, sample_rate=256.0)), "a", ""),
+            "rate",
+        ),
     ],
 )
 def test_what_does_not_suit_is_refused_and_nothing_changes(
-    bench: Bench, wish: Wish, words: str
+    bench: Bench, wish: ModelRequest, words: str
 ) -> None:
     granted = bench.ask(wish)
     assert not granted.done

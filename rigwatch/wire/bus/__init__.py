@@ -12,7 +12,7 @@ from rigwatch.wire.bus.alarm_list import ask_alarm_list, serve_alarm_list
 from rigwatch.wire.bus.bus import Bus, unique_process
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
 from rigwatch.wire.bus.connection import connect, open_router
-from rigwatch.wire.bus.model_change import KEY, PATIENCE, Granted, Wish, ask_for_model
+from rigwatch.wire.bus.model_change import KEY, PATIENCE, ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.security import (
     REGISTER,
@@ -35,13 +35,13 @@ __all__ = [
     "Bus",
     "Close",
     "CompleteSubscription",
-    "Granted",
     "Issued",
+    "ModelReply",
+    "ModelRequest",
     "Place",
     "Register",
     "RingQuestions",
     "Subscription",
-    "Wish",
     "ask_alarm_list",
     "ask_for_model",
     "authority_file",

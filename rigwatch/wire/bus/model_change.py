@@ -14,7 +14,7 @@ PATIENCE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class ModelRequest:
     """A model-change request.
 
     Attributes:
@@ -31,7 +31,7 @@ class Wish:
 
 
 @dataclass(frozen=True, slots=True)
-class Granted:
+class ModelReply:
     """The monitor's reply.
 
     Attributes:
@@ -46,7 +46,7 @@ class Granted:
     seq: int = 0
 
 
-def ask_for_model(bus: Bus, wish: Wish, timeout: float = PATIENCE) -> Granted:
+def ask_for_model(bus: Bus, wish: ModelRequest, timeout: float = PATIENCE) -> ModelReply:
     """Send the request and wait for the reply.
 
     Raises:
@@ -54,7 +54,7 @@ def ask_for_model(bus: Bus, wish: Wish, timeout: float = PATIENCE) -> Granted:
     """
     for reply in bus.query(KEY, msgspec.json.encode(wish), timeout):
         try:
-            return msgspec.json.decode(reply, type=Granted)
+            return msgspec.json.decode(reply, type=ModelReply)
         except msgspec.DecodeError:
             continue
     raise BusError(f"no monitor of rig {bus.rig} answers: start `rigwatch monitor`")

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import evaluated
 from rigwatch.physics.engine.equations import LEFT, TIME, Effect, EffectParameter, names_in
-from rigwatch.physics.engine.fit import Memory
+from rigwatch.physics.engine.fit import EffectStates
 from rigwatch.wire.arrays import FloatArray
 
 FINE, SAMPLED = 1 / 400, 1 / 40
@@ -84,7 +84,7 @@ def _along(effect: Effect, time: FloatArray, wave: FloatArray, speed: FloatArray
     spacing = float(time[1] - time[0])
     along = {TIME: time, LEFT: np.zeros_like(time), **signals}
     if effect.states:
-        along |= Memory(effect, {TIME: time, **signals}, spacing, "linear").run(values)
+        along |= EffectStates(effect, {TIME: time, **signals}, spacing, "linear").run(values)
     return evaluated(effect.expression, along, values, "effect")
 
 

@@ -6,11 +6,11 @@ from rigwatch.workbench.compare.locate import Region, locate, motion, sample_num
 from rigwatch.workbench.compare.preparation import (
     Bench,
     bench_of,
+    determined_by_healthy,
     open_bench,
     prepared,
-    told_by_healthy,
 )
-from rigwatch.workbench.compare.uncertainty_budget import apparent_strength, beyond
+from rigwatch.workbench.compare.uncertainty_budget import added_variances, apparent_strength
 from rigwatch.workbench.compare.warm import Warm
 
 __all__ = [
@@ -18,16 +18,16 @@ __all__ = [
     "Comparison",
     "Region",
     "Warm",
+    "added_variances",
     "apparent_strength",
     "bench_of",
-    "beyond",
     "compare",
     "comparison",
+    "determined_by_healthy",
     "locate",
     "motion",
     "open_bench",
     "prepared",
     "sample_numbers",
-    "told_by_healthy",
     "with_horizon_of",
 ]

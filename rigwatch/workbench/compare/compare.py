@@ -6,7 +6,7 @@ import numpy as np
 
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.compare.preparation import Bench, open_bench
-from rigwatch.workbench.compare.uncertainty_budget import beyond
+from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.data import METHODS
 from rigwatch.workbench.fit import Value, as_written, free_run, profile, values
 from rigwatch.workbench.study import Held, Study
@@ -79,7 +79,7 @@ def comparison(bench: Bench) -> Comparison:
     }
     alone = len(channels) == 1
     total = floor.rms[0] if alone else np.sqrt(np.mean((floor.rms / base.train.scale) ** 2))
-    found = values(base.train, beyond(bench.study, bench.data, bench.bare, base))
+    found = values(base.train, added_variances(bench.study, bench.data, bench.bare, base))
     weak = [f"{name}: {value.note}" for name, value in found.items() if value.note]
     return Comparison(
         base.train_error,

@@ -19,12 +19,12 @@ from rigwatch.workbench.data import (
 )
 from rigwatch.workbench.fit import (
     Fitted,
-    commissioned,
     fit_base,
     fit_model,
     learns_from_healthy,
-    loosely_told,
-    referenced,
+    poorly_determined,
+    with_healthy_parameters,
+    with_healthy_reference,
     with_healthy_remainder,
     with_hold,
 )
@@ -66,10 +66,10 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     """
     check_data(study)
     study = with_horizon(study)
-    return told_by_healthy(study, prepare(study))
+    return determined_by_healthy(study, prepare(study))
 
 
-def told_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:
+def determined_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:
     """`prepared` for recordings in memory, for the study's unmodified model.
 
     Raises:
@@ -82,12 +82,12 @@ def told_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray |
     several = data.train.outputs.shape[1] > 1 or data.along_motion
     scale = quiet_scale(data.train) if several else None
     study = with_hold(study, data, scale)
-    study = commissioned(study, data, scale)
+    study = with_healthy_parameters(study, data, scale)
     if study.kept is not None and data.healthy is not None:
         seconds = len(data.healthy) * data.healthy.dt
-        loose = loosely_told(study.kept, study.model, seconds)
+        loose = poorly_determined(study.kept, study.model, seconds)
         data = replace(data, remarks=(*data.remarks, *loose))
-    return *referenced(study, data, scale), scale
+    return *with_healthy_reference(study, data, scale), scale
 
 
 def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench:
@@ -103,7 +103,7 @@ def bench_of(study: Study, data: Data, scale: FloatArray | None = None) -> Bench
     if healthy is None:
         floor = from_residual(base.held_out, data.held_out, study.file.period, data.horizon)
         return Bench(study, data, base, floor, None)
-    bare = fit_model(study, healthy, (), study.file.start, base.train.scale, from_afar=True)
+    bare = fit_model(study, healthy, (), study.file.start, base.train.scale, multi_start=True)
     return Bench(study, data, base, _of_healthy(study, healthy, base, bare), bare)
 
 
@@ -115,6 +115,6 @@ def _of_healthy(study: Study, healthy: Data, base: Fitted, bare: Fitted) -> Nois
     """
     fits = [bare]
     if base.placements:
-        fits.append(fit_base(study, healthy, base.train.scale, afar=True))
+        fits.append(fit_base(study, healthy, base.train.scale, multi_start=True))
     method = "healthy motion" if healthy.along_motion else "healthy"
     return NoiseFloor(min(fits, key=lambda fitted: fitted.train_error).held_out.rms, method)

@@ -21,12 +21,14 @@ from rigwatch.physics.engine.equations import Placement, compose
 from rigwatch.physics.engine.fit import evaluate
 from rigwatch.physics.engine.score import Candidate
 from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit import Fitted, loosened
+from rigwatch.workbench.fit import Fitted, with_kept_free
 from rigwatch.workbench.ranking import score_all
 from rigwatch.workbench.study import Kept, Study
 
 
-def beyond(study: Study, data: Data, bare: Fitted | None, fitted: Fitted) -> dict[str, float]:
+def added_variances(
+    study: Study, data: Data, bare: Fitted | None, fitted: Fitted
+) -> dict[str, float]:
     """Variances to add to those of the parameters, by name; none without kept parameters.
 
     Args:
@@ -48,7 +50,7 @@ def beyond(study: Study, data: Data, bare: Fitted | None, fitted: Fitted) -> dic
 def _from_kept(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str, float]:
     """Variances of the fitted parameters due to the kept ones."""
     train = fitted.train
-    compiled = compile_system(compose(loosened(study.model, kept.names), fitted.placements))
+    compiled = compile_system(compose(with_kept_free(study.model, kept.names), fitted.placements))
     loose = dataclasses.replace(
         train, compiled=compiled, parameters=compiled.vector(train.values())
     )

@@ -21,7 +21,7 @@ MOST = 5.0
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
 VARIED = "`rigwatch study base {study} --take enough` searches for better variants of the model"
 
-UNTOLD = (
+UNCHECKED = (
     "the model could not be checked on a healthy recording: record one with nothing wrong and list"
     " it under [[healthy]] in the study"
 )
@@ -73,13 +73,13 @@ def unchecked(bench: Bench, found: Verdict) -> Verdict:
     if ratio > MOST and found.word != "model_inadequate":
         text = (
             f"with the best known effect the held-out error is {ratio:.3g} times its noise"
-            f" ({METHODS[bench.floor.method]}), expected at most {MOST:g}; {UNTOLD}"
+            f" ({METHODS[bench.floor.method]}), expected at most {MOST:g}; {UNCHECKED}"
         )
         return Verdict("model_inadequate", None, (), (), text)
     certain = periods and best is not None and bench.floor.reached(best.held_out)
     if found.word != "missing_effect" or certain:
         return found
-    return replace(found, word="undetermined", text=f"{found.text}; {UNTOLD}")
+    return replace(found, word="undetermined", text=f"{found.text}; {UNCHECKED}")
 
 
 def _worst(model: Model, ratios: FloatArray) -> str:

@@ -1,7 +1,7 @@
 """Whether the training recordings excite the model, and if not, a split that does.
 
 Recordings at rest, or steps cut off before their transient, leave model parameters undetermined.
-Such parameters take arbitrary values, so the held-out error says nothing about an effect. Before
+Such parameters take arbitrary values, so the held-out error is no evidence for an effect. Before
 anything is ranked every parameter's interval is checked. If one is undetermined, other splits of
 the same recordings are tried, and one that determines it is proposed.
 """
@@ -19,7 +19,7 @@ from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import Value, fit_base, shown, values
 from rigwatch.workbench.study import Span, Study
 
-OPEN, TOLD = 1.0, 0.25
+UNDETERMINED, DETERMINED = 1.0, 0.25
 """Half-width of an interval over its value: above the first a parameter counts as undetermined,
 below the second as determined."""
 SHARES = (0.5, 2 / 3)
@@ -28,20 +28,20 @@ SHARES = (0.5, 2 / 3)
 
 def unexcited(bench: Bench) -> Verdict | None:
     """The verdict if another split determines parameters that the training data do not."""
-    left_open = {n: v for n, v in _own(bench).items() if _width(v) > OPEN}
+    undetermined = {n: v for n, v in _own(bench).items() if _width(v) > UNDETERMINED}
     in_memory = len(bench.data.train.parts) != len(bench.study.file.train)
-    if not left_open or in_memory or bench.data.along_motion or bench.study.model.rough:
+    if not undetermined or in_memory or bench.data.along_motion or bench.study.model.rough:
         return None
     for study in _splits(bench.study, bench.data):
         found, judged = _values(study, bench)
-        told = all(_width(found[name]) < TOLD for name in left_open) if found else False
-        if told and all(_width(judged[name]) < OPEN for name in left_open):
-            said = ", ".join(f"{name} = {shown(value)}" for name, value in left_open.items())
-            then = ", ".join(f"{name} = {shown(found[name])}" for name in left_open)
+        determined = found and all(_width(found[name]) < DETERMINED for name in undetermined)
+        if determined and all(_width(judged[name]) < UNDETERMINED for name in undetermined):
+            before = ", ".join(f"{name} = {shown(value)}" for name, value in undetermined.items())
+            after = ", ".join(f"{name} = {shown(found[name])}" for name in undetermined)
+            train, held_out = _spans_text(study.file.train), _spans_text(study.file.held_out)
             text = (
-                f"the training does not excite the model ({said}); train on"
-                f" {_said(study.file.train)} and hold out {_said(study.file.held_out)}, which gives"
-                f" {then}"
+                f"the training does not excite the model ({before}); train on {train} and hold out"
+                f" {held_out}, which gives {after}"
             )
             return Verdict("model_inadequate", None, (), (), text)
     return None
@@ -107,7 +107,7 @@ def _whole(spans: Sequence[Span]) -> list[Span]:
     ]
 
 
-def _said(spans: Sequence[Span]) -> str:
+def _spans_text(spans: Sequence[Span]) -> str:
     def part(span: Span) -> str:
         end = "its end" if span.end == float("inf") else f"{span.end:.4g} s"
         return f"{span.session} from {span.start:.4g} s to {end}"

@@ -3,25 +3,29 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rigwatch.workbench.compare import Bench, Comparison, beyond, comparison, open_bench
+from rigwatch.workbench.compare import Bench, Comparison, added_variances, comparison, open_bench
 from rigwatch.workbench.explain.adequacy import inadequate, unchecked, with_base_offered
-from rigwatch.workbench.explain.believed import believed
+from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
-from rigwatch.workbench.explain.rough_verdict import leaves_much, modest, not_alone
-from rigwatch.workbench.explain.together import alone_is_not_enough, several_effects
+from rigwatch.workbench.explain.rough_verdict import (
+    leaves_much,
+    limited_verdict,
+    undetermined_if_much_left,
+)
+from rigwatch.workbench.explain.several_effects import may_need_several, several_effects
 from rigwatch.workbench.explain.verdict import Verdict, not_converged
 from rigwatch.workbench.explain.verdict_calibration import (
-    LATER,
-    doubt_along,
-    later_doubt,
-    seen,
-    seen_along,
+    LATER_COUNTS,
+    cases_seen,
+    cases_seen_along,
+    later_probability_wrong,
+    probability_wrong_along,
 )
 from rigwatch.workbench.fit import Value, as_written, values
-from rigwatch.workbench.ranking import Progress, Ranked, rank, rank_all, unheard
+from rigwatch.workbench.ranking import Progress, Ranked, no_progress, rank, rank_all
 from rigwatch.workbench.study import Study
 
 
@@ -79,7 +83,7 @@ class Explanation:
     like_this: tuple[int, int] = (0, 0)
 
 
-def explain(study: Study, progress: Progress = unheard) -> Explanation:
+def explain(study: Study, progress: Progress = no_progress) -> Explanation:
     """Rank every effect at every port and judge.
 
     Args:
@@ -95,25 +99,25 @@ def explain(study: Study, progress: Progress = unheard) -> Explanation:
     return explanation(bench, rows, verdict)
 
 
-def ranking(bench: Bench, progress: Progress = unheard) -> tuple[list[Ranked], Verdict]:
+def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked], Verdict]:
     """The ranking, with the effect named by the verdict first, and the verdict."""
     stopped = _stopped(bench)
     if stopped is not None:
         rows = rank_all(bench.study, bench.data, bench.base)
         return rows, with_base_offered(bench.study, stopped)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
-    verdict = believed(bench, rows)
+    verdict = credible_verdict(bench, rows)
     along = bench.data.along_motion
     # Sets of effects are judged by whether only noise is left, which a rough model never reaches.
     if along or bench.study.model.rough:
         verdict = _by_pairs(bench, rows, verdict, progress)
-    elif alone_is_not_enough(bench, verdict):
+    elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
     verdict = with_motion_sensor(bench, verdict)
     if along and bench.study.model.rough:
-        verdict = modest(bench.base, rows, bench.floor, verdict)
+        verdict = limited_verdict(bench.base, rows, bench.floor, verdict)
     elif along:
-        verdict = not_alone(bench.base, bench.floor, verdict)
+        verdict = undetermined_if_much_left(bench.base, bench.floor, verdict)
     verdict = with_base_offered(bench.study, unchecked(bench, verdict))
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
@@ -151,7 +155,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
     more: dict[str, float] = {}
     if verdict.best is not None and verdict.best.fitted is not None:
-        more = beyond(bench.study, bench.data, bench.bare, verdict.best.fitted)
+        more = added_variances(bench.study, bench.data, bench.bare, verdict.best.fitted)
     told = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
     ]
@@ -175,10 +179,11 @@ def _reliability(bench: Bench, verdict: Verdict) -> tuple[float | None, tuple[in
     if bench.data.along_motion and later:
         return None, (0, 0)
     if bench.data.along_motion:
-        return doubt_along(verdict.word, rough=rough), seen_along(verdict.word, rough=rough)
+        counted = cases_seen_along(verdict.word, rough=rough)
+        return probability_wrong_along(verdict.word, rough=rough), counted
     if later:
-        return later_doubt(), LATER
-    return verdict.doubt, seen(verdict.word, verdict.evidence)
+        return later_probability_wrong(), LATER_COUNTS
+    return verdict.probability_wrong, cases_seen(verdict.word, verdict.evidence)
 
 
 def _row(row: Ranked, alike: list[str], more: Mapping[str, float] | None = None) -> Row:

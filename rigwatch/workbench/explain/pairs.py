@@ -71,8 +71,8 @@ def two_effects(
     if not good:
         return verdict
     best, together = min(good, key=lambda found: found[1].held_out_error)
-    first = _beside(bench, rows, fits, best.other, best.one)
-    second = _beside(bench, rows, fits, best.one, best.other)
+    first = _verdict_with(bench, rows, fits, best.other, best.one)
+    second = _verdict_with(bench, rows, fits, best.one, best.other)
     if first is None or second is None:
         return verdict
     found = _both(bench, first, second, together)
@@ -93,10 +93,10 @@ def likely_pairs(bench: Bench, rows: Sequence[Ranked]) -> list[Pair]:
 
 
 def _pair(one: Ranked, other: Ranked) -> Pair | None:
-    """The pair; None if the two are too similar, or if one changes sign beside the other."""
+    """The pair; None if the two are too similar, or if one changes sign in the joint fit."""
     if other.explained > one.explained:
         one, other = other, one
-    cosine = one.turned.get(other.label, 0.0)
+    cosine = one.signed_cosines.get(other.label, 0.0)
     if abs(cosine) > SIMILAR:
         return None
     a, b = np.sqrt(one.explained), np.sqrt(other.explained)
@@ -152,14 +152,14 @@ def _enough(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pai
     ]
 
 
-def _beside(
+def _verdict_with(
     bench: Bench,
     rows: Sequence[Ranked],
     fits: Sequence[tuple[Pair, Fitted]],
     known: Ranked,
     wanted: Ranked,
 ) -> Verdict | None:
-    """The verdict on effects beside the known one of a pair; None if it does not name `wanted`."""
+    """The verdict with one effect of a pair in the model; None if it does not name `wanted`."""
     known = dataclasses.replace(known)
     if known.fitted is None:
         refit(bench.study, bench.data, bench.base, known)
@@ -171,16 +171,16 @@ def _beside(
             continue
         both = {row.label, known.label}
         together = (f for pair, f in fits if {pair.one.label, pair.other.label} == both)
-        beside = dataclasses.replace(row, fitted=next(together, None), accepted=False)
-        if beside.fitted is not None:
-            judge_fit(known.fitted, beside)
-        among.append(beside)
+        joint = dataclasses.replace(row, fitted=next(together, None), accepted=False)
+        if joint.fitted is not None:
+            judge_fit(known.fitted, joint)
+        among.append(joint)
     found = judge(known.fitted, among, bench.floor)
     return found if wanted.label in (*found.members, *found.rivals) else None
 
 
 def _row(rows: Sequence[Ranked], found: Ranked | None) -> Ranked | None:
-    """The single-effect row of an effect that was found beside another."""
+    """The single-effect row of an effect that was found together with another."""
     return next((row for row in rows if found is not None and row.label == found.label), None)
 
 

@@ -5,8 +5,8 @@ motion, so part of the residual is model error. Therefore:
 
 * residual no larger than on the healthy rig: nothing is missing, even if an effect lowers it;
 * residual slightly larger: an effect that fits it is not named;
-* best effect leaves much more than the healthy residual: another effect acts beside it or in its
-  place, and it is not named with confidence, for any model;
+* best effect leaves much more than the healthy residual: another effect acts in addition to it or
+  in its place, and it is not named with confidence, for any model;
 * best effect leaves more than the healthy residual: one that does nearly as well may be the right
   one, as the model error may favour either.
 """
@@ -19,7 +19,7 @@ from rigwatch.workbench.explain.verdict import MUCH_WORSE, NEARLY, Verdict
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import Ranked
 
-TRANSFERS = 1.2
+MOTION_ALLOWANCE = 1.2
 """Ratio of the error to the healthy error that a changed motion alone can cause.
 
 Healthy rigs of the simulated family leave 1.07 to 1.3 times as much under another excitation.
@@ -44,13 +44,13 @@ def much_left(base: Fitted, floor: NoiseFloor, fitted: Fitted) -> bool:
 
 
 def leaves_much(base: Fitted, floor: NoiseFloor, found: Verdict) -> bool:
-    """Whether the single effect named leaves so much that another must act beside it."""
+    """Whether the single effect named leaves so much that another must act as well."""
     if found.word != "missing_effect" or found.second or found.best is None:
         return False
     return found.best.fitted is not None and much_left(base, floor, found.best.fitted)
 
 
-def not_alone(base: Fitted, floor: NoiseFloor, found: Verdict) -> Verdict:
+def undetermined_if_much_left(base: Fitted, floor: NoiseFloor, found: Verdict) -> Verdict:
     """The verdict, made undetermined if the single effect named leaves a large residual."""
     if not leaves_much(base, floor, found):
         return found
@@ -59,12 +59,14 @@ def not_alone(base: Fitted, floor: NoiseFloor, found: Verdict) -> Verdict:
     left = floor.ratio(found.best.fitted.held_out)
     text = (
         f"{found.best.label} explains most, but leaves {left:.2f} times the error on the"
-        f" healthy recording, expected at most {MUCH:g}: another effect may act beside it"
+        f" healthy recording, expected at most {MUCH:g}: another effect may act as well"
     )
     return replace(found, word="undetermined", text=text)
 
 
-def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdict) -> Verdict:
+def limited_verdict(
+    base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdict
+) -> Verdict:
     """The verdict, weakened to what a rough model can support.
 
     Args:
@@ -79,14 +81,14 @@ def modest(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor, found: Verdi
         return Verdict("nothing_missing", None, (), (), text, evidence=found.evidence)
     if found.word != "missing_effect" or found.best is None:
         return found
-    if ratio <= TRANSFERS:
+    if ratio <= MOTION_ALLOWANCE:
         text = (
             f"the held-out error is {ratio:.2f} times that on the healthy recording, which a"
             f" changed motion alone can cause; {found.best.label} would also explain it"
         )
         return replace(found, word="undetermined", text=text)
     if leaves_much(base, floor, found):
-        return not_alone(base, floor, found)
+        return undetermined_if_much_left(base, floor, found)
     rivals = _nearly_as_good(rows, floor, found)
     if not rivals:
         return found

@@ -18,13 +18,13 @@ import numpy as np
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
-from rigwatch.workbench.explain.remainder import (
-    accepted_as_well,
+from rigwatch.workbench.explain.remaining_error import (
     explains,
-    explains_too_little,
-    what_stays,
+    explains_little,
+    other_accepted,
+    remaining_error,
 )
-from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, doubt
+from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, probability_wrong
 from rigwatch.workbench.fit import Fitted, block_differences
 from rigwatch.workbench.ranking import SAME, SIMILAR, Ranked
 
@@ -70,9 +70,9 @@ class Verdict:
     evidence: Evidence = field(default_factory=Evidence)
 
     @property
-    def doubt(self) -> float:
+    def probability_wrong(self) -> float:
         """Probability that the verdict is wrong, calibrated on simulated cases."""
-        return doubt(self.word, self.evidence)
+        return probability_wrong(self.word, self.evidence)
 
 
 def not_converged(fits: Mapping[str, Convergence | None]) -> Verdict | None:
@@ -105,7 +105,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
     word, text = _word(base, best, rivals, floor)
-    text += what_stays(base, best, floor) + accepted_as_well(rows, (*members, *rivals))
+    text += remaining_error(base, best, floor) + other_accepted(rows, (*members, *rivals))
     return Verdict(word, best, members, rivals, text, evidence=evidence)
 
 
@@ -113,7 +113,7 @@ def _word(
     base: Fitted, best: Ranked, rivals: tuple[str, ...], floor: NoiseFloor
 ) -> tuple[Word, str]:
     """The verdict if an effect lowers the error, and its sentence."""
-    if explains_too_little(base, best, floor):
+    if explains_little(base, best, floor):
         return "unknown_effect", (
             f"the best known effect, {best.label}, leaves much of the error above the noise floor"
         )
@@ -187,8 +187,8 @@ def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
         no_worse = row.held_out_error <= best.held_out_error * (1 + NO_DIFFERENCE)
         better = cosine > SIMILAR and _ahead(row, best) > PERHAPS
         # At another port it does not refine the best, however many parameters its shape has.
-        as_good = row.port != best.port and _equal(best, row, cosine)
-        return trusted and ((cosine > ALIKE and (no_worse or as_good)) or better)
+        not_worse = row.port != best.port and _equal(best, row, cosine)
+        return trusted and ((cosine > ALIKE and (no_worse or not_worse)) or better)
     if cosine > ALIKE and not trusted and row.held_out_error < MUCH_WORSE * best.held_out_error:
         return True
     return cosine > SIMILAR and _equal(best, row, cosine)

@@ -26,15 +26,15 @@ from msgspec import Meta
 
 from rigwatch.wire.typed_files import Section, parse
 
-LEFT = (0.02, 0.1)
+LEFT_EDGES = (0.02, 0.1)
 """Cell edges: share of the energy above the floor that the named effect leaves."""
-MARGIN = (3.0, 6.0)
+MARGIN_EDGES = (3.0, 6.0)
 """Cell edges: standard deviations by which it beats the best of the others."""
-LEANING = 2.0
+PRIOR_CASES = 2.0
 """Number of cases that a word's rate over all cells weighs in each cell."""
 FILE = "calibration.toml"
 ALONG_FILE = "calibration_along.toml"
-LATER = (78, 4)
+LATER_COUNTS = (78, 4)
 """Number of verdicts on later steps, after an effect was added, and how many were wrong: chains of
 two and three hidden effects on five simulated machines (`benchmarks/explaining/chains`). Later
 steps are wrong more often than first steps, which the cells count.
@@ -62,8 +62,8 @@ class Cell(Section, frozen=True, kw_only=True):
     """Counts of similar verdicts."""
 
     word: Annotated[str, Meta(description="the verdict")]
-    left: Annotated[int, Meta(ge=0, le=len(LEFT), description="which cell of `left`")]
-    margin: Annotated[int, Meta(ge=0, le=len(MARGIN), description="which cell of `margin`")]
+    left: Annotated[int, Meta(ge=0, le=len(LEFT_EDGES), description="which cell of `left`")]
+    margin: Annotated[int, Meta(ge=0, le=len(MARGIN_EDGES), description="which cell of `margin`")]
     cases: Annotated[int, Meta(ge=0, description="simulated cases with such a verdict")]
     wrong: Annotated[int, Meta(ge=0, description="those where it was wrong")]
 
@@ -91,40 +91,40 @@ class AlongCalibration(Section, frozen=True, kw_only=True):
 
 def cell_of(word: str, evidence: Evidence) -> tuple[str, int, int]:
     """The cell of a verdict: word, index of `left`, index of `margin`."""
-    left = int(np.searchsorted(LEFT, max(evidence.left, 0.0)))
-    return word, left, int(np.searchsorted(MARGIN, evidence.margin))
+    left = int(np.searchsorted(LEFT_EDGES, max(evidence.left, 0.0)))
+    return word, left, int(np.searchsorted(MARGIN_EDGES, evidence.margin))
 
 
-def seen(word: str, evidence: Evidence) -> tuple[int, int]:
+def cases_seen(word: str, evidence: Evidence) -> tuple[int, int]:
     """Number of simulated cases in the verdict's cell, and how many of them were wrong."""
     return _counts().get(cell_of(word, evidence), (0, 0))
 
 
-def later_doubt() -> float:
+def later_probability_wrong() -> float:
     """Probability that the verdict on a later step is wrong."""
-    cases, wrong = LATER
+    cases, wrong = LATER_COUNTS
     return (wrong + 1) / (cases + 2)
 
 
-def seen_along(word: str, *, rough: bool) -> tuple[int, int]:
+def cases_seen_along(word: str, *, rough: bool) -> tuple[int, int]:
     """Number of verdicts with the same word along the measured motion, and how many were wrong."""
     return _along_counts().get((rough, word), (0, 0))
 
 
-def doubt_along(word: str, *, rough: bool) -> float | None:
+def probability_wrong_along(word: str, *, rough: bool) -> float | None:
     """Probability that a verdict along the measured motion is wrong; None without such a case."""
-    cases, wrong = seen_along(word, rough=rough)
+    cases, wrong = cases_seen_along(word, rough=rough)
     return (wrong + 1) / (cases + 2) if cases else None
 
 
-def doubt(word: str, evidence: Evidence) -> float:
+def probability_wrong(word: str, evidence: Evidence) -> float:
     """Probability that the verdict is wrong; 0.5 if its cell has no simulated case."""
-    cases, wrong = seen(word, evidence)
+    cases, wrong = cases_seen(word, evidence)
     if not cases:
         return 0.5
     same = [count for cell, count in _counts().items() if cell[0] == word]
     rate = (sum(k for _, k in same) + 1) / (sum(n for n, _ in same) + 2)
-    return (wrong + LEANING * rate) / (cases + LEANING)
+    return (wrong + PRIOR_CASES * rate) / (cases + PRIOR_CASES)
 
 
 @cache

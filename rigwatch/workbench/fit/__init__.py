@@ -4,17 +4,21 @@ from rigwatch.workbench.fit.fitted_model import (
     Fitted,
     block_differences,
     eigenvalues,
-    fit_again,
     fit_base,
     fit_model,
-    fit_twice,
-    may_be_better,
+    fit_with_retry,
+    may_be_local_minimum,
     nodes,
     placements_of,
+    refit_from_short_horizons,
 )
 from rigwatch.workbench.fit.free_run import free_run
-from rigwatch.workbench.fit.healthy_parameters import commissioned, loosely_told, loosened
-from rigwatch.workbench.fit.healthy_reference import referenced
+from rigwatch.workbench.fit.healthy_parameters import (
+    poorly_determined,
+    with_healthy_parameters,
+    with_kept_free,
+)
+from rigwatch.workbench.fit.healthy_reference import with_healthy_reference
 from rigwatch.workbench.fit.healthy_remainder import learns_from_healthy, with_healthy_remainder
 from rigwatch.workbench.fit.input_hold import held_as, with_hold
 from rigwatch.workbench.fit.intervals import (
@@ -32,26 +36,26 @@ __all__ = [
     "Value",
     "as_written",
     "block_differences",
-    "commissioned",
     "covariance",
     "eigenvalues",
-    "fit_again",
     "fit_base",
     "fit_model",
-    "fit_twice",
+    "fit_with_retry",
     "free_run",
     "held_as",
     "interval_with_held",
     "learns_from_healthy",
-    "loosely_told",
-    "loosened",
-    "may_be_better",
+    "may_be_local_minimum",
     "nodes",
     "placements_of",
+    "poorly_determined",
     "profile",
-    "referenced",
+    "refit_from_short_horizons",
     "shown",
     "values",
+    "with_healthy_parameters",
+    "with_healthy_reference",
     "with_healthy_remainder",
     "with_hold",
+    "with_kept_free",
 ]

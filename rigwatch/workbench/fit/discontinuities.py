@@ -8,16 +8,16 @@ sample as large as the jump. In a correct model with little noise such samples d
 import numpy as np
 
 from rigwatch.physics.engine.compile import evaluated
-from rigwatch.physics.engine.fit import Fit, Recording, initial_states, seen, windows
+from rigwatch.physics.engine.fit import Fit, Recording, initial_states, port_signals, windows
 from rigwatch.wire.arrays import BoolArray
 
 JUMP = 0.5
 """Change per sample, relative to the largest value of the effect, that counts as a jump."""
 MOST = 0.3
-"""Share of samples beside jumps above which they are normal behaviour, not discontinuities."""
+"""Share of samples next to jumps above which they are normal behaviour, not discontinuities."""
 
 
-def between_jumps(fitted: Fit, recording: Recording, horizon: int) -> BoolArray | None:
+def away_from_jumps(fitted: Fit, recording: Recording, horizon: int) -> BoolArray | None:
     """Samples of a recording's windows away from jumps, shape (windows, length).
 
     Args:
@@ -30,32 +30,32 @@ def between_jumps(fitted: Fit, recording: Recording, horizon: int) -> BoolArray 
     """
     if recording.thinning is not None:
         return None
-    beside = _beside_jumps(fitted, recording)
-    if not beside.any() or beside.mean() > MOST:
+    near = _near_jumps(fitted, recording)
+    if not near.any() or near.mean() > MOST:
         return None
     cut = windows(fitted.compiled.system, len(recording), horizon)
-    calm: BoolArray = ~beside[cut.starts[:, None] + np.arange(cut.length)]
+    calm: BoolArray = ~near[cut.starts[:, None] + np.arange(cut.length)]
     return calm
 
 
-def _beside_jumps(fitted: Fit, recording: Recording) -> BoolArray:
+def _near_jumps(fitted: Fit, recording: Recording) -> BoolArray:
     """Whether an effect without states jumps right before or after a sample, shape (n,)."""
     system, values = fitted.compiled.system, fitted.values()
-    beside = np.zeros(len(recording), np.bool_)
+    near = np.zeros(len(recording), np.bool_)
     able = [
         placement
         for placement in system.placements
         if system.model.ports[placement.port].kind == "force" and not placement.effect.states
     ]
     if not able:
-        return beside
+        return near
     states = initial_states(system, recording)
     for placement in able:
         effect = placement.effect
-        signals = seen(system, placement, recording.inputs, states, recording.dt, values)
+        signals = port_signals(system, placement, recording.inputs, states, recording.dt, values)
         own = {name: values[placement.prefix + name] for name in effect.parameters}
         pushed = evaluated(effect.expression, signals, own, str(placement))
         sudden = np.abs(np.diff(pushed)) > JUMP * np.max(np.abs(pushed))
-        beside[:-1] |= sudden
-        beside[1:] |= sudden
-    return beside
+        near[:-1] |= sudden
+        near[1:] |= sudden
+    return near

@@ -23,12 +23,12 @@ from rigwatch.physics.engine.search import (
     ShortHorizons,
     WholeRuns,
     convergence,
-    fit_from_afar,
+    multi_start_fit,
 )
 from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, port_sizes, quiet_scale
-from rigwatch.workbench.fit.discontinuities import between_jumps
+from rigwatch.workbench.fit.discontinuities import away_from_jumps
 from rigwatch.workbench.study import Study
 
 LONG = 2000
@@ -37,7 +37,7 @@ SHORTER = 8
 """Ratio of the horizon to the shorter one."""
 WELL_ABOVE = 1.5
 """Ratio of error to noise above which a fit may have ended in a local minimum."""
-FROM_AFAR = 5
+MANY_PARAMETERS = 5
 """Number of free parameters above which a fit along the measured motion uses several starts."""
 FAST, SLOWED = 1.0, 0.5
 """Eigenvalue times step above which a linearisation uses finer steps, and its value then."""
@@ -131,30 +131,30 @@ def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:
 
 
 def fit_base(
-    study: Study, data: Data, scale: FloatArray | None = None, *, afar: bool = False
+    study: Study, data: Data, scale: FloatArray | None = None, *, multi_start: bool = False
 ) -> Fitted:
     """Fit the model of a study with its accepted effects.
 
-    The fit starts from the accepted fit of the last effect and stays in that minimum unless `afar`
-    is set: another minimum may have a lower training error but was not the one accepted. If the
-    model diverges from the study's initial values, it is fitted effect by effect in the order of
-    acceptance.
+    The fit starts from the accepted fit of the last effect and stays in that minimum unless
+    `multi_start` is set: another minimum may have a lower training error but was not the one
+    accepted. If the model diverges from the study's initial values, it is fitted effect by effect
+    in the order of acceptance.
 
     Raises:
         ModelError: the simulation diverges that way, too.
     """
     placements, start = placements_of(study, data.train), parameters_of(study.file)
     try:
-        if not afar and study.file.effects and study.file.effects[-1].model:
+        if not multi_start and study.file.effects and study.file.effects[-1].model:
             return _kept(fit_model(study, data, placements, start, scale))
-        return fit_twice(study, data, placements, start, scale, from_afar=True)
+        return fit_with_retry(study, data, placements, start, scale, multi_start=True)
     except ModelError:
         if not placements:
             raise
-    found = fit_model(study, data, (), start, scale, from_afar=True)
+    found = fit_model(study, data, (), start, scale, multi_start=True)
     for count in range(1, len(placements) + 1):
         begin = start | found.train.values()
-        found = fit_twice(study, data, placements[:count], begin, scale, from_afar=True)
+        found = fit_with_retry(study, data, placements[:count], begin, scale, multi_start=True)
     return found
 
 
@@ -165,7 +165,7 @@ def _kept(found: Fitted) -> Fitted:
     )
 
 
-def fit_twice(
+def fit_with_retry(
     study: Study,
     data: Data,
     placements: Sequence[Placement],
@@ -173,21 +173,23 @@ def fit_twice(
     scale: FloatArray | None = None,
     *,
     base: Fitted | None = None,
-    from_afar: bool = False,
+    multi_start: bool = False,
 ) -> Fitted:
     """`fit_model`, repeated if it may have ended in a local minimum."""
-    found = fit_model(study, data, placements, start, scale, base=base, from_afar=from_afar)
-    if scale is None or not may_be_better(study, data, found, start):
+    found = fit_model(study, data, placements, start, scale, base=base, multi_start=multi_start)
+    if scale is None or not may_be_local_minimum(study, data, found, start):
         return found
-    return fit_again(study, data, found, start)
+    return refit_from_short_horizons(study, data, found, start)
 
 
-def fit_again(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> Fitted:
+def refit_from_short_horizons(
+    study: Study, data: Data, found: Fitted, start: Mapping[str, float]
+) -> Fitted:
     """The better of a fit and a second one that starts with short horizons."""
     try:
         again = fit_model(
             study, data, found.placements, start, found.train.scale, base=found,
-            by_way_of_short=True,
+            from_short_horizons=True,
         )  # fmt: skip
     except ModelError:
         return found
@@ -210,8 +212,8 @@ def fit_model(
     scale: FloatArray | None = None,
     *,
     base: Fitted | None = None,
-    by_way_of_short: bool = False,
-    from_afar: bool = False,
+    from_short_horizons: bool = False,
+    multi_start: bool = False,
 ) -> Fitted:
     """Fit the study's model with `placements` from `start`.
 
@@ -221,9 +223,9 @@ def fit_model(
         start: initial values by name; the model's own for those not given.
         scale: divisor of each output's residuals, shape (outputs,).
         base: a fit with fewer effects, whose initial states are used as start.
-        by_way_of_short: start from a fit over short horizons, since stick-slip has many local
+        from_short_horizons: start from a fit over short horizons, since stick-slip has many local
             minima over long ones.
-        from_afar: whether `start` may be far from the optimum, so that other starts are tried.
+        multi_start: whether `start` may be far from the optimum, so that other starts are tried.
 
     Raises:
         ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
@@ -234,17 +236,17 @@ def fit_model(
     first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
     search: ShortHorizons | WholeRuns | None = None
-    if data.along_motion and len(compiled.system.free) >= FROM_AFAR and scale is not None:
+    if data.along_motion and len(compiled.system.free) >= MANY_PARAMETERS and scale is not None:
         search = WholeRuns(compiled, [data.train], scale, start=begin, substeps=substeps)
-    elif from_afar and not data.along_motion:
+    elif multi_start and not data.along_motion:
         noise = quiet_scale(data.train) if scale is None else scale
         search = ShortHorizons(compiled, data.train, horizon, begin, scale, noise, first, substeps)
     if search:
-        found, ended = fit_from_afar(search)
+        found, ended = multi_start_fit(search)
         found = _settled(study, data, found, horizon, substeps)
         return _judged(study, data, placements, found, horizon, later, ended)
     free_run = study.model.states and not data.along_motion
-    if free_run and (horizon >= LONG or by_way_of_short):
+    if free_run and (horizon >= LONG or from_short_horizons):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
     found = _settled(study, data, fit_over(horizon, start=begin, initial=first), horizon, substeps)
     return _judged(study, data, placements, found, horizon, later, None)
@@ -275,16 +277,18 @@ def _judged(  # noqa: PLR0917 -- they belong together
     ended: Convergence | None,
 ) -> Fitted:
     """A fit with its held-out error."""
-    beside = data.horizon if study.model.states else len(data.held_out)
+    length = data.horizon if study.model.states else len(data.held_out)
     substeps = study.file.substeps
     # Along the motion hidden states follow it; a rough model is judged with its reference.
     judging = not (data.along_motion or study.model.rough)
-    judged = evaluate(found, data.held_out, beside, substeps, initial, judging=judging)
-    calm = between_jumps(found, data.held_out, beside)
+    judged = evaluate(found, data.held_out, length, substeps, initial, judging=judging)
+    calm = away_from_jumps(found, data.held_out, length)
     return Fitted(tuple(placements), found, judged, substeps, horizon, calm, ended)
 
 
-def may_be_better(study: Study, data: Data, found: Fitted, start: Mapping[str, float]) -> bool:
+def may_be_local_minimum(
+    study: Study, data: Data, found: Fitted, start: Mapping[str, float]
+) -> bool:
     """Whether a fit may have ended in a local minimum.
 
     True if its residual exceeds the noise and its last effect needs finer steps than the model.

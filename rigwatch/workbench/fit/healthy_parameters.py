@@ -23,7 +23,7 @@ from rigwatch.workbench.study import Kept, Study
 
 SAME = 1e-6
 """Singular value, relative to the largest, below which a direction counts as undetermined."""
-LOOSE = 0.3
+POORLY_DETERMINED = 0.3
 """Relative standard deviation of a kept parameter above which a remark is given."""
 NEAR_ZERO = 0.01
 """Share of its range used as a lower limit of a parameter's value in relative deviations."""
@@ -31,7 +31,7 @@ LONGEST = 600.0
 """Longest healthy recording that a remark asks for [s]."""
 
 
-def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> Study:
+def with_healthy_parameters(study: Study, data: Data, scale: FloatArray | None = None) -> Study:
     """The study with a model whose kept parameters come from the healthy recording.
 
     Args:
@@ -46,15 +46,15 @@ def commissioned(study: Study, data: Data, scale: FloatArray | None = None) -> S
     kept = [name for name, p in study.model.parameters.items() if p.kept]
     if healthy is None or not kept:
         return study
-    loose = replace(study, model=loosened(study.model))
-    found = fit_model(loose, healthy, (), study.file.start, scale, from_afar=True)
+    loose = replace(study, model=with_kept_free(study.model))
+    found = fit_model(loose, healthy, (), study.file.start, scale, multi_start=True)
     places = [found.compiled.system.free.index(name) for name in kept]
     uncertain = covariance(found.train)[0][np.ix_(places, places)]
-    told = Kept(tuple(kept), uncertain, found.convergence)
+    fitted = Kept(tuple(kept), uncertain, found.convergence)
     return replace(
         study,
         model=_with_values(study.model, found.train.values()),
-        kept=with_known(told, healthy, found),
+        kept=with_known(fitted, healthy, found),
     )
 
 
@@ -74,7 +74,7 @@ def with_known(kept: Kept, healthy: Data, found: Fitted) -> Kept:
     known = [n for n, p in model.parameters.items() if p.deviation and n not in own]
     if not known:
         return kept
-    compiled = compile_system(compose(loosened(model, known)))
+    compiled = compile_system(compose(with_kept_free(model, known)))
     parameters = compiled.vector(found.train.values())
     loose = replace(found.train, compiled=compiled, parameters=parameters)
     at = evaluate(loose, healthy.train, found.horizon, found.substeps, found.train.initial)
@@ -92,8 +92,8 @@ def with_known(kept: Kept, healthy: Data, found: Fitted) -> Kept:
     return replace(kept, names=(*kept.names, *known), covariance=whole)
 
 
-def loosely_told(kept: Kept, model: Model, seconds: float) -> tuple[str, ...]:
-    """Remarks on kept parameters that the healthy recording does not determine.
+def poorly_determined(kept: Kept, model: Model, seconds: float) -> tuple[str, ...]:
+    """Remarks on kept parameters that the healthy recording determines poorly.
 
     Args:
         kept: parameters from the healthy recording.
@@ -106,18 +106,18 @@ def loosely_told(kept: Kept, model: Model, seconds: float) -> tuple[str, ...]:
         for name, deviation in zip(kept.names, deviations, strict=True)
         if model.parameters[name].kept
     }
-    loose = {name: share for name, share in shares.items() if share > LOOSE}
+    loose = {name: share for name, share in shares.items() if share > POORLY_DETERMINED}
     if not loose:
         return ()
-    told = ", ".join(
+    listed = ", ".join(
         f"{name} ({model.parameters[name].meaning or 'a parameter'}) to {share:.0%}"
         for name, share in loose.items()
     )
-    needed = seconds * (max(loose.values()) / LOOSE) ** 2
+    needed = seconds * (max(loose.values()) / POORLY_DETERMINED) ** 2
     longer = f"{needed:.2g} s of such a motion" if needed < LONGEST else "another motion"
     return (
-        f"the healthy recording of {seconds:.3g} s tells {told} of its value only; {longer} would"
-        f" tell them to {LOOSE:.0%}",
+        f"the healthy recording of {seconds:.3g} s determines {listed} of its value only; {longer}"
+        f" would determine them to {POORLY_DETERMINED:.0%}",
     )
 
 
@@ -127,7 +127,7 @@ def _scale_of(p: Parameter) -> float:
     return max(abs(p.value), NEAR_ZERO * span if np.isfinite(span) else 0.0, 1e-300)
 
 
-def loosened(model: Model, names: Collection[str] = ()) -> Model:
+def with_kept_free(model: Model, names: Collection[str] = ()) -> Model:
     """The model with its kept parameters and those named set free."""
     free = {
         name: structs.replace(p, fixed=p.fixed and not p.kept and name not in names)

@@ -27,7 +27,7 @@ from rigwatch.workbench.data import Data, find_period
 from rigwatch.workbench.fit.fitted_model import Fitted, fit_model
 from rigwatch.workbench.study import Study
 
-UNLIKE = 0.2
+MAX_DIFFERENCE = 0.2
 """Largest rms difference between an excitation and the healthy one, relative to its own rms."""
 FEWEST = 2
 """Number of healthy periods needed, so that each can be compared with another."""
@@ -47,11 +47,13 @@ class _Periods:
     left: FloatArray
 
 
-def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> tuple[Study, Data]:
+def with_healthy_reference(
+    study: Study, data: Data, scale: FloatArray | None = None
+) -> tuple[Study, Data]:
     """A rough model with its healthy residual added as input, and the recordings with that input.
 
     Args:
-        study: with parameters from the healthy recording, see `commissioned`.
+        study: with parameters from the healthy recording, see `with_healthy_parameters`.
         data: its recordings.
         scale: divisor of each output's residuals, shape (outputs,).
 
@@ -65,18 +67,18 @@ def referenced(study: Study, data: Data, scale: FloatArray | None = None) -> tup
     if alone is None:
         raise ModelError(
             f"{name}: found no healthy recording, expected one with the same excitation,"
-            " as this model leaves much unexplained on a healthy rig, too"
+            " as this model leaves a large residual on a healthy rig, too"
         )
     # Without the accepted effects: the healthy recording has nothing for them to explain.
-    bare = fit_model(study, alone, (), study.file.start, scale, from_afar=True)
+    bare = fit_model(study, alone, (), study.file.start, scale, multi_start=True)
     periods = _matching(study, bare, data.train, data, "train")
-    beside = _matching(study, bare, data.held_out, data, "held_out")
-    remark = f"{name}: its mean residual over {len(beside.left)} healthy periods is added to it"
+    judged = _matching(study, bare, data.held_out, data, "held_out")
+    remark = f"{name}: its mean residual over {len(judged.left)} healthy periods is added to it"
     return replace(study, model=_with_inputs(study.model)), replace(
         data,
-        train=_beside(data.train, np.nanmean(periods.left, axis=0)),
-        held_out=_beside(data.held_out, np.nanmean(beside.left, axis=0)),
-        healthy=_against_each_other(alone.train.dt, beside),
+        train=_with_reference(data.train, np.nanmean(periods.left, axis=0)),
+        held_out=_with_reference(data.held_out, np.nanmean(judged.left, axis=0)),
+        healthy=_leave_one_out(alone.train.dt, judged),
         remarks=(*data.remarks, remark),
     )
 
@@ -112,7 +114,7 @@ def _starts(period: FloatArray, signal: FloatArray) -> FloatArray:
     unlike = energy + own - 2 * correlate(signal, period, mode="valid")
     found: list[int] = []
     for start in np.argsort(unlike):
-        if unlike[start] > UNLIKE**2 * own:
+        if unlike[start] > MAX_DIFFERENCE**2 * own:
             break
         if all(abs(int(start) - other) >= length for other in found):
             found.append(int(start))
@@ -138,7 +140,7 @@ def _with_inputs(model: Model) -> Model:
     return structs.replace(model, inputs=model.inputs | inputs, outputs=outputs)
 
 
-def _beside(recording: Recording, reference: FloatArray) -> Recording:
+def _with_reference(recording: Recording, reference: FloatArray) -> Recording:
     """The recording with a periodic reference as additional inputs."""
     shown = reference[np.arange(len(recording)) % len(reference)]
     return replace(
@@ -148,11 +150,11 @@ def _beside(recording: Recording, reference: FloatArray) -> Recording:
     )
 
 
-def _against_each_other(dt: float, periods: _Periods) -> Recording:
+def _leave_one_out(dt: float, periods: _Periods) -> Recording:
     """Each healthy period with the mean residual of the others as its reference."""
     count = len(periods.left)
     others = (np.sum(periods.left, axis=0) - periods.left) / (count - 1)
     inputs, outputs, flat = (
         a.reshape(-1, a.shape[-1]) for a in (periods.inputs, periods.outputs, others)
     )
-    return _beside(Recording(dt, inputs, outputs), flat)
+    return _with_reference(Recording(dt, inputs, outputs), flat)

@@ -1,13 +1,13 @@
-"""A rough model along the measured motion, with what a healthy rig does beyond it learned.
+"""A rough model along the measured motion, extended by terms learned from a healthy rig.
 
-A rough model, such as a linear black box, drifts and leaves much when it is simulated on its own.
-Driven by the measured motion it predicts the force balance alone (see `measured_motion`), and a
-missing force shows there at once, whatever the excitation. What it still leaves of a healthy rig
-is learned from the healthy recordings as a function of the motion and of hidden states that follow
-it (`learning.py`).
+A free simulation of a rough model, such as a linear black box, drifts and leaves a large residual.
+Driven by the measured motion, the model only predicts the force balance (see `measured_motion`),
+where a missing force appears at once, for any excitation. Its remaining residual on a healthy rig
+is learned from the healthy recordings, as a function of the motion and of hidden states that follow
+it (`term_selection.py`).
 
-Then all of it is fixed, so that a fit to another recording cannot swallow a fault. The recordings
-need no common period and no common excitation; but motion beyond the healthy one is said.
+All parameters are then fixed, so a fit to another recording cannot absorb a fault. The recordings
+need neither a common period nor a common excitation; motion beyond the healthy range is reported.
 """
 
 from dataclasses import replace
@@ -21,27 +21,28 @@ from rigwatch.workbench.fit.fitted_model import Fitted
 from rigwatch.workbench.fit.healthy_parameters import with_known
 from rigwatch.workbench.fit.intervals import covariance
 from rigwatch.workbench.fit.learned_terms import LEARNED
-from rigwatch.workbench.fit.learning import Learned, learn
+from rigwatch.workbench.fit.term_selection import Learned, learn_terms
 from rigwatch.workbench.study import Kept, Study
 
 LONGER = 4
-"""Windows along the motion over the study's: nothing drifts, and hidden states settle once."""
+"""Ratio of window lengths along the motion to the study's: runs do not drift, and hidden states
+need to settle only once."""
 SUBSTEPS = 4
-"""Integration steps a sample at least: the hidden states are as fast as a valve."""
+"""Integration steps per sample: the hidden states are as fast as a valve."""
 
 
 def learns_from_healthy(study: Study) -> bool:
-    """Whether a study's model is rough and learns along the measured motion what it leaves."""
+    """Whether a study's model is rough and extended by terms learned along the measured motion."""
     if study.file.prediction != "auto":
         return False
     return study.model.rough and has_hidden_states(study.model)
 
 
 def with_healthy_remainder(study: Study, data: Data) -> tuple[Study, Data]:
-    """The study's rough model along the measured motion, with its remainder, and its recordings.
+    """The study with its rough model extended by learned terms, and its recordings.
 
     Args:
-        study: as it was opened.
+        study: as opened.
         data: its recordings.
 
     Raises:
@@ -50,8 +51,8 @@ def with_healthy_remainder(study: Study, data: Data) -> tuple[Study, Data]:
     name = study.model.name
     if data.healthy is None:
         raise ModelError(
-            f"{name}: found no healthy recording, expected one, as this model learns from it what a"
-            " healthy rig does"
+            f"{name}: found no healthy recording, expected one, as this model learns its terms from"
+            " it"
         )
     horizon = LONGER * data.horizon
     study, driven = along_motion(study, data)
@@ -62,19 +63,19 @@ def with_healthy_remainder(study: Study, data: Data) -> tuple[Study, Data]:
     whole = all(length % horizon == 0 for length in lengths)
     driven = replace(driven, horizon=horizon if whole else data.horizon)
     study = replace(study, file=structs.replace(study.file, substeps=SUBSTEPS))
-    found = learn(study, healthy, driven.horizon)
+    found = learn_terms(study, healthy, driven.horizon)
     kept = tuple(found.fitted.compiled.system.free)
-    told = Kept(kept, covariance(found.fitted.train)[0], found.fitted.convergence)
+    kept_parameters = Kept(kept, covariance(found.fitted.train)[0], found.fitted.convergence)
     alone = replace(driven, train=healthy, held_out=healthy, healthy=None)
-    told = with_known(told, alone, found.fitted)
-    # What the file says to start from has been used, and must not move what was learned.
+    kept_parameters = with_known(kept_parameters, alone, found.fitted)
+    # The start values have been used; they must not overwrite the learned parameters.
     file = structs.replace(study.file, start={})
-    study = replace(study, file=file, model=_fixed(found.model, found.fitted), kept=told)
-    return study, replace(driven, remarks=(*driven.remarks, _said(name, found)))
+    study = replace(study, file=file, model=_fixed(found.model, found.fitted), kept=kept_parameters)
+    return study, replace(driven, remarks=(*driven.remarks, _remark(name, found)))
 
 
 def _fixed(model: Model, fitted: Fitted) -> Model:
-    """The model with the values of a fit, none of them free any more."""
+    """The model with the values of a fit, all fixed."""
     values = fitted.train.values()
     parameters = {
         name: structs.replace(p, value=values[name], fixed=True)
@@ -83,7 +84,7 @@ def _fixed(model: Model, fitted: Fitted) -> Model:
     return structs.replace(model, parameters=parameters)
 
 
-def _said(name: str, found: Learned) -> str:
+def _remark(name: str, found: Learned) -> str:
     more = f", with {' and '.join(found.steps)}" if found.steps else ""
     count = sum(n.startswith(LEARNED) for n in found.fitted.compiled.system.free)
     return (

@@ -37,7 +37,7 @@ MATERIAL = 0.01
 """Relative fall of the squared error that is required."""
 AT_NOISE = 1.03
 """Ratio of error to sensor noise below which no delay is searched for."""
-LATENESSES = (0.25, 0.5, 0.75, 1.0)
+DELAYS = (0.25, 0.5, 0.75, 1.0)
 """Delays tried before the best is refined, as shares of a sample."""
 FINE = 5e-4
 """Resolution of the delay, as a share of a sample."""
@@ -68,21 +68,23 @@ def with_hold(study: Study, data: Data, scale: FloatArray | None = None) -> Stud
     if not names:
         return study
     if not model.states:
-        return replace(study, model=holding(model, dict.fromkeys(names, ("linear", 0.0))))
-    told = data.of_healthy or data
+        return replace(study, model=with_holds(model, dict.fromkeys(names, ("linear", 0.0))))
+    source_data = data.of_healthy or data
     placements = () if data.healthy is not None else placements_of(study, data.train)
     source = "the healthy recording" if data.healthy is not None else "the recordings"
-    best, line = _chosen(study, told, placements, scale)
+    best, line = _chosen(study, source_data, placements, scale)
     before, after = (float(np.nanmean(_blocks(each.fitted))) for each in (line, best))
-    held = Held(best.hold, best.late, told.train.dt * best.late, source, (after / before) ** 0.5)
+    held = Held(
+        best.hold, best.late, source_data.train.dt * best.late, source, (after / before) ** 0.5
+    )
     return replace(
         study,
-        model=holding(model, dict.fromkeys(names, (best.hold, best.late))),
+        model=with_holds(model, dict.fromkeys(names, (best.hold, best.late))),
         holds={**study.holds, **dict.fromkeys(names, held)},
     )
 
 
-def holding(model: Model, holds: Mapping[str, tuple[Hold, float]]) -> Model:
+def with_holds(model: Model, holds: Mapping[str, tuple[Hold, float]]) -> Model:
     """The model with the holds of some inputs set."""
     inputs = {
         name: structs.replace(own, hold=holds[name][0], late=holds[name][1])
@@ -96,7 +98,7 @@ def holding(model: Model, holds: Mapping[str, tuple[Hold, float]]) -> Model:
 def held_as(study: Study, holds: Mapping[str, Held]) -> Study:
     """The study with the holds found for another instance of it."""
     new = {n: (held.hold, held.late) for n, held in holds.items() if n in study.model.inputs}
-    return replace(study, model=holding(study.model, new), holds=dict(holds))
+    return replace(study, model=with_holds(study.model, new), holds=dict(holds))
 
 
 def _chosen(
@@ -125,10 +127,10 @@ def _tried(  # noqa: PLR0917 -- they belong together
     start: Mapping[str, float],
     base: Fitted | None,
 ) -> _Tried:
-    model = holding(study.model, dict.fromkeys(study.model.unheld(), (hold, late)))
+    model = with_holds(study.model, dict.fromkeys(study.model.unheld(), (hold, late)))
     fitted = fit_model(
         replace(study, model=model), data, placements, start, scale,
-        base=base, from_afar=base is None,
+        base=base, multi_start=base is None,
     )  # fmt: skip
     return _Tried(hold, late, fitted)
 
@@ -145,12 +147,12 @@ def _refined(try_late: "partial[_Tried]", kept: _Tried) -> _Tried | None:
             return float("inf")
         return float(np.nanmean(block_errors(found[late].fitted.train)))
 
-    sizes = [size(late) for late in LATENESSES]
+    sizes = [size(late) for late in DELAYS]
     if not found:
         return None
     # If no coarse step improves the error, no fine one does.
     if min(sizes) < float(np.nanmean(block_errors(kept.fitted.train))):
-        near = LATENESSES[int(np.argmin(sizes))]
+        near = DELAYS[int(np.argmin(sizes))]
         ends = (max(near - 0.25, 1e-3), min(near + 0.25, 1.0))
         minimize_scalar(size, bounds=ends, method="bounded", options={"xatol": FINE})
     return min(found.values(), key=lambda each: float(np.nanmean(block_errors(each.fitted.train))))

@@ -92,18 +92,18 @@ def _moved(normal: FloatArray, jacobian: FloatArray, error: FloatArray) -> Float
     )
 
 
-def values(fitted: Fit, beyond: Mapping[str, float] | None = None) -> dict[str, Value]:
+def values(fitted: Fit, added_variances: Mapping[str, float] | None = None) -> dict[str, Value]:
     """Every parameter of the model with its interval, in SI.
 
     Args:
         fitted: the fit.
-        beyond: additional variances that the recording does not show, by name.
+        added_variances: additional variances that the recording does not show, by name.
     """
     system = fitted.compiled.system
     spread: dict[str, float] = {}
     if system.free:
         matrix, free = covariance(fitted)
-        more = np.array([(beyond or {}).get(name, 0.0) for name in system.free])
+        more = np.array([(added_variances or {}).get(name, 0.0) for name in system.free])
         width = student.ppf(0.5 + CONFIDENCE / 2, free) * np.sqrt(np.diag(matrix) + more)
         spread = dict(zip(system.free, width.tolist(), strict=True))
     notes = identifiability(fitted)

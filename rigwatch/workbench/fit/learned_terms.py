@@ -1,15 +1,14 @@
-"""Terms that a rough model learns from a healthy rig: friction that it has, and products of motion.
+"""Terms that a rough model can learn from a healthy rig: friction, and products of the motion.
 
-A linear box leaves what the rig does otherwise. Two kinds of terms are offered, each with a
-coefficient of its own:
+A linear black box does not describe nonlinear behaviour of the healthy rig. Two kinds of terms can
+be added, each with its own coefficients:
 
-    friction   F ← F - Fh·tanh(v/vh) - ch·v   at every force port that sees a speed v
+    friction   F ← F - Fh·tanh(v/vh) - ch·v   at every force port with a speed v
     products   r ← r + Σ k_i·φ_i,             φ_i products of the port's variables, of a given order
 
 at the port `remainder` of the model. A state enters a product as 3·s·tanh(state/(3·s)), with s its
-size, so that what is simulated stays bounded by what is measured, whatever the coefficients are.
-The terms are functions of the motion and of hidden states that follow it: none knows the time, the
-measured output or a period.
+rms, so the simulated terms stay bounded for any coefficients. The terms depend only on the motion
+and on hidden states that follow it, not on time, the measured output or a period.
 """
 
 import re
@@ -21,19 +20,19 @@ from msgspec.structs import replace
 from rigwatch.physics.engine.equations import Model, Parameter
 
 PORT = "remainder"
-"""Force port that products enter."""
+"""Port at which products enter."""
 LEARNED = "learned_"
-"""What the names of learned parameters and states begin with."""
-SLOW = 0.03
-"""Speed up to which healthy friction turns with the motion, as a share of the size of the speed."""
+"""Prefix of the names of learned parameters."""
+TURNING_SPEED = 0.03
+"""Speed below which healthy friction is proportional to speed, over the rms of the speed."""
 
 
 def with_friction(model: Model, sizes: Mapping[str, Mapping[str, float]]) -> Model:
-    """The model with friction at each force port that sees a speed.
+    """The model with friction at each force port with a speed among its variables.
 
     Args:
         model: to be extended.
-        sizes: of each port's variables, in their units.
+        sizes: rms of each port's variables, in their units.
     """
     for name, port in model.ports.items():
         if port.kind != "force" or port.passive or "v" not in port.variables:
@@ -45,13 +44,13 @@ def with_friction(model: Model, sizes: Mapping[str, Mapping[str, float]]) -> Mod
                                    meaning="dry friction of the healthy rig"),
             f"{own}drag": Parameter(value=0.0, unit=f"({port.unit})/({v.unit})", low=0.0, kept=True,
                                     meaning="drag of the healthy rig"),
-            f"{own}slow": Parameter(value=SLOW * sizes[name]["v"], unit=v.unit, fixed=True,
+            f"{own}slow": Parameter(value=TURNING_SPEED * sizes[name]["v"], unit=v.unit, fixed=True,
                                     meaning="speed up to which that friction turns"),
         }  # fmt: skip
         speed = f"({v.expression})"
         model = replace(model, parameters=model.parameters | parameters)
         terms = f"{own}dry*tanh({speed}/{own}slow) + {own}drag*{speed}"
-        model = _entering(model, name, terms, sign="-")
+        model = _with_terms_at(model, name, terms, sign="-")
     return model
 
 
@@ -61,11 +60,11 @@ def with_products(
     order: int,
     without: tuple[str, ...] = (),
 ) -> Model:
-    """The model with products of one order at its port `remainder`; as it is where it has none.
+    """The model with products of one order at its port `remainder`; unchanged without that port.
 
     Args:
-        model: to be extended; products that it has already are not added again.
-        sizes: of each port's variables, in their units.
+        model: to be extended; products already present are not added again.
+        sizes: rms of each port's variables, in their units.
         order: of the products.
         without: variables of the port that are left out.
     """
@@ -88,17 +87,17 @@ def with_products(
         if coefficient not in parameters:
             parameters[coefficient] = Parameter(value=0.0, unit=port.unit, kept=True)
             terms.append("*".join([coefficient, *(shares[name] for name in names)]))
-    return _entering(replace(model, parameters=parameters), PORT, " + ".join(terms))
+    return _with_terms_at(replace(model, parameters=parameters), PORT, " + ".join(terms))
 
 
 def _share(expression: str, size: str, *, bounded: bool) -> str:
-    """A variable over its size, bounded where it is simulated."""
+    """A variable over its rms, bounded if it is simulated."""
     ratio = f"({expression})/{size}"
     return f"3*tanh({ratio}/3)" if bounded else f"({ratio})"
 
 
-def _entering(model: Model, port: str, terms: str, sign: str = "+") -> Model:
-    """The model with terms added to what enters at a port."""
+def _with_terms_at(model: Model, port: str, terms: str, sign: str = "+") -> Model:
+    """The model with terms added at a port, in all its equations."""
     word, added = re.compile(rf"\b{port}\b"), f"({port} {sign} ({terms}))"
     states = {
         name: replace(state, derivative=word.sub(added, state.derivative))

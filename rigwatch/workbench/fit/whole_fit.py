@@ -1,12 +1,11 @@
 """A rough model along the measured motion, fitted to whole recordings.
 
-What runs along the motion forgets its beginning, so that a whole recording is one run, and a value
-at which it blows up costs so much that the search steps back. A parameter without bounds has no
-size that a search could move it by: it gets one from what it does to the output, so that a
-coefficient of any unit moves as easily as another, and a direction in which the recording says
-nothing is held by a prior and freezes no other.
+Along the motion a model forgets its initial state, so each recording is one run; values at which
+the run diverges get a large cost, so the search steps back. A parameter without bounds has no
+natural scale. It gets one from its influence on the output, so coefficients of all units are scaled
+alike, and a prior holds directions that the recording does not determine.
 
-A fit that has not converged goes on from where it is.
+A fit that has not converged is continued from its last values.
 """
 
 from collections.abc import Mapping
@@ -16,16 +15,16 @@ import numpy as np
 from rigwatch.physics.engine.compile import CompiledSystem, compile_system
 from rigwatch.physics.engine.equations import Model, compose
 from rigwatch.physics.engine.fit import Fit, Recording, bounds, evaluate
-from rigwatch.physics.engine.search import Convergence, WholeRuns, fit_from_afar
+from rigwatch.physics.engine.search import Convergence, WholeRuns, multi_start_fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data, quiet_scale
 from rigwatch.workbench.fit.fitted_model import Fitted
 from rigwatch.workbench.study import Study
 
 SHARE = 0.3
-"""What a unit of a parameter without bounds does to the output, over the output's own size."""
-CARRIED_ON = 4
-"""Times at most that a search goes on from where it has ended."""
+"""Change of the output, relative to its deviation, by one scale of an unbounded parameter."""
+CONTINUATIONS = 4
+"""Largest number of times that a search is continued."""
 
 
 def fit_whole(
@@ -34,47 +33,47 @@ def fit_whole(
     """A model along the measured motion, fitted to the training recording in one run.
 
     Args:
-        study: how finely is integrated.
-        model: along the motion; what is free in it is fitted.
+        study: gives the integration steps per sample.
+        model: along the motion; its free parameters are fitted.
         data: recordings along the motion.
-        start: values by name, the model's own where there are none.
-        searches: drawn starts beside that.
+        start: initial values by name; the model's own for those not given.
+        searches: number of random starts in addition.
 
     Raises:
         ModelError: the simulation diverges from every start (NaN or infinite).
     """
     compiled = compile_system(compose(model))
     own = {name: value for name, value in start.items() if name in model.parameters}
-    fit, ended = _carried_on(study, compiled, data.train, compiled.vector(own), searches)
+    fit, ended = _fit_until_converged(study, compiled, data.train, compiled.vector(own), searches)
     judged = evaluate(fit, data.held_out, len(data.held_out), study.file.substeps)
     return Fitted((), fit, judged, study.file.substeps, len(data.train), None, ended)
 
 
-def _carried_on(
+def _fit_until_converged(
     study: Study, compiled: CompiledSystem, recording: Recording, start: FloatArray, searches: int
 ) -> tuple[Fit, Convergence]:
-    """The fit from one start, and how it ended."""
+    """The fit from one start, and its convergence."""
     initial: FloatArray | None = None
     scale, substeps = quiet_scale(recording), study.file.substeps
-    for _ in range(1 + CARRIED_ON):
+    for _ in range(1 + CONTINUATIONS):
         search = WholeRuns(
             compiled, [recording], scale, start=start,
-            sizes=sizes_shown(compiled, recording, start, substeps), initial=initial,
+            sizes=search_scales(compiled, recording, start, substeps), initial=initial,
             robust=np.inf, substeps=substeps, starts=searches,
         )  # fmt: skip
-        fit, ended = fit_from_afar(search)
+        fit, ended = multi_start_fit(search)
         if ended.converged:
             break
         start, initial, searches = fit.parameters, fit.initial, 0
     return fit, ended
 
 
-def sizes_shown(
+def search_scales(
     compiled: CompiledSystem, recording: Recording, at: FloatArray, substeps: int
 ) -> FloatArray:
-    """How far a search moves parameters without bounds, shape (m,); NaN for the others.
+    """Scales of the parameters without bounds, shape (m,); NaN for the others.
 
-    Each moves the output by `SHARE` of its own size.
+    One scale changes the output by `SHARE` of its deviation.
 
     Args:
         compiled: along the motion.
@@ -88,6 +87,6 @@ def sizes_shown(
     )  # fmt: skip
     low, high = bounds(compiled.system)
     slopes = run.slopes[0, :, :, : len(low)] / np.nanstd(recording.outputs, axis=0)[:, None]
-    shown = np.sqrt(np.mean(slopes**2, axis=(0, 1)))
-    told = ~np.isfinite(high - low) & np.isfinite(shown) & (shown > 0)
-    return np.where(told, SHARE / np.where(told, shown, 1.0), np.nan)
+    influence = np.sqrt(np.mean(slopes**2, axis=(0, 1)))
+    scaled = ~np.isfinite(high - low) & np.isfinite(influence) & (influence > 0)
+    return np.where(scaled, SHARE / np.where(scaled, influence, 1.0), np.nan)

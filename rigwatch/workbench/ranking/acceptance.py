@@ -33,7 +33,7 @@ def judge_fit(base: Fitted, row: Ranked) -> None:
     assert row.fitted is not None
     found = difference(base.held_out, row.fitted.held_out)
     row.gain, row.reason = found.mean, _refused(found)
-    if not row.reason and (vague := _vague(row)) is not None:
+    if not row.reason and (vague := _undetermined_strength(row)) is not None:
         row.reason = vague
     row.accepted = not row.reason
     row.reason = row.reason or "held-out error falls"
@@ -49,7 +49,7 @@ def _refused(found: Difference) -> str:
     return "" if found.relative > MATERIAL else f"held-out error falls by less than {MATERIAL:.0%}"
 
 
-def _vague(row: Ranked) -> str | None:
+def _undetermined_strength(row: Ranked) -> str | None:
     """Reason if the strength's interval contains its neutral value, otherwise None.
 
     Shape parameters that vanish with the effect are held: a strength correlated with them alone is
@@ -58,7 +58,7 @@ def _vague(row: Ranked) -> str | None:
     assert row.fitted is not None
     effect, prefix = row.placement.effect, row.placement.prefix
     name = effect.strength
-    shape = [prefix + other for other in _gone_without(effect)]
+    shape = [prefix + other for other in _vanishing_shape(effect)]
     interval = interval_with_held(row.fitted.train, prefix + name, shape)
     p = effect.parameters[name]
     if p.role == "switch" or interval is None or not interval[0] <= p.neutral <= interval[1]:
@@ -69,16 +69,16 @@ def _vague(row: Ranked) -> str | None:
     )
 
 
-def _gone_without(effect: Effect) -> list[str]:
-    """Parameters of which nothing is left in the expression where the strength is neutral."""
+def _vanishing_shape(effect: Effect) -> list[str]:
+    """Parameters that vanish from the expression when the strength is neutral."""
     neutral = effect.parameters[effect.strength].neutral
-    left = {effect.strength, *_left_at(effect.expression, effect.strength, neutral)}
+    left = {effect.strength, *_names_at_neutral(effect.expression, effect.strength, neutral)}
     return [name for name in effect.parameters if name not in left]
 
 
 @cache
-def _left_at(expression: str, strength: str, neutral: float) -> frozenset[str]:
-    """Names that an expression still holds once its strength is neutral."""
+def _names_at_neutral(expression: str, strength: str, neutral: float) -> frozenset[str]:
+    """Names left in an expression when its strength is neutral."""
     names = {name: symbol(name) for name in names_in(expression, "effect")}
     value = sympy.nsimplify(neutral)
     rest = parse(expression, names, "effect").subs(symbol(strength), value)

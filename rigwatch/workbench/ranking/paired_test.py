@@ -20,13 +20,13 @@ from scipy.stats import norm
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.arrays import FloatArray
 
-FORGOTTEN = 0.1
+UNCORRELATED = 0.1
 """Autocorrelation below which samples count as uncorrelated."""
-MEMORIES = 2.0
+BLOCK_LENGTH = 2.0
 """Block length over the correlation time."""
-FEWEST = 8
+MIN_BLOCKS = 8
 """Minimum number of blocks; fewer cannot reach significance."""
-COUNTED = 12
+ENUMERATED = 12
 """Number of blocks up to which all sign combinations are enumerated; beyond, the sum is nearly
 normal."""
 
@@ -49,18 +49,22 @@ class Difference:
 
 def difference(before: Fit, after: Fit) -> Difference:
     """Difference of the squared errors of two fits on the same recordings."""
-    one, other = _counted(before, after)
+    one, other = _scaled_residuals(before, after)
     squares = np.sum(one**2, axis=1), np.sum(other**2, axis=1)
     fall = squares[0] - squares[1]
-    length = int(np.clip(np.ceil(MEMORIES * _memory(one, other)), 1, max(len(one) // FEWEST, 1)))
+    length = int(
+        np.clip(
+            np.ceil(BLOCK_LENGTH * _correlation_time(one, other)), 1, max(len(one) // MIN_BLOCKS, 1)
+        )
+    )
     blocks = np.add.reduceat(fall, np.arange(0, len(fall), length))
-    falls, rises = _chance(blocks), _chance(-blocks)
+    falls, rises = _p_value(blocks), _p_value(-blocks)
     total = [float(np.sum(each)) for each in squares]
     relative = 1 - float(np.sqrt(total[1] / max(total[0], 1e-300)))
     return Difference(float(fall.mean()), relative, falls, rises)
 
 
-def _counted(before: Fit, after: Fit) -> tuple[FloatArray, FloatArray]:
+def _scaled_residuals(before: Fit, after: Fit) -> tuple[FloatArray, FloatArray]:
     """Scaled residuals at the samples valid in both, each of shape (samples, outputs)."""
     outputs = len(before.scale)
     scale = before.scale if outputs > 1 else np.ones(1)
@@ -70,7 +74,7 @@ def _counted(before: Fit, after: Fit) -> tuple[FloatArray, FloatArray]:
     return np.where(known, one, 0.0)[rows], np.where(known, other, 0.0)[rows]
 
 
-def _memory(one: FloatArray, other: FloatArray) -> float:
+def _correlation_time(one: FloatArray, other: FloatArray) -> float:
     """Correlation time [samples] of the product of residual and model difference.
 
     The part of the residual proportional to the model difference is removed first.
@@ -79,19 +83,19 @@ def _memory(one: FloatArray, other: FloatArray) -> float:
     share = np.sum(one * apart) / max(float(np.sum(apart**2)), 1e-300)
     product_ = np.sum((one - share * apart) * apart, axis=1)
     spectrum = np.abs(np.fft.rfft(product_, 2 * len(product_))) ** 2
-    together = np.fft.irfft(spectrum)[: max(len(product_) // FEWEST, 1)]
+    together = np.fft.irfft(spectrum)[: max(len(product_) // MIN_BLOCKS, 1)]
     correlation = together / max(float(together[0]), 1e-300)
-    below = np.nonzero(correlation < FORGOTTEN)[0]
+    below = np.nonzero(correlation < UNCORRELATED)[0]
     last = int(below[0]) if len(below) else len(correlation)
     return float(1 + 2 * np.sum(correlation[1:last]))
 
 
-def _chance(blocks: FloatArray) -> float:
+def _p_value(blocks: FloatArray) -> float:
     """Share of all sign combinations whose sum is at least that of the blocks."""
     total, size = float(np.sum(blocks)), float(np.sqrt(np.sum(blocks**2)))
     if size == 0:
         return 1.0
-    if len(blocks) > COUNTED:
+    if len(blocks) > ENUMERATED:
         return float(norm.sf(total / size))
     signs = np.array(list(product((1.0, -1.0), repeat=len(blocks))))
     return float(np.mean(signs @ blocks >= total - 1e-12 * size))

@@ -9,12 +9,18 @@ full. An effect is accepted only if the held-out error falls, over blocks, by mo
 from collections.abc import Sequence
 
 from rigwatch.workbench.data import Data, NoiseFloor
-from rigwatch.workbench.fit import Fitted, fit_model, fit_twice
+from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
 from rigwatch.workbench.ranking.candidates import candidates
+from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.ranked import SAME, Ranked, in_order
-from rigwatch.workbench.ranking.refitting import Progress, fit_each, refit, try_again, unheard
+from rigwatch.workbench.ranking.refitting import (
+    Progress,
+    fit_each,
+    no_progress,
+    refit,
+    refit_elsewhere,
+)
 from rigwatch.workbench.ranking.scoring import scored
-from rigwatch.workbench.ranking.worth_a_fit import worth_a_fit
 from rigwatch.workbench.study import Study
 
 AGAIN = 0.25
@@ -27,7 +33,7 @@ def rank(
     data: Data,
     base: Fitted,
     floor: NoiseFloor,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> list[Ranked]:
     """All effects at all ports, best first; the most promising are fitted and judged.
 
@@ -38,30 +44,30 @@ def rank(
     """
     rows = scored(study, data, base, candidates(study, data.train))
     kind = "dynamic" if study.model.states else "static"
-    chosen = worth_a_fit(rows, kind)
+    chosen = select_for_fit(rows, kind)
     enough = fit_each(study, data, base, floor, chosen, progress)
     if not enough:
         least = AGAIN * floor.above(base.train)
         likely = [row for row in chosen if row.explained > least]
-        try_again(study, data, base, likely, progress)
-    while spare := _in_place_of_troubled(rows):
+        refit_elsewhere(study, data, base, likely, progress)
+    while spare := _substitute_of_failed(rows):
         progress(f"fitting {spare.label}, as the effect it resembles cannot be fitted")
-        refit(study, data, base, spare, fit_model if enough else fit_twice)
-    while double := _unfitted_double(rows, floor):
-        progress(f"fitting {double.label}, which resembles the best")
-        refit(study, data, base, double, fit_model if enough else fit_twice)
+        refit(study, data, base, spare, fit_model if enough else fit_with_retry)
+    while similar := _unfitted_similar(rows, floor):
+        progress(f"fitting {similar.label}, which resembles the best")
+        refit(study, data, base, similar, fit_model if enough else fit_with_retry)
     return in_order(rows)
 
 
-def _in_place_of_troubled(rows: Sequence[Ranked]) -> Ranked | None:
+def _substitute_of_failed(rows: Sequence[Ranked]) -> Ranked | None:
     """A row skipped in favour of one whose fit then failed; None if there is none."""
-    troubled = {row.label for row in rows if row.trouble}
-    waiting = (row for row in rows if row.fitted is None and not row.trouble)
-    return next((row for row in waiting if row.told_by in troubled), None)
+    failed = {row.label for row in rows if row.failure}
+    waiting = (row for row in rows if row.fitted is None and not row.failure)
+    return next((row for row in waiting if row.fitted_instead in failed), None)
 
 
-def _unfitted_double(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:
-    """An unfitted row that resembles the best to first order; a fit must decide between them.
+def _unfitted_similar(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:
+    """An unfitted row similar to the best to first order; only a fit can decide between them.
 
     A row parallel to the best is fitted only if the best's residual is above the noise floor.
     """
@@ -69,7 +75,7 @@ def _unfitted_double(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None
     if not accepted:
         return None
     best = in_order(accepted)[0]
-    waiting = {row.label: row for row in rows if row.fitted is None and not row.trouble}
+    waiting = {row.label: row for row in rows if row.fitted is None and not row.failure}
     alike = (waiting[label] for label in best.alike if label in waiting)
     assert best.fitted is not None
     enough = floor.reached(best.fitted.held_out)

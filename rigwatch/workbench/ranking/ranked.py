@@ -28,13 +28,14 @@ class Ranked:
         start: initial values of its fit, by the effect's own parameter names.
         alike: effects whose directions on this recording are nearly parallel, as "effect@port".
         cosines: absolute cosine with every other effect, by label.
-        turned: signed cosine: negative if the two explain the residual with opposite signs.
+        signed_cosines: the same with its sign: negative if the two explain opposite parts of the
+            residual.
         fitted: the model fitted with it; None if not fitted or if the fit failed.
         gain: fall of the held-out mean squared error, None without a fit.
         accepted: whether the held-out error falls by more than chance.
         reason: why it is accepted, refused or not fitted, in words.
-        trouble: why its fit failed; empty otherwise.
-        told_by: label of the similar effect fitted in its place; empty if there is none.
+        failure: why its fit failed; empty otherwise.
+        fitted_instead: label of the similar effect fitted in its place; empty if there is none.
     """
 
     placement: Placement
@@ -44,13 +45,13 @@ class Ranked:
     start: dict[str, float]
     alike: list[str]
     cosines: dict[str, float]
-    turned: dict[str, float]
+    signed_cosines: dict[str, float]
     fitted: Fitted | None = None
     gain: float | None = None
     accepted: bool = False
     reason: str = "not like the residual"
-    trouble: str = ""
-    told_by: str = ""
+    failure: str = ""
+    fitted_instead: str = ""
 
     @property
     def effect(self) -> str:
@@ -95,7 +96,7 @@ def row_of(candidate: Candidate, found: Standing, kind: str) -> Ranked:
         start_of(candidate, found.strength),
         found.alike,
         found.cosines,
-        found.turned,
+        found.signed_cosines,
     )
 
 

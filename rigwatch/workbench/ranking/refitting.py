@@ -6,7 +6,13 @@ from dataclasses import replace
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor
-from rigwatch.workbench.fit import Fitted, fit_again, fit_model, fit_twice, may_be_better
+from rigwatch.workbench.fit import (
+    Fitted,
+    fit_model,
+    fit_with_retry,
+    may_be_local_minimum,
+    refit_from_short_horizons,
+)
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, judge_fit, leaves_nothing
 from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
 from rigwatch.workbench.study import Study
@@ -15,38 +21,38 @@ Progress = Callable[[str], None]
 Fitting = Callable[..., Fitted]
 
 
-def unheard(_: str) -> None:
+def no_progress(_: str) -> None:
     """Default progress callback: does nothing."""
 
 
 def refit(
-    study: Study, data: Data, base: Fitted, row: Ranked, fitting: Fitting = fit_twice
+    study: Study, data: Data, base: Fitted, row: Ranked, fitting: Fitting = fit_with_retry
 ) -> None:
     """Fit the model with the row's effect and judge it on the recordings held out.
 
     Args:
         study, data, base: the study, its recordings and the fitted model.
         row: the effect; its fit and the decision are stored in it.
-        fitting: `fit_model` accepts the first minimum, `fit_twice` also searches elsewhere.
+        fitting: `fit_model` accepts the first minimum, `fit_with_retry` also searches elsewhere.
     """
-    start, fits, troubles = base.train.values() | row.begin(), list[Fitted](), list[str]()
-    for placement in _orders(base, row):
+    start, fits, failures = base.train.values() | row.begin(), list[Fitted](), list[str]()
+    for placement in _orders_at_port(base, row):
         placements = (*base.placements, placement)
         try:
             fits.append(fitting(study, data, placements, start, base.train.scale, base=base))
         except ModelError as error:
-            troubles.append(str(error))
+            failures.append(str(error))
     if not fits:
-        row.reason, row.trouble = "cannot be fitted", troubles[0]
+        row.reason, row.failure = "cannot be fitted", failures[0]
         return
     row.fitted = min(fits, key=lambda fitted: fitted.train_error)
     judge_fit(base, row)
 
 
-def _orders(base: Fitted, row: Ranked) -> list[Placement]:
-    """The effect behind those at its port and, where a signal passes them in turn, ahead of them.
+def _orders_at_port(base: Fitted, row: Ranked) -> list[Placement]:
+    """The effect after those at its port and, where a signal passes them in order, before them.
 
-    A drive that is late and then saturates is another one than a drive that saturates first.
+    A drive that is delayed and then saturates differs from one that saturates first.
     """
     others = any(placement.port == row.port for placement in base.placements)
     if row.kind == "force" or not others:
@@ -78,14 +84,14 @@ def fit_each(  # noqa: PLR0917 -- they belong together
     return enough
 
 
-def try_again(
+def refit_elsewhere(
     study: Study, data: Data, base: Fitted, rows: Sequence[Ranked], progress: Progress
 ) -> None:
     """Refit the rows that may have ended in a local minimum."""
     for row in rows:
         start = base.train.values() | row.begin()
-        if row.fitted is None or not may_be_better(study, data, row.fitted, start):
+        if row.fitted is None or not may_be_local_minimum(study, data, row.fitted, start):
             continue
-        progress(f"fitting {row.label} again, by way of short horizons")
-        row.fitted = fit_again(study, data, row.fitted, start)
+        progress(f"fitting {row.label} again, starting from short horizons")
+        row.fitted = refit_from_short_horizons(study, data, row.fitted, start)
         judge_fit(base, row)

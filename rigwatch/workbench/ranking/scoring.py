@@ -21,7 +21,7 @@ from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, nodes
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.ranked import Ranked, row_of
-from rigwatch.workbench.ranking.separate_recordings import part_by_part
+from rigwatch.workbench.ranking.separate_recordings import per_recording
 from rigwatch.workbench.study import Study
 
 
@@ -34,7 +34,7 @@ def score_all(data: Data, base: Fitted, found: Sequence[Candidate]) -> Scores:
     """
     fitted, recording = base.train, data.train
     cut = windows(base.compiled.system, len(recording), base.horizon)
-    moved, slopes = part_by_part(_along, data, base, found)
+    moved, slopes = per_recording(_along, data, base, found)
     measured = np.isfinite(recording.outputs)[cut.starts[:, None] + np.arange(cut.length)]
     moved, slopes = moved * measured[..., None], slopes * measured[..., None]
     if recording.thinning:

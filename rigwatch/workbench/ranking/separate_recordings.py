@@ -1,6 +1,6 @@
 """Directions of candidates per recording, for effects with states on a model without states.
 
-Effect states do not carry over from one recording to the next; each recording starts afresh.
+The states of an effect do not carry over from one recording to the next.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,11 +16,13 @@ from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.study import Study
 
-PLACE = """[ports.load], kind = "force", unit, variables, and `+ load` in the equation of a rate"""
+EXPECTED_PORT = (
+    """[ports.load], kind = "force", unit, variables, and `+ load` in the equation of a rate"""
+)
 Along = Callable[[Data, Fitted, Sequence[Candidate]], tuple[FloatArray, FloatArray]]
 
 
-def part_by_part(
+def per_recording(
     along: Along, data: Data, base: Fitted, found: Sequence[Candidate]
 ) -> tuple[FloatArray, FloatArray]:
     """`along` for the whole of the training recordings.
@@ -34,16 +36,18 @@ def part_by_part(
     if system.model.states or len(data.train.parts) < 2:
         return along(data, base, found)
     if system.states:
-        return _apart(along, data, base, found)
+        return _one_by_one(along, data, base, found)
     # Effects without states keep continuous time across recordings, as in a fit.
     moved, slopes = along(data, base, found)
-    keen = [index for index, candidate in enumerate(found) if candidate.effect.states]
-    if keen:
-        moved[..., keen] = _apart(along, data, base, [found[index] for index in keen])[0]
+    stateful = [index for index, candidate in enumerate(found) if candidate.effect.states]
+    if stateful:
+        moved[..., stateful] = _one_by_one(along, data, base, [found[index] for index in stateful])[
+            0
+        ]
     return moved, slopes
 
 
-def _apart(
+def _one_by_one(
     along: Along, data: Data, base: Fitted, found: Sequence[Candidate]
 ) -> tuple[FloatArray, FloatArray]:
     """`along` for each recording separately; each has initial states of its own."""
@@ -71,7 +75,8 @@ def check_ports(study: Study) -> None:
     """
     if not study.model.ports:
         raise ModelError(
-            f"{study.file.model}: found no port, expected one where effects may enter: {PLACE}"
+            f"{study.file.model}: found no port, expected one where effects may enter:"
+            f" {EXPECTED_PORT}"
         )
 
 

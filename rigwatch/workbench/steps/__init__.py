@@ -4,14 +4,14 @@ from rigwatch.workbench.steps import change
 from rigwatch.workbench.steps.base import Base, Bases, find_base, take_base
 from rigwatch.workbench.steps.change import add, learn, undo
 from rigwatch.workbench.steps.from_logs import Logs, study_from_logs
-from rigwatch.workbench.steps.handing_over import (
-    HandedOver,
+from rigwatch.workbench.steps.ledger_replay import replay
+from rigwatch.workbench.steps.model_handover import (
+    ModelHandover,
     Rehearsal,
     hand_over,
     model_path,
     rehearse,
 )
-from rigwatch.workbench.steps.ledger_replay import replay
 from rigwatch.workbench.steps.model_steps import Signals, Stage, signals, stages
 from rigwatch.workbench.steps.promotion import promotion
 from rigwatch.workbench.steps.trial import Change, Trial, try_add, try_effect, try_undo, whole
@@ -20,8 +20,8 @@ __all__ = [
     "Base",
     "Bases",
     "Change",
-    "HandedOver",
     "Logs",
+    "ModelHandover",
     "Rehearsal",
     "Signals",
     "Stage",

@@ -23,8 +23,8 @@ from rigwatch.workbench.data import (
     prepare,
     quiet_scale,
 )
-from rigwatch.workbench.fit import Fitted, fit_model, loosened, with_hold
-from rigwatch.workbench.ranking import STEP, Progress, difference, unheard
+from rigwatch.workbench.fit import Fitted, fit_model, with_hold, with_kept_free
+from rigwatch.workbench.ranking import STEP, Progress, difference, no_progress
 from rigwatch.workbench.study import Study, check_data, commit, use_variants, varied
 
 FIT_SHARE = 0.6
@@ -87,7 +87,7 @@ class _Tried:
     model: Model
 
 
-def find_base(study: Study, progress: Progress = unheard) -> Bases:
+def find_base(study: Study, progress: Progress = no_progress) -> Bases:
     """Search for the variants of the study's model that its healthy recordings support.
 
     Args:
@@ -200,7 +200,12 @@ class _Search:
         scale = quiet_scale(data.train)
         study = with_hold(study, data, scale)
         found = fit_model(
-            replace(study, model=loosened(study.model)), data, (), start, scale, from_afar=True
+            replace(study, model=with_kept_free(study.model)),
+            data,
+            (),
+            start,
+            scale,
+            multi_start=True,
         )
         noise = from_residual(found.held_out, data.held_out, study.file.period, data.horizon)
         base = Base(

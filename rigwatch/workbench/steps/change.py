@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rigwatch.physics.engine.equations import Placement, compose, load_effects
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.ranking import Progress, unheard
+from rigwatch.workbench.ranking import Progress, no_progress
 from rigwatch.workbench.steps.trial import Change, try_add, try_undo
 from rigwatch.workbench.study import Study, commit, use_effect_file
 
@@ -18,7 +18,7 @@ def add(
     port: str | None = None,
     *,
     anyway: bool = False,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> Change:
     """Add an effect to the model if the held-out error supports it.
 
@@ -36,7 +36,7 @@ def add(
     return try_add(study, effect, port, anyway=anyway, progress=progress).commit()
 
 
-def undo(study: Study, progress: Progress = unheard) -> Change:
+def undo(study: Study, progress: Progress = no_progress) -> Change:
     """Remove the last effect or, if there is none, the variants of the model.
 
     Raises:

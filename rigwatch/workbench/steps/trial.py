@@ -20,10 +20,10 @@ from rigwatch.workbench.ranking import (
     Progress,
     Ranked,
     accepted_from,
+    no_progress,
     rank_only,
     refit,
     shapes_of,
-    unheard,
 )
 from rigwatch.workbench.study import (
     Accepted,
@@ -98,7 +98,7 @@ def try_add(
     port: str | None = None,
     *,
     anyway: bool = False,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
     warm: Warm | None = None,
 ) -> Trial:
     """Try `add` without writing anything; can be cancelled at any time.
@@ -150,7 +150,7 @@ def keeps_gain(before: float, accepted: float, again: float, floor: float) -> bo
     return again <= max(WORSE * accepted, before - KEPT * (before - accepted), floor)
 
 
-def try_undo(study: Study, progress: Progress = unheard, warm: Warm | None = None) -> Trial:
+def try_undo(study: Study, progress: Progress = no_progress, warm: Warm | None = None) -> Trial:
     """Try `undo` without writing anything.
 
     Raises:
@@ -195,7 +195,7 @@ def _which(change: Change) -> dict[str, Any]:
 
 
 def try_effect(
-    study: Study, effect: str, port: str, progress: Progress = unheard, warm: Warm | None = None
+    study: Study, effect: str, port: str, progress: Progress = no_progress, warm: Warm | None = None
 ) -> Ranked:
     """Fit an effect at a port and judge it by the held-out error.
 
@@ -265,5 +265,5 @@ def _tried(bench: Bench, effect: str, port: str) -> Ranked:
     row = rank_only(bench.study, bench.data, bench.base, found)
     refit(bench.study, bench.data, bench.base, row)
     if row.fitted is None:
-        raise ModelError(f"{row.label}: cannot be fitted: {row.trouble}")
+        raise ModelError(f"{row.label}: cannot be fitted: {row.failure}")
     return row

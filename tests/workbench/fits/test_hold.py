@@ -16,7 +16,7 @@ from rigwatch.workbench.compare.compare import comparison
 from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.fit.input_hold import holding, with_hold
+from rigwatch.workbench.fit.input_hold import with_hold, with_holds
 from rigwatch.workbench.report.text_report import fit_lines
 from rigwatch.workbench.study.edits import keep_holds
 from rigwatch.workbench.study.study import Accepted, Span, Study, StudyFile, open_study
@@ -67,7 +67,7 @@ def test_it_is_chosen_and_nothing_is_missing(held, hold, healthy):
 
 def test_what_is_held_and_late_by_a_part_of_a_sample_is_found_and_said():
     late = 0.4
-    model = holding(shipped_models()["mass-spring-damper"], {"force": ("zero", late)})
+    model = with_holds(shipped_models()["mass-spring-damper"], {"force": ("zero", late)})
     made = []
     for seed in (1, 2):
         force = force_of(seed)
@@ -91,7 +91,7 @@ def test_an_input_that_is_late_changes_in_the_middle_of_an_interval():
     step = np.concatenate([np.zeros(5), np.ones(15)])[:, None]
     values = np.array([1.0, 0.0, 0.0])
     for late in (0.0, 0.25, 1.0):
-        compiled = compile_system(compose(holding(model, {"force": ("zero", late)})))
+        compiled = compile_system(compose(with_holds(model, {"force": ("zero", late)})))
         run = compiled.simulate(
             step, 0.1, np.zeros(1, np.int64), 20, initial=np.zeros((1, 2)), parameters=values
         )

@@ -8,7 +8,7 @@ from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.fit.discontinuities import MOST, between_jumps
+from rigwatch.workbench.fit.discontinuities import MOST, away_from_jumps
 from tests.workbench.simulated import HORIZON, multisine, opened
 
 FORCE = multisine(np.arange(0.25, 8.0, 0.25), 1.0)
@@ -26,7 +26,7 @@ def bench():
 
 
 def test_friction_jumps_where_the_motion_turns_round(bench):
-    calm = between_jumps(fitted(bench, "coulomb"), bench.data.train, HORIZON)
+    calm = away_from_jumps(fitted(bench, "coulomb"), bench.data.train, HORIZON)
     assert calm is not None
     position = bench.data.train.outputs[: calm.size, 0]
     turning = np.abs(np.gradient(position)) < 0.01 * np.abs(np.gradient(position)).max()
@@ -36,7 +36,7 @@ def test_friction_jumps_where_the_motion_turns_round(bench):
 
 @pytest.mark.parametrize("name", ["viscous", "cubic_stiffness", "dahl"])
 def test_what_goes_smoothly_has_no_jumps(bench, name):
-    assert between_jumps(fitted(bench, name), bench.data.train, HORIZON) is None
+    assert away_from_jumps(fitted(bench, name), bench.data.train, HORIZON) is None
 
 
 def test_the_floor_counts_the_samples_that_it_is_told(bench):

@@ -66,6 +66,8 @@ def test_a_healthy_recording_says_what_it_leaves_open(tmp_path: Path) -> None:
     assert not any("of its value only" in remark for remark in told.remarks)
 
     vague = compared(tmp_path / "short", run(2, 0.0, 200, noise=0.5), "")
-    said = [remark for remark in vague.remarks if "the healthy recording of 2 s tells c" in remark]
+    said = [
+        remark for remark in vague.remarks if "the healthy recording of 2 s determines c" in remark
+    ]
     assert said
-    assert "s of such a motion would tell" in said[0]
+    assert "s of such a motion would determine" in said[0]

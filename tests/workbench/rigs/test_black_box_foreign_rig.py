@@ -9,10 +9,10 @@ import pytest
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
-from rigwatch.workbench.compare.preparation import Bench, bench_of, told_by_healthy
+from rigwatch.workbench.compare.preparation import Bench, bench_of, determined_by_healthy
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.explain.rough_verdict import TRANSFERS, modest
+from rigwatch.workbench.explain.rough_verdict import MOTION_ALLOWANCE, limited_verdict
 from rigwatch.workbench.study.study import Span, Study, StudyFile
 from tests.workbench.conftest import measured
 
@@ -37,7 +37,7 @@ def bench(case: str) -> Bench:
         recorded(case, SETTLED, HALF), recorded(case, HALF), recorded("healthy", SETTLED),
         RATE // 2, (),
     )  # fmt: skip
-    return bench_of(*told_by_healthy(study, data))
+    return bench_of(*determined_by_healthy(study, data))
 
 
 def test_nothing_is_missing_where_nothing_is_hidden() -> None:
@@ -63,6 +63,6 @@ def test_what_another_motion_may_leave_is_not_named() -> None:
 
     rows, verdict = ranking(found)
 
-    assert found.floor.ratio(found.base.held_out) < TRANSFERS
+    assert found.floor.ratio(found.base.held_out) < MOTION_ALLOWANCE
     assert verdict.word != "missing_effect"
-    assert modest(found.base, rows, found.floor, verdict).word != "missing_effect"
+    assert limited_verdict(found.base, rows, found.floor, verdict).word != "missing_effect"

@@ -10,7 +10,7 @@ import pytest
 from rigwatch.physics.engine.equations.effect import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
-from rigwatch.workbench.compare.preparation import Bench, bench_of, told_by_healthy
+from rigwatch.workbench.compare.preparation import Bench, bench_of, determined_by_healthy
 from rigwatch.workbench.data.noise_floor import from_residual
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
@@ -41,7 +41,7 @@ def bench(case: str, healthy: Recording | None = None) -> Bench:
     study = Study(Path(), file, shipped_models()["servo-pneumatic"], library(), frozenset())
     whole, known = recorded(case), healthy or part(recorded("healthy"), SETTLED)
     data = Data(part(whole, SETTLED, HALF), part(whole, HALF), known, RATE // 2, ())
-    return bench_of(*told_by_healthy(study, data))
+    return bench_of(*determined_by_healthy(study, data))
 
 
 def test_healthy_fit_comes_near_to_what_repeated_periods_allow() -> None:

@@ -11,7 +11,7 @@ from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.fit.fitted_model import fit_base
-from rigwatch.workbench.fit.healthy_parameters import commissioned
+from rigwatch.workbench.fit.healthy_parameters import with_healthy_parameters
 from rigwatch.workbench.study.study import Span, Study, StudyFile
 from sim_plant.excitation import Multisine, drive
 from sim_plant.parameters import RigParameters
@@ -43,7 +43,7 @@ def study() -> Study:
     file = StudyFile(model="servo-pneumatic", train=span, held_out=span)
     given = Study(Path(), file, shipped_models()["servo-pneumatic"], library(), frozenset())
     healthy = recorded(3)
-    return commissioned(given, Data(healthy, healthy, healthy, 128, ()), NOISE)
+    return with_healthy_parameters(given, Data(healthy, healthy, healthy, 128, ()), NOISE)
 
 
 def test_the_analytic_model_reaches_the_noise_of_the_sensors(study):
@@ -60,4 +60,7 @@ def test_what_a_healthy_recording_tells_is_not_fitted_away(study):
 
 def test_without_a_healthy_recording_nothing_is_moved(study):
     plain = replace(study, model=shipped_models()["servo-pneumatic"])
-    assert commissioned(plain, Data(recorded(1), recorded(2), None, 128, ()), NOISE) is plain
+    assert (
+        with_healthy_parameters(plain, Data(recorded(1), recorded(2), None, 128, ()), NOISE)
+        is plain
+    )

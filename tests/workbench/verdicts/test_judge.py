@@ -11,7 +11,7 @@ from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.verdict import Verdict, judge, not_converged
-from rigwatch.workbench.explain.verdict_calibration import CLEAR, doubt
+from rigwatch.workbench.explain.verdict_calibration import CLEAR, probability_wrong
 from rigwatch.workbench.fit import Fitted
 from rigwatch.workbench.ranking import Ranked
 
@@ -110,7 +110,7 @@ def test_the_only_effect_that_helps_is_missing() -> None:
     assert (found.rivals, found.second) == ((), ())
     assert found.text == ("coulomb@load is missing: the held-out error falls from 3 to 1.05")
     assert found.evidence.left == pytest.approx((1.05**2 - 1) / (3**2 - 1))
-    assert found.doubt == doubt("missing_effect", found.evidence)
+    assert found.probability_wrong == probability_wrong("missing_effect", found.evidence)
 
 
 def test_the_margin_is_to_the_nearest_that_it_is_not_confused_with() -> None:

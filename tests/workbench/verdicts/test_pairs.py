@@ -10,7 +10,7 @@ from rigwatch.workbench.explain.pairs import Pair, _pair, likely_pairs, two_effe
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking.rank import rank
 from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
-from rigwatch.workbench.ranking.refitting import unheard
+from rigwatch.workbench.ranking.refitting import no_progress
 from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.simulated import fitted, multisine
 
@@ -33,7 +33,7 @@ def rows(bench):
 def pair_of(rows: list[Ranked], explained: tuple[float, float], cosine: float) -> Pair | None:
     """The pair of two effects that explain so much alone and have this cosine."""
     one, other = (
-        dataclasses.replace(row, explained=share, turned={beside.label: cosine})
+        dataclasses.replace(row, explained=share, signed_cosines={beside.label: cosine})
         for row, beside, share in zip(rows[:2], rows[1::-1], explained, strict=True)
     )
     return _pair(one, other)
@@ -72,7 +72,9 @@ def test_a_cosine_with_a_sign_has_the_size_of_the_one_without(rows: list[Ranked]
     for one in rows[:3]:
         for other in rows[:3]:
             if one is not other:
-                assert abs(one.turned[other.label]) == pytest.approx(one.cosines[other.label])
+                assert abs(one.signed_cosines[other.label]) == pytest.approx(
+                    one.cosines[other.label]
+                )
 
 
 def test_the_two_that_are_hidden_are_the_likeliest_pair(bench, rows):
@@ -82,7 +84,7 @@ def test_the_two_that_are_hidden_are_the_likeliest_pair(bench, rows):
 
 def test_both_are_named_and_the_ranking_shows_each_alone(bench, rows):
     alone = judge(bench.base, rows, bench.floor)
-    found = two_effects(bench, rows, alone, unheard)
+    found = two_effects(bench, rows, alone, no_progress)
     assert found.word == "missing_effect"
     assert {found.members[0], found.second[0]} == set(PAIR)
     assert found.best in rows
@@ -93,4 +95,4 @@ def test_both_are_named_and_the_ranking_shows_each_alone(bench, rows):
 def test_a_pair_that_leaves_more_than_noise_is_not_named(bench, rows):
     alone = judge(bench.base, rows, bench.floor)
     others = [row for row in rows if row.label not in PAIR]
-    assert two_effects(bench, others, alone, unheard) is alone
+    assert two_effects(bench, others, alone, no_progress) is alone

@@ -45,7 +45,7 @@ from rigwatch.physics.engine.equations.system import (
     Placement,
     System,
     compose,
-    passed_in_turn,
+    signal_order,
     units_at,
 )
 from rigwatch.physics.engine.equations.variants import excludes, with_variants
@@ -88,9 +88,9 @@ __all__ = [
     "names_in",
     "offered",
     "parse",
-    "passed_in_turn",
     "predicted_outputs",
     "shipped_models",
+    "signal_order",
     "spelt_out",
     "symbol",
     "units_at",

@@ -87,7 +87,7 @@ class System:
         return tuple(name for name, p in self.parameters.items() if not p.fixed)
 
 
-def passed_in_turn(placements: Sequence[Placement], port: str) -> list[Placement]:
+def signal_order(placements: Sequence[Placement], port: str) -> list[Placement]:
     """The effects at a port in the order in which its signal passes them."""
     found: list[Placement] = []
     for placement in placements:
@@ -215,7 +215,7 @@ class _Composer:
         unit = self._port_unit(name, port)
         signal = port.kind != "force"
         value = self._scope.meanings[port.signal] if signal else sympy.Integer(0)
-        for placement in passed_in_turn(self._placements, name):
+        for placement in signal_order(self._placements, name):
             change = self._effect_value(placement, port, value, unit)
             value = change if signal else value + change
         return value

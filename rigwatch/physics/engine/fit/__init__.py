@@ -4,9 +4,11 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 """
 
 from rigwatch.physics.engine.fit.decimation import Thinning
-from rigwatch.physics.engine.fit.effect_states import Memory, Recall, held_at, seen
+from rigwatch.physics.engine.fit.effect_states import EffectStates, hold_at
 from rigwatch.physics.engine.fit.measured_recording import motion_recording, motion_widths
+from rigwatch.physics.engine.fit.port_signals import port_signals
 from rigwatch.physics.engine.fit.problem import Problem
+from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
 from rigwatch.physics.engine.fit.recording import (
     Recording,
     beginning,
@@ -26,10 +28,10 @@ from rigwatch.physics.engine.fit.windowed_fit import (
 )
 
 __all__ = [
+    "EffectStates",
     "Fit",
-    "Memory",
     "Problem",
-    "Recall",
+    "RecordedEffectStates",
     "Recording",
     "Thinning",
     "beginning",
@@ -38,13 +40,13 @@ __all__ = [
     "evaluate",
     "filled",
     "fit",
-    "held_at",
+    "hold_at",
     "initial_states",
     "joined",
     "motion_recording",
     "motion_widths",
+    "port_signals",
     "result_of",
-    "seen",
     "untied",
     "windows",
 ]

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem
-from rigwatch.physics.engine.fit.effect_states import Recall
 from rigwatch.physics.engine.fit.initial_state_projection import Tangent
+from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
 from rigwatch.physics.engine.fit.recording import Recording, cut_for, initial_states, shown_states
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
@@ -100,8 +100,10 @@ class Problem:
         begun = initial_states(system, recording)
         self.initial = begun[self._cut.starts]
         self._offered = initial
-        self._memory = Recall(system, recording.inputs, begun, recording.dt, compiled.parameters)
-        known = self._memory.exact
+        self._effect_states = RecordedEffectStates(
+            system, recording.inputs, begun, recording.dt, compiled.parameters
+        )
+        known = self._effect_states.exact
         self._every = np.arange(len(system.states))
         self._unknown = np.array([i for i in self._every if i not in known], np.int64)
         shown = shown_states(system)
@@ -158,7 +160,7 @@ class Problem:
 
         Windows start from the channels' states or, if better, from the given ones.
         """
-        self._remember(parameters, self._memory.columns)
+        self._remember(parameters, self._effect_states.columns)
         if self._offered is None or len(self._offered) != len(self.initial):
             return
         rows, own = np.arange(len(self.initial)), len(self.system.model.states)
@@ -171,11 +173,11 @@ class Problem:
 
     def _follow_inputs(self, parameters: FloatArray) -> None:
         """Initialise effect states at actuators from the inputs; the first window's are fitted."""
-        self._remember(parameters, self._memory.exact, since=1)
+        self._remember(parameters, self._effect_states.exact, since=1)
 
     def _remember(self, parameters: FloatArray, columns: list[int], since: int = 0) -> None:
         if columns and not self._cut.parts:
-            led = self._memory.at(parameters)
+            led = self._effect_states.at(parameters)
             self.initial = self.initial.copy()
             for column in columns:
                 self.initial[since:, column] = led[column][self._cut.starts[since:]]

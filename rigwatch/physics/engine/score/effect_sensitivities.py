@@ -34,7 +34,7 @@ from rigwatch.physics.engine.equations import (
     parse,
     symbol,
 )
-from rigwatch.physics.engine.fit import Memory, held_at
+from rigwatch.physics.engine.fit import EffectStates, hold_at
 from rigwatch.physics.engine.score.candidates import Candidate
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.kernel import kernel
@@ -98,7 +98,7 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
         pushes = np.stack([_push(at, c, seen[c.port]) for c in inner], axis=-1)
         columns = np.array([_probe_column(system, c.port) for c in inner])
         places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
-        held = np.array([held_at(system.model, c.port) == "zero" for c in inner])
+        held = np.array([hold_at(system.model, c.port) == "zero" for c in inner])
         found[..., places] = _propagated(run, len(system.free), pushes, columns, held)
     for index, candidate in enumerate(candidates):
         if kinds[candidate.port] == "sensor":
@@ -200,9 +200,9 @@ def _memory(
     """
     more = ((0, 0), (0, at.run.substeps - 1))
     along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
-    hold = held_at(at.compiled.system.model, candidate.port)
-    memory = Memory(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
-    found = memory.run(_neutral_values(candidate))
+    hold = hold_at(at.compiled.system.model, candidate.port)
+    states = EffectStates(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
+    found = states.run(_neutral_values(candidate))
     windows, nodes = at.time.shape
     return {name: state.reshape(windows, -1)[:, :nodes] for name, state in found.items()}
 

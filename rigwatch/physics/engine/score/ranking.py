@@ -25,7 +25,7 @@ class Standing:
         p_value: of the score, corrected for the number of candidates.
         explained: share of the residual's energy.
         strength: first-order estimate.
-        turned: signed cosine with every other label: negative if the two explain the residual
+        signed_cosines: cosine with every other label: negative if the two explain the residual
             with opposite signs.
     """
 
@@ -35,12 +35,12 @@ class Standing:
     p_value: float
     explained: float
     strength: float
-    turned: dict[str, float]
+    signed_cosines: dict[str, float]
 
     @property
     def cosines(self) -> dict[str, float]:
         """Absolute cosines with every other label."""
-        return {label: abs(cosine) for label, cosine in self.turned.items()}
+        return {label: abs(cosine) for label, cosine in self.signed_cosines.items()}
 
     @property
     def alike(self) -> list[str]:
@@ -65,12 +65,12 @@ def standings(
     best = _best_shapes(labels, scores, allowed)
     chosen = list(best.values())
     units, signs = scores.units[:, chosen], np.sign(scores.strength)[chosen]
-    turned = (units * signs).T @ (units * signs)
+    signed_cosines = (units * signs).T @ (units * signs)
     rows = [
         Standing(
             label, index, float(scores.score[index]), float(p_values[index]),
             float(scores.explained[index]), float(scores.strength[index]),
-            {other: float(turned[at, j]) for j, other in enumerate(best) if j != at},
+            {other: float(signed_cosines[at, j]) for j, other in enumerate(best) if j != at},
         )
         for at, (label, index) in enumerate(best.items())
     ]  # fmt: skip

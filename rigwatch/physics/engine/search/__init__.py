@@ -1,11 +1,11 @@
 """Multi-start fits: initial values, stopping rule, and convergence of the best fit.
 
-search (ShortHorizons, WholeRuns) ──attempts──▶ fit_from_afar ──▶ Fit, Convergence
+search (ShortHorizons, WholeRuns) ──attempts──▶ multi_start_fit ──▶ Fit, Convergence
 """
 
 from rigwatch.physics.engine.search.convergence import Convergence, convergence
-from rigwatch.physics.engine.search.fit_from_afar import fit_from_afar
+from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
 from rigwatch.physics.engine.search.short_horizons import ShortHorizons
 from rigwatch.physics.engine.search.whole_runs import WholeRuns
 
-__all__ = ["Convergence", "ShortHorizons", "WholeRuns", "convergence", "fit_from_afar"]
+__all__ = ["Convergence", "ShortHorizons", "WholeRuns", "convergence", "multi_start_fit"]

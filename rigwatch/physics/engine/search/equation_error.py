@@ -18,7 +18,13 @@ from scipy.signal import savgol_filter
 
 from rigwatch.physics.engine.compile import CompiledSystem, derivative, numpy_function
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
-from rigwatch.physics.engine.fit import Recall, Recording, bounds, filled, initial_states
+from rigwatch.physics.engine.fit import (
+    RecordedEffectStates,
+    Recording,
+    bounds,
+    filled,
+    initial_states,
+)
 from rigwatch.wire.arrays import FloatArray
 
 TARGET = "target_"
@@ -151,7 +157,7 @@ def _signals(
     """All variables of the equations except the free parameters, along the recording."""
     states = initial_states(system, recording, width)
     inputs, dt = recording.inputs, recording.dt
-    for column, led in Recall(system, inputs, states, dt, begin).at(begin).items():
+    for column, led in RecordedEffectStates(system, inputs, states, dt, begin).at(begin).items():
         states[:, column] = led
     known: dict[str, FloatArray] = {TIME: dt * np.arange(len(inputs), dtype=np.float64)}
     known |= dict(zip(system.states, states.T, strict=True))

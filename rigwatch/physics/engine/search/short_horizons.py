@@ -23,7 +23,7 @@ from rigwatch.physics.engine.fit import Fit, Recording, error_at, fit
 from rigwatch.physics.engine.search.convergence import AGREE, PROMISED, promise, spread
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
 from rigwatch.physics.engine.search.equation_error import equation_error_starts
-from rigwatch.physics.engine.search.fit_from_afar import Attempt
+from rigwatch.physics.engine.search.multi_start_fit import Attempt
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
@@ -45,7 +45,7 @@ LONG = 2000
 
 @dataclass(frozen=True, eq=False)
 class ShortHorizons:
-    """Search of `fit_from_afar` over windows.
+    """Search of `multi_start_fit` over windows.
 
     Attributes:
         compiled: the system.

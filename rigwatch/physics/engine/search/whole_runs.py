@@ -20,7 +20,7 @@ from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit import Fit, Problem, Recording, beginning, joined, result_of
 from rigwatch.physics.engine.search.convergence import PROMISED
-from rigwatch.physics.engine.search.fit_from_afar import Attempt
+from rigwatch.physics.engine.search.multi_start_fit import Attempt
 from rigwatch.physics.engine.search.unknowns import Unknowns, unknowns
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -67,7 +67,7 @@ class _Look:
 
 
 class WholeRuns:
-    """Search of `fit_from_afar` along the measured motion.
+    """Search of `multi_start_fit` along the measured motion.
 
     Args:
         compiled: a model from `along_measured_motion`, with effects.

@@ -1,11 +1,11 @@
-"""Where one effect alone does not explain the error: what every good explanation holds is missing.
+"""The verdict where a single effect does not explain the error.
 
-One effect that does not explain all takes a part of what others do, and the more so the more
-parameters it has. So it is judged beside the others: of the sets of effects that explain the error
-best, one is taken, and each of its effects is ranked against all others with the rest of the set in
-the model. It is missing where it wins there, and where no other set that does as well goes without.
-Where no set leaves nothing but noise, something else is missing too, and the verdict is that on one
-effect.
+An effect that explains only part of the error also absorbs part of what other effects cause, and
+more of it the more parameters it has. Each effect is therefore judged together with the others. One
+of the sets of effects that explain the error best is selected, and each of its effects is ranked
+against all candidates while the rest of the set is in the model. An effect is named as missing if
+it comes first there and if every equally good set contains it. If no set reduces the residual to
+noise, something else is missing as well, and the verdict on single effects stands.
 """
 
 from collections.abc import Sequence
@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.explain.combinations import (
-    ANY,
+    UNLIMITED,
     Combination,
-    as_good,
     combinations,
-    fewest_of_the_best,
-    leaves_noise,
-    own_floor,
+    floor_of,
+    not_worse,
+    reaches_noise,
+    simplest_of_best,
     with_rows,
     without,
 )
@@ -35,58 +35,60 @@ from rigwatch.workbench.ranking import (
 )
 
 ROUNDS = 3
-"""Times that effects of a set are exchanged for better ones."""
+"""Largest number of times that an effect of the set is replaced by a better one."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
-    """One effect of a set, judged beside the rest of it."""
+class _Member:
+    """One effect of a set, judged with the rest of the set in the model."""
 
     row: Ranked
     verdict: Verdict
 
     @property
     def named(self) -> frozenset[str]:
-        """It, its class and its rivals."""
+        """The effect named, its class and its rivals."""
         return frozenset((*self.verdict.members, *self.verdict.rivals))
 
     @property
     def certain(self) -> bool:
-        """Whether it wins beside the rest."""
+        """Whether it is named without rivals."""
         return self.verdict.word == "missing_effect"
 
 
 def several_effects(
     bench: Bench, rows: Sequence[Ranked], verdict: Verdict, progress: Progress
 ) -> Verdict:
-    """The verdict once sets of effects have been tried; as it was where none does better than one.
+    """The verdict after trying sets of effects; unchanged if no set reduces the residual to noise.
 
     Args:
         bench: the study.
         rows: the ranking of single effects.
-        verdict: on them.
-        progress: told what begins.
+        verdict: the verdict on single effects.
+        progress: called with a line of text as each part begins.
     """
-    every = combinations(bench, rows, progress, _most_free(bench, verdict.best))
-    if not any(len(each.rows) > 1 and leaves_noise(bench, each.fitted) for each in every):
+    every = combinations(bench, rows, progress, _max_parameters(bench, verdict.best))
+    if not any(len(each.rows) > 1 and reaches_noise(bench, each.fitted) for each in every):
         return verdict
-    best = fewest_of_the_best(every)
-    parts: list[_Part] = []
+    best = simplest_of_best(every)
+    parts: list[_Member] = []
     for _ in range(ROUNDS):
         if len(best.rows) == 1:
-            return _not_simpler(verdict, best, every)
-        better, parts = _judged_in_turn(bench, best, progress)
+            return _with_equal_sets(verdict, best, every)
+        better, parts = _judge_each(bench, best, progress)
         if better is None:
             break
         every, best = [*every, better], better
-    others = [each for each in every if as_good(each, best) and len(each.rows) <= len(best.rows)]
-    return _said(bench, rows, verdict, best, [_doubted(part, best, others) for part in parts])
+    others = [each for each in every if not_worse(each, best) and len(each.rows) <= len(best.rows)]
+    return _set_verdict(
+        bench, rows, verdict, best, [_with_alternatives(part, best, others) for part in parts]
+    )
 
 
-def alone_is_not_enough(bench: Bench, verdict: Verdict) -> bool:
+def may_need_several(bench: Bench, verdict: Verdict) -> bool:
     """Whether more than one effect may be missing.
 
-    The best leaves more than little, or has a shape of its own, which may stand for a second one.
+    The best leaves a considerable residual, or has shape parameters that may mimic a second effect.
     """
     if verdict.word == "nothing_missing":
         return False
@@ -94,21 +96,24 @@ def alone_is_not_enough(bench: Bench, verdict: Verdict) -> bool:
     return best is None or best.free > 1 or not _leaves_little(bench, best)
 
 
-def _most_free(bench: Bench, best: Ranked | None) -> int:
-    """Parameters of a set: no more than those of one effect that leaves little."""
-    return best.free if best is not None and _leaves_little(bench, best) else ANY
+def _max_parameters(bench: Bench, best: Ranked | None) -> int:
+    """Largest number of parameters of a set: those of a single effect that leaves little."""
+    return best.free if best is not None and _leaves_little(bench, best) else UNLIMITED
 
 
 def _leaves_little(bench: Bench, best: Ranked) -> bool:
-    """Whether an effect alone leaves nothing but noise, or next to nothing."""
+    """Whether a single effect reduces the residual to noise, or nearly so."""
     if best.fitted is None:
         return False
     left = left_over(bench.base, best, bench.floor)
-    return left < 1 - EXPLAINED or leaves_noise(bench, best.fitted)
+    return left < 1 - EXPLAINED or reaches_noise(bench, best.fitted)
 
 
-def _not_simpler(verdict: Verdict, best: Combination, every: Sequence[Combination]) -> Verdict:
-    """The verdict on one effect, with others that together do as well by as many parameters."""
+def _with_equal_sets(verdict: Verdict, best: Combination, every: Sequence[Combination]) -> Verdict:
+    """The verdict on one effect; undetermined if a set of other effects is equally good.
+
+    Sets with more parameters do not count.
+    """
     named = {*verdict.members, *verdict.rivals}
     instead = [
         each
@@ -116,7 +121,7 @@ def _not_simpler(verdict: Verdict, best: Combination, every: Sequence[Combinatio
         if len(each.rows) > 1
         and each.free <= best.free
         and not each.labels & named
-        and as_good(each, best)
+        and not_worse(each, best)
     ]
     if not instead or verdict.word != "missing_effect":
         return verdict
@@ -127,29 +132,29 @@ def _not_simpler(verdict: Verdict, best: Combination, every: Sequence[Combinatio
     return replace(verdict, word="undetermined", rivals=rivals, text=text)
 
 
-def _judged_in_turn(
+def _judge_each(
     bench: Bench, best: Combination, progress: Progress
-) -> tuple[Combination | None, list[_Part]]:
-    """A better set, where an effect is better exchanged for another; the verdict on each effect."""
+) -> tuple[Combination | None, list[_Member]]:
+    """A better set if replacing an effect gives one, and the verdict on each effect."""
     parts = []
     for row in best.rows:
         rest = without(bench, best, row)
         if rest is None:
             continue
-        progress(f"judging {row.label} beside {', '.join(sorted(rest.labels))}")
-        study, floor = with_rows(bench.study, rest.rows), own_floor(bench, best.fitted)
+        progress(f"judging {row.label} together with {', '.join(sorted(rest.labels))}")
+        study, floor = with_rows(bench.study, rest.rows), floor_of(bench, best.fitted)
         found = judge(rest.fitted, rank(study, bench.data, rest.fitted, floor), floor)
         other = found.best
         if other is not None and other.label != row.label:
             better = Combination((*rest.rows, other))
             if better.fitted.held_out_error < best.fitted.held_out_error:
                 return better, []
-        parts.append(_Part(row, found))
+        parts.append(_Member(row, found))
     return None, parts
 
 
-def _doubted(part: _Part, best: Combination, others: Sequence[Combination]) -> _Part:
-    """An effect, with what takes its place in sets that do as well without it or its like."""
+def _with_alternatives(part: _Member, best: Combination, others: Sequence[Combination]) -> _Member:
+    """An effect, undetermined if equally good sets contain neither it nor its class or rivals."""
     without_it = [each for each in others if not each.labels & part.named]
     instead = sorted(frozenset().union(*(each.labels - best.labels for each in without_it)))
     if part.verdict.best is None or not instead:
@@ -158,44 +163,45 @@ def _doubted(part: _Part, best: Combination, others: Sequence[Combination]) -> _
     return replace(part, verdict=replace(part.verdict, word="undetermined", rivals=rivals))
 
 
-def _said(
+def _set_verdict(
     bench: Bench,
     rows: Sequence[Ranked],
     verdict: Verdict,
     best: Combination,
-    parts: Sequence[_Part],
+    parts: Sequence[_Member],
 ) -> Verdict:
-    """The verdict on the set: one of its effects in front, the next of them as well."""
+    """The verdict on the set: one effect is named first, the next certain one second."""
     alone = {row.label: row for row in rows}
     known = [part for part in parts if part.verdict.best and part.row.label in alone]
-    # What is accepted alone goes first, as it can be added first; of these what leaves least alone.
+    # Effects accepted alone come first, as they can be added first, best first.
     order = sorted(known, key=lambda part: (
         not part.certain, not alone[part.row.label].accepted, alone[part.row.label].held_out_error
     ))  # fmt: skip
     if not order or order[0].verdict.word == "unknown_effect":
-        return _unsupported(verdict, best)
+        return _undetermined_by_sets(verdict, best)
     first, then = order[0], [part for part in order[1:] if part.certain]
     row = alone[first.row.label]
     if row.fitted is None:
         refit(bench.study, bench.data, bench.base, row)
     found, second = first.verdict, then[0].verdict.members if first.certain and then else ()
-    left = own_floor(bench, best.fitted).left_over(bench.base.held_out, best.fitted.held_out)
+    left = floor_of(bench, best.fitted).left_over(bench.base.held_out, best.fitted.held_out)
+    others = ", ".join(sorted(best.labels - {row.label}))
     return replace(
         found,
         best=row,
-        text=f"beside {', '.join(sorted(best.labels - {row.label}))}: {found.text}{_how(row)}",
+        text=f"with {others}: {found.text}{_how_to_add(row)}",
         second=second,
         evidence=Evidence(left, found.evidence.margin),
     )
 
 
-def _how(row: Ranked) -> str:
-    """How to add an effect that is not accepted alone; empty where it is."""
+def _how_to_add(row: Ranked) -> str:
+    """How to add an effect that is not accepted alone; empty if it is accepted."""
     return "" if row.accepted else "; alone it is refused: add it with --anyway, then the others"
 
 
-def _unsupported(verdict: Verdict, best: Combination) -> Verdict:
-    """The verdict on one effect, where it has no place in what explains the error better."""
+def _undetermined_by_sets(verdict: Verdict, best: Combination) -> Verdict:
+    """The verdict on one effect; undetermined if a better set does not contain it."""
     if (
         verdict.best is None
         or verdict.word == "unknown_effect"

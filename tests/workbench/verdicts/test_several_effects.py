@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.explain.together import several_effects
+from rigwatch.workbench.explain.several_effects import several_effects
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking.rank import rank
-from rigwatch.workbench.ranking.refitting import unheard
+from rigwatch.workbench.ranking.refitting import no_progress
 from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.simulated import fitted, multisine
 
@@ -35,7 +35,7 @@ def rows(three):
 def test_one_of_three_hidden_effects_is_named_with_another(three, rows):
     alone = judge(three.base, rows, three.floor)
     assert alone.word == "unknown_effect"
-    found = several_effects(three, rows, alone, unheard)
+    found = several_effects(three, rows, alone, no_progress)
     assert found.word == "missing_effect"
     assert set(found.members) & LABELS
     assert set(found.second) & LABELS - set(found.members)

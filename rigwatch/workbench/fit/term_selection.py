@@ -1,11 +1,11 @@
-"""What a rough model learns from a healthy recording: terms that windows not fitted gain by.
+"""Selects the terms that a rough model learns from a healthy recording, by held-out error.
 
-Every set of terms (`learned_terms.py`) is fitted for itself to one part of the recording, the
-smaller ones first, and each from the best that it contains or, where that leads nowhere, from the
-model without terms; the rest of the recording decides. Of those that leave as little as any the one
-with the fewest kinds of terms is taken, so that no order in which terms are tried matters.
+Every set of terms (`learned_terms.py`) is fitted to one part of the recording, smaller sets first.
+A fit starts from the best subset or, if that fails, from the model without terms. The rest of the
+recording decides. Of the sets with nearly the smallest error there, the one with the fewest kinds
+of terms is selected, so the result does not depend on the order in which sets are tried.
 
-A set is taken only if its fit has converged and the model stays where it belongs (`staying.py`).
+A set is selected only if its fit has converged and the model stays bounded (`boundedness.py`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -18,18 +18,18 @@ from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data
+from rigwatch.workbench.fit.boundedness import BoundednessTest, Sizes
 from rigwatch.workbench.fit.fitted_model import Fitted
 from rigwatch.workbench.fit.learned_terms import with_friction, with_products
-from rigwatch.workbench.fit.staying import Sizes, Staying
 from rigwatch.workbench.fit.whole_fit import fit_whole
 from rigwatch.workbench.study import Study
 
 FIT_SHARE = 0.6
-"""Share of the healthy recording that terms are fitted to; the rest decides on them."""
-WORTH = 0.03
-"""Share by which the error of windows that were not fitted must fall for more terms."""
-SEARCHES = 5
-"""Drawn starts of the model without terms, beside its own values."""
+"""Share of the healthy recording that terms are fitted to; the rest decides which are kept."""
+MIN_GAIN = 0.03
+"""Relative fall of the held-out error that justifies more terms."""
+DRAWN_STARTS = 5
+"""Random starts of the model without terms, in addition to its own values."""
 
 Term = Callable[[Model, Sizes], Model]
 TERMS: Mapping[str, Term] = {
@@ -37,17 +37,17 @@ TERMS: Mapping[str, Term] = {
     "products of three": lambda model, sizes: with_products(model, sizes, 3),
     "products of two": lambda model, sizes: with_products(model, sizes, 2),
 }
-"""What may be learned, by what it is called."""
+"""Kinds of terms, by name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What a healthy recording has taught.
+    """A rough model with the terms learned from a healthy recording.
 
     Attributes:
         model: along the measured motion, its learned parameters free.
-        fitted: it, fitted to the healthy recording.
-        steps: what was added.
+        fitted: the model fitted to the healthy recording.
+        steps: names of the terms added.
     """
 
     model: Model
@@ -55,8 +55,8 @@ class Learned:
     steps: tuple[str, ...]
 
 
-def learn(study: Study, healthy: Recording, horizon: int) -> Learned:
-    """The model along the measured motion with the terms that a healthy recording is worth.
+def learn_terms(study: Study, healthy: Recording, horizon: int) -> Learned:
+    """The model along the measured motion with the terms that a healthy recording supports.
 
     Args:
         study: with its model along the measured motion.
@@ -66,10 +66,10 @@ def learn(study: Study, healthy: Recording, horizon: int) -> Learned:
     Raises:
         ModelError: not even the model without terms can be simulated.
     """
-    bare = _loose(study.model)
+    bare = _only_kept_free(study.model)
     both = _split(healthy, horizon)
-    first = fit_whole(study, bare, both, study.file.start, SEARCHES)
-    test = Staying(first, healthy)
+    first = fit_whole(study, bare, both, study.file.start, DRAWN_STARTS)
+    test = BoundednessTest(first, healthy)
     models: dict[tuple[str, ...], Model] = {(): bare}
     fits: dict[tuple[str, ...], Fitted] = {(): first}
     for chosen in _sets():
@@ -90,12 +90,12 @@ def learn(study: Study, healthy: Recording, horizon: int) -> Learned:
 
 
 def _sets() -> list[tuple[str, ...]]:
-    """Sets of terms, the smaller ones first."""
+    """Sets of terms, smaller ones first."""
     return [chosen for n in range(1, len(TERMS) + 1) for chosen in combinations(TERMS, n)]
 
 
 def _with_terms(model: Model, sizes: Sizes, chosen: tuple[str, ...]) -> Model | None:
-    """The model with a set of terms; None where one of them has no place in it."""
+    """The model with a set of terms; None if one of them does not apply to it."""
     for name in chosen:
         larger = TERMS[name](model, sizes)
         if larger is model:
@@ -105,36 +105,36 @@ def _with_terms(model: Model, sizes: Sizes, chosen: tuple[str, ...]) -> Model | 
 
 
 def _best_first(fits: Mapping[tuple[str, ...], Fitted]) -> list[tuple[str, ...]]:
-    """Sets that leave as little as any, the smallest of them first; then the others."""
+    """Sets with nearly the smallest error, those with fewest terms first; then the others."""
     least = min(fitted.held_out_error for fitted in fits.values())
 
     def order(chosen: tuple[str, ...]) -> tuple[bool, int, float]:
         error = fits[chosen].held_out_error
-        worse = (1 - WORTH) * error > least
+        worse = (1 - MIN_GAIN) * error > least
         return worse, 0 if worse else len(chosen), error
 
     return sorted(fits, key=order)
 
 
 def _usable(
-    study: Study, model: Model, data: Data, begin: Sequence[Fitted], test: Staying
+    study: Study, model: Model, data: Data, begin: Sequence[Fitted], test: BoundednessTest
 ) -> Fitted | None:
-    """A model's fit from the first of several fits that leads to a usable one; None if none does.
+    """The first usable fit of a model, tried from several initial fits; None if there is none.
 
-    One that diverges, has not converged, or does not stay where it belongs is not used.
+    A fit is usable if it neither diverges nor fails to converge, and the model stays bounded.
     """
     for start in begin:
         try:
             found = fit_whole(study, model, data, start.train.values())
         except ModelError:
             continue
-        if found.convergence is not None and found.convergence.converged and test.stays(found):
+        if found.convergence is not None and found.convergence.converged and test.passes(found):
             return found
     return None
 
 
 def _split(healthy: Recording, horizon: int) -> Data:
-    """A part of the recording that is fitted, and the rest, which decides."""
+    """The recording as a training part and a held-out part."""
     windows = len(healthy) // horizon
     cut = max(round(FIT_SHARE * windows), 1) * horizon
     if cut >= len(healthy):
@@ -146,8 +146,8 @@ def _split(healthy: Recording, horizon: int) -> Data:
     return Data(first, rest, None, horizon, ())
 
 
-def _loose(model: Model) -> Model:
-    """The model with all that a healthy recording may tell free, but what forces divide by."""
+def _only_kept_free(model: Model) -> Model:
+    """The model with only its kept parameters free."""
     parameters = {
         name: structs.replace(p, fixed=not p.kept, kept=p.kept)
         for name, p in model.parameters.items()

@@ -1,7 +1,8 @@
-"""Whether a model along the measured motion stays where it belongs.
+"""Whether a model along the measured motion stays bounded and forgets its initial state.
 
-Products of motion may hold several equilibria, and one that nobody has seen is met by the next
-recording. So a model is run from different states under a motion larger than the healthy one.
+A model with products of the motion may have several equilibria, and another recording may reach one
+that the training data do not show. The model is therefore simulated from different initial states
+under a motion larger than the healthy one.
 """
 
 from collections.abc import Mapping
@@ -16,31 +17,31 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import port_sizes
 from rigwatch.workbench.fit.fitted_model import Fitted
 
-LARGER = 1.2
-"""Motion over the healthy one under which a model must still stay bounded."""
-FAR = 3.0
-"""States that a run begins in, over their own sizes."""
-TOGETHER, BOUNDED = 0.02, 3.0
-"""How far runs may be apart at last, and how large they may become, in sizes of the output."""
-SETTLED = 4
-"""Part of a recording after which hidden states have forgotten where they began: one in so many."""
+MOTION_GAIN = 1.2
+"""Ratio of the test motion to the healthy motion."""
+INITIAL_STATES = 3.0
+"""Initial states of the test runs, in multiples of the rms of each state."""
+CONVERGED, BOUNDED = 0.02, 3.0
+"""Largest final difference between runs, and largest rms, relative to the output's deviation."""
+SETTLING_PARTS = 4
+"""Hidden states have settled after one of this many equal parts of a recording."""
 
 Sizes = Mapping[str, Mapping[str, float]]
-"""Of each port's variables, in their units."""
+"""Rms of each port's variables, in their units."""
 
 
-class Staying:
-    """A test of models against the one without terms.
+class BoundednessTest:
+    """Tests models against the one without learned terms.
 
-    Runs from different states must come together, as those of the model without terms do, which is
-    linear and stable; and they must stay as large as the output.
+    Runs from different initial states must converge, as those of the model without terms do, which
+    is linear and stable; and they must stay within a few times the output's deviation.
 
     Args:
         bare: the model without terms.
         healthy: recording of a healthy rig.
 
     Attributes:
-        sizes: of each port's variables, those of hidden states as the model without terms has them.
+        sizes: rms of each port's variables; for hidden states, as simulated without terms.
     """
 
     def __init__(self, bare: Fitted, healthy: Recording) -> None:
@@ -50,19 +51,19 @@ class Staying:
         self.sizes = _of_states(model, port_sizes(model, healthy), self._states)
         self._apart = self._run(bare)[0]
 
-    def stays(self, fitted: Fitted) -> bool:
-        """Whether one does."""
+    def passes(self, fitted: Fitted) -> bool:
+        """Whether a fitted model passes the test."""
         size = np.nanstd(self._healthy.outputs, axis=0)
         apart, reached = self._run(fitted)
-        together = apart < TOGETHER * size + 2 * self._apart
+        together = apart < CONVERGED * size + 2 * self._apart
         return bool(np.all(together) and np.all(reached < BOUNDED * size))
 
     def _run(self, fitted: Fitted) -> tuple[FloatArray, FloatArray]:
-        """How far runs are apart at last, and how large they become; each (outputs,)."""
+        """Final difference between runs, and their rms; each of shape (outputs,)."""
         healthy = self._healthy
-        far = FAR * np.array(list(self._states.values()))
+        far = INITIAL_STATES * np.array(list(self._states.values()))
         run = fitted.compiled.simulate(
-            LARGER * healthy.inputs, healthy.dt, np.zeros(3, np.int64), len(healthy),
+            MOTION_GAIN * healthy.inputs, healthy.dt, np.zeros(3, np.int64), len(healthy),
             initial=np.stack([0 * far, far, -far]), parameters=fitted.train.parameters,
             substeps=fitted.substeps,
         )  # fmt: skip
@@ -72,7 +73,7 @@ class Staying:
 
 
 def _state_sizes(fitted: Fitted, recording: Recording) -> dict[str, float]:
-    """Root mean squares of the hidden states that a model simulates, by name."""
+    """Rms of the hidden states that a model simulates, by name."""
     model, values = fitted.compiled.system.model, fitted.train.values()
     parameters = {
         name: structs.replace(p, value=values[name], fixed=True, kept=False)
@@ -87,12 +88,12 @@ def _state_sizes(fitted: Fitted, recording: Recording) -> dict[str, float]:
         initial=np.zeros((1, len(model.states))), parameters=compiled.parameters,
         substeps=fitted.substeps,
     )  # fmt: skip
-    sizes = np.sqrt(np.mean(run.outputs[0, len(recording) // SETTLED :] ** 2, axis=0))
+    sizes = np.sqrt(np.mean(run.outputs[0, len(recording) // SETTLING_PARTS :] ** 2, axis=0))
     return dict(zip(model.states, sizes.tolist(), strict=True))
 
 
 def _of_states(model: Model, sizes: Sizes, states: Mapping[str, float]) -> Sizes:
-    """Sizes of the ports' variables, those of hidden states replaced."""
+    """Rms of the ports' variables, with those of hidden states replaced."""
     found = {port: dict(own) for port, own in sizes.items()}
     for port, own in found.items():
         for name, variable in model.ports[port].variables.items():

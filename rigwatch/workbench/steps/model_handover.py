@@ -14,7 +14,7 @@ import numpy as np
 from monitor.model import RigModel, load_model, model_versions
 from monitor.pipeline import RigMonitor
 from monitor.process import monitor_section
-from rigwatch.wire.bus import Granted, Wish, ask_for_model, connect, unique_process
+from rigwatch.wire.bus import ModelReply, ModelRequest, ask_for_model, connect, unique_process
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import Alarm, SampleBlock
 from rigwatch.wire.rig_config import load_rig
@@ -25,7 +25,7 @@ LINK_TIMEOUT = 3.0
 
 
 @dataclass(frozen=True)
-class HandedOver:
+class ModelHandover:
     """Outcome of a model change.
 
     Attributes:
@@ -34,7 +34,7 @@ class HandedOver:
         found: the promoted model; None for a rollback.
     """
 
-    granted: Granted
+    granted: ModelReply
     live: bool
     found: Promotion | None
 
@@ -62,7 +62,7 @@ def hand_over(
     *,
     rollback: bool = False,
     say: Callable[[str], None] = lambda _: None,
-) -> HandedOver:
+) -> ModelHandover:
     """Promote a study's model to a rig's monitor, or restore the previous model.
 
     Args:
@@ -79,15 +79,15 @@ def hand_over(
     path = model_path(rig)
     name, found = study.folder.resolve().name, None
     if rollback:
-        wish = Wish("rollback", "", user, f"rolled back from study {name}")
+        wish = ModelRequest("rollback", "", user, f"rolled back from study {name}")
     else:
         found = promotion(study, load_model(path))
         effects = ", ".join(a.effect for a in study.file.effects)
-        wish = Wish("promote", found.text, user, f"study {name}: {effects}")
+        wish = ModelRequest("promote", found.text, user, f"study {name}: {effects}")
     granted, live = _send(rig, path, wish, say)
     if granted.done:
         ledger.append(study, wish.action, rig=str(rig), live=live, text=granted.text)
-    return HandedOver(granted, live, found)
+    return ModelHandover(granted, live, found)
 
 
 def model_path(rig: Path) -> Path:
@@ -114,7 +114,9 @@ def _run(model: RigModel, blocks: Sequence[SampleBlock]) -> tuple[float, tuple[s
     return float(np.sqrt(np.nanmean(whole**2))) if whole.size else float("nan"), tuple(names)
 
 
-def _send(rig: Path, path: Path, wish: Wish, say: Callable[[str], None]) -> tuple[Granted, bool]:
+def _send(
+    rig: Path, path: Path, wish: ModelRequest, say: Callable[[str], None]
+) -> tuple[ModelReply, bool]:
     """The monitor's answer and True; if none runs, the file is changed, and False."""
     try:
         bus = connect(load_rig(rig), unique_process("promote"), LINK_TIMEOUT)
@@ -127,10 +129,10 @@ def _send(rig: Path, path: Path, wish: Wish, say: Callable[[str], None]) -> tupl
         return _in_file(path, wish), False
 
 
-def _in_file(path: Path, wish: Wish) -> Granted:
+def _in_file(path: Path, wish: ModelRequest) -> ModelReply:
     now = time.time_ns()
     if wish.action == "rollback":
         model_versions.roll_back(path, now, wish.user, wish.text)
     else:
         model_versions.install(path, wish.model, now, wish.user, wish.text)
-    return Granted(True, "in force from the monitor's next start on")
+    return ModelReply(True, "in force from the monitor's next start on")

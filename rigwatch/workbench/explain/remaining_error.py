@@ -22,7 +22,7 @@ def explains(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
     return left_over(base, row, floor, tolerant=True) <= 1 - EXPLAINED
 
 
-def explains_too_little(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
+def explains_little(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
     """Whether most of the error is caused by something else.
 
     The quietest band is a lower limit of the noise, so more of the error may remain above it.
@@ -32,8 +32,8 @@ def explains_too_little(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
     return left_over(base, row, floor, tolerant=True) > 1 - LITTLE
 
 
-def what_stays(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
-    """The error an effect leaves above the floor, in words; empty at the noise floor."""
+def remaining_error(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
+    """The error that an effect leaves above the floor, in words; empty at the noise floor."""
     assert row.fitted is not None
     if floor.reached(row.fitted.held_out) or explains(base, row, floor):
         return ""
@@ -42,10 +42,10 @@ def what_stays(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:
     return f"; {share:.0%} of the error's energy remains, {times:.2g} times the noise floor"
 
 
-def accepted_as_well(rows: Sequence[Ranked], named: Sequence[str]) -> str:
+def other_accepted(rows: Sequence[Ranked], named: Sequence[str]) -> str:
     """The best accepted effects that are not named, in words; empty if there are none."""
     others = [row for row in rows if row.accepted and row.label not in named]
     best = sorted(others, key=lambda row: row.held_out_error)[:MENTIONED]
-    said = ", ".join(f"{row.label} ({row.held_out_error:.3g})" for row in best)
+    listed = ", ".join(f"{row.label} ({row.held_out_error:.3g})" for row in best)
     more = f" and {len(others) - len(best)} more" if len(others) > len(best) else ""
-    return f"; also accepted: {said}{more}" if said else ""
+    return f"; also accepted: {listed}{more}" if listed else ""

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from rigwatch.workbench.compare.preparation import open_bench
-from rigwatch.workbench.compare.uncertainty_budget import beyond
+from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.fit.intervals import values
 from rigwatch.workbench.study.study import create
@@ -40,7 +40,7 @@ def test_what_is_named_has_an_interval_that_is_wider_than_its_recording_says(tmp
     low, high = found.ranking[0].parameters["d"].interval
     assert low < DRAG < high
     accepted = open_bench(study.with_effects([]))
-    more = beyond(accepted.study, accepted.data, accepted.bare, accepted.base)
+    more = added_variances(accepted.study, accepted.data, accepted.bare, accepted.base)
     assert set(more) == set(accepted.base.compiled.system.free)
     alone, whole = (values(accepted.base.train, extra) for extra in (None, more))
     for name, variance in more.items():
@@ -50,7 +50,7 @@ def test_what_is_named_has_an_interval_that_is_wider_than_its_recording_says(tmp
 
 def test_without_a_healthy_recording_that_tells_parameters_nothing_is_added():
     bench = opened(multisine(np.arange(0.5, 8.0, 0.5), 1.0, seconds=5.0))
-    assert beyond(bench.study, bench.data, bench.bare, bench.base) == {}
+    assert added_variances(bench.study, bench.data, bench.bare, bench.base) == {}
 
 
 def width(value) -> float:

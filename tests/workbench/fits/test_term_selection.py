@@ -14,10 +14,10 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.data.motion import along_motion
 from rigwatch.workbench.data.signals import prepare
 from rigwatch.workbench.fit import learning
+from rigwatch.workbench.fit.boundedness import BoundednessTest
 from rigwatch.workbench.fit.learned_terms import LEARNED, with_products
-from rigwatch.workbench.fit.learning import Learned, learn
-from rigwatch.workbench.fit.staying import Staying
-from rigwatch.workbench.fit.whole_fit import SHARE, fit_whole, sizes_shown
+from rigwatch.workbench.fit.term_selection import Learned, learn_terms
+from rigwatch.workbench.fit.whole_fit import SHARE, fit_whole, search_scales
 from rigwatch.workbench.study.study import Study
 from tests.workbench.black_box import record, study
 
@@ -45,20 +45,20 @@ def healthy(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Case]:
 
 @pytest.fixture(scope="module")
 def taught(healthy: Callable[[int], Case]) -> Learned:
-    return learn(*healthy(2), HORIZON)
+    return learn_terms(*healthy(2), HORIZON)
 
 
 def bare(case: Case) -> Learned:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(learning, "TERMS", {})
-        return learn(*case, HORIZON)
+        return learn_terms(*case, HORIZON)
 
 
 @pytest.mark.parametrize("seed", [2, 3, 6])
 def test_products_are_learned_from_any_excitation(
     healthy: Callable[[int], Case], seed: int
 ) -> None:
-    found = learn(*healthy(seed), HORIZON)
+    found = learn_terms(*healthy(seed), HORIZON)
 
     assert set(found.steps) >= set(TOGETHER)
     assert found.fitted.convergence is not None
@@ -72,7 +72,7 @@ def test_what_is_learned_does_not_hinge_on_the_last_digits(
     opened, recording = healthy(2)
     last = 1 + 1e-12 * np.random.default_rng(0).standard_normal(recording.outputs.shape)
 
-    found = learn(opened, replace(recording, outputs=recording.outputs * last), HORIZON)
+    found = learn_terms(opened, replace(recording, outputs=recording.outputs * last), HORIZON)
 
     assert found.steps == taught.steps
     assert found.fitted.train_error == pytest.approx(taught.fitted.train_error, rel=1e-3)
@@ -84,7 +84,7 @@ def test_the_order_of_terms_makes_no_difference(
     backwards = dict(reversed(learning.TERMS.items()))
     monkeypatch.setattr(learning, "TERMS", backwards)
 
-    found = learn(*healthy(2), HORIZON)
+    found = learn_terms(*healthy(2), HORIZON)
 
     assert set(found.steps) == set(taught.steps)
     assert found.fitted.train_error == pytest.approx(taught.fitted.train_error, rel=0.03)
@@ -106,13 +106,13 @@ def test_a_model_with_equilibria_that_nobody_has_seen_does_not_stay(
     healthy: Callable[[int], Case], taught: Learned
 ) -> None:
     _, recording = healthy(2)
-    test = Staying(bare(healthy(2)).fitted, recording)
-    assert test.stays(taught.fitted)
+    test = BoundednessTest(bare(healthy(2)).fitted, recording)
+    assert test.passes(taught.fitted)
     compiled = taught.fitted.compiled
     values = taught.fitted.train.values() | {f"{LEARNED}push_push_push": 1e5}
     pushed = replace(taught.fitted.train, parameters=compiled.vector(values))
 
-    assert not test.stays(replace(taught.fitted, train=pushed))
+    assert not test.passes(replace(taught.fitted, train=pushed))
 
 
 def test_coefficients_move_the_output_alike_whatever_their_units(
@@ -120,11 +120,11 @@ def test_coefficients_move_the_output_alike_whatever_their_units(
 ) -> None:
     _, recording = healthy(2)
     fitted = bare(healthy(2)).fitted
-    sizes = Staying(fitted, recording).sizes
+    sizes = BoundednessTest(fitted, recording).sizes
     larger = with_products(fitted.compiled.system.model, sizes, 2)
     compiled = compile_system(compose(larger))
     at = compiled.vector(fitted.train.values())
-    moved = sizes_shown(compiled, recording, at, 4)
+    moved = search_scales(compiled, recording, at, 4)
     size = np.nanstd(recording.outputs)
     states = len(compiled.system.states)
 

@@ -12,17 +12,17 @@ STRONGER = 3.0
 """Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
 
 
-def believed(bench: Bench, rows: list[Ranked]) -> Verdict:
+def credible_verdict(bench: Bench, rows: list[Ranked]) -> Verdict:
     """The verdict among the credible effects; the others are no longer accepted."""
     verdict = judge(bench.base, rows, bench.floor)
-    while verdict.best is not None and pretended(bench, verdict.best):
+    while verdict.best is not None and apparent_when_healthy(bench, verdict.best):
         verdict.best.accepted = False
         verdict.best.reason = "nearly as strong on the healthy recording"
         verdict = judge(bench.base, rows, bench.floor)
     return verdict
 
 
-def pretended(bench: Bench, row: Ranked) -> bool:
+def apparent_when_healthy(bench: Bench, row: Ranked) -> bool:
     """Whether the effect appears nearly as strong on the healthy recording."""
     healthy = bench.data.of_healthy
     if healthy is None or bench.bare is None or not healthy.along_motion or row.fitted is None:

@@ -12,7 +12,7 @@ from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.physics.engine.search.convergence import promise
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
 from rigwatch.physics.engine.search.equation_error import equation_error_starts
-from rigwatch.physics.engine.search.fit_from_afar import fit_from_afar
+from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
 from rigwatch.physics.engine.search.short_horizons import ShortHorizons, growing_horizons
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.typed_files.loading import parse
@@ -68,7 +68,7 @@ def error_over_noise(found, noise):
 @pytest.mark.parametrize("start", [(1.0, 1.0, 1.0), (1e3, 1e-3, 1e-2), (1e-3, 1e3, 4e5)])
 def test_the_floor_is_reached_from_starts_six_decades_apart(start, horizon, hold):
     recording, noise = recorded(hold)
-    found, ended = fit_from_afar(ShortHorizons(
+    found, ended = multi_start_fit(ShortHorizons(
         compiled_with(hold), recording, horizon, start=np.array(start), scale=noise, noise=noise,
         substeps=2,
     ))  # fmt: skip
@@ -142,7 +142,7 @@ def test_a_hidden_state_is_reached_by_growing_horizons_and_what_is_open_is_said(
     compiled = compile_system(compose(parse(HIDDEN_STATE, Model, "filtered")))
     start = np.array([3000.0, 1e-2, 1e-2])
     assert equation_error_starts(compiled, recording, start) == []
-    found, ended = fit_from_afar(
+    found, ended = multi_start_fit(
         ShortHorizons(compiled, recording, 256, start=start, scale=noise, noise=noise, substeps=2)
     )
     assert error_over_noise(found, noise) < 1.1
@@ -158,7 +158,7 @@ def test_a_parameter_at_its_bound_is_named():
         return structs.replace(model, parameters=model.parameters | {"k": low})
 
     recording, noise = recorded()
-    _, ended = fit_from_afar(
+    _, ended = multi_start_fit(
         ShortHorizons(
             compiled_with(change=stiff), recording, 128, scale=noise, noise=noise, substeps=2
         )
@@ -202,6 +202,6 @@ def test_what_blows_up_from_everywhere_is_an_error():
     recording, noise = recorded()
     spoiled = Recording(DT, recording.inputs * 1e306, recording.outputs)
     with pytest.raises(ModelError):
-        fit_from_afar(
+        multi_start_fit(
             ShortHorizons(compiled_with(), spoiled, 64, scale=noise, noise=noise, substeps=2)
         )

@@ -8,7 +8,11 @@ import pytest
 
 from rigwatch.workbench.data.noise_floor import NoiseFloor
 from rigwatch.workbench.explain.adequacy import unchecked
-from rigwatch.workbench.explain.rough_verdict import leaves_much, modest, not_alone
+from rigwatch.workbench.explain.rough_verdict import (
+    leaves_much,
+    limited_verdict,
+    undetermined_if_much_left,
+)
 from rigwatch.workbench.explain.verdict import Verdict
 
 
@@ -34,22 +38,24 @@ FLOOR = NoiseFloor(np.ones(1), "healthy motion")
 
 
 def test_one_effect_that_leaves_much_of_a_rough_model_is_not_named_with_confidence() -> None:
-    found = modest(left(4.0), [], FLOOR, naming(2.0))
+    found = limited_verdict(left(4.0), [], FLOOR, naming(2.0))
 
     assert found.word == "undetermined"
     assert "leaves 2.00 times" in found.text
-    assert not_alone(left(4.0), FLOOR, naming(2.0)) == found, "nor of any other model"
+    assert undetermined_if_much_left(left(4.0), FLOOR, naming(2.0)) == found, (
+        "nor of any other model"
+    )
 
 
 def test_a_strong_effect_may_leave_more_as_it_changes_the_motion() -> None:
-    assert modest(left(28.0), [], FLOOR, naming(3.3)).word == "missing_effect"
-    assert modest(left(7.3), [], FLOOR, naming(2.0)).word == "undetermined"
+    assert limited_verdict(left(28.0), [], FLOOR, naming(3.3)).word == "missing_effect"
+    assert limited_verdict(left(7.3), [], FLOOR, naming(2.0)).word == "undetermined"
 
 
 @pytest.mark.parametrize("found", [naming(1.3), naming(2.0, ("cubic_stiffness@load",))])
 def test_what_leaves_little_and_a_pair_stay_named(found: Verdict) -> None:
     assert not leaves_much(left(4.0), FLOOR, found)
-    assert modest(left(4.0), [], FLOOR, found).word == "missing_effect"
+    assert limited_verdict(left(4.0), [], FLOOR, found).word == "missing_effect"
 
 
 @pytest.mark.parametrize(

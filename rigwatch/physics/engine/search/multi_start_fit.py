@@ -47,7 +47,7 @@ class Search(Protocol):
         """Whether an error is so small that no other optimum could be much better."""
 
 
-def fit_from_afar(search: Search) -> tuple[Fit, Convergence]:
+def multi_start_fit(search: Search) -> tuple[Fit, Convergence]:
     """The best of fits from several starts, and its convergence.
 
     Raises:

@@ -1,12 +1,12 @@
-"""Fits from afar: does the fitting driver reach the noise floor from wherever it is told to begin?
+"""Multi-start fits: does the fitting driver reach the noise floor from any initial values?
 
 A mass on a spring in closed form (`sim_plant/specimens/exact_mass.py`), which shares nothing with
-the engine, is drawn too (mass over four decades, resonance 1 to 12 Hz, damping 2 to 50 %), starts
-are drawn log-uniformly over six decades around the truth, horizons from 0.25 to 4 s. A fit reaches
-the floor where its error is at most 1.1 times the noise; one that does not is called out by its
-convergence, or a verdict would be built on it.
+the engine, is drawn at random (mass over four decades, resonance 1 to 12 Hz, damping 2 to 50 %),
+starts are drawn log-uniformly over six decades around the truth, horizons from 0.25 to 4 s. A fit
+reaches the floor if its error is at most 1.1 times the noise; one that does not must be reported as
+not converged, since a verdict would rely on it.
 
-    python -m benchmarks fits_from_afar --quick
+    python -m benchmarks multi_start_fits --quick
 """
 
 import time
@@ -19,7 +19,7 @@ from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.model import Hold, Model, shipped_models
 from rigwatch.physics.engine.equations.system import compose
 from rigwatch.physics.engine.fit.recording import Recording
-from rigwatch.physics.engine.search.fit_from_afar import fit_from_afar
+from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
 from rigwatch.physics.engine.search.short_horizons import ShortHorizons
 from sim_plant.specimens.exact_mass import RATE, Mass, excitation, moved
 from tools.benchmark_table import Row
@@ -62,7 +62,7 @@ def solved(seed: int, *, alone: bool) -> tuple[bool, bool, float]:
         model, read, noise = position_alone(model), read[:, :1], noise[:1]
     start = plant.values * 10 ** generator.uniform(-DECADES, DECADES, 3)
     begin = time.perf_counter()
-    found, ended = fit_from_afar(ShortHorizons(
+    found, ended = multi_start_fit(ShortHorizons(
         compile_system(compose(model)), Recording(1 / RATE, force[:, None], read),
         HORIZONS[seed // 2 % len(HORIZONS)], start=start, scale=noise, noise=noise, substeps=2,
     ))  # fmt: skip

@@ -1,0 +1,54 @@
+"""The signals at an effect's port, computed from the channels of a recording."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rigwatch.physics.engine.compile import evaluated
+from rigwatch.physics.engine.equations import (
+    RATE,
+    TIME,
+    Placement,
+    System,
+)
+from rigwatch.wire.arrays import FloatArray
+
+Signals = dict[str, FloatArray]
+
+
+def port_signals(  # noqa: PLR0917 -- they belong together
+    system: System,
+    placement: Placement,
+    inputs: FloatArray,
+    states: FloatArray,
+    dt: float,
+    values: Mapping[str, float],
+) -> Signals:
+    """The signals at an effect's port, computed from the channels.
+
+    Args:
+        system: a model with the effect.
+        placement: the effect.
+        inputs: shape (n, inputs).
+        states: from the channels, shape (n, states).
+        dt: time between samples [s].
+        values: parameters by name.
+    """
+    port = system.model.ports[placement.port]
+    known: Signals = {TIME: dt * np.arange(len(inputs), dtype=np.float64)}
+    known |= dict(zip(system.states, states.T, strict=True))
+    known |= dict(zip(system.model.inputs, inputs.T, strict=True))
+    for name, other in system.model.ports.items():
+        if other.kind != "sensor":
+            known[name] = known.get(other.signal, np.zeros(len(inputs)))
+
+    def along(text: str) -> FloatArray:
+        return evaluated(text, known, values, f"port {placement.port}")
+
+    found = {name: along(variable.expression) for name, variable in port.variables.items()}
+    if port.kind != "force":
+        sensor = port.kind == "sensor"
+        text = system.model.outputs[port.signal].expression if sensor else port.signal
+        found["u"] = along(text)
+        found[RATE] = np.asarray(np.gradient(found["u"], dt), np.float64)
+    return {TIME: known[TIME], **found}
