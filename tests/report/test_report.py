@@ -12,7 +12,7 @@ import pytest
 from rigwatch.commands import main
 from rigwatch.page.scale import Scale, limits
 from rigwatch.page.svg import Plot
-from rigwatch.workbench.explain.verdict_calibration import LATER, later_doubt
+from rigwatch.workbench.explain.verdict_calibration import LATER_COUNTS, later_probability_wrong
 from rigwatch.workbench.report.html_report import gather
 from rigwatch.workbench.report.sections import headline
 from rigwatch.workbench.study.study import Study
@@ -129,8 +129,8 @@ def test_an_undetermined_verdict_is_a_whole_sentence(
 
 def test_the_doubt_of_a_later_step_is_that_of_later_steps(study: Study) -> None:
     found = gather(study).explanation
-    assert found.like_this == LATER
-    assert found.wrong_probability == later_doubt()
+    assert found.like_this == LATER_COUNTS
+    assert found.wrong_probability == later_probability_wrong()
 
 
 def test_an_output_that_cannot_be_written(
