@@ -1,7 +1,7 @@
-"""NamedArrays of numbers, to and from the data frames that people work with.
+"""Named arrays of numbers, converted from and to data frames.
 
-A table that comes in is a mapping of arrays, a pandas or polars data frame, or an xarray data set.
-What goes out is a mapping of arrays that converts itself to any of them.
+A table may be given as a mapping of arrays, a pandas or polars data frame, or an xarray data set.
+Tables are returned as a mapping of arrays that converts to any of these.
 """
 
 import csv
@@ -43,7 +43,7 @@ def columns_from(table: Any, name: str) -> NamedArrays:
         name: of the table, for errors.
 
     Raises:
-        ImportDataError: it is no such table, or its columns differ in length.
+        ImportDataError: it is none of these, or its columns differ in length.
     """
     if hasattr(table, "data_vars"):
         found = {_headed(table[key]): table[key] for key in (*table.coords, *table.data_vars)}

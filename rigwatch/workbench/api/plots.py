@@ -28,7 +28,7 @@ def signals(stage: Stage, channel: str = "") -> "Figure":
         channel: the output; the first if empty.
 
     Raises:
-        ModelError: there is no such output.
+        ModelError: the model has no output of that name.
     """
     index, name, unit = _output(stage, channel)
     found = signals_of(stage)
@@ -54,7 +54,7 @@ def where(stage: Stage, channel: str = "") -> "Figure":
         channel: the output; the first if empty.
 
     Raises:
-        ModelError: there is no such output.
+        ModelError: the model has no output of that name.
     """
     index, name, unit = _output(stage, channel)
     grid = residual_over_motion(stage, index)

@@ -123,7 +123,7 @@ class Study:
         return Shown(found, lambda regions: region_lines(regions, MOST_REGIONS), _regions)
 
     def explain(self) -> Shown[Explanation]:
-        """Which effects may be missing (`rigwatch explain`)."""
+        """Effects that may be missing (`rigwatch explain`)."""
         bench = self._warm.bench(self._opened())
         return Shown(explanation(bench, *ranking(bench)), explanation_lines, _ranking)
 
@@ -137,7 +137,7 @@ class Study:
         return Shown(try_undo(self._opened(), warm=self._warm).commit(), change_lines, _errors)
 
     def signals(self, *, held_out: bool = True) -> NamedArrays:
-        """Time [s], and for each output what was measured, modelled, and the residual."""
+        """Time [s], and for each output its measured and modelled values and the residual."""
         stage = self._current()
         found = signals(stage, held_out=held_out)
         columns = NamedArrays(time=found.time)

@@ -16,7 +16,7 @@ from rigwatch.wire.arrays import FloatArray
 FINE, SAMPLED = 1 / 400, 1 / 40
 """Time between points for continuous effects and for sampled ones [s]."""
 PERIODS, MOVE = 2, (0.2, 0.3)
-"""Number of one-second periods, the last of which is shown; start and end of the move [s]."""
+"""Number of one-second periods (the last one is shown); start and end of the move [s]."""
 SEEN = {"T": (1.0, 0.5), "pu": (2.0, 0.9), "pd": (1.0, 0.0), "Ta": (1.0, 0.0)}
 """Mean and amplitude of variables that are no motion; all others have amplitude 1 about zero."""
 
@@ -89,7 +89,7 @@ def _along(effect: Effect, time: FloatArray, wave: FloatArray, speed: FloatArray
 
 
 def _values(effect: Effect) -> dict[str, float]:
-    """Parameter values for drawing; a visible strength where the file's value is neutral."""
+    """Parameter values for drawing; with a visible strength if the file's value is neutral."""
     found = {n: _within_the_sine(p) for n, p in effect.parameters.items()}
     p = effect.parameters[effect.strength]
     if p.role == "switch":

@@ -1,4 +1,4 @@
-"""Compares model and measurements: errors against the noise floor, and where they arise."""
+"""Compares model and measurements: errors against the noise floor, and where they occur."""
 
 from rigwatch.workbench.compare.compare import Comparison, compare, comparison
 from rigwatch.workbench.compare.horizon import with_horizon_of

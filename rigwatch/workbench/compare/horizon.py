@@ -22,7 +22,7 @@ from rigwatch.workbench.study import Study
 SPANS = 3.0
 """Horizon over the slowest time constant."""
 PERIODS = 2.0
-"""Periods in a horizon, where the slowest motion oscillates."""
+"""Periods in a horizon if the slowest motion oscillates."""
 WINDOWS = 10
 """Minimum number of windows in the shortest recording."""
 FEWEST = 20

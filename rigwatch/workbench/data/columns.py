@@ -15,7 +15,7 @@ class Columns:
 
     Attributes:
         dt: time between samples [s].
-        values: by channel, each of shape (n,), in SI; NaN where no valid sample was measured.
+        values: by channel, each of shape (n,), in SI; NaN for invalid samples.
         units: of the channels as recorded.
     """
 

@@ -32,7 +32,7 @@ def on_one_rate(
     rate: float | None,
     kept: frozenset[str] = frozenset(),
 ) -> tuple[list[Columns], list[str]]:
-    """The recordings at one sample rate, and remarks on what was resampled.
+    """The recordings at one sample rate, and remarks on resampled channels.
 
     Args:
         tables: the recordings.

@@ -57,7 +57,7 @@ def with_base_offered(study: Study, found: Verdict) -> Verdict:
 def unchecked(bench: Bench, found: Verdict) -> Verdict:
     """The verdict for a model along its measured motion if there is no healthy recording.
 
-    Model error and a fault cannot be told apart then. An effect is named only if its residual is
+    Model error and a fault are then indistinguishable. An effect is named only if its residual is
     no larger than the difference between repeated periods of the excitation. If even the best
     effect leaves many times that, the model does not describe the rig.
 

@@ -63,7 +63,7 @@ class Explanation:
         text: the verdict in a sentence.
         comparison: the current model against the recordings.
         ranking: best first.
-        rivals: effects of different physics that the recording cannot tell from the best.
+        rivals: effects of different physics that the recording cannot distinguish from the best.
         also: second missing effect, if two are missing at once.
         next_experiment: an excitation that separates the rivals; None if there are none, or if
             none is found.

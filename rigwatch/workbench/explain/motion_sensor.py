@@ -1,6 +1,6 @@
 """Faults of the sensor whose measured motion drives the model; no port can represent them.
 
-Along the measured motion a sensor fault enters the equations wherever position or speed does. The
+Along the measured motion a sensor fault enters all equations that contain position or speed. The
 fault is therefore subtracted from the reading, to first order in its strength s, and likewise from
 the rate:
 

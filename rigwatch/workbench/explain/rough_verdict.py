@@ -7,8 +7,8 @@ motion, so part of the residual is model error. Therefore:
 * residual slightly larger: an effect that fits it is not named;
 * best effect leaves much more than the healthy residual: another effect acts in addition to it or
   in its place, and it is not named with confidence, for any model;
-* best effect leaves more than the healthy residual: one that does nearly as well may be the right
-  one, as the model error may favour either.
+* best effect leaves more than the healthy residual: a nearly equal one may be the right one, as
+  the model error may favour either.
 """
 
 from collections.abc import Sequence

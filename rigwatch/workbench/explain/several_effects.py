@@ -1,4 +1,4 @@
-"""The verdict where a single effect does not explain the error.
+"""The verdict if a single effect does not explain the error.
 
 An effect that explains only part of the error also absorbs part of what other effects cause, and
 more of it the more parameters it has. Each effect is therefore judged together with the others. One

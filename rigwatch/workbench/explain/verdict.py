@@ -1,7 +1,7 @@
 """The verdict: the conclusion from the ranking, in one of five words.
 
 `nothing_missing`, `missing_effect`, `undetermined` (rivals of different physics that this recording
-cannot tell apart), `unknown_effect` (the error stays above the noise floor, and no known effect
+cannot distinguish), `unknown_effect` (the error stays above the noise floor, and no known effect
 explains it) or `model_inadequate` (the model's fit did not converge or does not describe the
 healthy rig, see `adequacy.py`; no effect is named). All five are valid results.
 
@@ -55,7 +55,7 @@ class Verdict:
         word: one of five.
         best: the effect named, None if there is none.
         members: labels of the best's class: itself first, then effects equivalent to it.
-        rivals: labels of effects of other physics that this recording cannot tell from it.
+        rivals: labels of effects of other physics that this recording cannot distinguish from it.
         text: the verdict in a sentence.
         second: labels of the second missing effect, if two are missing at once.
         evidence: what the verdict is based on.
@@ -79,7 +79,7 @@ def not_converged(fits: Mapping[str, Convergence | None]) -> Verdict | None:
     """`model_inadequate` if a fit that others build on did not converge, otherwise None.
 
     Args:
-        fits: convergence of each fit, by a description of what is fitted.
+        fits: convergence of each fit, by a description of the fitted model.
     """
     for name, ended in fits.items():
         if ended is not None and not ended.converged:
@@ -136,7 +136,7 @@ def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> 
 def _undistinguished(
     best: Ranked, rows: Sequence[Ranked], *, trusted: bool
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Labels of effects that this recording cannot tell from the best: its class, and rivals.
+    """Labels of effects that this recording cannot distinguish from the best: class and rivals.
 
     Args:
         best: the effect named.
@@ -160,7 +160,7 @@ def _undistinguished(
 
 
 def _looking_like(rows: Sequence[Ranked], rivals: Sequence[str], known: set[str]) -> list[str]:
-    """Labels of what was not fitted, as it looks the same as a rival that was."""
+    """Labels of effects not fitted because they are parallel to a rival that was."""
     return [
         row.label
         for row in rows
@@ -171,9 +171,9 @@ def _looking_like(rows: Sequence[Ranked], rivals: Sequence[str], known: set[str]
 
 
 def _one_with(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
-    """Whether what looks the same, or is of the same kind, cannot be told from the best."""
+    """Whether a parallel effect, or one of the same family, belongs to the best's class."""
     if _equal(best, row, cosine):
-        # At another place it is no refinement, whatever its shape needs.
+        # At another port it does not refine the best, however many parameters its shape has.
         return _earns(best, row) or (cosine > SAME and row.port != best.port)
     near = row.held_out_error < MUCH_WORSE * best.held_out_error
     return not trusted and row.accepted and cosine > ALIKE and near and _earns(best, row)

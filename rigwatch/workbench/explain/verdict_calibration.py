@@ -1,4 +1,4 @@
-"""How often a similar verdict was wrong on simulated plants, where the truth is known.
+"""How often similar verdicts were wrong on simulated plants with known truth.
 
 A verdict falls into a cell by its word, the share of the error above the floor that the named
 effect leaves, and the margin by which it beats effects outside its class. `calibration.toml` counts
@@ -48,7 +48,7 @@ class Evidence:
     Attributes:
         left: share of the energy above the noise floor that the named effect leaves.
         margin: paired held-out difference to the best effect outside its class and rivals, in
-            standard deviations; `CLEAR` if there is no such effect.
+            standard deviations; `CLEAR` if there is no other effect.
     """
 
     left: float = 1.0

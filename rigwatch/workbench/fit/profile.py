@@ -1,6 +1,6 @@
 """Profile likelihood: asymmetric intervals, for parameters that enter the model nonlinearly.
 
-A parameter is fixed away from its optimum, the others are refitted, and the interval ends where the
+A parameter is fixed away from its optimum, the others are refitted, and the interval ends when the
 squared error has risen by more than chance allows,
 
     Δ(Σ r²) = χ²(95 %, 1) · s² · swelling

@@ -10,9 +10,9 @@ from rigwatch.workbench.study import Study
 
 
 def candidates(study: Study, recording: Recording) -> list[Candidate]:
-    """Every effect at every compatible port where it is not yet in the model.
+    """Every effect at every compatible port not yet in the model.
 
-    Elective effects are included only if the study asks for the whole library.
+    Elective effects are included only if the study selects the whole library.
 
     Args:
         study: its model, its effects and those already accepted.

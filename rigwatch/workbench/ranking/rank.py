@@ -25,7 +25,7 @@ from rigwatch.workbench.study import Study
 
 AGAIN = 0.25
 """Share of the energy above the floor that an effect must explain, to first order, to be fitted
-again where its fit may have ended in a local minimum."""
+again if its fit may have ended in a local minimum."""
 
 
 def rank(

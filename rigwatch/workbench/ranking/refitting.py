@@ -50,7 +50,7 @@ def refit(
 
 
 def _orders_at_port(base: Fitted, row: Ranked) -> list[Placement]:
-    """The effect after those at its port and, where a signal passes them in order, before them.
+    """The effect placed after those at its port and, where order matters, before them.
 
     A drive that is delayed and then saturates differs from one that saturates first.
     """

@@ -72,7 +72,7 @@ def _beside(refused: Sequence[Refused]) -> list[tuple[float, Refused]]:
 
 
 def stretch(first: Signals, last: Signals, channel: int) -> slice:
-    """The section that shows the effects best: where the error fell most."""
+    """The section in which the error fell most, which shows the effects best."""
     measured = np.nan_to_num(first.measured[:, channel] - np.nanmean(first.measured[:, channel]))
     crossings = max(int(np.sum(np.diff(np.sign(measured)) != 0)), 1)
     width = int(np.clip(len(measured) * CROSSINGS / crossings, 60, len(measured)))

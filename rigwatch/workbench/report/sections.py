@@ -58,7 +58,7 @@ class Material:
 
 
 def headline(m: Material) -> str:
-    """The heading: how far the error fell, and what is still missing."""
+    """The heading: the fall of the error, and the effects still missing."""
     first, last = m.stages[0].comparison, m.stages[-1].comparison
     best = m.explanation.ranking[0] if m.explanation.ranking else None
     name = f"{_plain(best.effect)} at {best.port}" if best else ""

@@ -86,7 +86,7 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
 def _imported(
     folder: Path, logs: Logs, model: Model, written: list[Path]
 ) -> tuple[Matched, list[str]]:
-    """Imports logs as sessions beside the study's file; `written` collects their paths."""
+    """Imports logs as sessions into the study's folder; `written` collects their paths."""
     names = [path.stem for path in (*logs.data, *logs.healthy)]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ModelError(f"--data: found {min(twice)} twice, expected files of different names")

@@ -38,7 +38,7 @@ def matched(columns: Sequence[str], model: Model, given: Mapping[str, str]) -> M
         given: mapping given by the user, channel = "column[unit]".
 
     Raises:
-        ModelError: no column, or more than one, matches a signal; the text says what to type.
+        ModelError: no column, or more than one, matches a signal; the text names the option.
     """
     headers = [read_header(column) for column in columns]
     time = next((header for header in headers if header.name in TIMES), None)

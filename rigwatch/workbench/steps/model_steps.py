@@ -39,7 +39,7 @@ class Signals:
 
     Attributes:
         time: from the recording's first sample [s], shape (n,).
-        measured, modelled: shape (n, outputs); NaN where no valid sample was measured.
+        measured, modelled: shape (n, outputs); NaN for invalid samples.
     """
 
     time: FloatArray

@@ -186,7 +186,7 @@ def _scatter(columns: FloatArray, known: PromotedSection, sample_rate: float) ->
 
 
 def _felt(change: FloatArray, regressor: FloatArray, window: int) -> float:
-    """Rms of white noise that would disturb an estimate over a window as much."""
+    """Rms of white noise with the same influence on an estimate over a window."""
     along = np.convolve(change * regressor, np.ones(window), "valid")
     size = np.convolve(regressor**2, np.ones(window), "valid")
     return float(np.sqrt(np.mean(along**2 / size)))

@@ -209,7 +209,7 @@ def try_effect(
 
 
 def whole(row: Ranked) -> Accepted:
-    """The effect as an entry of the study's file, with all fitted values beside its own."""
+    """The effect as an entry of the study's file, with all values fitted with it."""
     assert row.fitted is not None
     own, fit = accepted_from(row), row.fitted.train
     free = set(fit.compiled.system.free)

@@ -79,7 +79,7 @@ class Accepted(Section, frozen=True, kw_only=True):
     """An accepted effect."""
 
     effect: Annotated[str, Meta(description="its name")]
-    port: Annotated[str, Meta(description="where it enters")]
+    port: Annotated[str, Meta(description="its port")]
     parameters: Annotated[
         dict[str, float], Meta(description="initial values of its fit, in the parameters' units")
     ] = field(default_factory=dict)
@@ -100,8 +100,8 @@ class StudyFile(Section, frozen=True, kw_only=True):
     variants: Annotated[
         tuple[str, ...], Meta(description="model variants in use, see `rigwatch study base`")
     ] = ()
-    train: Annotated[tuple[Span, ...], Meta(min_length=1, description="what is fitted to")]
-    held_out: Annotated[tuple[Span, ...], Meta(min_length=1, description="what decides")]
+    train: Annotated[tuple[Span, ...], Meta(min_length=1, description="training recordings")]
+    held_out: Annotated[tuple[Span, ...], Meta(min_length=1, description="recordings that judge effects")]
     healthy: Annotated[
         tuple[Span, ...], Meta(description="recordings of the healthy rig, for the noise floor")
     ] = ()
@@ -116,7 +116,7 @@ class StudyFile(Section, frozen=True, kw_only=True):
         Literal["auto", "measured motion", "free"],
         Meta(
             description="along the measured motion, or free runs over horizons; auto: along the"
-            " motion where channels show some of the model's states but not all"
+            " motion if channels show some of the model's states but not all"
         ),
     ] = "auto"
     rate: Annotated[
@@ -196,7 +196,7 @@ class Study:
         effects: all available effects by name: shipped, from entry points, own.
         own: names of those that are not shipped.
         kept: parameters from the healthy recording, None before they are estimated.
-        holds: holds of inputs by name, as far as known.
+        holds: holds of inputs by name, if known.
         text: content of the file when opened.
         horizon_from: what the horizon was chosen from, in words; empty if given.
     """
