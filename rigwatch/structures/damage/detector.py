@@ -80,7 +80,7 @@ class Judge:
         *,
         spread: FloatArray | None = None,
     ) -> Watch:
-        """Run the model beside the record.
+        """Run the model in parallel with the record.
 
         Args:
             model: structure and record.

@@ -1,6 +1,6 @@
 """Finds damage of a structure in a record: when, where, how much, and what follows.
 
-The undamaged structure's model runs beside the record. Once the residual exceeds noise, only data
+The undamaged structure's model runs in parallel with the record. Once the residual exceeds noise, only data
 from there on are used (a fit to the whole record mixes two structures, thesis 4.6.1): the
 springs are ranked, the best is identified with unknown first states, and monitoring continues with
 the changed model until the next damage.
@@ -109,7 +109,7 @@ def examine(
         structure: the undamaged structure.
         record: the measurement, undamaged at first.
         settings: settings of the examination.
-        progress: called with what is being done.
+        progress: called with a description of each step.
         model: of an earlier examination of the same structure, to reuse its kernel.
 
     Raises:
@@ -225,7 +225,7 @@ class _Work:
         return Stretch(self.base.model, now.parameters, first, last, self.base.sigma)
 
     def _located(self, now: _Now, path: FloatArray, begin: int) -> tuple[Ranking, bool]:
-        """Rank with more and more data as long as a change explains them, else with less.
+        """Rank with more and more data while a change explains them, otherwise with less.
 
         Two simultaneous changes are considered only if a single one does not suffice.
         """
@@ -234,7 +234,7 @@ class _Work:
         shortest = min(length, end - begin) // 4
         kept: Ranking | None = None
         while True:
-            # A remainder too short on its own joins the data before it.
+            # A remainder that is too short is joined to the data before it.
             last = end if begin + 1.5 * length > end else begin + length
             ranking, holds = self._ranked(now, path, begin, last)
             if not holds:

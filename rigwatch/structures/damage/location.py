@@ -5,7 +5,7 @@ every candidate and every unknown first state at once (thesis 4.13, 4.14); the e
 ranks the candidates. Second pass: the best few are refitted with unknown first states and ranked by
 what they leave unexplained. Candidates form an indistinguishable class if their directions, with
 the first states projected out, have a cosine above 0.95 and the data do not prefer the best: what
-it explains beyond another is no more than chance would give.
+it explains beyond another is not significant.
 """
 
 from collections.abc import Mapping

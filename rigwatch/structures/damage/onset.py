@@ -46,7 +46,7 @@ def instant(
     Args:
         model: structure and record.
         damaged: parameters after the damage, shape (n_p,).
-        watch: the undamaged model's run beside the record.
+        watch: the undamaged model's run over the record.
         alarm: of that watch.
         sigma: standard deviation of each signal's noise, shape (m,).
     """

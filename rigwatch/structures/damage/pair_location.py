@@ -2,7 +2,7 @@
 
 Along the observed trajectory the response is linear in every coefficient, so that all pairs are
 judged by one regression (as `locate` judges single ones); the best few are refitted. A pair is
-accepted only if each of its two changes is significant beside the other.
+accepted only if each of its two changes is significant with the other included.
 """
 
 from collections.abc import Mapping
@@ -110,7 +110,7 @@ def _ranked(
 
 
 def _member(single: Candidate, refit: Refit, count: int) -> Candidate:
-    """One of a pair; its p-value is that of its change beside the other, as the best of all."""
+    """One of a pair; its p-value is that of its change given the other, as the best of all."""
     after, deviation = refit.values[single.name], refit.deviations[single.name]
     score = ((after - single.before) / max(deviation, 1e-300)) ** 2
     alone = chi2.sf(score, 1)

@@ -1,7 +1,7 @@
 """Fits spring coefficients over a stretch of a record whose first state is unknown.
 
 Gauss-Newton with the kernel's exact sensitivities; the states at the stretch's first sample are
-unknowns beside the coefficients (thesis 4.6.1: "the case of unknown initial conditions").
+unknowns in addition to the coefficients (thesis 4.6.1: "the case of unknown initial conditions").
 """
 
 from collections.abc import Mapping, Sequence

@@ -13,7 +13,7 @@ UNDAMAGED, FOUND = "undamaged model", "with the damage found"
 
 
 def statistic(found: Examination) -> FloatArray:
-    """Test statistic over its threshold at every sample, NaN where nothing was monitored."""
+    """Test statistic over its threshold at every sample, NaN outside the monitored span."""
     values = np.full(len(found.reference.model), np.nan)
     for first, part in reversed(pieces(found)):  # an alarm's own sample shows what raised it
         values[first : first + len(part)] = part
@@ -36,7 +36,7 @@ def pieces(found: Examination) -> list[tuple[int, FloatArray]]:
 def modelled(found: Examination) -> Mapping[str, FloatArray]:
     """Signals of the undamaged model and, if there is damage, of the damaged one.
 
-    Each of shape (samples, m), NaN where nothing was measured.
+    Each of shape (samples, m), NaN without a measurement.
     """
     observed = found.reference.model.observed
     base = observed + found.watches[0].residual

@@ -68,7 +68,7 @@ class SpringModel:
 
     @property
     def observed(self) -> FloatArray:
-        """Shape (samples, m); NaN where nothing valid was measured."""
+        """Shape (samples, m); NaN for invalid samples."""
         return self.problem.recording.outputs[:, : len(self.signals)]
 
     def __len__(self) -> int:

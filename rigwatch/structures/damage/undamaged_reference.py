@@ -64,7 +64,7 @@ def reference(
     """The structure identified from the first `undamaged` seconds of the record.
 
     Args:
-        structure: the description; what it marks as unknown is identified.
+        structure: the description; its unknowns are identified.
         record: the whole record.
         undamaged: length of the undamaged start [s].
         known: take the file's values as true instead of identifying.

@@ -191,7 +191,7 @@ def problem_of(
 
 
 def _fastest(problem: Problem) -> Speed:
-    """The fastest motion at the guess, linearised about some states of the record."""
+    """The fastest motion at the initial guess, linearised about some states of the record."""
     nominal = problem.shown[problem.first :]
     some = np.unique(np.linspace(0, len(nominal) - 1, 25).astype(int))
     _, slopes = problem.sweeper.rates(

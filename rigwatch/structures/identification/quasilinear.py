@@ -29,7 +29,7 @@ STABLE = 2.78
 BLOWN_UP = 1e60
 """Bound that the sensitivities of a stable linear solution never reach."""
 UNOBSERVED = (
-    "states that no signal shows follow the model from the guess, not the record",
+    "unobserved states follow the model from the initial guess, not the record",
     "they are replaced by the linear solution of each iteration",
 )
 

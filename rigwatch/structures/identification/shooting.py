@@ -111,7 +111,7 @@ class _Grown:
 
 
 def _grown(problem: Problem) -> _Grown:
-    """The windows, grown as far as they are accepted."""
+    """Windows that grow until one is not accepted."""
     grown, count = _Grown([problem.guess], None, problem.start), len(problem.free)
     if not count:
         return grown
@@ -181,7 +181,7 @@ def _uncertain(problem: Problem, found: FloatArray, step: Step) -> tuple[str, ..
 def _regressed(problem: Problem) -> list[FloatArray]:
     """All parameters from the direct approach, if it finds any: an alternative to the guess.
 
-    It simulates nothing, so no guess is too poor for it.
+    It needs no simulation, so it works for any initial guess.
     """
     try:
         found = regression(replace(problem, loose=problem.loose[:0]))

@@ -69,7 +69,7 @@ class WholeRecord:
         return found, last, good and self.consistent(errors)
 
     def consistent(self, errors: FloatArray) -> bool:
-        """Whether the errors are as small as over windows."""
+        """Whether the errors are as small as those over windows."""
         share = errors / spreads(self.problem.observed)
         return bool(np.sqrt(np.nanmean(share**2)) <= self.expected)
 

@@ -6,7 +6,7 @@ The undamaged structure is identified from the first seconds, then its model run
 (4.34) and the residual is judged as `damage.examine` judges a record. Some seconds after an alarm
 the record so far is examined, which names the place. A restarted device begins a new record.
 
-Nothing here reads a clock, bus or file, and every sample is processed on its own: the messages are
+Nothing here reads a clock, bus or file, and samples are processed one by one: the messages are
 identical to the bit however the samples are cut into blocks, live or from a recording.
 """
 
@@ -80,7 +80,7 @@ class LiveDamage:
         self._boot: int | None = None
 
     def prepare(self) -> None:
-        """Compile what the first samples need; no state is kept."""
+        """Compile the kernels that the first samples need; the state is unchanged."""
         settings = replace(self._settings, known=True, undamaged=LEAST * self._dt)
         trial, count = LiveDamage(self._structure, self._dt, settings), LEAST + 2
         names = (*self._structure.signals, *self._loads)
@@ -186,7 +186,7 @@ class LiveDamage:
 
 
 class _Beside:
-    """The undamaged model run beside the samples, one step at a time."""
+    """The undamaged model, run in parallel with the samples one step at a time."""
 
     def __init__(self, base: Reference, settings: LiveSettings, dt: float) -> None:
         self.model = base.model

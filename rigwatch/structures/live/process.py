@@ -41,7 +41,7 @@ class StructureProcess:
         self.reader = SampleReader(bus, history=history)
 
     def turn(self, timeout: float = TURN) -> None:
-        """Process what has arrived, waiting at most `timeout` [s]."""
+        """Process the samples received, waiting at most `timeout` [s]."""
         for item in self.reader.read(timeout):
             if isinstance(item, SampleBlock):
                 self._take(item)

@@ -43,7 +43,7 @@ class GrowingRecord:
 
     @property
     def observed(self) -> FloatArray:
-        """Signals, shape (samples, signals); NaN where nothing valid was measured."""
+        """Signals, shape (samples, signals); NaN for invalid samples."""
         return self._observed[: self._count]
 
     @property
@@ -52,7 +52,7 @@ class GrowingRecord:
         return self._t_ns[: self._count]
 
     def take(self, block: SampleBlock, lost: int = 0) -> None:
-        """The samples of a block, after some that were lost; KeyError where it lacks a channel."""
+        """Append a block after a number of lost samples; KeyError if it lacks a channel."""
         loads = [block.channel(name).usable() for name in self._loads]
         signals = [block.channel(name).usable() for name in self._signals]
         begin, middle = self._count, self._count + lost

@@ -1,4 +1,4 @@
-"""A record: what the sensors of a structure showed, sample by sample.
+"""A record: the sensor signals of a structure, sample by sample.
 
 A file is CSV with a header, or NPZ; the column `t` [s] is the time, equally spaced from 0 on, and
 the others are called after the signals they hold: x6, v6, a6 and the channels of recorded loads. An
@@ -25,7 +25,7 @@ class Record:
 
     Attributes:
         dt: time between samples [s].
-        columns: by name, each of shape (n,); NaN where nothing valid was measured.
+        columns: by name, each of shape (n,); NaN for invalid samples.
     """
 
     dt: float
@@ -104,7 +104,7 @@ def read_record(path: Path | str) -> Record:
 
 
 def write_record(record: Record, path: Path | str) -> None:
-    """Write a record as CSV, or NPZ where the path ends so; every digit is kept.
+    """Write a record as CSV or, for a path with that ending, NPZ; every digit is kept.
 
     Raises:
         ImportDataError: the file cannot be written.

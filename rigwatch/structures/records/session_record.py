@@ -1,7 +1,7 @@
 """A recorded session as the record of a structure: its channels are the signals and loads.
 
-Samples stand where their numbers say; lost ones, and ones that the device or the monitor declared
-invalid, are NaN.
+Samples are placed by their sequence numbers; lost samples, and samples flagged invalid by device or
+monitor, are NaN.
 """
 
 from pathlib import Path
@@ -22,8 +22,8 @@ def read_any(path: Path | str) -> Record:
     """The record in a table (.csv, .npz), or in a session: a file (.mcap) or folder of segments.
 
     Raises:
-        SessionError: no such session.
-        ImportDataError: the file cannot be read, or its samples are no single even series.
+        SessionError: there is no session at the path.
+        ImportDataError: the file cannot be read, or its samples are not one evenly sampled series.
     """
     file = Path(path)
     return read_record(file) if file.suffix in TABLES else record_of_session(file)
@@ -61,7 +61,7 @@ def _place(block: SampleBlock, at: int, columns: dict[str, FloatArray], clock: F
 
 
 def _in_si(column: Column) -> FloatArray:
-    """Valid values in SI; as they are where the unit is not known.
+    """Valid values in SI; unconverted if the unit is unknown.
 
     Raises:
         ImportDataError: the unit is g, which may be gravity or the gram.

@@ -20,7 +20,7 @@ def statistic_svg(found: Examination) -> str:
 
 
 def residual_svg(found: Examination, signal: int) -> str:
-    """One signal's residual beside the undamaged model, with the noise's band."""
+    """One signal's residual against the undamaged model, with the band of the noise."""
     values = np.abs(np.nan_to_num(found.watches[0].residual[:, signal]))
     sigma, name = float(found.reference.sigma[signal]), found.reference.model.signals[signal]
     plot = _plot(found, f"|residual| of {name}", sigma / 10, max(_peak(values), 10 * sigma))

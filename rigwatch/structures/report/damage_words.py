@@ -51,7 +51,7 @@ def alike(ranking: Ranking) -> str:
     changed = ranking.changed
     known = "No change of a single spring explains the data. " if ranking.second else ""
     vague = [
-        f"This record cannot tell {c.name} from a change of {', '.join(c.alike)}."
+        f"This record cannot distinguish {c.name} from a change of {', '.join(c.alike)}."
         for c in changed
         if c.alike
     ]

@@ -101,7 +101,9 @@ class StudyFile(Section, frozen=True, kw_only=True):
         tuple[str, ...], Meta(description="model variants in use, see `rigwatch study base`")
     ] = ()
     train: Annotated[tuple[Span, ...], Meta(min_length=1, description="training recordings")]
-    held_out: Annotated[tuple[Span, ...], Meta(min_length=1, description="recordings that judge effects")]
+    held_out: Annotated[
+        tuple[Span, ...], Meta(min_length=1, description="recordings that judge effects")
+    ]
     healthy: Annotated[
         tuple[Span, ...], Meta(description="recordings of the healthy rig, for the noise floor")
     ] = ()

@@ -19,7 +19,7 @@ COARSER = 3.0
 def even_substeps(
     system: System, inputs: FloatArray, states: FloatArray, parameters: FloatArray, spacing: float
 ) -> int:
-    """Substeps that follow what is stiff anywhere on a recording.
+    """Substeps for the stiffest point of a recording.
 
     Args:
         system: the equations.

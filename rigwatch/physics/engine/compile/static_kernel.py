@@ -32,7 +32,7 @@ def _printed(names: tuple[str, ...], expressions: Any) -> Callable[..., Any]:
     function = sympy.lambdify(arguments, ready, "numpy", printer=_Printer, cse=True)
 
     def quiet(*arguments: Any) -> Any:
-        # A choice is computed on all its branches, also where a branch divides by zero.
+        # All branches of a choice are computed, including one that divides by zero.
         with np.errstate(all="ignore"):
             return function(*arguments)
 
@@ -77,9 +77,9 @@ def evaluated(
 
     Args:
         text: the expression.
-        signals: what it may name, each of shape (n,).
+        signals: signals it may refer to, each of shape (n,).
         values: numbers that it may name.
-        where: what it is, for an error.
+        where: description of the expression, for errors.
 
     Raises:
         ModelError: it does not parse, or names something else.

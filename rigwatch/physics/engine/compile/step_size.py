@@ -20,7 +20,7 @@ from rigwatch.physics.engine.equations import System, compose, symbol
 STABLE = 1.0
 """Largest rate times step, with a margin."""
 ACCURATE = 0.1
-"""The same where a state crosses zero, as speed does: accuracy requires smaller steps there."""
+"""The same near zero crossings of a state, such as speed, where accuracy needs smaller steps."""
 ALONE = 2.0
 """The same for an effect state that is driven by signals and drives nothing itself."""
 FINEST = 256

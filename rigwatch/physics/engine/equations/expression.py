@@ -63,7 +63,7 @@ def parse(text: str, names: Mapping[str, sympy.Expr], where: str) -> sympy.Expr:
     Args:
         text: the user's text.
         names: the allowed symbols, by name.
-        where: what is being defined, for error messages.
+        where: what the expression defines, for errors.
 
     Raises:
         ModelError: it does not parse, or uses an unknown name.

@@ -39,7 +39,7 @@ class Scope:
             self.grams.add(name)
 
     def define_all(self, units: Mapping[str, str], prefix: str = "") -> None:
-        """Define each name as a symbol of its own, named with `prefix`."""
+        """Define each name as a separate symbol, named with `prefix`."""
         for name, unit in units.items():
             self.define(name, symbol(prefix + name), unit)
 

@@ -1,7 +1,7 @@
 """A recording for a model along its measured motion.
 
 The motion is smoothed with zero phase, with a width chosen from each channel's noise, and added to
-the inputs. Samples do not count (NaN outputs) where the smoothing window is incomplete, as next to
+the inputs. Samples do not count (NaN outputs) if the smoothing window is incomplete, as next to
 a gap, and while hidden states settle.
 
 If the balance of a state is predicted, it is compared with the rate of the channel. The

@@ -57,7 +57,7 @@ def unknowns(
 
     Args:
         centre, low, high: shape (unknowns,).
-        positive: number of leading unknowns of which nonnegative ones are logarithmic.
+        positive: number of leading unknowns; nonnegative ones among them are logarithmic.
         sizes: units of the other unknowns, shape (unknowns,); the default of `_sizes` if NaN, or
             None for all.
     """

@@ -81,7 +81,7 @@ class WholeRuns:
         initial: initial states, shape (recordings, states); from the channels if None.
         robust: transition of the robust loss to linear [standard deviations of noise].
         substeps: Runge-Kutta steps between samples.
-        starts: searches beside the one from the given values, where that ends above `GOOD`.
+        starts: number of further searches if the one from the given values ends above `GOOD`.
     """
 
     def __init__(
