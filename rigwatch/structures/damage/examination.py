@@ -1,7 +1,7 @@
 """Finds damage of a structure in a record: when, where, how much, and what follows.
 
-The undamaged structure's model runs in parallel with the record. Once the residual exceeds noise, only data
-from there on are used (a fit to the whole record mixes two structures, thesis 4.6.1): the
+The undamaged structure's model runs in parallel with the record. Once the residual exceeds noise,
+only data from there on are used (a fit to the whole record mixes two structures, thesis 4.6.1): the
 springs are ranked, the best is identified with unknown first states, and monitoring continues with
 the changed model until the next damage.
 """
