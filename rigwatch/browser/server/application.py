@@ -15,6 +15,7 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from rigwatch.browser.server import (
+    editor_routes,
     import_routes,
     job_routes,
     rig_routes,
@@ -36,6 +37,7 @@ def application(context: Context, access: Access) -> Starlette:
     routes = [
         Route("/static/page.css", _style),
         Mount("/static", StaticFiles(directory=STATIC)),
+        *editor_routes.ROUTES,
         *import_routes.ROUTES,
         *rig_routes.ROUTES,
         *signal_routes.ROUTES,

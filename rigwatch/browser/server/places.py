@@ -8,6 +8,7 @@ from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.study import FILE, Study, open_study
 
 RECORDINGS = "recordings"
+MODELS = "models"
 UPLOADS = ".uploads"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
 

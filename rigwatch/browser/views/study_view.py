@@ -6,6 +6,7 @@ from typing import Any
 from rigwatch.browser.views.motion_map import motion_map
 from rigwatch.browser.views.pages import render
 from rigwatch.browser.views.study_state import State
+from rigwatch.workbench.data import goes_along_motion
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.report import VERDICTS, doubt_of
 
@@ -69,6 +70,7 @@ def parts_of(state: State, *, rig: bool = False) -> dict[str, str]:
         "views": VIEWS,
         "maps": motion_map(state),
         "command": command,
+        "no_experiment": no_experiment(state),
         "rig": rig,
         "rehearsal": state.results.read("rehearsal") if rig else None,
     }
@@ -149,6 +151,21 @@ def _first_number(name: str) -> float:
         return float(words[0])
     except (IndexError, ValueError):
         return 0.0
+
+
+def no_experiment(state: State) -> str:
+    """Why no next experiment is proposed."""
+    found = state.explanation
+    if found is None or found.next_experiment is not None:
+        return ""
+    if not found.rivals:
+        return "None is needed: no effect of other physics explains this recording as well."
+    if goes_along_motion(state.study):
+        return (
+            "None can be predicted: the model goes along the measured motion, which another"
+            " excitation would change."
+        )
+    return "None of the excitations tried separates the rivals better than this recording."
 
 
 def command(state: State, step: str, effect: str = "", port: str = "") -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""`rigwatch study base`: which variants of the model the healthy recordings support."""
+"""`rigwatch study base`: the study's base model: variants that the data support, or an own file."""
 
 import argparse
 from collections.abc import Sequence
@@ -10,11 +10,12 @@ from rigwatch.commands.common import print_json, say
 if TYPE_CHECKING:
     from rigwatch.workbench.study import Study
 
-HELP = "fit the model's variants to the healthy recordings and rank them on those held out"
+HELP = "rank the model's variants by the healthy recordings held out, or use an own model file"
 EXAMPLE = """\
   rigwatch study base rubbing
   rigwatch study base rubbing --take first_order_valve,isothermal
-  rigwatch study base rubbing --take enough"""
+  rigwatch study base rubbing --take enough
+  rigwatch study base rubbing --model-file my_rig.toml"""
 ENOUGH, WRITTEN = "enough", "none"
 
 
@@ -27,6 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write these variants, separated by commas, to the study; `enough`: those that the"
         " healthy recordings support; `none`: the unmodified model",
     )
+    parser.add_argument(
+        "--model-file",
+        type=Path,
+        metavar="TOML",
+        help="own model file: copied into the study and used from now on; see `rigwatch model new`",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,6 +42,10 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.study import open_study
 
     study, wished = open_study(arguments.study), arguments.take
+    if arguments.model_file is not None:
+        study = _remodelled(study, arguments)
+        if wished is None:
+            return 0
     if wished in (None, ENOUGH):
         return _found(study, arguments)
     names = [] if wished == WRITTEN else [name.strip() for name in wished.split(",")]
@@ -44,6 +55,19 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         print(_taken(study, names))
     return 0
+
+
+def _remodelled(study: "Study", arguments: argparse.Namespace) -> "Study":
+    from rigwatch.wire.typed_files import read_text
+    from rigwatch.workbench.steps import remodel
+
+    file = arguments.model_file
+    changed = remodel(study, file.name, read_text(file))
+    if not arguments.json:
+        print(f"{study.folder}: uses {changed.model.name} of {file.name}")
+    elif arguments.take is None:
+        print_json({"step": "model-file", "file": file.name, "model": changed.model.name})
+    return changed
 
 
 def _found(study: "Study", arguments: argparse.Namespace) -> int:

@@ -2,7 +2,7 @@
 
 from rigwatch.workbench.steps import change
 from rigwatch.workbench.steps.base import Base, Bases, find_base, take_base
-from rigwatch.workbench.steps.change import add, learn, undo
+from rigwatch.workbench.steps.change import add, check_effect, learn, learn_text, remodel, undo
 from rigwatch.workbench.steps.from_logs import Logs, study_from_logs
 from rigwatch.workbench.steps.ledger_replay import replay
 from rigwatch.workbench.steps.model_handover import (
@@ -28,12 +28,15 @@ __all__ = [
     "Trial",
     "add",
     "change",
+    "check_effect",
     "find_base",
     "hand_over",
     "learn",
+    "learn_text",
     "model_path",
     "promotion",
     "rehearse",
+    "remodel",
     "replay",
     "signals",
     "stages",

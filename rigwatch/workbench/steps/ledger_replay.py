@@ -26,13 +26,18 @@ class Check:
 
 
 def replay(study: Study, progress: Callable[[str], None] = lambda _: None) -> list[Check]:
-    """Refit the models of all steps that changed the effects; the study's file is not changed."""
-    checks = []
+    """Refit the models of all steps that changed the effects; the study's file is not changed.
+
+    Steps before the last change of the model's file are left out, as that model is gone.
+    """
+    checks: list[Check] = []
     accepted: dict[str, Accepted] = {}
     # The variants in force at the first step: those that the first change of base replaced.
     first = next((line for line in lines(study) if line["step"] == "base"), None)
     study = varied(study, first["before"] if first else study.file.variants)
     for line in lines(study):
+        if line["step"] == "model-file":
+            checks.clear()
         if line["step"] == "base":
             study = varied(study, line["variants"])
         if line["step"] == "add":

@@ -6,6 +6,7 @@ from rigwatch.workbench.study.edits import (
     drop_effect,
     keep_holds,
     use_effect_file,
+    use_model_file,
     use_variants,
 )
 from rigwatch.workbench.study.folder import FILE, digest
@@ -52,6 +53,7 @@ __all__ = [
     "stands_on",
     "study_of",
     "use_effect_file",
+    "use_model_file",
     "use_variants",
     "varied",
 ]

@@ -1,17 +1,14 @@
-"""Edits of a study's file: each returns the changed study and leaves the file unchanged.
+"""Edits of a study's file: each returns the changed study and leaves all files unchanged.
 
-`commit` writes the result together with the ledger's line. `use_effect_file` is the exception: it
-copies the effect file into the study's folder at once.
+`commit` writes the result together with the ledger's line.
 """
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
-from rigwatch.physics.engine.equations import load_effects
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.host import replace_file
+from rigwatch.workbench.study.own_files import unsaved
 from rigwatch.workbench.study.study import GIVEN, Accepted, Study, converted, study_of
 
 _TABLE = "\n[[effects]]\n"
@@ -52,18 +49,42 @@ def drop_effect(study: Study) -> Study:
     return study_of(study.folder, text)
 
 
-def use_effect_file(study: Study, path: Path) -> Study:
-    """The study with the user's effect file, which is copied into the study's folder.
+def use_effect_file(study: Study, name: str, text: str) -> Study:
+    """The study with an own effect file of this name and content in its folder.
 
     Raises:
-        ConfigError: the file is invalid.
+        ConfigError: the content is invalid.
+        ModelError: the name is not a plain one, or an accepted effect would change.
     """
-    load_effects(path)
-    target = study.folder / path.name
-    if path.resolve() != target.resolve():
-        replace_file(target, path.read_text(encoding="utf-8"))
-    names = dict.fromkeys([*study.file.effect_files, path.name])
-    return study_of(study.folder, _with_list(study, "effect_files", tuple(names)))
+    new = unsaved(study.folder, name, text)
+    names = tuple(dict.fromkeys([*study.file.effect_files, name]))
+    changed = study_of(study.folder, _with_list(study, "effect_files", names), new)
+    for accepted in study.file.effects:
+        if changed.effect(accepted.effect) != study.effect(accepted.effect):
+            raise ModelError(
+                f"{name}: {accepted.effect}: found another declaration of an effect that the model"
+                " has, expected another name; `rigwatch undo` removes it from the model"
+            )
+    return changed
+
+
+def use_model_file(study: Study, name: str, text: str) -> Study:
+    """The study on an own model file of this name and content in its folder.
+
+    Raises:
+        ConfigError: the content is invalid.
+        ModelError: the name is not a plain one, the model cannot be used, or effects have been
+            accepted on the current one.
+    """
+    if study.file.effects:
+        label = f"{study.file.effects[-1].effect}@{study.file.effects[-1].port}"
+        raise ModelError(
+            f"{study.folder}: found {label} accepted on the current model, expected a study without"
+            " effects; `rigwatch undo` removes them"
+        )
+    new = unsaved(study.folder, name, text)
+    kept = [x for x in study.text.splitlines(True) if not re.match(r"model\s*=", x)]
+    return study_of(study.folder, "".join([f'model = "{name}"\n', *kept]), new)
 
 
 def use_variants(study: Study, variants: Sequence[str]) -> Study:

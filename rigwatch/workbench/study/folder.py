@@ -1,16 +1,18 @@
 """A study's folder: file and ledger change atomically, even if the process is killed.
 
-A change is written as `study.new`, then its line with the new file's SHA-256 is appended to the
-ledger, then `study.new` replaces the file. After a kill in between, the next opening completes the
-change if the ledger records it and discards it otherwise.
+A change is written as `study.new`, own effect and model files as `NAME.toml.new`; then its line
+with the new files' SHA-256 is appended to the ledger, then the new files replace the old ones.
+After a kill in between, the next opening completes the change if the ledger records it and discards
+it otherwise.
 """
 
 import fcntl
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -19,6 +21,7 @@ from rigwatch.wire.host import write_through
 FILE = "study.toml"
 LEDGER = "ledger.jsonl"
 NEW = "study.new"
+STAGED = ".new"
 
 
 def digest(text: str) -> str:
@@ -37,7 +40,9 @@ def locked(folder: Path) -> Iterator[int]:
         os.close(descriptor)
 
 
-def write_step(folder: Path, ledger: int, line: bytes, text: str | None) -> None:
+def write_step(
+    folder: Path, ledger: int, line: bytes, text: str | None, files: Mapping[str, str]
+) -> None:
     """Append a line to the ledger and, given a `text`, replace the study's file.
 
     Args:
@@ -45,13 +50,18 @@ def write_step(folder: Path, ledger: int, line: bytes, text: str | None) -> None
         ledger: descriptor of its ledger.
         line: the line including its newline.
         text: new content of `study.toml`.
+        files: new content of own files, by name; only with a `text`.
     """
     _drop_torn_line(ledger)
     if text is not None:
         write_through(folder / NEW, text)
+        for name, content in files.items():
+            write_through(folder / f"{name}{STAGED}", content)
     os.write(ledger, line)
     os.fsync(ledger)
     if text is not None:
+        for name in files:
+            (folder / f"{name}{STAGED}").replace(folder / name)
         (folder / NEW).replace(folder / FILE)
 
 
@@ -64,19 +74,30 @@ def settle(folder: Path) -> None:
         if not new.exists():
             return
         _drop_torn_line(ledger)
-        if _last_study(folder) == hashlib.sha256(new.read_bytes()).hexdigest():
-            new.replace(folder / FILE)
-        else:
-            new.unlink()
+        last = _last_line(folder)
+        known = last.get("files", {})
+        # The study's own file is the last, so that it never names a file that is not there yet.
+        for staged in folder.glob(f"*.toml{STAGED}"):
+            name = staged.name.removesuffix(STAGED)
+            _complete_or_discard(staged, folder / name, known.get(name, ""))
+        _complete_or_discard(new, folder / FILE, last.get("study", ""))
 
 
-def _last_study(folder: Path) -> str:
-    """SHA-256 of the study's file in the ledger's last line; empty if there is none."""
+def _complete_or_discard(new: Path, file: Path, recorded: str) -> None:
+    """Put a file in place if its SHA-256 is the recorded one, otherwise remove it."""
+    if hashlib.sha256(new.read_bytes()).hexdigest() == recorded:
+        new.replace(file)
+    else:
+        new.unlink()
+
+
+def _last_line(folder: Path) -> dict[str, Any]:
+    """The ledger's last line; empty if there is none."""
     lines = (folder / LEDGER).read_bytes().splitlines()
     try:
-        return str(msgspec.json.decode(lines[-1]).get("study", "")) if lines else ""
+        return dict(msgspec.json.decode(lines[-1])) if lines else {}
     except msgspec.DecodeError:
-        return ""
+        return {}
 
 
 def _drop_torn_line(ledger: int) -> None:

@@ -18,6 +18,7 @@ from rigwatch.version import __version__
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.typed_files import read_text
 from rigwatch.workbench.study.folder import FILE, digest, locked, write_step
+from rigwatch.workbench.study.own_files import check_unchanged
 from rigwatch.workbench.study.study import Study
 
 _PART = 1 << 22
@@ -85,7 +86,7 @@ def append(study: Study, step: str, /, **content: Any) -> dict[str, Any]:
 
 
 def commit(before: Study, after: Study, step: str, /, **content: Any) -> dict[str, Any]:
-    """Write the study's file and the ledger's line, both or neither.
+    """Write the study's file, its own effect and model files and the ledger's line, or nothing.
 
     Args:
         before: the study as opened.
@@ -109,14 +110,18 @@ def commit(before: Study, after: Study, step: str, /, **content: Any) -> dict[st
         "effects": [f"{a.effect}@{a.port}" for a in after.file.effects],
         **content,
     }
-    text = after.text if after.text != before.text else None
+    files = {name: new.text for name, new in after.unsaved.items()}
+    if files:
+        line["files"] = {name: digest(text) for name, text in files.items()}
+    text = after.text if files or after.text != before.text else None
     with locked(before.folder) as ledger:
         if read_text(before.folder / FILE) != before.text:
             raise ModelError(
                 f"{before.folder}: the study has been changed since this step was tried;"
                 " nothing was written"
             )
-        write_step(before.folder, ledger, msgspec.json.encode(line) + b"\n", text)
+        check_unchanged(before.folder, before.own_files, after.unsaved)
+        write_step(before.folder, ledger, msgspec.json.encode(line) + b"\n", text, files)
     return line
 
 

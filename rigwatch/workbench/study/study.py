@@ -26,6 +26,8 @@ from rigwatch.physics.engine.equations import (
     library,
     model_named,
     offered,
+    parse_effects,
+    parse_model,
     units_at,
     with_variants,
 )
@@ -34,6 +36,7 @@ from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError, nearest
 from rigwatch.wire.typed_files import Section, load, parse, read_text
 from rigwatch.wire.units import Unit, unit_of
 from rigwatch.workbench.study.folder import FILE, LEDGER, settle
+from rigwatch.workbench.study.own_files import NOTHING_UNSAVED, Unsaved, content
 from rigwatch.workbench.study.recording_parameters import known_as_inputs, known_in_si
 
 GIVEN = ("the study", "the model file")
@@ -201,6 +204,8 @@ class Study:
         holds: holds of inputs by name, if known.
         text: content of the file when opened.
         horizon_from: what the horizon was chosen from, in words; empty if given.
+        own_files: content of own effect and model files when opened, by name.
+        unsaved: own files, by name, that `commit` is to write.
     """
 
     folder: Path
@@ -212,6 +217,8 @@ class Study:
     holds: Mapping[str, Held] = dataclass_field(default_factory=dict)
     text: str = ""
     horizon_from: str = ""
+    own_files: Mapping[str, str] = dataclass_field(default_factory=dict)
+    unsaved: Mapping[str, Unsaved] = dataclass_field(default_factory=dict)
 
     @property
     def ledger(self) -> Path:
@@ -264,20 +271,38 @@ def open_study(folder: Path | str) -> Study:
     return study_of(folder, read_text(path))
 
 
-def study_of(folder: Path, text: str) -> Study:
+def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_UNSAVED) -> Study:
     """The study that `text` describes in `folder`; nothing is written.
+
+    Args:
+        folder: the study's folder.
+        text: content of its file.
+        unsaved: files that take the place of those in the folder.
 
     Raises:
         ConfigError: the text is invalid.
         ModelError: its model or one of its effects is unknown.
     """
     file = parse(text, StudyFile, folder / FILE)
-    given = offered(folder / name for name in file.effect_files)
+    own_files = {name: content(folder, name, unsaved) for name in _own_names(file)}
+    given = offered(())
+    for name in file.effect_files:
+        given |= parse_effects(own_files[name], folder / name)
     effects = {**library(), **given}
-    written = _written(folder, file)
+    written = _written(folder, file, own_files)
     file = known_in_si(written, file, folder / FILE)
     model, holds = _held(known_as_inputs(written, file), file)
-    study = Study(folder, file, model, effects, frozenset(given), holds=holds, text=text)
+    study = Study(
+        folder,
+        file,
+        model,
+        effects,
+        frozenset(given),
+        holds=holds,
+        text=text,
+        own_files=own_files,
+        unsaved=unsaved,
+    )
     for accepted in file.effects:
         study.effect(accepted.effect)
     return _in_si(study)
@@ -322,11 +347,18 @@ def _unit(parameter: Parameter | EffectParameter | None) -> Unit:
     return unit_of((parameter.shown or parameter.unit) if parameter else "")
 
 
-def _written(folder: Path, file: StudyFile) -> Model:
+def _own_names(file: StudyFile) -> tuple[str, ...]:
+    """Names of the own effect and model files."""
+    return (*file.effect_files, *((file.model,) if file.model.endswith(".toml") else ()))
+
+
+def _written(folder: Path, file: StudyFile, own_files: Mapping[str, str]) -> Model:
     """The study's model with its variants, without holds."""
-    model = model_named(file.model, folder)
-    if file.model.endswith(".toml"):
-        check_model(model, str(folder / file.model))
+    if not file.model.endswith(".toml"):
+        return with_variants(model_named(file.model), file.variants)
+    path = folder / file.model
+    model = parse_model(own_files[file.model], path)
+    check_model(model, str(path))
     return with_variants(model, file.variants)
 
 
@@ -337,7 +369,7 @@ def varied(study: Study, variants: Sequence[str]) -> Study:
         ModelError: a variant is unknown, or two of them exclude each other.
     """
     file = structs.replace(study.file, variants=tuple(variants))
-    model, holds = _held(known_as_inputs(_written(study.folder, file), file), file)
+    model, holds = _held(known_as_inputs(_written(study.folder, file, study.own_files), file), file)
     return replace(study, file=file, model=model, kept=None, holds=holds)
 
 

@@ -6,7 +6,13 @@
 `plugins` finds the effects of other packages.
 """
 
-from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, library, load_effects
+from rigwatch.physics.engine.equations.effect import (
+    Effect,
+    EffectParameter,
+    library,
+    load_effects,
+    parse_effects,
+)
 from rigwatch.physics.engine.equations.expression import FUNCTIONS, names_in, parse
 from rigwatch.physics.engine.equations.measured_motion import (
     along_measured_motion,
@@ -29,6 +35,7 @@ from rigwatch.physics.engine.equations.model import (
     load_model,
     model_named,
     model_text,
+    parse_model,
     shipped_models,
 )
 from rigwatch.physics.engine.equations.model_check import check_model, check_variants, unused_ports
@@ -88,6 +95,8 @@ __all__ = [
     "names_in",
     "offered",
     "parse",
+    "parse_effects",
+    "parse_model",
     "predicted_outputs",
     "shipped_models",
     "signal_order",

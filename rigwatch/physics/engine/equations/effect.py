@@ -24,7 +24,7 @@ from msgspec.structs import replace
 from rigwatch.physics.engine.equations.expression import parse as parse_expression
 from rigwatch.physics.engine.equations.in_si import into_si
 from rigwatch.wire.errors import ConfigError, ModelError
-from rigwatch.wire.typed_files import Section, load, parse
+from rigwatch.wire.typed_files import Section, parse, read_text
 from rigwatch.wire.units import UnitError
 
 Text = Annotated[str, Meta(min_length=1)]
@@ -213,8 +213,17 @@ def load_effects(path: Path | str) -> dict[str, Effect]:
     Raises:
         ConfigError: the file is invalid.
     """
-    found = load(path, EffectFile).effects
-    return {name: usable(name, effect, path) for name, effect in found.items()}
+    return parse_effects(read_text(Path(path)), path)
+
+
+def parse_effects(text: str, file: Path | str) -> dict[str, Effect]:
+    """The effects in the text of a file, by name; `file` is named in errors.
+
+    Raises:
+        ConfigError: the text is invalid.
+    """
+    found = parse(text, EffectFile, file).effects
+    return {name: usable(name, effect, file) for name, effect in found.items()}
 
 
 @cache

@@ -222,6 +222,15 @@ def load_model(path: Path | str) -> Model:
     return load(path, Model)
 
 
+def parse_model(text: str, file: Path | str) -> Model:
+    """The model in the text of a file; `file` is named in errors.
+
+    Raises:
+        ConfigError: the text is invalid, or a unit is unknown.
+    """
+    return parse(text, Model, file)
+
+
 @cache
 def shipped_models() -> dict[str, Model]:
     """The base models that ship with rigwatch, by name."""
