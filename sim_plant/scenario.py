@@ -92,7 +92,7 @@ def load_scenario(path: Path | str) -> Scenario:
             raise ConfigError(path, f"events[{index}].at_s", f"{event.at_s} s", expected)
     for name, value in scenario.effects.items():
         _check_effect(path, f"effects.{name}", name, value)
-    return _beside(scenario, Path(path).parent)
+    return _with_paths(scenario, Path(path).parent)
 
 
 def _check_effect(path: Path | str, key: str, name: str, value: float) -> None:
@@ -100,7 +100,7 @@ def _check_effect(path: Path | str, key: str, name: str, value: float) -> None:
         raise ConfigError(path, key, *wrong)
 
 
-def _beside(scenario: Scenario, folder: Path) -> Scenario:
+def _with_paths(scenario: Scenario, folder: Path) -> Scenario:
     file = getattr(scenario.excitation, "file", "")
     if not file:
         return scenario

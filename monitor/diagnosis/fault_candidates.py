@@ -25,7 +25,7 @@ from rigwatch.physics.engine.score import (
     candidates,
     corrected_p_values,
     directions,
-    knows,
+    has_variables,
     possible,
     root_mean_square,
     score,
@@ -138,7 +138,7 @@ def _candidates(ports: RigPorts, effects: Mapping[str, Effect], model: RigModel)
 
     def effect_at(name: str, port: str) -> Effect | None:
         effect, place = effects[name], places[port]
-        stands = effect.fits(place.kind) and knows(effect, place)
+        stands = effect.fits(place.kind) and has_variables(effect, place)
         return effect.scaled(sizes[port]) if stands else None
 
     return candidates(places, effects, effect_at)
