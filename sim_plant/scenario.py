@@ -33,7 +33,7 @@ class Event(Section, frozen=True, kw_only=True):
 
 
 class Experiment(Section, frozen=True, kw_only=True):
-    """[experiment] — what the thesis prints about the experiment (Tables 5.2 and 5.3)."""
+    """[experiment] — published figures of the experiment (Tables 5.2 and 5.3)."""
 
     test: Annotated[int, Meta(ge=1, description="number of the experiment")]
     fault_s: Annotated[tuple[float, ...], Meta(description="when friction begins [s]")]
