@@ -102,7 +102,7 @@ class AlarmManager:
         return self._take_announcements()
 
     def command(self, command: AlarmCommand) -> list[Announcement]:
-        """Execute an operator's command, or return an event that says why not."""
+        """Execute an operator's command, or return an event with the reason for its refusal."""
         self._advance(command.t_ns)
         found = addressed(command, self._alarms.values())
         why_not = refusal(command, found)
