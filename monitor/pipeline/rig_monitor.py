@@ -140,7 +140,7 @@ def _disarmed(column: Column, wrong: BoolArray) -> Column:
 
 
 def _silenced(condition: Condition, wrong: BoolArray) -> Condition:
-    """The condition, inactive while the wiring is wrong; conditions of the samples are unchanged."""
+    """The condition, inactive while the wiring is wrong; conditions of samples are unchanged."""
     if condition.name.partition(".")[0] in OF_SAMPLES:
         return condition
     return replace(condition, active=np.where(wrong, 0, condition.active).astype(np.uint8))
