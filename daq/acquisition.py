@@ -17,7 +17,7 @@ from rigwatch.wire.messages import Event, Gap, Message, SampleBlock, Severity
 from rigwatch.wire.rig_config import RigConfig
 
 LONGEST_BLOCK = 1024
-"""Most samples in a block, so that no message exceeds what the bus carries."""
+"""Largest number of samples in a block, which keeps messages below the limit of the bus."""
 
 
 class Acquisition:

@@ -1,4 +1,4 @@
-"""The adapter protocol: an adapter turns a device into raw blocks and knows nothing of their use.
+"""The adapter protocol: an adapter turns a device into raw blocks, independently of their use.
 
 An adapter's `read` waits for samples and returns them as received: counters may wrap, samples may
 repeat or be missing. Everything after that is the same for all devices (`acquisition.py`). An
@@ -32,7 +32,7 @@ class RawBlock:
         codes: shape (n, channels), raw codes, or SI values where `calibrated`.
         arrived_ns: shape (n,), host's monotonic clock when each sample was complete [ns].
         calibrated: whether `codes` are SI values already, as in a recording.
-        quality: shape (n, channels), flags of a recording; empty where there are none.
+        quality: shape (n, channels), flags of a recording; empty if there are none.
     """
 
     boot: int
@@ -60,7 +60,7 @@ class Adapter(Protocol):
         """Open the device.
 
         Raises:
-            DeviceError: it is absent, in use, or not what the configuration says.
+            DeviceError: it is absent, in use, or does not match the configuration.
         """
 
     def read(self, timeout: float) -> Sequence[RawBlock]:

@@ -152,5 +152,5 @@ class _Run:
 
 
 def _signed(difference: int) -> int:
-    """The difference of two 32-bit counters, either of which may have wrapped."""
+    """The difference of two 32-bit counters, allowing for wraps of either."""
     return (difference + _U32 // 2) % _U32 - _U32 // 2

@@ -1,4 +1,4 @@
-"""Keeps an adapter open: after an error it is closed and reopened, for as long as it takes.
+"""Keeps an adapter open: after an error it is closed and reopened until it works.
 
 The wait between attempts grows from 50 ms to one second, and resets once samples arrive.
 """
@@ -24,7 +24,7 @@ class Supervisor:
 
     Attributes:
         connected: whether the device is open.
-        text: what is wrong, empty if nothing is.
+        text: the problem, empty if there is none.
         reconnects: how often it was reopened after a loss.
         losses: how often it was lost.
     """

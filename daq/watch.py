@@ -36,7 +36,7 @@ _STATE_EVENTS: dict[str, tuple[Severity, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """The connection: whether it is up, what is wrong with it, how often it was re-established."""
+    """The connection: whether it is up, its problem, and the number of reconnections."""
 
     connected: bool
     text: str = ""

@@ -1,7 +1,8 @@
 """Hidden effects and faults of the rig: one declaration each, read by the kernels by name.
 
 A declaration states what the effect does, where it acts, the value at which it is absent
-(`neutral`) and a visible strength (`typical`). A new one is a line here and its line of physics.
+(`neutral`) and a visible strength (`typical`). A new effect needs a line here and its line of
+physics.
 """
 
 import difflib
@@ -115,7 +116,7 @@ SENSOR_FAULTS: tuple[SensorFault, ...] = (
     SensorFault("lag", "s", "time constant of the reading", (0.01, 0.01, 0.01)),
     SensorFault("delay", "s", "lateness of the reading", (0.012, 0.012, 0.012), high=LONGEST_DELAY),
     SensorFault("noise", "SI", "rms of added noise", (0.1, 5.0e-4, 1.0)),
-    SensorFault("stuck", "0 or 1", "the reading stays where it is", (1.0, 1.0, 1.0), high=1.0),
+    SensorFault("stuck", "0 or 1", "the reading is frozen", (1.0, 1.0, 1.0), high=1.0),
     SensorFault("saturation", "SI", "limit of the reading, 0 for none", (0.8, 3.0e-3, 8.0)),
     SensorFault("spikes", "SI", "height of spikes, two a second", (2.0, 8.0e-3, 60.0), low=ANY),
 )

@@ -91,7 +91,7 @@ class Chirp(Shape, frozen=True, kw_only=True, tag="chirp"):
     start: Annotated[float, Meta(gt=0, description="first frequency [Hz]")]
     stop: Annotated[float, Meta(gt=0, description="last frequency [Hz]")]
     length_s: Annotated[float, Meta(gt=0, description="length of one sweep [s]")]
-    phase: Annotated[float, Meta(description="where a sweep starts [cycles]")] = 0.25
+    phase: Annotated[float, Meta(description="phase at which a sweep starts [cycles]")] = 0.25
 
     def source(self, rate: float) -> Source:
         """Volts at sample numbers."""

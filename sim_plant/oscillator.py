@@ -4,8 +4,8 @@
 
 It has its own equations and integrator: velocity first, then position (leapfrog: velocity is half a
 step behind, and forces that depend on it extrapolate it), with 64 steps per sample, and dry
-friction that truly sticks (D. Karnopp, 1985: below a speed that friction can stop within a step,
-the mass is held as long as the other forces are too weak).
+friction with true sticking (D. Karnopp, 1985: below a speed that friction can stop within a step,
+the mass is held while the other forces are weaker).
 
 Symbols: x position [m], v velocity [m/s], u commanded force [N], F force that acts [N].
 """
@@ -43,8 +43,9 @@ EFFECTS: tuple[str, ...] = (
 )  # fmt: skip
 """Names of the hidden effects; those in `UNKNOWN` are not in any library."""
 DIGITAL = EFFECTS[-6:]
-"""Done by a computer, sample by sample: y'(k) = s·y'(k-1) + (1-s)·y(k), or a mean of 1+s samples,
-rounded up. At the drive they make sense where the force is held from sample to sample."""
+"""Digital filters, computed sample by sample: y'(k) = s·y'(k-1) + (1-s)·y(k), or a mean of 1+s
+samples, rounded up. At the drive they apply only if the force is held from sample to sample.
+"""
 UNKNOWN = ("van_der_pol", "maxwell", "pulsating_spring", "knocks")
 
 
@@ -108,7 +109,7 @@ def strength_for(name: str, force: FloatArray, share: float, *, held: bool = Fal
     Args:
         name: one of `EFFECTS`.
         force: commanded, shape (n,) [N].
-        share: such as 0.05.
+        share: for example 0.05.
         held: whether the force is held from sample to sample.
     """
     silent = np.zeros(2)

@@ -1,11 +1,11 @@
-"""The simulated rig: voltage in, raw codes of three channels out, with the truth beside them.
+"""The simulated rig: voltage in, raw codes of three channels out, with the true values.
 
 `Rig` keeps all state between calls, so a run gives the same samples however it is divided.
 Effects of `sim_plant.effects` can be set or ramped at any sample.
 
 A cylinder integrates, and with a rod on one side only it creeps, so two measures hold it at mid
 stroke for days. A one-time null adjustment of the valve makes 0 V balance the two areas
-(`plant_kernel.balance`). And a slow centring loop adds to the commanded voltage: its own pick-off,
+(`plant_kernel.balance`). A slow centring loop adds to the commanded voltage: its own pick-off,
 low-passed at 0.7 Hz, times -16 V/m, which gives a corner near 0.2 Hz and about 10 mV at 8 Hz. The
 addition reaches the valve, so it is part of the measured voltage.
 """

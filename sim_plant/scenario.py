@@ -33,7 +33,7 @@ class Event(Section, frozen=True, kw_only=True):
 
 
 class Experiment(Section, frozen=True, kw_only=True):
-    """[experiment] — what the thesis prints about the experiment (Tables 5.2 and 5.3)."""
+    """[experiment] — published figures of the experiment (Tables 5.2 and 5.3)."""
 
     test: Annotated[int, Meta(ge=1, description="number of the experiment")]
     fault_s: Annotated[tuple[float, ...], Meta(description="when friction begins [s]")]
@@ -92,7 +92,7 @@ def load_scenario(path: Path | str) -> Scenario:
             raise ConfigError(path, f"events[{index}].at_s", f"{event.at_s} s", expected)
     for name, value in scenario.effects.items():
         _check_effect(path, f"effects.{name}", name, value)
-    return _beside(scenario, Path(path).parent)
+    return _with_paths(scenario, Path(path).parent)
 
 
 def _check_effect(path: Path | str, key: str, name: str, value: float) -> None:
@@ -100,7 +100,7 @@ def _check_effect(path: Path | str, key: str, name: str, value: float) -> None:
         raise ConfigError(path, key, *wrong)
 
 
-def _beside(scenario: Scenario, folder: Path) -> Scenario:
+def _with_paths(scenario: Scenario, folder: Path) -> Scenario:
     file = getattr(scenario.excitation, "file", "")
     if not file:
         return scenario

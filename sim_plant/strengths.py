@@ -1,4 +1,4 @@
-"""How strong a hidden effect must be to change what sensors read by a given share."""
+"""The strength at which a hidden effect changes the sensor signals by a given share."""
 
 from collections.abc import Callable
 
@@ -10,7 +10,7 @@ from rigwatch.wire.arrays import FloatArray
 LIMIT = 1e6
 """Share that stands for a plant that diverges (NaN or infinite)."""
 LEAST, MOST = 1e-9, 1e9
-"""Strengths that are looked at, in the effect's own unit."""
+"""Range of strengths that is searched, in the effect's unit."""
 
 
 def strength_that_causes(share: float, read: Callable[[float], FloatArray]) -> float:
@@ -19,8 +19,8 @@ def strength_that_causes(share: float, read: Callable[[float], FloatArray]) -> f
     The largest of the shares of all channels counts.
 
     Args:
-        share: such as 0.05.
-        read: what the sensors read at a strength, without noise, shape (n, outputs); at 0 the
+        share: for example 0.05.
+        read: noise-free sensor signals at a strength, shape (n, outputs); at 0 the
             plant is healthy.
     """
     healthy = read(0.0)

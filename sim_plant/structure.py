@@ -1,7 +1,7 @@
-"""Stands in for a structure with sensors: makes the records that an identification is tried on.
+"""Simulates a structure with sensors: the records for tests of identification.
 
-Reads the same file as `rigwatch structure`, and nothing else of it: the equations here go from
-element to element and are integrated by extrapolation, with steps finer than the record's.
+Only the file is shared with `rigwatch structure`: the equations here are assembled element by
+element and integrated by extrapolation, with steps finer than the record's.
 """
 
 import copy
@@ -26,11 +26,11 @@ FINEST_TURN = 0.2
 
 @dataclass(frozen=True)
 class Damage:
-    """From `time` on, some numbers of the structure are others.
+    """A change of some numbers of the structure at `time`.
 
     Attributes:
         time: [s].
-        values: by their place in the file, such as {"springs.k4_46.stiffness": 50.0}.
+        values: new values by their place in the file, such as {"springs.k4_46.stiffness": 50.0}.
     """
 
     time: float
@@ -39,7 +39,7 @@ class Damage:
 
 @dataclass(frozen=True, eq=False)
 class StructureRecord:
-    """What the sensors of a structure recorded.
+    """The sensor signals of a structure.
 
     Attributes:
         time: shape (n,) [s].
@@ -78,11 +78,11 @@ def simulate(
         duration: [s]; the sample at its end is included.
         loads: instead of the file's, in the file's words.
         recorded: loads by channel, sampled every dt, a line between samples.
-        values: other numbers than the file's, by their place there: {"springs.k1_6.cubic": 500.0}.
-        damages: changes on the way.
+        values: values that replace the file's, by their place there: {"springs.k1_6.cubic": 500.0}.
+        damages: changes during the record.
 
     Raises:
-        ConfigError: the file cannot be read, or lacks what a simulation needs.
+        ConfigError: the file cannot be read, or is incomplete for a simulation.
     """
     raw = _read(Path(file))
     time = sample_times(dt, duration)
@@ -113,7 +113,7 @@ def with_noise(
     """Noise on the named columns, as a share of each one's peak.
 
     Args:
-        record: what is without noise.
+        record: the noise-free record.
         shares: by column, half width of the uniform noise, or standard deviation of the normal one,
             over the column's peak.
         seed: of the random numbers.

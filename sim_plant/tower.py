@@ -55,7 +55,7 @@ def water(time: Floats) -> tuple[Floats, Floats]:
 
 
 def tower(dt: float, duration: float) -> Columns:
-    """Positions z1, z2 of the tower and what the water does at both masses."""
+    """Positions z1, z2 of the tower and the forces of the water on both masses."""
 
     def rates(t: float, state: Floats) -> Floats:
         u, du = (part[:, 0] for part in water(np.array([t])))

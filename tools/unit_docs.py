@@ -21,7 +21,7 @@ Equations compute in SI. The errors of an output are in its SI unit.
   `m/(s V)`, `kN/mm`. Powers by `^`, also broken ones: `m/s^2`, `l/(min bar^0.5)`; `m/s2` and `m/s²`
   are read, too. In equations a power is `**`.
 * `g` is the gram; standard gravity is `g0` or `gn`. Accelerometers are often labelled g, so an
-  import refuses `g` and asks for `g0` or `gram`.
+  import refuses `g` and suggests `g0` or `gram`.
 * A temperature that stands alone is absolute: 20 degC are 293.15 K. Within a product it is a
   difference: W/degC is W/K. A difference by itself is written in K.
 * Angles are pure numbers (rad). Hz counts turns and rad/s angles: a channel in one is refused where

@@ -20,7 +20,7 @@ from rigwatch.wire.errors import DeviceError, ModbusError
 
 _FAILURES = 3
 _MARGIN = 8
-"""Slots about to be overwritten, which are no longer read."""
+"""Slots about to be overwritten, which are not read."""
 _U32 = 1 << 32
 
 
@@ -83,7 +83,7 @@ class ModbusAdapter:
 
         Raises:
             DeviceError: the device cannot be reached.
-            ModbusError: it is not what the configuration says.
+            ModbusError: it does not match the configuration.
         """
         self._registers.open()
         self._failed = 0
@@ -95,7 +95,7 @@ class ModbusAdapter:
 
         Raises:
             DeviceError: the link is gone, or several polls in a row failed.
-            ModbusError: the device refuses, or is not what the configuration says.
+            ModbusError: the device refuses, or does not match the configuration.
         """
         wait = (self._next_poll - self._clock()) * 1e-9
         self._sleep(min(max(wait, 0.0), timeout))

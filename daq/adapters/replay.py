@@ -1,7 +1,7 @@
 """Plays a recorded session in place of a device, at any speed.
 
 Samples arrive when they are due by the recording's clock, calibrated and flagged as recorded. They
-keep their recorded sequence numbers; each pass of a loop is a boot of its own.
+keep their recorded sequence numbers; each pass of a loop is a separate boot.
 """
 
 import math
@@ -58,7 +58,7 @@ class ReplayAdapter:
         """Start at the session's first sample.
 
         Raises:
-            DeviceError: there is no such session, or it holds no samples.
+            DeviceError: the session does not exist or has no samples.
         """
         self._blocks = self._opened()
         self._rest = self._next()

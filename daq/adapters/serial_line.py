@@ -3,7 +3,7 @@
     port (device file or glob) ── SerialPort ──bytes──▶ FrameDecoder ──frames──▶ RawBlock
 
 The port is watched with `select`, so that a frame is passed on as soon as its last byte arrives.
-A test passes a transport of its own.
+A test passes its own transport.
 """
 
 import errno

@@ -176,11 +176,11 @@ def _sync_folder(folder: Path) -> None:
 
 def _line(record: AlarmRecord) -> bytes:
     plain = asdict(record)
-    plain["alarm"] = {name: _said(value) for name, value in plain["alarm"].items()}
+    plain["alarm"] = {name: _json_value(value) for name, value in plain["alarm"].items()}
     return json.dumps(plain, ensure_ascii=False, allow_nan=False).encode() + b"\n"
 
 
-def _said(value: object) -> object:
+def _json_value(value: object) -> object:
     return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 

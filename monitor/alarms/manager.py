@@ -21,7 +21,7 @@ from dataclasses import replace
 from monitor.alarms.debounce import Debouncer
 from monitor.alarms.flood import MOST_IN_WINDOW, FloodWatch
 from monitor.alarms.kinds import ALARM_FLOOD, REFINED, check_settings, order_of, settings_of
-from monitor.alarms.operator import refusal, wanted
+from monitor.alarms.operator import addressed, refusal
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
 from monitor.signals import Condition
@@ -88,7 +88,7 @@ class AlarmManager:
             self._set(name[1], at, active=rising)
         if len(t_ns):
             self._advance(int(t_ns[-1]))
-        return self._take_said()
+        return self._take_announcements()
 
     def report(self, name: str, at: Occasion, *, active: bool) -> list[Announcement]:
         """Set a condition detected without a sample: whether `name` holds since `at`.
@@ -99,20 +99,20 @@ class AlarmManager:
         self._advance(at.t_ns)
         if self._alarm(name).active != active:
             self._set(name, at, active=active)
-        return self._take_said()
+        return self._take_announcements()
 
     def command(self, command: AlarmCommand) -> list[Announcement]:
-        """Execute an operator's command, or return an event that says why not."""
+        """Execute an operator's command, or return an event with the reason for its refusal."""
         self._advance(command.t_ns)
-        found = wanted(command, self._alarms.values())
+        found = addressed(command, self._alarms.values())
         why_not = refusal(command, found)
         if why_not:
             self._tell("alarm_command_refused", why_not, command.t_ns)
-            return self._take_said()
+            return self._take_announcements()
         for alarm in found:
             self._obey(alarm, command)
         self._raise_unnamed(command.t_ns)
-        return self._take_said()
+        return self._take_announcements()
 
     def standing(self) -> list[Alarm]:
         """Every alarm that is not normal, first-out first, then in order of time."""
@@ -366,6 +366,6 @@ class AlarmManager:
     def _tell(self, code: str, text: str, t_ns: int) -> None:
         self._said.append(Event(SOURCE, t_ns, "warning", code, text))
 
-    def _take_said(self) -> list[Announcement]:
+    def _take_announcements(self) -> list[Announcement]:
         said, self._said = self._said, []
         return said

@@ -10,7 +10,7 @@ from rigwatch.wire.messages import AlarmCommand
 EVERY = "*"
 LONGEST_NAME, LONGEST_TEXT = 100, 500
 """Longest names and text of a command that are kept [characters]."""
-MOST_APART_NS = 60_000_000_000
+MAX_CLOCK_DIFFERENCE_NS = 60_000_000_000
 """Largest difference between a command's time and the monitor's; beyond it, it is wrong [ns]."""
 
 
@@ -21,7 +21,7 @@ def bounded(command: AlarmCommand, now_ns: int) -> AlarmCommand:
         command: as received.
         now_ns: the monitor's Unix time, used if the command's is far off [ns].
     """
-    wrong_clock = abs(command.t_ns - now_ns) > MOST_APART_NS
+    wrong_clock = abs(command.t_ns - now_ns) > MAX_CLOCK_DIFFERENCE_NS
     return replace(
         command,
         name=_shortened(command.name, LONGEST_NAME),
@@ -35,7 +35,7 @@ def _shortened(text: str, longest: int) -> str:
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
 
 
-def wanted(command: AlarmCommand, alarms: Iterable[AlarmInstance]) -> list[AlarmInstance]:
+def addressed(command: AlarmCommand, alarms: Iterable[AlarmInstance]) -> list[AlarmInstance]:
     """The alarms addressed: one, all channels of a kind, or with "*" all that can be changed."""
     alarms = list(alarms)
     if command.name == EVERY:

@@ -94,7 +94,7 @@ class AlarmInstance:
         return self.kind.cause.format(channel=split(self.name)[1])
 
     def added_to(self, cause: str) -> str:
-        """What a published `cause` says beyond the alarm's own; "" for nothing."""
+        """Addition to the alarm's own text in a published `cause`; "" for none."""
         own = f"{self.cause}: "
         return cause.removeprefix(own) if cause.startswith(own) else ""
 

@@ -1,6 +1,6 @@
 """Clipping inside the range: a channel whose peaks are cut off at one and the same value.
 
-A real reading carries noise, so it seldom repeats to the last digit; a clipped one repeats as long
+A real reading carries noise, so it rarely repeats exactly; a clipped one repeats as long
 as the signal would exceed it. Every reading at the extreme of the last one to two spans is a trial:
 does the next one repeat it? With p the largest probability that noise allows and q = (1 + p)/2,
 Page's cumulative sum, one for each end of each channel,
@@ -42,7 +42,7 @@ class FlatTops(NamedTuple):
     Args:
         score: S, shape (c, 2).
         extreme: largest x and largest -x of the running span and of the one before, (2, c, 2).
-        last: newest reading, NaN where it was not good, shape (c,).
+        last: newest reading, NaN if it was not good, shape (c,).
         filled: samples in the running span, shape (1,).
         trials, repeats: counted since the start, shape (c, 2).
     """
@@ -118,7 +118,7 @@ def judge_flat_tops(  # noqa: PLR0917
 def _try(  # noqa: PLR0917
     side: float, c: int, end: int, chance: float, limit: float, state: FlatTops
 ) -> None:
-    """One reading of one channel, seen from one end: `side` is x or -x."""
+    """One reading of one channel, for one end of the range: `side` is x or -x."""
     before = state.last[c] if end == 0 else -state.last[c]
     at_extreme = before >= _extreme(state, c, end)
     if at_extreme and before > -_extreme(state, c, 1 - end):

@@ -39,7 +39,7 @@ def commission_best(
     """
     if scheme == "transfer":
         return commission(recordings, settings)
-    transfer, why = (None, "equations were asked for")
+    transfer, why = (None, "equations were requested")
     if scheme == "auto":
         transfer, why = _transfer(recordings, settings)
         say(f"{why}; fitting the equations of {equations}")

@@ -77,7 +77,7 @@ def check_healthy(names: Sequence[str], judged: Sequence[FloatArray], rate: floa
         _check_onset(name, one, rate)
     if len(blocks) >= LEAST:
         for k, name in enumerate(names):
-            _check_beside(name, blocks[k], blocks[:k] + blocks[k + 1 :])
+            _check_against_others(name, blocks[k], blocks[:k] + blocks[k + 1 :])
 
 
 def _blocks(judged: FloatArray) -> FloatArray:
@@ -109,7 +109,7 @@ def _rise(force: FloatArray, at: int) -> float:
     return float(force[at:].mean() - force[:at].mean())
 
 
-def _check_beside(name: str, blocks: FloatArray, others: Sequence[FloatArray]) -> None:
+def _check_against_others(name: str, blocks: FloatArray, others: Sequence[FloatArray]) -> None:
     force, squares, _ = blocks
     usual = float(np.median([np.median(other[0]) for other in others]))
     left = float(np.median([np.median(other[2]) for other in others]))

@@ -48,10 +48,10 @@ FIRST_LOOK, LOOK_EVERY = 12, 4
 PLAINLY_HEALTHY = 0.6
 """Share of the threshold below which a sample is added to the healthy average."""
 LOOKS_AT_NEW_EXCITATION = 32
-"""Number of tests after which another excitation is accepted and learnt."""
+"""Number of tests after which another excitation is accepted and its reference learned."""
 LOUDER = 2.0
-"""Ratio of an aperiodic voltage's amplitude to that of the learnt stretch above which it is another
-excitation. No fault is named then: with the model error of an aperiodic motion, a dead band
+"""Ratio of an aperiodic voltage's amplitude to that of the learned stretch above which it counts as
+another excitation. No fault is named then: with the model error of an aperiodic motion, a dead band
 resembles dry friction, and heavy friction resembles any fault.
 """
 SHORTEST_CYCLE, LONGEST_CYCLE = 32, 256

@@ -38,7 +38,7 @@ from monitor.reference import (
 LEAST_FILL = 8
 """Minimum number of samples to estimate two parameters."""
 _APERIODIC_VARIANCE = 9.0
-"""Factor for aperiodic drives, where the residual itself is judged: it peaks at about 3 rms."""
+"""Factor for aperiodic drives, for which the residual itself is judged: it peaks at about 3 rms."""
 
 
 @njit(inline="always")

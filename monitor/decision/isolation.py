@@ -180,7 +180,7 @@ def _compare(gram: FloatArray, rest: float, rest_always: float, peak: float) -> 
     """Evidence from the normal matrix of rivals, friction regressors and y, in this order."""
     yy = max(gram[-1, -1], 1e-30)
     explained, dry = _friction_fit(gram, yy)
-    remains, jump, sign = _beyond_rivals(gram)
+    remains, jump, sign = _gain_over_rivals(gram)
     rho = sign * np.sqrt(min(jump / remains, 1.0)) if remains > 0.0 else 0.0
     return Evidence(
         explained,
@@ -210,7 +210,7 @@ def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
 
 
 @njit()
-def _beyond_rivals(gram: FloatArray) -> tuple[float, float, float]:
+def _gain_over_rivals(gram: FloatArray) -> tuple[float, float, float]:
     """Residual energy of the rivals, the part of it that the jump explains, and the jump's sign."""
     y, g1 = gram.shape[0] - 1, _RIVALS
     left = gram.copy()

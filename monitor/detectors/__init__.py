@@ -1,4 +1,4 @@
-"""Detectors beside the friction scheme, one row each in `registry`."""
+"""Detectors in addition to the friction scheme, one row each in `registry`."""
 
 from monitor.detectors.detector import Detector
 from monitor.detectors.registry import DETECTORS, DetectorKind, detector_kind

@@ -23,7 +23,7 @@ LONGEST_HOLD = 8
 
 
 class Detector(Protocol):
-    """The protocol of a detector beside the friction scheme."""
+    """The protocol of a detector in addition to the friction scheme."""
 
     def update(self, block: SampleBlock) -> Findings:
         """Columns to publish and conditions, each as long as the block."""
@@ -47,7 +47,7 @@ class Channels:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One published column of a detector over n samples; NaN where nothing was judged."""
+    """One published column of a detector over n samples; NaN if not judged."""
 
     name: str
     unit: str
@@ -60,7 +60,7 @@ class Judgement:
 
     Attributes:
         series: columns to publish.
-        value: the judged quantity, NaN where nothing was judged.
+        value: the judged quantity, NaN if not judged.
         low, high: its limits.
     """
 

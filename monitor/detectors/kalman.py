@@ -8,7 +8,7 @@
     y   measurement, shape (m,)      Φ   Jacobian of f, shape (n, n)
     w   state noise, covariance W    v   measurement noise, covariance V
 
-The generalised filter (Nowakowski, Boutayeb and Darouach 1993) knows nothing of ξ and η: they join
+The generalised filter (Nowakowski, Boutayeb and Darouach 1993) has no model of ξ and η: they join
 the state, x̄ = (x, η, ξ of the step before), and with E = [I 0 -F], C = [H G 0] one least-squares
 step gives them all:
 

@@ -13,7 +13,7 @@ model in parallel and depends on all past samples; the MA residual depends on th
 reacts at once, and amplifies noise.
 
 The operating point is either given, or followed by a first-order high-pass of both signals; linear
-filters commute, so the high-pass keeps the residual's meaning and lets constant faults decay with
+filters commute, so the high-pass preserves the residual's meaning, and constant faults decay with
 its time constant. The residual is high-passed once more: the model of an integrating plant, such as
 the rig, never forgets its initial state; this removes it. Each
 residual is judged by an adaptive threshold.
@@ -126,7 +126,7 @@ def parity_block(  # noqa: PLR0917 -- a compiled kernel takes no keywords
     signals: FloatArray,
     code: NDArray[np.int64],
 ) -> tuple[FloatArray, FloatArray]:
-    """Residual and limit of consecutive samples; NaN where nothing is judged.
+    """Residual and limit of consecutive samples; NaN if not judged.
 
     Args:
         moving_average: r_MA in place of r_ARMA.

@@ -1,4 +1,4 @@
-"""Detectors beside the friction scheme: one row each, and every generic test picks the row up.
+"""Detectors in addition to the friction scheme: one row each, tested by all generic tests.
 
 A detector needs the model file's transfer function from input to output and a table of figures from
 `calibrate` on a healthy recording. `monitor.detectors` in the configuration selects the detectors.

@@ -3,7 +3,8 @@
 Two filters run side by side on the same model (Nowakowski, Boutayeb and Darouach 1993, thesis
 2.54-2.61):
 
-* the plain one trusts the position sensor. Its innovations are white and of known size while that
+* the plain one assumes a correct position sensor. Its innovations are white and of known size while
+that
   is right; a sliding chi-square test of them detects the fault (`innovation_test.py`);
 * the generalised one takes the sensor's bias η as an unknown input of the measurement,
   y = H·x + G·η, and so estimates the fault-free states and the bias.
@@ -198,7 +199,7 @@ def unknown_input_block(
     signals: FloatArray,
     code: NDArray[np.int64],
 ) -> tuple[FloatArray, FloatArray]:
-    """Bias [output unit] and sum of normalised innovations [1]; NaN where nothing is judged.
+    """Bias [output unit] and sum of normalised innovations [1]; NaN if not judged.
 
     Args:
         model: constant matrices.

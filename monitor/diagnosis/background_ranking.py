@@ -25,7 +25,7 @@ WAIT = 2.0
 """Time from the onset to the ranking [s]."""
 KEPT = 20.0
 """Length of the buffered samples [s]."""
-MOST_TOLD = 64
+MAX_ANSWERS = 64
 """Number of answers kept for later listings of alarms."""
 Judged = tuple[EstimateBlock, SampleBlock]
 
@@ -72,7 +72,7 @@ class Explainer:
         if alarm.state == "unacknowledged" and alarm.name in NAMED and key not in self._told:
             self._told[key] = ""
             self._wanted = alarm
-            while len(self._told) > MOST_TOLD:
+            while len(self._told) > MAX_ANSWERS:
                 self._told.pop(next(iter(self._told)))
 
     def results(self) -> list[Event]:

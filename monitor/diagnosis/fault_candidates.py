@@ -3,7 +3,7 @@
 The engine's score test, as in a study: the first-order change that an effect at a port would cause
 along the measured motion is compared with the observed change. p-values allow for residuals that
 are correlated and for the number of candidates; effects whose directions are nearly parallel form a
-class, except those that are clearly worse. Nothing is fitted: a study tells more.
+class, except those that are clearly worse. Nothing is fitted; a study gives more detail.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ from rigwatch.physics.engine.score import (
     candidates,
     corrected_p_values,
     directions,
-    knows,
+    has_variables,
     possible,
     root_mean_square,
     score,
@@ -36,7 +36,7 @@ from rigwatch.physics.engine.score import (
 from rigwatch.wire.arrays import FloatArray
 
 LEVEL = 0.01
-"""Corrected p-value above which nothing is named."""
+"""Corrected p-value above which no candidate is named."""
 EXPLAINED = 0.5
 """Share of the change's energy below which the best effect is rejected."""
 NEARLY = 0.02
@@ -54,7 +54,7 @@ class Evidence:
     """Samples around an alarm.
 
     Attributes:
-        signals: the model's channels, NaN where there is nothing valid, shape (n, channels).
+        signals: the model's channels, NaN if invalid, shape (n, channels).
         change: of the residual against the healthy rig [m/s^2], shape (n,).
         onset: row at which the change began.
     """
@@ -138,7 +138,7 @@ def _candidates(ports: RigPorts, effects: Mapping[str, Effect], model: RigModel)
 
     def effect_at(name: str, port: str) -> Effect | None:
         effect, place = effects[name], places[port]
-        stands = effect.fits(place.kind) and knows(effect, place)
+        stands = effect.fits(place.kind) and has_variables(effect, place)
         return effect.scaled(sizes[port]) if stands else None
 
     return candidates(places, effects, effect_at)
@@ -192,7 +192,7 @@ def _named(
     rows: Sequence[tuple[Suspect, int]], residual: FloatArray, units: FloatArray
 ) -> list[Suspect]:
     """The first gives the class its name: the one with the fewest parameters of those that do as
-    well as the best. Of its class stays what the samples do not make clearly worse.
+    well as the best. Members of its class that are clearly worse on the samples are dropped.
     """
     if not rows:
         return []

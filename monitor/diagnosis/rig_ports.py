@@ -3,13 +3,12 @@
 A monitor's model has no equations of motion, so its ports are evaluated on measured signals, and
 the model's filters carry the effect to the residual:
 
-    force at the mass    -Ge for a transfer function, as Ge takes friction against the motion to be
+    force at the mass    -Ge for a transfer function, as Ge counts friction against the motion as
                          positive; 1/M for an inertia
-    leak of a chamber    pressure goes as m·a and a leak lets it go in time: -Ge after an integrator
+    leak of a chamber    pressure follows m·a and decays through a leak: -Ge after an integrator
     drive                Ĝ, as from voltage to modelled acceleration; 1/M for an inertia
-    reading of the drive the same with the other sign: it moves what is modelled, not what is
-                         measured
-    accelerometer        nothing between
+    reading of the drive the same with opposite sign: it changes the modelled acceleration only
+    accelerometer        no filter
 """
 
 from collections.abc import Callable, Mapping
@@ -43,7 +42,7 @@ Response = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class RigPorts:
-    """Places where an effect may be missing, over a stretch of samples.
+    """Ports at which an effect may be missing, over a stretch of samples.
 
     Attributes:
         model: a model without states: its inputs are measured, each of its ports has an output.

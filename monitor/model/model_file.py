@@ -210,7 +210,7 @@ def parse_model(text: str, name: str) -> RigModel:
 
 
 def check_model(model: RigModel, path: Path | str) -> None:
-    """Check the consistency of a model beyond its types.
+    """Check the consistency of a model.
 
     Raises:
         ConfigError: the parts of the model are inconsistent.

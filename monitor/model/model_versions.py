@@ -1,4 +1,4 @@
-"""The model file with its history: every former version is kept beside it.
+"""The model file with its history: all previous versions are kept next to it.
 
 model.toml                the current model, read at the monitor's start
 model.v1.toml, .v2.toml   former versions, the newest with the highest number

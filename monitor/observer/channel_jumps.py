@@ -41,7 +41,7 @@ class ChannelJumps:
     """Finds jumps block by block.
 
     Args:
-        seen: largest differences of healthy recordings, by channel; others are not checked.
+        seen: largest differences in healthy recordings, by channel; others are not checked.
         model: the unmodified model.
         channels: names of the columns of the samples.
     """

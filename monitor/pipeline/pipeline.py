@@ -191,7 +191,7 @@ def _arming_rules(model: RigModel) -> ReferenceRules:
 
 def _known(model: RigModel) -> list[tuple[FloatArray, float, int]]:
     if model.promoted:
-        # Stored periods were modelled without the friction learnt since.
+        # Stored periods were modelled without the friction promoted since.
         return []
     return [
         (np.array([r.voltage, r.position, r.acceleration, r.modelled]), r.scale, r.periods)

@@ -1,4 +1,4 @@
-"""Promoted friction: learnt friction as part of the modelled acceleration.
+"""Promoted friction: friction from a study as part of the modelled acceleration.
 
     am ← am + θ1·g1 + θ2·g2 - d1·|g1| - d2·|g2|
 

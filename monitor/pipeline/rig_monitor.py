@@ -128,19 +128,19 @@ class RigMonitor:
 
 
 def _fresh(block: SampleBlock, judged: EstimateBlock) -> SampleBlock:
-    """The part of a block that has been judged now, without samples seen before."""
+    """The part of a block judged in this call, without samples judged before."""
     return cut(block, judged.seq - block.seq, len(block))
 
 
 def _disarmed(column: Column, wrong: BoolArray) -> Column:
-    """The column `armed` with 0 where the wiring is wrong; other columns unchanged."""
+    """The column `armed` with 0 while the wiring is wrong; other columns unchanged."""
     if column.name != "armed":
         return column
     return replace(column, values=np.where(wrong, 0.0, column.values))
 
 
 def _silenced(condition: Condition, wrong: BoolArray) -> Condition:
-    """The condition, not active where the wiring is wrong, unless it is one of the samples."""
+    """The condition, inactive while the wiring is wrong; conditions of samples are unchanged."""
     if condition.name.partition(".")[0] in OF_SAMPLES:
         return condition
     return replace(condition, active=np.where(wrong, 0, condition.active).astype(np.uint8))

@@ -143,7 +143,7 @@ class MonitorProcess:
             self._router_lost_at = self._router_lost_at or time.monotonic()
         elif self._router_lost_at is not None:
             away, self._router_lost_at = time.monotonic() - self._router_lost_at, None
-            text = f"the router was away for {away:.1f} s; what was said meanwhile follows"
+            text = f"the router was away for {away:.1f} s; messages from that time follow"
             self.bus.publish(EVENTS, Event("monitor", seen.t_ns, "warning", "ROUTER BACK", text))
 
     def say(self, announcements: Iterable[Announcement]) -> None:

@@ -78,7 +78,7 @@ class ModelDesk:
         try:
             one = _Waiting(_bounded(msgspec.json.decode(question, type=ModelRequest)))
         except (msgspec.DecodeError, RecursionError) as error:
-            return [msgspec.json.encode(ModelReply(False, f"not a wish for a model: {error}"))]
+            return [msgspec.json.encode(ModelReply(False, f"not a model request: {error}"))]
         self._waiting.put(one)
         one.withdrawn = not one.answered.wait(0.8 * PATIENCE)
         return [msgspec.json.encode(one.answer)]

@@ -18,7 +18,7 @@ from monitor.reference.reference_state import (
 from rigwatch.wire.arrays import FloatArray
 
 STRETCHES = 16
-"""Number of stretches of `learn` samples from which an aperiodic excitation is learnt."""
+"""Number of stretches of `learn` samples that give the reference of an aperiodic excitation."""
 APERIODIC_CYCLE = 256
 """Assumed cycle of the motion for an aperiodic drive [samples]."""
 

@@ -13,7 +13,7 @@ NO_REFERENCE, FROM_MODEL, FROM_RUN, APERIODIC, FIXED = 0, 1, 2, 3, 4
 _COUNTS = np.dtype(
     [
         ("mode", np.int64),
-        ("source", np.int64),  # where the reference is from
+        ("source", np.int64),  # origin of the reference
         ("since", np.int64),  # samples since the last restart
         ("period", np.int64),  # [samples]
         ("anchor", np.int64),  # sample number of the period's first place
@@ -36,7 +36,7 @@ _LEVELS = np.dtype(
         # Without a period:
         ("left_share", np.float64),  # r²
         ("quick", np.float64),  # mean square of the modelled acceleration, quick to follow
-        ("slow", np.float64),  # the same, slow to forget [(m/s^2)^2]
+        ("slow", np.float64),  # the same, with a long time constant [(m/s^2)^2]
     ]
 )
 

@@ -29,7 +29,7 @@ class Admitted:
     Args:
         signals: one row per sample, one column per channel, held where not good, shape (n, c).
         code: shape (n,).
-        position_valid: 1 where the second channel may be judged, shape (n,).
+        position_valid: 1 if the second channel may be judged, shape (n,).
         seq: number of each sample, shape (n,).
         padding: number of inserted samples at the start.
         missing: samples known to be missing before the block, -1 for an unknown number.

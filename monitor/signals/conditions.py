@@ -119,7 +119,7 @@ class Condition:
     Args:
         name: one of `CONDITION_KINDS`, or SENSOR_CLIPPED or SENSOR_JUMPED with its channel.
         active: 1 where the condition holds, shape (n,).
-        value: the judged quantity, shape (n,), in the kind's unit; NaN where nothing was judged.
+        value: the judged quantity, shape (n,), in the kind's unit; NaN if not judged.
         low: lower limit of `value`, shape (n,); -inf if there is none.
         high: upper limit of `value`, shape (n,); +inf if there is none.
     """

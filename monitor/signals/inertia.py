@@ -62,7 +62,7 @@ class InertiaResidual:
 
     def __init__(self, model: RigModel) -> None:
         if not isinstance(model.plant, InertiaPlant):
-            raise TypeError("InertiaResidual wants a plant that is an inertia")
+            raise TypeError("InertiaResidual needs a plant that is an inertia")
         self._kernels = kernels(model.plant.half_width, model.sample_rate)
         self._mass, self._offset = model.plant.mass, model.plant.offset
         self._ring = np.zeros((2, self._kernels.shape[1]))

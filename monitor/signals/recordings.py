@@ -36,7 +36,7 @@ class Recording:
         """The values of a channel.
 
         Raises:
-            ModelError: there is no such channel.
+            ModelError: the recording has no such channel.
         """
         if name not in self.channels:
             raise ModelError(

@@ -56,7 +56,7 @@ class TransferResidual:
 
     def __init__(self, model: RigModel) -> None:
         if not isinstance(model.plant, TransferPlant):
-            raise TypeError("TransferResidual wants a transfer function")
+            raise TypeError("TransferResidual needs a transfer function")
         acceleration, delay = modelled_acceleration(model.plant, model.sample_rate)
         velocity = velocity_filter(
             model.velocity.corner, model.sample_rate, model.velocity.sensor_corner

@@ -4,7 +4,7 @@
                                                      └▶ failed, after two windows in a row
 
 One good window passes until the device or the monitor starts again. After a failure nothing is
-judged until then: what was learnt with wrong wiring would count as healthy.
+judged until then: a reference learned with wrong wiring would count as healthy.
 """
 
 import numpy as np
@@ -22,8 +22,8 @@ FAILURES = 2
 GAIN, PHASE = 3.0, 60.0
 """Largest factor and phase [deg] that sensors which show the same motion may differ by."""
 REVERSED = 15.0
-"""Largest phase that a reversed sensor may have beside its 180° [deg]; further off, swapped
-channels are as likely.
+"""Largest deviation of a reversed sensor's phase from 180° [deg]; beyond that, swapped
+channels are equally likely.
 """
 SIGN, SCALE, SWAPPED = "wiring_sign", "wiring_scale", "wiring_swapped"
 WIRING = (SIGN, SCALE, SWAPPED)
@@ -48,7 +48,7 @@ class WiringCheck:
         self._gain = self._phase = np.nan
 
     def update(self, block: SampleBlock) -> tuple[BoolArray, tuple[Condition, ...]]:
-        """Whether the wiring is wrong at each sample, shape (n,), and the conditions that say why.
+        """Whether the wiring is wrong at each sample, shape (n,), and conditions with the reason.
 
         Args:
             block: new samples; a gap before it discards the window.

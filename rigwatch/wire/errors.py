@@ -10,7 +10,7 @@ RigwatchError             one plain line, shown by the command line without a tr
 ├── KeysError             keys or certificates are missing
 ├── BusError              the bus cannot be reached
 ├── SessionError          a session file cannot be read or written
-├── ImportDataError       foreign data cannot be turned into a session (column, unit, rate)
+├── ImportDataError       foreign data cannot be imported as a session (column, unit, rate)
 ├── ModelError            a model cannot be fitted or does not match the data
 └── MissingExtraError     an optional package is not installed
 """
@@ -77,7 +77,7 @@ class SessionError(RigwatchError):
 
 
 class ImportDataError(RigwatchError):
-    """Foreign data cannot be turned into a session."""
+    """Foreign data cannot be imported as a session."""
 
 
 class ModelError(RigwatchError):

@@ -20,16 +20,16 @@ MULTISINE_S = 8.0
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """What the generator plays.
+    """A generator's signal.
 
     Args:
         shape: sine, square, triangle, chirp, multisine or noise.
         volts: amplitude; rms of multisine and noise.
-        hz: frequency of those that have one.
+        hz: frequency of periodic shapes.
         seed: of the phases of multisine and noise.
-        free: the generator runs on its own clock.
+        free: the generator has its own clock.
         changes: (second, factor on the voltage, factor on the frequency), from then on; a factor
-            of 0 stops the drive, and the next one starts it anew with its ramp.
+            of 0 stops the drive, and the next one restarts it with its ramp.
         loop: a controller adds to the voltage.
     """
 

@@ -1,7 +1,7 @@
-"""The flavours of the family: what fixes the equations of a member.
+"""The flavours of the family: sets of laws that fix the equations of a member.
 
-The four of `calibration` are for choosing thresholds, the four of `judged` for judging them. No
-flow law, friction law beside valve and heat of a judged flavour is that of a calibration flavour.
+Thresholds are chosen on the flavours of `calibration` and judged on those of `judged`. No judged
+flavour has the same flow, friction, valve and heat laws as a calibration flavour.
 """
 
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from sim_plant.family.laws import Flow, Friction, Heat, Stage
 
 @dataclass(frozen=True, slots=True)
 class Flavour:
-    """The laws of a member and the habits of those who built it.
+    """The laws of a member and its construction details.
 
     Args:
         group: calibration or judged.
         flow, heat, stage: laws of the gas and of the valve.
-        own: dry friction that the healthy rig has, None for none.
+        own: dry friction of the healthy rig, None for none.
         added: law of the dry friction that is added as a fault.
         second_order_valve: else one lag.
         play, slew, asymmetry: whether the valve has a small one.

@@ -1,4 +1,4 @@
-"""Writes members as folders of CSV files with `truth.json`, as the rig that is not ours has."""
+"""Writes members as folders of CSV files with `truth.json`, in the layout of a foreign rig."""
 
 import json
 from collections.abc import Callable
@@ -29,7 +29,7 @@ def members(group: str, seed: int = 1) -> dict[str, Member]:
 
 
 def write_rig(folder: Path, member: Member, parts: tuple[str, ...] = ("watch", "explain")) -> None:
-    """Writes the recordings of `parts` and truth.json, which also says strengths, to `folder`."""
+    """Writes the recordings of `parts` and truth.json, which includes strengths, to `folder`."""
     truth: dict[str, dict[str, Any]] = {}
     for part in parts:
         (folder / part).mkdir(parents=True, exist_ok=True)

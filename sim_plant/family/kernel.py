@@ -21,7 +21,7 @@ Sensors: LVDT with one lag; accelerometer with one or two high-pass stages and t
 # Fields of a record are known to numba, not to mypy.
 # mypy: disable-error-code="no-any-return"
 
-# All that `simulate` calls stands in this file: numba's cache does not see changes in others.
+# Everything that `simulate` calls is in this file: numba's cache ignores changes in others.
 
 import math
 from typing import Any
@@ -123,7 +123,7 @@ def flow(  # noqa: PLR0917
         else:
             amount = c * up * share_of_choked(law, r, critical)
     else:
-        # Poiseuille's flow of a gas, bent over to the turbulent root where that is less.
+        # Poiseuille's flow of a gas, limited by the turbulent square-root law.
         square = 0.5 * (1.0 - r * r)
         poiseuille = c * up * square / math.sqrt(laminar)
         turbulent = c * up * math.sqrt(square) + 1e-30
@@ -196,7 +196,7 @@ def gas_rates(  # noqa: PLR0917
         n = p.exponent if p.heat == POLYTROPIC else 1.0
         return n * (w - pressure * widening) / volume, 0.0
     t0 = p.temperature
-    # What leaves is warmer or colder than T0: less or more mass, with more or less heat.
+    # Gas that leaves is warmer or colder than T0: less or more mass, with more or less heat.
     mass_flow = w if w > 0.0 else w * math.sqrt(t0 / temperature)
     heat_flow = mass_flow * (1.0 if w > 0.0 else temperature / t0)
     wall = (GAMMA - 1.0) * p.wall * (t0 - temperature)

@@ -1,4 +1,4 @@
-"""Numbers of the laws that a member of the family is made of; the kernel switches on them."""
+"""Numbers of the laws of a member; the kernel switches on them."""
 
 from enum import IntEnum
 
@@ -15,7 +15,7 @@ class Flow(IntEnum):
 
 
 class Heat(IntEnum):
-    """What the gas in a chamber does with its heat."""
+    """Heat law of the gas in a chamber."""
 
     ISOTHERMAL = 0
     POLYTROPIC = 1

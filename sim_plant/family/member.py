@@ -1,7 +1,7 @@
 """One member of the family: its laws, and quantities drawn from a seed.
 
-Restrictions are drawn by the pressure drop that a moving piston makes across them and the valve's
-gain by the motion that 1.4 V at 8 Hz give, so that members of all laws move as much as one another.
+Restrictions are drawn by the pressure drop that a moving piston causes across them, and the valve's
+gain by the motion that 1.4 V at 8 Hz causes, so members of all laws have similar motions.
 """
 
 from dataclasses import dataclass, field, replace
@@ -25,7 +25,7 @@ class Member:
     """A rig of the family.
 
     Attributes:
-        flavour: what fixes its equations.
+        flavour: the laws that fix its equations.
         seed: of everything drawn.
         record: laws and quantities for the kernel, shape (1,).
         noise: of the LVDT [m] and the accelerometer [m/s^2].

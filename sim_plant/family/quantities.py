@@ -18,7 +18,7 @@ _PISTON_SPEED = 0.25
 
 
 def body(kind: Flavour, random: Random) -> dict[str, float]:
-    """Mass, cylinder, hoses that centre, viscous friction."""
+    """Mass, cylinder, centring by hoses, viscous friction."""
     area = random.uniform(5.8e-5, 7.5e-5)
     return {
         "mass": random.uniform(0.20, 0.28),
@@ -32,7 +32,7 @@ def body(kind: Flavour, random: Random) -> dict[str, float]:
 
 
 def gas(kind: Flavour, random: Random) -> dict[str, float]:
-    """Pressures, dead volumes, what the gas does with its heat, laws of flow."""
+    """Pressures, dead volumes, heat of the gas, laws of flow."""
     supply = random.uniform(250e3, 400e3)
     return {
         "supply": supply,
@@ -66,7 +66,7 @@ def valve(kind: Flavour, random: Random) -> dict[str, float]:
 
 
 def friction(kind: Flavour, random: Random) -> dict[str, float]:
-    """Dry friction of the healthy rig, and the shape of what is added as a fault."""
+    """Dry friction of the healthy rig, and the shape of that added as a fault."""
     own = Friction.TANH if kind.own is None else kind.own
     level = random.uniform(0.02, 0.08)
     return {

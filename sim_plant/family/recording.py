@@ -46,7 +46,7 @@ def play(member: Member, name: str, scenario: Scenario) -> Floats:
 
 
 def _start(member: Member, scenario: Scenario) -> Floats:
-    """States at rest; what is hidden from the start has let the rig come to rest with it."""
+    """States at rest; with effects present from the start, the equilibrium includes them."""
     if scenario.hidden and not scenario.from_s:
         return at_rest(member, scenario.hidden)
     return member.rest.copy()

@@ -1,8 +1,8 @@
-"""What is recorded of a member: names, onsets and excitations as of the rig that is not ours.
+"""The recordings of a member: names, onsets and excitations as those of a foreign rig.
 
 `watch` has healthy recordings, dry friction from a known time and other faults; `explain` a
 multisine of five periods with one hidden effect each. `hard_*` in `watch` are excitations that
-the other rig's folder lacks. Strengths are drawn from the member's seed and the recording's name.
+the foreign rig's folder lacks. Strengths are drawn from the member's seed and the recording's name.
 """
 
 from dataclasses import dataclass, field, replace
@@ -46,7 +46,7 @@ class Scenario:
     """One recording.
 
     Attributes:
-        what: as truth.json says it; `from_s` likewise [s].
+        what: description in truth.json; `from_s`: onset there [s].
         hidden: effects of the plant by the kernel's names, from `from_s` on.
         sensor: fault of a sensor, its value: gain, stuck, noise, delay, smoothing of the
             acceleration, or bias of the position.
@@ -61,7 +61,7 @@ class Scenario:
 
 
 class Strengths:
-    """Draws strengths for a recording of a member, scaled with how it moves."""
+    """Draws strengths for a recording of a member, scaled to its motion."""
 
     def __init__(self, member: Member, name: str) -> None:
         self._random = np.random.default_rng([member.seed, *name.encode()])
@@ -188,7 +188,7 @@ def explain(member: Member) -> dict[str, Scenario]:
 
 
 def _hidden(member: Member, drive: Drive) -> dict[str, dict[str, float]]:
-    """Effects of the plant, as strong against the motion of this member as on the other rig."""
+    """Effects of the plant, as strong relative to the motion as on the foreign rig."""
     s = Strengths(member, "hidden")
     out = free_run(member, voltage(drive, member, 16.0)[:, 0], member.rest.copy())
     x = float(np.abs(out[:, 1]).max())
@@ -214,7 +214,7 @@ def _hidden(member: Member, drive: Drive) -> dict[str, dict[str, float]]:
 
 
 def _stranger(member: Member, s: Strengths) -> dict[str, float]:
-    """Something that no effect of the library is."""
+    """An effect that is not in the library."""
     match member.flavour.stranger:
         case "ripple":
             return {"ripple": s(0.04, 0.08), "ripple_rate": 2 * np.pi * s(2.2, 6.0)}
@@ -225,7 +225,7 @@ def _stranger(member: Member, s: Strengths) -> dict[str, float]:
 
 
 def _late(member: Member, s: Strengths, none: Scenario) -> Scenario:
-    """The accelerometer late by a lag, by a sample or by digital smoothing."""
+    """The accelerometer delayed by a lag, by a sample or by digital smoothing."""
     late = replace(none, what="accel_late")
     match member.flavour.late_fault:
         case "lag":

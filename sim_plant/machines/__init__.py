@@ -1,7 +1,7 @@
-"""Machines of five kinds, each with effects that can be hidden in it: plants to be explained.
+"""Machines of five kinds, each with effects that can be hidden in it, as plants to be explained.
 
-Each has its own equations and means of integration; nothing is shared with the models that are
-fitted to it. Inputs are held between samples, sensors have noise and steps, and all start at rest.
+Each has its own equations and integrator and shares nothing with the models that are fitted to it.
+Inputs are held between samples, sensors have noise and finite resolution, and runs start at rest.
 
     motor = MACHINES["motor"]
     table = log(motor, {"coulomb": strength_for(motor, "coulomb", 0.1, seed=1)}, 0.002, seed=1)

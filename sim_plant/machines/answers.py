@@ -1,12 +1,12 @@
-"""What a library of effects calls what is hidden in a machine, and how good an answer is.
+"""Library names of the effects hidden in each machine, and the classification of an answer.
 
-right       what is named is hidden and not found yet, or cannot be told from what is
-undecided   rivals are named, the truth among them
+right       the effect named is hidden and not found yet, or indistinguishable from one that is
+undecided   rivals are named, including a hidden effect
 unknown     no known effect explains the error: nothing is named
-astray      rivals are named, the truth not among them
-wrong       with confidence: an effect that is not there, or nothing missing where more is
-ended       nothing is missing, once all is found
-more        something still is, though all is found
+astray      rivals are named, none of which is hidden
+wrong       with confidence: an absent effect, or nothing missing while an effect is hidden
+ended       nothing is missing, and all hidden effects are found
+more        an effect is missing, although all hidden effects are found
 """
 
 from collections.abc import Sequence
@@ -47,23 +47,24 @@ RIGHT: dict[str, dict[str, tuple[str, ...]]] = {
         "inlet": ("constant_force@lower",),
     },
 }
-"""What the library calls each hidden effect; several where they are one on any recording.
+"""Library names of each hidden effect; several if no recording can distinguish them.
 
-Of two tanks on known grounds with holes of unknown size, a leak of the upper one takes a share of
-what reaches the lower one. That is what a wrong gain of either level makes of it: flows go with the
-root of a level, so that its gain is a factor of holes and pump but for that share.
+In two tanks of known base area with holes of unknown size, a leak of the upper tank reduces the
+flow into the lower one by a fixed share. A wrong gain of either level sensor has the same effect:
+flows are proportional to the square root of the level, so the gain scales holes and pump, except
+for that share.
 """
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What was said of a recording.
+    """The verdict on a recording.
 
     Attributes:
         word: the verdict.
-        members: labels of what is named and what it cannot be told from.
-        rivals: labels of what may be there in its place.
-        second: labels of what is said to be missing as well.
+        members: labels of the effect named and of those indistinguishable from it.
+        rivals: labels of effects of other physics that may be present instead.
+        second: labels of the second missing effect.
     """
 
     word: str
@@ -73,7 +74,7 @@ class Answer:
 
 
 def judged(machine: str, left: Sequence[str], answer: Answer) -> tuple[str, str]:
-    """How good an answer is where `left` is still hidden, and which of it is found."""
+    """The class of an answer while `left` is still hidden, and which of these it finds."""
     if not left:
         return ("ended" if answer.word == "nothing_missing" else "more"), ""
     right = {name: set(RIGHT[machine][name]) for name in left}
@@ -83,8 +84,8 @@ def judged(machine: str, left: Sequence[str], answer: Answer) -> tuple[str, str]
     }.get(answer.word, set())
     found = next((name for name in left if labels & right[name]), "")
     others = [name for name in left if name != found]
-    beside = any(set(answer.second) & right[name] for name in others)
-    true = bool(found) and (beside or not answer.second)
+    second = any(set(answer.second) & right[name] for name in others)
+    true = bool(found) and (second or not answer.second)
     match answer.word:
         case "missing_effect":
             return ("right" if true else "wrong"), found

@@ -3,7 +3,7 @@
     F = c·v + k·x + hidden
 
 The path is a sum of sines, so speed is exact; a displacement sensor reads the path. A dry element
-is a spring in series with a slider, which is carried along exactly from step to step (return
+is a spring in series with a slider, integrated exactly from step to step (return
 mapping); it may sit behind a gap. 20 steps a sample.
 
 Symbols: x displacement [m], v speed [m/s], F force [N].
@@ -22,11 +22,11 @@ DAMPING, STIFFNESS = 900.0, 12e3
 ELEMENT = 3e4
 """Stiffness of the spring in series with the slider [N/m]."""
 STOP = 0.018
-"""Where the bump stop begins [m]."""
+"""Displacement at which the bump stop begins [m]."""
 YIELD = 4e-3
 """Displacement at which the yielding joint gives way [m]."""
 GAP = 3e-3
-"""Half of the gap before the slider that sits behind one [m]."""
+"""Half of the gap in front of a slider with a gap [m]."""
 EFFECTS = (
     "slider", "slider_behind_gap", "joint", "preload", "hardening", "bump_stop", "orifice",
     "one_way_valve", "cell_offset",
@@ -50,7 +50,7 @@ def run(path: FloatArray, s: FloatArray, out: FloatArray) -> None:
         moved = x - before
         before = x
         bent = max(-s[0], min(s[0], bent + ELEMENT * moved))
-        # The gap's far side is pushed along as soon as one of its walls touches.
+        # The far side of the gap moves along as soon as one of its walls touches.
         last = carried
         carried = min(max(carried, x - GAP), x + GAP)
         behind = max(-s[1], min(s[1], behind + ELEMENT * (carried - last)))

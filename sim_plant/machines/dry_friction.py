@@ -1,4 +1,4 @@
-"""Dry friction that truly sticks (D. Karnopp, 1985), for plants that step speed by speed."""
+"""Dry friction with true sticking (D. Karnopp, 1985), for explicit steps of the speed."""
 
 import numpy as np
 
@@ -7,12 +7,12 @@ from rigwatch.wire.kernel import kernel
 
 @kernel(inline="always")
 def slid(v: float, drive: float, dry: float, mass: float, h: float) -> float:
-    """Speed a step later under a drive and dry friction; zero where friction holds.
+    """Speed after a step under a drive and dry friction; zero if friction holds the body.
 
     Args:
         v: speed now [m/s or rad/s].
         drive: sum of all other forces [N or N m].
-        dry: the most that friction can hold [the same].
+        dry: largest friction force [the same].
         mass: mass or inertia.
         h: step [s].
     """
@@ -24,6 +24,6 @@ def slid(v: float, drive: float, dry: float, mass: float, h: float) -> float:
         return float(h * (drive - np.sign(drive) * dry) / mass)
     later = float(v + h * (drive - np.sign(v) * dry) / mass)
     if np.sign(later) != np.sign(v):
-        # It comes to rest within the step, and goes on only where the drive is stronger.
+        # The body comes to rest within the step, and moves on only if the drive exceeds friction.
         return 0.0 if abs(drive) <= dry else later
     return later

@@ -1,4 +1,4 @@
-"""What a machine's log holds: signals as sensors read them, with noise and steps of a converter."""
+"""A machine's log: sensor signals with noise and the quantization of a converter."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ from sim_plant.oscillator import Hidden, oscillate
 from sim_plant.strengths import strength_that_causes
 
 STEP = 0.3
-"""Step of a sensor's converter over its noise."""
+"""Quantization step of a sensor's converter, relative to its noise."""
 FINEST = 2e-5
-"""Least step of a converter, over the rms of what it reads: 16 bits."""
+"""Smallest step of a converter, relative to the rms of its signal: 16 bits."""
 BETTER = 0.05
-"""Noise of a sensor that reads what drives the model, over the level asked for."""
+"""Noise of a sensor whose signal is an input of the model, relative to that of the others."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,12 @@ class Machine:
 
     Attributes:
         rate: samples a second.
-        columns: names of what its log holds beside the time, with units as loggers write them.
-        commanded: how many of the columns are commands, which have no noise.
-        precise: how many of those after them come from sensors that are better than the others.
-        effects: what may be hidden.
-        drive: a drawn excitation, from a seed.
-        run: columns at each sample without noise, of an excitation and strengths of effects.
+        columns: columns of its log without the time, with units as loggers write them.
+        commanded: number of leading columns that are commands, which have no noise.
+        precise: number of following columns that come from more accurate sensors.
+        effects: names of the effects that can be hidden.
+        drive: a random excitation, from a seed.
+        run: noise-free columns for an excitation and strengths of effects.
     """
 
     rate: float
@@ -49,7 +49,7 @@ def strength_for(machine: Machine, effect: str, share: float, seed: int) -> floa
     Args:
         machine: the machine, with nothing else hidden.
         effect: one of its effects.
-        share: such as 0.1.
+        share: for example 0.1.
         seed: of the excitation.
     """
     excitation, first = machine.drive(seed), machine.commanded + machine.precise
@@ -65,8 +65,8 @@ def log(
 
     Args:
         machine: the machine.
-        hidden: strengths of what is hidden, by name.
-        noise: standard deviation of the sensors' noise over the rms of what they read.
+        hidden: strengths of the hidden effects, by name.
+        noise: standard deviation of the sensors' noise, relative to the rms of their signals.
         seed: of excitation and noise.
     """
     clean = machine.run(machine.drive(seed), hidden)
@@ -116,7 +116,7 @@ def _oscillator(force: FloatArray, hidden: Mapping[str, float]) -> FloatArray:
 
 
 def _force(seed: int, samples: int = 3072) -> FloatArray:
-    """Force of lines from 0.25 to 8 Hz with drawn phases, rms 4 N, shape (samples,)."""
+    """Multisine force from 0.25 to 8 Hz with random phases, rms 4 N, shape (samples,)."""
     phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, 31)
     time, lines = np.arange(samples) / OSCILLATOR_RATE, np.arange(0.25, 8, 0.25)
     return np.asarray(

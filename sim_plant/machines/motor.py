@@ -1,9 +1,9 @@
-"""A DC motor on a bench: a voltage that a converter holds drives it, a tachometer reads its speed.
+"""A DC motor on a bench, driven by a held voltage; a tachometer measures its speed.
 
     L·di/dt = V − R·i − K·w,    J·dw/dt = K·i − b·w − hidden
 
-The current takes the exact step of its linear equation while speed and voltage stand; then speed
-takes an explicit one, with dry friction that truly sticks. 40 steps a sample.
+The current takes the exact step of its linear equation at constant speed and voltage; then speed
+takes an explicit step, with true sticking. 40 steps a sample.
 
 Symbols: V voltage [V], i current [A], w speed [rad/s], a angle [rad].
 """
@@ -22,7 +22,7 @@ RESISTANCE, INDUCTANCE, CONSTANT = 2.0, 0.012, 0.06
 INERTIA, DAMPING = 2.5e-4, 6e-5
 """[kg m^2], [N m s]."""
 LARGEST = 14.0
-"""Voltage that the amplifier gives before it clips, divided by 1 + the strength [V]."""
+"""Voltage at which the amplifier clips, divided by 1 + the strength [V]."""
 EFFECTS = (
     "coulomb", "stribeck", "fan", "load", "cogging", "drag_by_direction", "dead_band",
     "saturation", "tacho_lag", "amplifier_asymmetry",
@@ -65,7 +65,7 @@ def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
 
 
 def drive(seed: int, samples: int = 2400) -> FloatArray:
-    """Voltage of a bench test: steps to drawn levels, both ways and zero, shape (samples,) [V]."""
+    """Voltage of a bench test: random steps of both signs and zero, shape (samples,) [V]."""
     random = np.random.default_rng(seed)
     found = np.zeros(samples)
     at = round(0.25 * RATE)

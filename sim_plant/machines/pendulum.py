@@ -1,10 +1,10 @@
-"""A pendulum on a geared servo: a held voltage drives it, an encoder on its shaft reads the angle.
+"""A pendulum on a geared servo, driven by a held voltage; an encoder measures its angle.
 
     J·dw/dt = K/R·(V − K·w) − b·w − G·sin(a) − hidden,    da/dt = w
 
-The gear's ratio is in K; the current follows at once. Angle and speed take turns (leapfrog), with
-dry friction that truly sticks. With play in the gear the motor is a body of its own, and teeth
-touch the arm by a stiff spring with damping. 40 steps a sample.
+K includes the gear ratio; the current follows without delay. Angle and speed alternate (leapfrog),
+with true sticking. With play in the gear the motor is a separate body, in contact with the arm
+through a stiff spring with damping. 40 steps a sample.
 
 Symbols: V voltage [V], a angle [rad], w speed [rad/s].
 """
@@ -23,18 +23,18 @@ RESISTANCE, CONSTANT = 4.0, 0.5
 INERTIA, DAMPING, GRAVITY = 0.012, 0.01, 0.6
 """[kg m^2], [N m s], [N m] at a right angle."""
 MOTOR_SHARE = 0.3
-"""Share of the inertia that the motor has, where there is play."""
+"""Share of the inertia in the motor, with play."""
 TEETH = 60.0
-"""Stiffness of teeth that touch [N m/rad]."""
+"""Contact stiffness of the teeth [N m/rad]."""
 LARGEST = 3.2
-"""Voltage that the amplifier gives before it clips, divided by 1 + the strength [V]."""
+"""Voltage at which the amplifier clips, divided by 1 + the strength [V]."""
 EFFECTS = (
     "coulomb", "stribeck", "air_drag", "imbalance", "gear_play", "dead_band", "saturation",
     "late_drive", "cable", "stop", "encoder_offset",
 )  # fmt: skip
 """Names of the hidden effects, in the order of their strengths."""
 STOP = 0.8
-"""Where a rubber stop begins [rad]."""
+"""Angle at which a rubber stop begins [rad]."""
 
 
 @kernel()
@@ -81,7 +81,7 @@ def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
 
 
 def drive(seed: int, samples: int = 2400) -> FloatArray:
-    """Voltage of drawn steps over a slow swing, shape (samples,) [V]."""
+    """Voltage of random steps on a slow oscillation, shape (samples,) [V]."""
     random = np.random.default_rng(seed)
     found = np.zeros(samples)
     at = round(0.3 * RATE)

@@ -2,7 +2,7 @@
 
     volume of each tank: dV/dt = in − out,    out = area of the hole · speed of a free jet
 
-Volumes are what is integrated, by Heun's method, 20 steps a sample; levels follow from them.
+The volumes are integrated by Heun's method, 20 steps a sample; levels follow from them.
 
 Symbols: u voltage of the pump [V], h levels [m].
 """
@@ -16,16 +16,16 @@ RATE = 1.0
 """Samples a second."""
 STEPS = 20
 GROUND = (0.0028, 0.0032)
-"""Ground of the upper and the lower tank [m^2]."""
+"""Base areas of the upper and the lower tank [m^2]."""
 HOLES = (7.1e-6, 5.7e-6)
 """Effective areas of their holes [m^2]."""
 PUMP = 3.3e-6
 """Flow per volt [m^3/(s V)]."""
 FALL = 9.81
 RESTING = 4.0
-"""Voltage under which the levels rest at the start [V]."""
+"""Voltage of the initial equilibrium [V]."""
 LARGEST = 9.0
-"""Voltage from which the pump gives no more, divided by 1 + the strength [V]."""
+"""Voltage at which the pump saturates, divided by 1 + the strength [V]."""
 EFFECTS = (
     "leak", "dead_band", "saturation", "inlet", "late_pump", "seep", "level_offset", "slow_level",
 )  # fmt: skip
@@ -77,7 +77,7 @@ def run(voltage: FloatArray, s: FloatArray, out: FloatArray) -> None:
 
 
 def drive(seed: int, samples: int = 2400) -> FloatArray:
-    """Voltage of the pump: drawn steps, off now and then, shape (samples,) [V]."""
+    """Voltage of the pump: random steps, sometimes off, shape (samples,) [V]."""
     random = np.random.default_rng(seed)
     found = np.full(samples, RESTING)
     at = round(30 * RATE)

@@ -58,7 +58,7 @@ def ask(path: Path, line: str) -> str:
 
 
 class ControlServer:
-    """Answers lines on a UNIX socket, in a thread of its own.
+    """Answers lines on a UNIX socket, in a separate thread.
 
     Args:
         path: the socket; a stale one is replaced.

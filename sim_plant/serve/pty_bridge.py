@@ -1,4 +1,4 @@
-"""Two pseudo terminals back to back: a cable between two programs that both want a port."""
+"""Two pseudo terminals back to back: a cable between two programs that each need a port."""
 
 import contextlib
 import os

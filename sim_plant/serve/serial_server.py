@@ -16,8 +16,8 @@ class SerialServer:
         device: the device.
         line: the line, plugged and unplugged by the faults.
         rate: sample rate [Hz].
-        faults: what goes wrong on the line, nothing where None.
-        heartbeat: told how many samples were sent, where given.
+        faults: faults of the line; None for none.
+        heartbeat: called with the number of samples sent; None for none.
     """
 
     def __init__(

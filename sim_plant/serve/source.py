@@ -1,4 +1,4 @@
-"""Where a server's samples come from, and the pace at which they are due.
+"""Source of a server's samples, and the schedule of their due times.
 
 `Device` numbers the samples as a real one does: a boot drawn at its start, counters of 32 bits that
 wrap. Faults of the device itself (a restart, a clock that drifts or jumps) are switched here;
@@ -29,7 +29,7 @@ class Samples(Protocol):
 
 
 class Source(Protocol):
-    """Something that is simulated sample by sample, such as `ScenarioRun`."""
+    """A simulation that runs sample by sample, such as `ScenarioRun`."""
 
     def advance(self, n: int, /) -> Any:
         """The next n samples, of class `Samples`."""
@@ -101,8 +101,8 @@ class Pace:
 
     Args:
         rate: samples a second [Hz].
-        max_backlog: after a standstill longer than this [s] the schedule starts anew, as a
-            device that has been off does not make up for what it missed.
+        max_backlog: after a standstill longer than this [s] the schedule restarts, as a
+            device that was off does not catch up on missed samples.
     """
 
     def __init__(self, rate: float, max_backlog: float = 1.0) -> None:

@@ -1,8 +1,8 @@
-"""Small machines of other equations and integrators, each with an effect hidden in it.
+"""Small machines with independent equations and integrators, each with one hidden effect.
 
-A specimen goes with a model that ships: what it is driven with and what its sensors read are the
-model's inputs and outputs, in their order. Its equations are written in energies, volumes and
-charges, contacts as what touches and slips, and it is integrated by semi-implicit Euler steps.
+A specimen belongs to a shipped model: its drives and sensor signals are the model's inputs and
+outputs, in their order. Its equations are in energies, volumes and charges, its contacts stick and
+slip, and it is integrated by semi-implicit Euler steps.
 
     recorded = specimen("attached_mass").record(seed=3, hidden=True)
 """

@@ -1,4 +1,4 @@
-"""A winding, balanced as flux, and a motor that drives a load through a shaft, as momenta."""
+"""A winding in terms of flux, and a motor that drives a load through a shaft, in momenta."""
 
 import math
 from collections.abc import Callable
@@ -25,7 +25,7 @@ def volts(time: FloatArray, seed: int) -> FloatArray:
 
 
 def _magnetising(flux: float) -> float:
-    """Current of an iron core that bends off softly [A]."""
+    """Current of an iron core that saturates softly [A]."""
     return flux / INDUCTANCE * (1 + 12.0 * flux * flux)
 
 

@@ -1,7 +1,7 @@
-"""A mass on a spring in closed form, its resonance anywhere that a force of 0.25 to 16 Hz reaches.
+"""A mass on a spring in closed form, with its resonance within the force's 0.25 to 16 Hz.
 
-The force is a line between samples or held, so that the exact step from sample to sample is a
-matrix exponential.
+The force is linear between samples or held, so the exact step from sample to sample is a matrix
+exponential.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from rigwatch.wire.arrays import FloatArray
 
 RATE, SAMPLES = 256.0, 5120
-"""Samples a second, and in a recording."""
+"""Sample rate [Hz], and samples in a recording."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Mass:
 
     @property
     def values(self) -> FloatArray:
-        """In this order, shape (3,)."""
+        """Mass, damper and spring, shape (3,)."""
         return np.array([self.m, self.c, self.k])
 
 
@@ -33,9 +33,9 @@ def moved(mass: Mass, force: FloatArray, *, held: bool) -> FloatArray:
     """Position [m] and acceleration [m/s^2] at the samples, from rest; shape (n, 2).
 
     Args:
-        mass: what is pushed.
+        mass: the mass and its spring.
         force: at the samples, shape (n,) [N].
-        held: whether it stays from sample to sample; else a line joins them.
+        held: whether it is constant between samples; else a line joins them.
     """
     whole = np.zeros((4, 4))
     whole[0, 1] = 1.0

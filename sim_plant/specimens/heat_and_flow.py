@@ -38,7 +38,7 @@ CAPACITY, CONDUCTANCE = 400.0, 1.2
 
 
 def warm(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
-    """Temperature of the block [K], shape (n, 1); what the room takes is known but convection."""
+    """Temperature of the block [K], shape (n, 1); losses other than convection are known."""
     lost = LOSSES.get(hidden, _nothing)
     known = 0.0 if hidden == "convection" else CONDUCTANCE
     energy, h = CAPACITY * 293.0, dt / STEPS

@@ -1,4 +1,4 @@
-# ruff: noqa: ARG005 -- laws of one kind take the same, whichever of it they need
+# ruff: noqa: ARG005 -- laws of one kind take the same arguments
 """A mass on a spring and a damper: contacts, stops, second masses; a drive and sensors.
 
 Symbols: x position [m], v velocity [m/s], u force [N], h step [s], t time [s].
@@ -46,7 +46,7 @@ def march(inputs: FloatArray, dt: float, hidden: str) -> FloatArray:
 
 
 class SlipElement:
-    """A spring that ends in a dry slider: it stretches up to where it slips."""
+    """A spring in series with a dry slider: it stretches until the slider slips."""
 
     def __init__(self, stretch: float, force: float) -> None:
         self._most, self._force, self._stretched = stretch, force, 0.0

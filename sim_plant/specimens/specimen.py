@@ -1,4 +1,4 @@
-"""What all specimens share: a drive of several sines, steps finer than samples, sensors' noise."""
+"""Common parts of all specimens: multisine drives, integration steps, sensor noise."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from rigwatch.wire.arrays import FloatArray
 
 NOISE = 1e-3
-"""Standard deviation of each sensor's noise over that of what it reads."""
+"""Standard deviation of each sensor's noise, relative to that of its signal."""
 
 March = Callable[[FloatArray, float, str], FloatArray]
 """Inputs (n, inputs), time between samples [s] and the hidden effect, none if empty → outputs."""
@@ -16,7 +16,7 @@ March = Callable[[FloatArray, float, str], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What a specimen did.
+    """A recording of a specimen.
 
     Attributes:
         dt: time between samples [s].
@@ -31,10 +31,10 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Machine:
-    """What can be driven and read.
+    """A machine with drives and sensors.
 
     Attributes:
-        model: that goes with it, by name.
+        model: name of its model.
         rate: samples a second [Hz].
         drive: time (n,) [s] and a seed → inputs (n, inputs).
         march: integrates it.
@@ -51,8 +51,8 @@ class Specimen:
     """A machine with one effect of the library to be hidden in it.
 
     Attributes:
-        machine: what is driven and read.
-        hidden: what may be hidden.
+        machine: the machine.
+        hidden: the effect that can be hidden.
         named: effects at ports by which a workbench names it.
     """
 

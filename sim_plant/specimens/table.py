@@ -1,4 +1,4 @@
-"""Which effect of the library is hidden in which machine, and what it may be called."""
+"""The effects hidden in each machine, and the library names that count as right."""
 
 from sim_plant.specimens import electric, heat_and_flow, mass
 from sim_plant.specimens.specimen import Machine, Specimen

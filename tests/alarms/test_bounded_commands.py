@@ -1,7 +1,7 @@
 """What a command may claim: the monitor's clock counts, and texts have bounds."""
 
 from monitor.alarms import AlarmManager, Occasion, bounded, last_records
-from monitor.alarms.operator import LONGEST_NAME, LONGEST_TEXT, MOST_APART_NS
+from monitor.alarms.operator import LONGEST_NAME, LONGEST_TEXT, MAX_CLOCK_DIFFERENCE_NS
 from rigwatch.wire.messages import Alarm, AlarmCommand
 from tests.alarms.alarm_signals import condition, run, spell, time_of
 
@@ -26,7 +26,7 @@ def test_a_shelf_ends_after_eight_hours_of_the_monitors_clock() -> None:
 
 
 def test_a_clock_that_is_a_little_off_keeps_its_time() -> None:
-    command = AlarmCommand("dry_friction", "shelve", "ann", NOW - MOST_APART_NS)
+    command = AlarmCommand("dry_friction", "shelve", "ann", NOW - MAX_CLOCK_DIFFERENCE_NS)
     assert bounded(command, NOW) == command
 
 

@@ -293,7 +293,7 @@ def test_every_hole_is_asked_for_as_often_as_the_first() -> None:
             order.on_block(block(seq))
             assert order.on_reply(ask, None) == [ask]
         outcomes = order.on_reply(ask, None)
-        assert outcomes[0] == Loss(7, ask.first, ask.last, "nobody could be asked for them")
+        assert outcomes[0] == Loss(7, ask.first, ask.last, "no source could be queried for them")
         assert order.position == (7, seq)
         seq += 5
 
@@ -427,7 +427,7 @@ def test_a_position_beyond_the_newest_sample_is_set_back_to_it() -> None:
     bench.reply_all()
     told = "sample 20 of boot 7 lies beyond its newest, 19; reading continues from there"
     assert bench.remarks == [Remark("error", POSITION_WRONG, told)]
-    assert bench.losses == [Loss(7, 20, 19, "the position to go on from was wrong")]
+    assert bench.losses == [Loss(7, 20, 19, "the resume position was wrong")]
     bench.send(block(20))
     bench.send(block(22, 10))
     assert len(bench.losses) == 1, "ten may wait"

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print every finding; 1 if one of them prevents rigwatch from running."""
     findings = []
-    for finding in _asked(arguments):
+    for finding in _selected(arguments):
         findings.append(finding)
         if not arguments.json:
             print(_line(finding), flush=True)
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if any(finding.level == "fail" for finding in findings) else 0
 
 
-def _asked(arguments: argparse.Namespace) -> Iterator[Finding]:
+def _selected(arguments: argparse.Namespace) -> Iterator[Finding]:
     if arguments.alive is None:
         yield from _findings(arguments.config)
         return

@@ -9,7 +9,7 @@ from rigwatch.commands.structures.structure_files import (
     as_written,
     figures,
     plain,
-    problem_asked,
+    problem_from,
     units_of,
     write_report,
 )
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.wire.errors import ModelError
 
     drawn = wanted(arguments)
-    problem = problem_asked(arguments)
+    problem = problem_from(arguments)
     results: dict[str, Identification | str] = {}
     for method in METHODS:
         try:

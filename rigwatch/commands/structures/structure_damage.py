@@ -11,7 +11,7 @@ from rigwatch.commands.structures.structure_files import (
     add_test,
     write_page,
 )
-from rigwatch.commands.structures.structure_view import add_views, draw_damage, told, wanted
+from rigwatch.commands.structures.structure_view import add_views, damage_lines, draw_damage, wanted
 
 if TYPE_CHECKING:
     from rigwatch.structures.damage import Damage, Examination, Figure
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
         print("no damage")
     else:
         for damage in found.damages:
-            print("\n".join(told(damage)))
+            print("\n".join(damage_lines(damage)))
     return 0
 
 

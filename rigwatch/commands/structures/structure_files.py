@@ -74,7 +74,7 @@ def add_record(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def problem_asked(arguments: argparse.Namespace) -> "Problem":
+def problem_from(arguments: argparse.Namespace) -> "Problem":
     """The identification problem from the arguments of `add_problem`.
 
     Raises:

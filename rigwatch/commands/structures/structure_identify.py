@@ -9,7 +9,7 @@ from rigwatch.commands.structures.structure_files import (
     as_written,
     figures,
     plain,
-    problem_asked,
+    problem_from,
     units_of,
     write_report,
 )
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.structures.identification import solved
 
     drawn = wanted(arguments)
-    problem = problem_asked(arguments)
+    problem = problem_from(arguments)
     found = solved(arguments.method, problem, **_options(arguments))
     if arguments.report:
         write_report(arguments, problem, {found.method: found})

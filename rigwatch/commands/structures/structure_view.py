@@ -66,13 +66,13 @@ def draw_damage(arguments: argparse.Namespace, found: "Examination") -> None:
         for d in found.damages
     }
     judged = Judged(damage_signals.statistic(found), instants)
-    lines = [line for damage in found.damages for line in told(damage)]
+    lines = [line for damage in found.damages for line in damage_lines(damage)]
     story = _story(f"{model.structure.name}: {verdict(found)}", lines)
     seconds = np.arange(len(model)) * np.float64(model.dt)
     _draw(arguments, seconds, [outputs[k] for k in loudest], story, judged)
 
 
-def told(damage: "Damage") -> list[str]:
+def damage_lines(damage: "Damage") -> list[str]:
     """The description of a damage."""
     at = damage.instant
     vague = "" if damage.explained else ", not explained by one change or two"

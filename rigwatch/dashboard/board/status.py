@@ -114,20 +114,20 @@ def _counter_rows(facts: Facts) -> Iterator[str]:
     found: dict[str, Mapping[str, float]] = {}
     for health in facts.health.values():
         for name, value in health.counters.items():
-            if _worth_a_row(name, value) and not _belongs_to_another(name, health.counters):
+            if _has_row(name, value) and not _belongs_to_another(name, health.counters):
                 known = found.get(name)
                 if known is None or value > known[name]:
                     found[name] = health.counters
-    for name in sorted(found, key=_wanted):
+    for name in sorted(found, key=_display_order):
         mean, worst = (found[name].get(_with(name, word)) for word in ("mean", "worst"))
         yield _row(_words(name), found[name][name], mean, worst)
 
 
-def _wanted(name: str) -> tuple[int, str]:
+def _display_order(name: str) -> tuple[int, str]:
     return (_ALWAYS.index(name) if name in _ALWAYS else len(_ALWAYS)), name
 
 
-def _worth_a_row(name: str, value: float) -> bool:
+def _has_row(name: str, value: float) -> bool:
     """The screen has room for the most requested figures; the Health tab has all."""
     shown = name in _ALWAYS or name.startswith("latency")
     return shown or (value != 0.0 and any(word in name for word in _WHEN_NOT_ZERO))

@@ -167,7 +167,7 @@ def spring_model(
     return SpringModel(whole, problem, signals)
 
 
-def beside(model: SpringModel, record: Record) -> SpringModel:
+def with_record(model: SpringModel, record: Record) -> SpringModel:
     """The same kernel with another record of the same signals and time step."""
     equations = model.problem.sweeper.compiled.system.model
     wanted = {*model.signals, *(i.channel or name for name, i in equations.inputs.items())}

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigwatch.structures.damage.detector import noise
-from rigwatch.structures.damage.spring_model import SpringModel, beside, spring_model
+from rigwatch.structures.damage.spring_model import SpringModel, spring_model, with_record
 from rigwatch.structures.identification import CONFIDENCE, problem_of, solver
 from rigwatch.structures.model import Structure, coefficients
 from rigwatch.structures.records import Record
@@ -81,7 +81,7 @@ def reference(
         )
     names, values, covariance = _identified(structure, record, samples, known=known)
     if known and model is not None:
-        model = beside(model, record)
+        model = with_record(model, record)
     else:
         model = spring_model(structure, record, dict(zip(names, values.tolist(), strict=True)))
     parameters = model.problem.start

@@ -104,7 +104,7 @@ class LiveDamage:
         except KeyError as error:
             name = self._structure.name
             raise ModelError(f"{name}: found samples without the channel {error}") from None
-        return self._said()
+        return self._messages()
 
     def _begin(self, block: SampleBlock) -> None:
         self._boot, self._first, self._device = block.boot, block.seq, block.device
@@ -112,18 +112,18 @@ class LiveDamage:
         self._stage: Literal["learning", "watching", "gathering", "told"] = "learning"
         self._done = 0
 
-    def _said(self) -> list[Said]:
-        said, rows, begin = list[Said](), list[FloatArray](), self._done
+    def _messages(self) -> list[Said]:
+        messages, rows, begin = list[Said](), list[FloatArray](), self._done
         for row in range(self._done, len(self._record)):
             if self._stage == "learning" and row + 1 == self._learnt:
-                said += self._learn(row)
+                messages += self._learn(row)
                 begin = row + 1
             elif self._stage in {"watching", "gathering"}:
                 residual, over = self._beside.step(self._record, row)
                 rows.append(residual)
-                said += self._judged(row, over=over)
+                messages += self._judged(row, over=over)
         self._done = len(self._record)
-        return [self._estimates(begin, rows), *said] if rows else said
+        return [self._estimates(begin, rows), *messages] if rows else messages
 
     def _learn(self, row: int) -> list[Said]:
         """The undamaged structure, and the judgement of the same samples."""
@@ -133,13 +133,13 @@ class LiveDamage:
         except ModelError as error:
             self._stage = "told"
             return [self._event(row, "error", "NOT WATCHED", str(error))]
-        self._beside = _Beside(base, settings, self._dt)
+        self._beside = _UndamagedRun(base, settings, self._dt)
         self._stage = "watching"
-        said: list[Said] = [self._event(row, "info", "WATCHED", _learnt(base))]
+        messages: list[Said] = [self._event(row, "info", "WATCHED", _learnt(base))]
         for past in range(row + 1):
             over = self._beside.step(self._record, past)[1]
-            said += self._judged(past, over=over)
-        return said
+            messages += self._judged(past, over=over)
+        return messages
 
     def _judged(self, row: int, *, over: bool) -> list[Said]:
         if self._stage == "watching" and over:
@@ -185,7 +185,7 @@ class LiveDamage:
         return EstimateBlock(self._device, self._boot or 0, self._first + begin, t_ns, columns)
 
 
-class _Beside:
+class _UndamagedRun:
     """The undamaged model, run in parallel with the samples one step at a time."""
 
     def __init__(self, base: Reference, settings: LiveSettings, dt: float) -> None:

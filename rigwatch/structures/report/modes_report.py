@@ -8,7 +8,7 @@ from rigwatch.page import page
 from rigwatch.structures.model import StrainEnergy, Structure, by_family
 from rigwatch.structures.report.mode_drawing import shares_plot
 
-TOLD = 6
+NAMED = 6
 """Number of springs named as most suspect."""
 
 
@@ -30,7 +30,7 @@ def modes_html(structure: Structure, energy: StrainEnergy) -> str:
         name=structure.name,
         energy=energy,
         leading=leading,
-        suspects=energy.ranking()[:TOLD],
+        suspects=energy.ranking()[:NAMED],
         families=shares_plot(families, title).drawn(),
         members=shares_plot(apart, title).drawn(),
     )

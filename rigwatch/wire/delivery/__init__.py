@@ -1,6 +1,7 @@
 """Every sample is delivered, recovered or reported as lost.
 
-    publisher ──▶ Ring ◀──asks── SampleReader ──▶ SampleOrder ──▶ samples in order, losses counted
+    publisher ──▶ Ring ◀──queries── SampleReader ──▶ SampleOrder ──▶ samples in order, losses
+    counted
 
 The logic is in `ordering`, which is also used for alarms and estimates.
 """

@@ -61,7 +61,7 @@ class RingStore:
         """The requested samples still stored, as many as fit into one reply."""
         last = min(ask.last, self.newest)
         first = min(max(ask.first, self.newest - self.capacity + 1, 0), last + 1)
-        # Samples older than the ring are settled as well: they will never come.
+        # Samples older than the ring are settled as well: they are permanently lost.
         last = min(last, first + SAMPLES_PER_REPLY - 1)
         seq = np.arange(first, last + 1)
         runs = _runs(seq[self._seq[seq % self.capacity] == seq])

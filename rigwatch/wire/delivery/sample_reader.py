@@ -2,7 +2,7 @@
 
     bus ──blocks, tokens──▶ inbox ──▶ SampleOrder ──▶ blocks and gaps in order
                               ▲            │ Ask
-                              └──replies── questions, asked in a thread of their own
+                              └──replies── queries, sent from a separate thread
 
 All logic is in `sample_order.py`; a block in order passes straight through, in the reader's thread.
 """
@@ -57,7 +57,7 @@ class SampleReader:
     Args:
         bus: source of the samples; `bus.process` is named in gaps and events.
         resume_after: (boot, seq) of the last sample that an earlier run of this process has
-            processed, so that none after it is missed.
+            processed, so reading continues after it.
         history: number of samples before those (or before the first received) that are also read
             if the ring has them; missing ones are not a gap.
         capacity: messages queued for a slow reader before further ones are left to the ring.

@@ -1,20 +1,20 @@
-"""How much memory a foreign file may ask for: packed, a few kilobytes can mean gigabytes."""
+"""Memory limit for foreign files: a few kilobytes may decompress to gigabytes."""
 
 BASE, RATIO = 1 << 25, 50
-"""Bytes that any file may take, and bytes more for each of its own."""
+"""Memory allowed for any file [bytes], plus the memory per byte of the file."""
 
 
 class Budget:
-    """What is left of the bytes that a file of `size` bytes may take."""
+    """The remaining memory that a file of `size` bytes may use."""
 
     def __init__(self, size: int) -> None:
         self.left = BASE + RATIO * size
 
     def take(self, wanted: int) -> None:
-        """Use up `wanted` bytes.
+        """Use `wanted` bytes.
 
         Raises:
-            ValueError: so many are not left.
+            ValueError: fewer bytes remain.
         """
         if wanted > self.left:
             raise ValueError(f"unpacks to more than {self.left >> 20} MB, expected less")

@@ -1,4 +1,4 @@
-"""The units that imported data may come in, and how they become SI.
+"""Units of imported data and their conversion to SI.
 
 SI value = factor · value + offset
 """
@@ -27,7 +27,7 @@ CHANNEL_UNITS = {
     "force": "N",
     "pressure": "Pa",
 }
-"""SI units of the channel names that have a meaning here: no other unit is taken for them."""
+"""SI units of the channel names with a fixed quantity; units of other quantities are refused."""
 _USUAL = {
     "s": "s, ms, us, min, h",
     "V": "V, mV, kV",
@@ -41,11 +41,11 @@ AMBIGUOUS = {
     "g": "'g0' for standard gravity or 'gram'",
     "mg": "'mg0' for standard gravity or 'mgram'",
 }
-"""Accelerometers are read in g and scales too: a recording has to say which."""
+"""Both accelerations and masses are given in g, so the unit must be written unambiguously."""
 
 
 def conversion(unit: str, channel: str) -> Conversion:
-    """How values of `channel` in `unit` become SI.
+    """Conversion of values of `channel` from `unit` to SI.
 
     Raises:
         ImportDataError: the unit is unknown, ambiguous, or not one of the channel's kind.
@@ -59,7 +59,8 @@ def conversion(unit: str, channel: str) -> Conversion:
     wanted = CHANNEL_UNITS.get(channel)
     if wanted is not None and found.dimension != unit_of(wanted).dimension:
         raise ImportDataError(
-            f"{channel}: found the unit {unit!r}, expected one of {_USUAL[wanted]} or alike"
+            f"{channel}: found the unit {unit!r}, expected one of {_USUAL[wanted]} or another unit"
+            " of the same kind"
         )
     si = wanted or ("" if found.si == "1" else found.si)
     return Conversion(si, float(found.factor), float(found.offset))

@@ -1,4 +1,4 @@
-"""Sessions as CSV, Parquet or MAT files, with units in the titles; nothing is lost on the way."""
+"""Sessions as CSV, Parquet or MAT files, with units in the titles, without loss."""
 
 import csv
 import re
@@ -22,7 +22,7 @@ Tables = Iterator[dict[str, Array]]
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """What an export made: the file, its rows and the titles of its columns."""
+    """Result of an export: the file, its rows and the titles of its columns."""
 
     path: Path
     rows: int
@@ -41,10 +41,10 @@ def export_session(
     """The samples (or estimates) of one device as a CSV, Parquet or MAT file, by its ending.
 
     Args:
-        session: what is exported.
-        target: the file to be made.
+        session: the session.
+        target: the new file.
         estimates: the monitor's estimates instead of the samples.
-        device: which device, None where the session has only one.
+        device: name of the device, None if the session has only one.
         start, end: time span [ns].
 
     Raises:
@@ -106,7 +106,7 @@ def _write_csv(target: Path, first: dict[str, Array], rest: Tables) -> int:
         writer = csv.writer(file)
         writer.writerow(first)
         for table in _all(first, rest):
-            # Python prints a float with as many digits as bring the same float back.
+            # Python prints a float with enough digits to restore it exactly.
             writer.writerows(zip(*(column.tolist() for column in table.values()), strict=True))
             rows += _length(table)
     return rows

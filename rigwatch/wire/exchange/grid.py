@@ -1,4 +1,4 @@
-"""Puts jittered samples onto a uniform grid, and says which of its points had no data near.
+"""Puts jittered samples onto a uniform grid, and marks points without data nearby.
 
 t_k = t_0 + k / rate        linear interpolation between the neighbours
 """
@@ -12,13 +12,13 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError
 
 JITTER = 0.1
-"""Time stamps this far from a uniform grid, in sample periods, are still taken for uniform."""
+"""Deviation from a uniform grid, in sample periods, up to which time stamps count as uniform."""
 RATE_TOLERANCE = 0.02
-"""A given rate may differ from that of the time stamps by this share."""
+"""Allowed relative difference between a given rate and that of the time stamps."""
 LATEST = 9e9
-"""Time beyond which nanoseconds do not fit their 64 bits [s]."""
+"""Largest time whose nanoseconds fit into 64 bits [s]."""
 MOST_POINTS, MOST_PER_SAMPLE = 4_000_000, 50
-"""Points that any grid may have, and those more for each sample."""
+"""Largest number of points of any grid, plus the number per sample."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Grid:
         rate_hz: sample rate [Hz].
         times: shape (n,) [s].
         jittered: the recording's own time stamps are not uniform, its values must be interpolated.
-        in_hole: shape (n,), points where the recording has no sample near enough.
+        in_hole: shape (n,), points without a sample of the recording nearby.
         steps_s: shortest and longest step of the time stamps [s].
     """
 
@@ -78,11 +78,11 @@ def _too_many(times: FloatArray, rate_hz: float) -> str:
     at = int(np.argmax(np.diff(times)))
     jump = f"a jump from {times[at]:.6g} s to {times[at + 1]:.6g} s"
     points = f"{(times[-1] - times[0]) * rate_hz:.3g} points at {rate_hz:.6g} Hz"
-    return f"time: found {jump}, which asks for {points}; expected one recording without it"
+    return f"time: found {jump}, which needs {points}; expected one recording without it"
 
 
 def _is_uniform(times: FloatArray, period: float) -> bool:
-    """Whether no time stamp lies far from the straight line through the first and the last."""
+    """Whether all time stamps are close to the straight line through the first and the last."""
     steps = len(times) - 1
     span = float(times[-1] - times[0])
     line = times[0] + np.arange(steps + 1) * (span / max(1, steps))

@@ -1,4 +1,4 @@
-"""What a logger's column headers say: a name and a unit.
+"""Name and unit from a logger's column header.
 
 speed_rad_s    speed [rad/s]    Speed (rpm)    accel_m_s2    time_ms    t
 """
@@ -16,13 +16,13 @@ _POWER = re.compile(r"^(?P<unit>[A-Za-zµΩ°%]+)(?P<power>\d)$")
 
 @dataclass(frozen=True)
 class Header:
-    """A column as its header names it.
+    """A column header.
 
     Attributes:
-        column: the header as it stands.
-        name: what is measured, in lower case with `_` between words.
-        units: what may be meant, as rigwatch writes it, the likeliest first; empty where the header
-            tells none. `N_m` may be N/m or N m.
+        column: the header as written.
+        name: the quantity, in lower case with `_` between words.
+        units: possible units in rigwatch's notation, the likeliest first; empty without a unit.
+            `N_m` may be N/m or N m.
     """
 
     column: str
@@ -31,7 +31,7 @@ class Header:
 
 
 def read_header(column: str) -> Header:
-    """The name and the units that a header tells."""
+    """Name and possible units from a header."""
     if found := _BRACKETED.match(column):
         units = tuple(filter(_known, [found["unit"].strip()]))
         return Header(column, _plain(found["name"]), units)
@@ -47,7 +47,7 @@ def _plain(name: str) -> str:
 
 
 def _units(words: list[str]) -> Iterator[str]:
-    """Units that words may stand for: the first over the others, or all of them together."""
+    """Units that words may mean: the first divided by the others, or their product."""
     told = [_powered(word) for word in words if word.lower() != "per"]
     if len(told) == 2:
         yield "/".join(told)

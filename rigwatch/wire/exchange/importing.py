@@ -20,14 +20,14 @@ from rigwatch.wire.session import LARGEST_BLOCK, SessionWriter, run_info
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """What an import made.
+    """Result of an import.
 
     Attributes:
         path: the new session.
         samples: how many samples (or estimates) it has.
         rate_hz: their rate [Hz].
         channels: unit of each channel.
-        remarks: what was done to the data, in words; also in the session's notes.
+        remarks: changes to the data, in words; also in the session's notes.
     """
 
     path: Path
@@ -40,11 +40,11 @@ class Imported:
 def import_file(source: Path, target: Path, mapping: ImportMapping, start_ns: int = 0) -> Imported:
     """A session at `target` of the CSV, MAT or Parquet file at `source`.
 
-    A file that `rigwatch export` made, with no channels mapped, comes back sample for sample.
+    A file written by `rigwatch export` is restored sample by sample if no channels are mapped.
 
     Args:
         source: the foreign file.
-        target: the session to be made.
+        target: the new session.
         mapping: which columns become which channels.
         start_ns: added to the file's times [ns].
 
@@ -79,7 +79,7 @@ class _TimeBase:
 
 
 def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str, ...]]:
-    """The times, and remarks on what was done to them."""
+    """The times, and remarks on changes to them."""
     if not mapping.time:
         return _counted(table, mapping)
     source = _source("time", mapping.time, table)
@@ -156,7 +156,7 @@ def _channel(name: str, text: str, table: Table, base: _TimeBase, *, allow_missi
 
 
 def _resampled(column: Column, grid: Grid, times: FloatArray) -> Column:
-    """Interpolated between finite neighbours; what lies beside a missing one is invalid too."""
+    """Interpolated between finite neighbours; points next to a missing sample are invalid."""
     missing = column.quality != quality.GOOD
     if missing.all():
         found = np.full(len(grid.times), np.nan)

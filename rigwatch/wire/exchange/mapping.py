@@ -36,7 +36,7 @@ class ImportMapping(Section, frozen=True):
     ] = ""
     rate: Annotated[
         Annotated[float, Meta(ge=1e-6, le=1e9)] | None,
-        Meta(description="sample rate [Hz]; needed where there is no time"),
+        Meta(description="sample rate [Hz]; required without a time column"),
     ] = None
     format: Annotated[
         Literal["auto", "csv", "mat", "parquet", "json"],

@@ -5,7 +5,7 @@
     4 bytes matrix  := flags | dimensions | name | real part              each an element
 
 Written here because a damaged file can crash the process in SciPy's reader. Structures, sparse and
-complex arrays are passed over. Source: MathWorks, "MAT-File Format", 2019.
+complex arrays are skipped. Source: MathWorks, "MAT-File Format", 2019.
 """
 
 import itertools
@@ -38,7 +38,7 @@ _MOST_PARTS = 10_000
 
 
 class MatError(ValueError):
-    """The bytes are no MAT file of version 5; the text says what was found."""
+    """The bytes are not a MAT file of version 5; the text describes them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ def _elements(data: memoryview, order: str) -> Iterator[_Element]:
             kind, size, start = kind & 0xFFFF, kind >> 16, at + 4
             at += 8
         else:
-            # Only compressed elements stand without padding.
+            # Only compressed elements have no padding.
             at = start + (size if kind == _COMPRESSED else (size + 7) // 8 * 8)
         if start + size > len(data) or (start == at - 4 and size > 4):
             raise ValueError("an element is longer than the file")
@@ -106,7 +106,7 @@ def _unpacked(element: _Element, order: str, budget: Budget) -> _Element:
 
 
 def _matrix(element: _Element, order: str, budget: Budget) -> tuple[str, Value | None]:
-    """Name and value of a variable; None for a kind that we pass over."""
+    """Name and value of a variable; None for a kind that is skipped."""
     if element.kind != _MATRIX:
         raise ValueError(f"an element of kind {element.kind} where a variable should be")
     parts = list(itertools.islice(_elements(element.data, order), _MOST_PARTS + 1))

@@ -1,9 +1,8 @@
-"""Our own tables: one row a sample, in columns whose titles carry names and units.
+"""Tables in rigwatch's own layout: one row a sample, in columns whose titles carry names and units.
 
     boot, seq, t_ns [ns], device_us [us], voltage [V], voltage quality, …
 
-`device_us` stands in tables of samples only. `export` writes them, and reading one back gives the
-same blocks.
+Only tables of samples have `device_us`. `export` writes them; reading one restores the same blocks.
 """
 
 import re
@@ -43,12 +42,12 @@ def table_columns(block: Block) -> dict[str, Array]:
 
 
 def is_native(table: Table) -> bool:
-    """Whether the table has the columns that only ours has."""
+    """Whether the table is in this layout."""
     return {BOOT, SEQ, T_NS} <= set(table.names)
 
 
 def native_blocks(table: Table, device: str) -> list[SampleBlock] | list[EstimateBlock]:
-    """The blocks of a table of ours: one for each run of consecutive samples.
+    """The blocks of a table in this layout: one for each run of consecutive samples.
 
     Raises:
         ImportDataError: a cell is not what its column holds; file, line and column are named.

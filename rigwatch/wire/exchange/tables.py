@@ -22,7 +22,7 @@ FORMATS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv"} | {
     ".json": "json",
 }
 _DELIMITERS = ";\t,"
-"""Looked for in this order."""
+"""Delimiters, in the order in which they are tried."""
 _DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
 
 
@@ -33,8 +33,8 @@ class Table:
     Attributes:
         path: the file, named in errors.
         cells: the columns as they were read, text or numbers.
-        scalars: single numbers beside the columns.
-        first_line: line of row 0 where lines can be counted (CSV), else None.
+        scalars: single numbers of the file, by name.
+        first_line: line of row 0 in a CSV file, otherwise None.
     """
 
     path: Path
@@ -48,7 +48,7 @@ class Table:
         return tuple(self.cells)
 
     def place(self, row: int, column: str) -> str:
-        """Where a cell stands, for errors."""
+        """Location of a cell, for errors."""
         if self.first_line is None:
             return f"{self.path}, row {row + 1}, column {column}"
         return f"{self.path}:{self.first_line + row}, column {column}"
@@ -138,7 +138,7 @@ def read_table(path: Path, mapping: ImportMapping) -> Table:
 
 
 def columns_of(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
-    """Cells of each column of a foreign file, and the single numbers beside them.
+    """Cells of each column of a foreign file, and its single numbers.
 
     Raises:
         ImportDataError: it cannot be read.
@@ -183,7 +183,7 @@ def _all_numbers(cells: list[str]) -> bool:
 
 
 def _with_points(rows: list[list[str]]) -> list[list[str]]:
-    """Rows with decimal points where they came with decimal commas."""
+    """Rows with decimal commas replaced by decimal points."""
     if not any(_DECIMAL_COMMA.match(cell) for row in rows[:100] for cell in row):
         return rows
     return [[_pointed(cell) for cell in row] for row in rows]
@@ -195,7 +195,7 @@ def _pointed(cell: str) -> str:
 
 def _rows(lines: list[str], delimiter: str) -> list[list[str]]:
     if delimiter == "auto":
-        # Where there is a semicolon or a tab, a comma is the decimal one.
+        # With semicolons or tabs as delimiters, commas are decimal commas.
         delimiter = next((mark for mark in _DELIMITERS if mark in lines[0]), "whitespace")
     if delimiter == "whitespace":
         return [line.split() for line in lines]
@@ -227,13 +227,13 @@ def _read_mat(path: Path, _: ImportMapping) -> Table:
 
 
 def _titles(found: Value | None, arrays: dict[str, Any]) -> dict[str, str]:
-    """Column titles by variable that our own export adds, as names in MAT files hold no units."""
+    """Column titles by variable, added by `rigwatch export`: names in MAT files have no units."""
     pairs = [text.partition("=") for text in found] if isinstance(found, list) else []
     return {name: title for name, _, title in pairs if name in arrays}
 
 
 def _read_json(path: Path, _: ImportMapping) -> Table:
-    """An object of columns, with numbers beside them, or a list of rows that are objects."""
+    """Columns and scalars of an object of columns, or of a list of row objects."""
     try:
         found = msgspec.json.decode(path.read_bytes())
     except msgspec.DecodeError as error:

@@ -1,11 +1,11 @@
-"""Files that a kill at any moment leaves as they were or as they are to be."""
+"""Atomic writing of files: after a kill at any moment a file is either old or new."""
 
 import os
 from pathlib import Path
 
 
 def write_through(path: Path, text: str) -> None:
-    """Write a text file, and return once it is on the disk."""
+    """Write a text file and return once it is on the disk."""
     with path.open("w", encoding="utf-8") as file:
         file.write(text)
         file.flush()
@@ -13,7 +13,7 @@ def write_through(path: Path, text: str) -> None:
 
 
 def replace_file(path: Path, text: str) -> None:
-    """Write a text file whole or not at all."""
+    """Write a text file completely or not at all."""
     beside = path.with_name(f"{path.name}.{os.getpid()}.part")
     write_through(beside, text)
     beside.replace(path)

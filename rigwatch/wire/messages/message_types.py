@@ -1,4 +1,4 @@
-"""What the processes say to each other, and what a session file keeps: one declaration a message.
+"""The messages between processes and in session files, one declaration each.
 
 Every message is a frozen dataclass. Its protobuf schema is built from the annotations
 (`protobuf.py`), so that the bus and the session files carry the same bytes and any protobuf or MCAP
@@ -36,7 +36,7 @@ class Column:
         name: channel or signal name, such as "voltage".
         unit: SI unit, "" for a pure number.
         values: shape (n,).
-        quality: shape (n,), flags of `quality_flags.py`; empty where the signal has none.
+        quality: shape (n,), flags of `quality_flags.py`; empty if the signal has none.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Column:
     quality: ByteArray = field(default_factory=lambda: np.zeros(0, np.uint8))
 
     def usable(self) -> FloatArray:
-        """The values, NaN where they are invalid or no numbers; shape (n,)."""
+        """The values, NaN if invalid or not a number; shape (n,)."""
         good = np.isfinite(self.values)
         if len(self.quality):
             good &= valid(self.quality)
@@ -76,7 +76,7 @@ class SampleBlock:
         return len(self.t_ns)
 
     def channel(self, name: str) -> Column:
-        """The channel called `name`; KeyError where the device has none."""
+        """The channel called `name`; KeyError if there is none."""
         for column in self.channels:
             if column.name == name:
                 return column
@@ -85,7 +85,7 @@ class SampleBlock:
 
 @dataclass(frozen=True, slots=True)
 class EstimateBlock:
-    """What the monitor computed for consecutive samples.
+    """Results of the monitor for consecutive samples.
 
     Attributes:
         device: the device whose samples these were.
@@ -105,7 +105,7 @@ class EstimateBlock:
         return len(self.t_ns)
 
     def column(self, name: str) -> Column:
-        """The field called `name`; KeyError where there is none."""
+        """The field called `name`; KeyError if there is none."""
         for column in self.columns:
             if column.name == name:
                 return column
@@ -114,10 +114,10 @@ class EstimateBlock:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """Samples, or messages of `topic`, that a reader will never get: `first` to `last`, both lost.
+    """Samples, or messages of `topic`, lost to a reader: `first` to `last`, inclusive.
 
-    `last` below `first` says that the number is unknown (the device restarted meanwhile). Of
-    messages `device` is the process that said them, `boot` its run. An empty topic means samples.
+    `last` below `first` means an unknown number (the device restarted meanwhile). For messages
+    `device` is the process that sent them, `boot` its run. An empty topic means samples.
     """
 
     device: str
@@ -132,13 +132,13 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """How a process is doing, published about once a second.
+    """State of a process, published about once a second.
 
     Attributes:
         source: the process, such as "daq/rig1".
-        t_ns: when this was said [ns].
+        t_ns: time of the message [ns].
         state: one word for people: "running", "stale", "reconnecting", "stopped", …
-        text: one plain line, empty where all is well.
+        text: one plain line, empty without a problem.
         counters: figures by name, unit in the name (`rate_hz`, `lost_samples`, `crc_errors`).
     """
 
@@ -154,9 +154,10 @@ PROBABLY_MISSING = "PROBABLY MISSING"
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened once and is worth a line in the log.
+    """A single occurrence for the log.
 
-    With the code `PROBABLY_MISSING` its text is an alarm's name, ": ", and what the ranking found.
+    With the code `PROBABLY_MISSING` its text is an alarm's name, ": ", and the result of the
+    ranking.
     """
 
     source: str
@@ -171,16 +172,13 @@ class Alarm:
     """One transition of one alarm.
 
     Attributes:
-        name: the alarm, such as "dry_friction" or "link".
-        state: the state it is in from now on.
-        severity: how bad.
-        cause: what is probably wrong, in words.
-        guidance: what to do now, in words.
-        device, boot, seq, t_ns: the sample that decided; seq -1 where no sample did.
-        value, low, high: the figure and the limits it left; NaN where there are none.
-        first_out: it was the first of the flood it stands in.
-        user: who acted, for transitions by an operator.
-        onset_seq: the first sample at which the condition held; persistence lies between.
+        name: the alarm, such as "dry_friction" or "link". state: the state it is in from now on.
+        severity: from info to critical. cause: the probable cause, in words. guidance: the
+        recommended action, in words. device, boot, seq, t_ns: the sample that decided; seq -1 if no
+        sample did. value, low, high: the value and the limits it exceeded; NaN if there are none.
+        first_out: whether it was the first of its flood. user: the operator, for transitions by an
+        operator. onset_seq: the first sample at which the condition held; earlier than the alarm by
+        its persistence.
     """
 
     name: str
@@ -202,7 +200,7 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class AlarmCommand:
-    """What an operator asks of an alarm; `name` "*" means all."""
+    """An operator's command for an alarm; `name` "*" means all."""
 
     name: str
     action: AlarmAction
@@ -213,7 +211,7 @@ class AlarmCommand:
 
 @dataclass(frozen=True, slots=True)
 class RunInfo:
-    """What a run was made with; written at the head of every session segment.
+    """Configuration and origin of a run; written at the head of every session segment.
 
     Attributes:
         rig: the rig's id.
@@ -222,7 +220,7 @@ class RunInfo:
         configuration: text of the configuration file.
         configuration_sha256: its hash.
         software: name and version of the writer.
-        notes: free text, such as where imported data came from and what was done to them.
+        notes: free text, such as the origin of imported data and changes to them.
     """
 
     rig: str
@@ -241,10 +239,10 @@ class ModelChange:
     Attributes:
         device, boot, seq: the first sample that is judged with it; seq 0 before any sample.
         t_ns: later than the last sample before, not later than that one [ns].
-        user: who wanted it.
-        text: why, in words.
+        user: who requested it.
+        text: the reason, in words.
         model: the model file's text.
-        previous: the text of the one before.
+        previous: the text of the previous one.
     """
 
     device: str

@@ -21,14 +21,14 @@ class Topic:
     """One line of the table.
 
     Attributes:
-        name: what code and session files call it.
+        name: its name in code and session files.
         key: key on the bus below `rig/<id>/`, the same for every publisher of the topic.
         message: class of its messages.
-        publisher: the process that says it.
+        publisher: the process that publishes it.
         rate_hz: messages a second at most in normal running [Hz]; 0 for now and then.
         recorded: whether the recorder keeps it.
-        numbered: whether its messages are numbered and kept by the process that says them, so that
-            a listener gets each of them, once, or knows which are missing.
+        numbered: whether its publisher numbers and stores its messages, so that a listener gets
+            each message once or a report of the missing ones.
     """
 
     name: str
@@ -67,13 +67,13 @@ TOPICS: tuple[Topic, ...] = (
 )
 
 RING_KEY = "daq/ring"
-"""Key of the adapter's ring of recent samples, asked by readers that miss some."""
+"""Key of the adapter's ring of recent samples, queried by readers that missed some."""
 ALIVE_KEY = "alive"
-"""Liveliness tokens stand at `alive/<process>`."""
+"""Liveliness tokens are at `alive/<process>`."""
 
 
 def topic(name: str) -> Topic:
-    """The topic called `name`; KeyError where there is none."""
+    """The topic called `name`; KeyError if there is none."""
     for line in TOPICS:
         if line.name == name:
             return line

@@ -3,8 +3,8 @@
     question    boot, first, last                    three int64, little endian
     reply       boot, settled, blocks in order       two int64, then each block's length and bytes
 
-A reply settles the samples from `first` to `settled`: those not in its blocks will never come. If
-`settled` is less than `last`, the reader queries again from there. A ring that does not know the
+A reply settles the samples from `first` to `settled`: those not in its blocks are lost. If
+`settled` is less than `last`, the reader queries again from there. A ring without that
 boot replies with `settled` = -1 and no block.
 """
 
@@ -18,7 +18,7 @@ from rigwatch.wire.messages import SampleBlock, decode, encode
 from rigwatch.wire.ordering.numbered import Numbered
 
 S = TypeVar("S", SampleBlock, Numbered)
-"""What is put in order."""
+"""The type of items that are ordered."""
 
 OPEN = 2**62
 """As `last` of a query: everything available."""

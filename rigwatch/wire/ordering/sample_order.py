@@ -157,7 +157,7 @@ class SampleOrder(Generic[S]):
         if ask == self._asked:
             self._asked = None
             if reply is None:
-                self._nobody_replied(ask)
+                self._no_reply(ask)
             else:
                 self._settle(ask, reply)
         return self._outcomes()
@@ -328,7 +328,7 @@ class SampleOrder(Generic[S]):
             self._set_back(front, reply.settled + 1)
             return
         if reply.settled < ask.first and ask.last != OPEN:
-            self._disbelieve(front)
+            self._drop_forged(front)
             return
         for block in reply.blocks:
             before = self.counters.delivered
@@ -339,7 +339,7 @@ class SampleOrder(Generic[S]):
         if ask.last == OPEN and front.ended and not self._progressed(ask, front):
             self._leave(front)
 
-    def _disbelieve(self, front: Stream[S]) -> None:
+    def _drop_forged(self, front: Stream[S]) -> None:
         """Drop forged samples: every sample is in the ring before it is published.
 
         A sample that arrived during the query is also dropped, and recovered from the ring.
@@ -354,7 +354,7 @@ class SampleOrder(Generic[S]):
         """Correct a position beyond the newest sample of the source."""
         told = f"sample {front.next - 1} of boot {front.boot} lies beyond its newest, {seq - 1}"
         self._out.append(Remark("error", POSITION_WRONG, f"{told}; reading continues from there"))
-        self._lose(front.boot, seq, seq - 1, "the position to go on from was wrong")
+        self._lose(front.boot, seq, seq - 1, "the resume position was wrong")
         front.waiting.clear()
         front.samples_waiting = 0
         front.next = front.promised_from = seq
@@ -380,7 +380,7 @@ class SampleOrder(Generic[S]):
             self._lose(front.boot, max(front.next, front.promised_from), last, reason)
         front.next = last + 1
 
-    def _nobody_replied(self, ask: Ask) -> None:
+    def _no_reply(self, ask: Ask) -> None:
         # Without any samples the link is down: the ring is available again once it recovers.
         alone = not self._heard_since_ask and self.sources.is_alive(ask.boot)
         self._unanswered += 0 if alone else 1
@@ -388,7 +388,7 @@ class SampleOrder(Generic[S]):
             self._ask(ask)
             return
         self._unanswered = 0
-        self._give_up(self._line[0], ask, "nobody could be asked for them")
+        self._give_up(self._line[0], ask, "no source could be queried for them")
 
     def _give_up(self, front: Stream[S], ask: Ask, reason: str) -> None:
         if ask.last != OPEN:

@@ -195,7 +195,7 @@ def _check_length(file: BinaryIO, offset: int, body: bytes, size: int) -> None:
 
 
 def _next_chunk(file: BinaryIO, start: int, size: int) -> int:
-    """Offset of the next whole chunk from `start` on, `size` where there is none."""
+    """Offset of the next complete chunk from `start` on; `size` if there is none."""
     position = start
     overlap = len(_ZSTD) - 1
     while position < size:

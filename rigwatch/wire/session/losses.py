@@ -1,7 +1,7 @@
 """What a session lacks, each sample and message counted once.
 
 Several readers may report the same loss, and one reader's loss may be in the recording all the
-same: missing is what was reported or lies between two samples, and is not there.
+same: samples are missing if reported lost or skipped between two others, and not present.
 """
 
 from bisect import bisect_left
@@ -95,7 +95,7 @@ def count(spans: Iterable[Span]) -> int:
 
 
 def _extend(spans: list[Span], span: Span) -> None:
-    """Append a span, joined to the last where it continues it: a session has millions of blocks."""
+    """Append a span, merged with the last if adjacent: a session has millions of blocks."""
     if spans and span[0] == spans[-1][1] + 1:
         spans[-1] = spans[-1][0], span[1]
     else:

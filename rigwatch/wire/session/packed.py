@@ -3,7 +3,7 @@
 The general decoder makes a Python object of every number; here the packed doubles and integers are
 viewed in place. Blocks of one recording differ only in `seq` and the numbers, so their layout is
 determined once, and every other byte is compared for each further block. Anything that this module
-does not recognise is left to `protobuf.decode`, which reports what is wrong.
+does not recognise is left to `protobuf.decode`, which reports the error.
 """
 
 from collections.abc import Set

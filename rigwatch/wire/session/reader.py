@@ -132,8 +132,8 @@ class Session:
 
         It needs no pass through the session.
         """
-        said = [topic_counts(path) for path in self.segments]
-        return any(counts is None or counts.get(name, 0) > 0 for counts in said)
+        counted = [topic_counts(path) for path in self.segments]
+        return any(counts is None or counts.get(name, 0) > 0 for counts in counted)
 
     def check_content(self) -> None:
         """Raise if the session holds no message of rigwatch."""

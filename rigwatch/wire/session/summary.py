@@ -67,10 +67,10 @@ class Summary:
 
     Attributes:
         run: description of the run, None if lost.
-        start_ns, end_ns: times of the first and last message [ns], 0 where there is none.
+        start_ns, end_ns: times of the first and last message [ns], 0 if there is none.
         topics: messages per topic.
         unknown_ends: starts of a device whose last samples are missing, number unknown.
-        lost_messages: missing messages per topic, such as alarms that no ring held any longer.
+        lost_messages: missing messages per topic, for example alarms no longer in any ring.
         lost: damage.
         unclosed: segments without an index, by name.
     """

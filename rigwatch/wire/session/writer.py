@@ -59,7 +59,7 @@ class SessionWriter:
 
     `write` buffers; `flush` merges the buffered messages, writes them as one chunk and waits for
     the disk. After a failed flush the file is unchanged, `pending` holds the unwritten messages,
-    and the writer cannot be used any more.
+    and the writer is closed.
 
     Args:
         path: the file; it must not exist.
@@ -280,6 +280,6 @@ def run_info(
     configuration: str = "",
     configuration_sha256: str = "",
 ) -> RunInfo:
-    """A `RunInfo` signed by this version; `t_ns` is now where it is not given [ns]."""
+    """A `RunInfo` signed by this version; `t_ns` is the current time if not given [ns]."""
     began = time.time_ns() if t_ns is None else t_ns
     return RunInfo(rig, began, sample_rate_hz, configuration, configuration_sha256, SOFTWARE, notes)

@@ -1,4 +1,4 @@
-"""Units: one table of quantities with exact factors, and what a text such as "kN/mm" means."""
+"""Units: one table of quantities with exact factors, and parsing of texts such as "kN/mm"."""
 
 from rigwatch.wire.units.unit import (
     GRAM,

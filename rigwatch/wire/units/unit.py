@@ -2,7 +2,7 @@
 
 "N s/m", "kN/mm", "m/s^2", "N/(m/s)" and "l/min" are units: products by a space, * or ·, quotients
 by /, which applies to the next factor only, powers by ^. All files are converted on reading with
-the same table; internally all numbers are SI. A temperature on its own is absolute (degC has an
+the same table; internally all numbers are SI. A temperature by itself is absolute (degC has an
 offset); within a product it is a difference.
 """
 

@@ -47,7 +47,7 @@ class Quantity:
         exponents: of the base units.
         units: factor to SI, by unit.
         prefixed: those of `units` that take the prefixes of `PREFIXES`.
-        offsets: value of a unit's zero [SI], where it is not 0.
+        offsets: value of a unit's zero [SI], if not 0.
     """
 
     name: str
@@ -144,7 +144,7 @@ class Entry:
 
 
 def _entries() -> dict[str, Entry]:
-    """Every single unit by name; a name of its own goes before one with a prefix."""
+    """Every single unit by name; an unprefixed name takes precedence over a prefixed one."""
     plain: dict[str, Entry] = {}
     prefixed: dict[str, Entry] = {}
     for q in QUANTITIES:

@@ -29,7 +29,7 @@ MOST, FINEST, SETTLED = 4000, 20.0, 5.0
 """Most samples of a run, samples per fastest time constant, slowest time constants per run."""
 SHOWN = 1e-9
 """Derivative by a state, relative to the largest, below which it is unobservable."""
-APART = 1e-7
+DISTINGUISHABLE = 1e-7
 """Singular value, relative to the largest, above which states are distinguishable."""
 
 
@@ -151,7 +151,7 @@ def _observed(names: list[str], slopes: FloatArray) -> tuple[tuple[str, ...], tu
     _, singular, axes = np.linalg.svd(unit, full_matrices=False)
     tied: set[str] = set()
     for value, axis in zip(singular.tolist(), axes, strict=True):
-        if value < APART * singular[0]:
+        if value < DISTINGUISHABLE * singular[0]:
             tied |= {n for n, part in zip(kept, np.abs(axis).tolist(), strict=True) if part > 0.1}
     unseen = tuple(name for name in names if name not in kept)
     return unseen, tuple(name for name in kept if name in tied)

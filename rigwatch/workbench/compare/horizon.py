@@ -15,7 +15,7 @@ from msgspec import structs
 from rigwatch.physics.engine.fit import Recording, filled
 from rigwatch.wire.arrays import ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import goes_along_motion, prepare, quiet_scale
+from rigwatch.workbench.data import predicts_along_motion, prepare, quiet_scale
 from rigwatch.workbench.fit import Fitted, eigenvalues, fit_base, with_hold
 from rigwatch.workbench.study import Study
 
@@ -27,7 +27,7 @@ WINDOWS = 10
 """Minimum number of windows in the shortest recording."""
 FEWEST = 20
 """Minimum number of samples in a window."""
-GONE = float(np.exp(-1))
+UNCORRELATED = float(np.exp(-1))
 """Autocorrelation that defines an output's correlation time."""
 
 
@@ -38,7 +38,7 @@ def with_horizon(study: Study) -> Study:
         ModelError: data do not suit the model.
     """
     given = study.file.horizon is not None or not study.model.states
-    if given or study.model.rough or goes_along_motion(study):
+    if given or study.model.rough or predicts_along_motion(study):
         return study
     data = prepare(_with(study, ""))
     shortest = (
@@ -111,5 +111,5 @@ def _like_itself(signal: FloatArray) -> int:
     left = signal - signal.mean()
     spectrum = np.abs(np.fft.rfft(left, 2 * len(left))) ** 2
     together = np.fft.irfft(spectrum)[: len(left)]
-    below = np.nonzero(together < GONE * max(float(together[0]), 1e-300))[0]
+    below = np.nonzero(together < UNCORRELATED * max(float(together[0]), 1e-300))[0]
     return int(below[0]) if len(below) else len(left)

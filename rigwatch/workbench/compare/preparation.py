@@ -13,7 +13,7 @@ from rigwatch.workbench.data import (
     NoiseFloor,
     along_motion,
     from_residual,
-    goes_along_motion,
+    predicts_along_motion,
     prepare,
     quiet_scale,
 )
@@ -77,7 +77,7 @@ def determined_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatA
     """
     if learns_from_healthy(study):
         return *with_healthy_remainder(study, data), None
-    if goes_along_motion(study):
+    if predicts_along_motion(study):
         study, data = along_motion(study, data)
     several = data.train.outputs.shape[1] > 1 or data.along_motion
     scale = quiet_scale(data.train) if several else None

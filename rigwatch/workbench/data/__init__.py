@@ -1,7 +1,7 @@
 """A study's measured data: signals on one time grid, their scales, and the noise floor."""
 
 from rigwatch.workbench.data.columns import Columns
-from rigwatch.workbench.data.motion import along_motion, goes_along_motion
+from rigwatch.workbench.data.motion import along_motion, predicts_along_motion
 from rigwatch.workbench.data.noise_floor import (
     METHODS,
     NoiseFloor,
@@ -29,9 +29,9 @@ __all__ = [
     "along_motion",
     "find_period",
     "from_residual",
-    "goes_along_motion",
     "parameters_of",
     "port_sizes",
+    "predicts_along_motion",
     "prepare",
     "proposed_low_pass",
     "proposed_split",

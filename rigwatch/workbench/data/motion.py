@@ -30,12 +30,12 @@ UNCHECKED = (
     "no healthy recording: the model cannot be checked; record one with nothing wrong and list it"
     " under [[healthy]]"
 )
-BEYOND = 1.2
+RANGE_RATIO = 1.2
 """Ratio of motion ranges above which a recording is reported to exceed the healthy one."""
 FORM = "predicted along the measured motion: {shown} drive the model, {hidden} are simulated"
 
 
-def goes_along_motion(study: Study) -> bool:
+def predicts_along_motion(study: Study) -> bool:
     """Whether a study is predicted along its measured motion."""
     if study.file.prediction != "auto":
         return study.file.prediction == "measured motion"
@@ -71,7 +71,7 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     shown = ", ".join(state.name for state in measured_states(study.model))
     form = FORM.format(shown=shown, hidden=", ".join(model.states) or "no states")
     told = () if healthy is not None else (UNCHECKED,)
-    remarks = (*data.remarks, form, *told, *beyond_healthy_motion(study, train, held_out, healthy))
+    remarks = (*data.remarks, form, *told, *motion_range_remarks(study, train, held_out, healthy))
     along = Data(
         train, held_out, healthy, longest, remarks, along_motion=True, motion=_sensors(study)
     )
@@ -110,7 +110,7 @@ def _rms(signals: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.mean(signals**2, axis=0)))
 
 
-def beyond_healthy_motion(
+def motion_range_remarks(
     study: Study, train: Recording, held_out: Recording, healthy: Recording | None
 ) -> list[str]:
     """Remarks on motions that exceed the range of the healthy recording."""
@@ -122,7 +122,7 @@ def beyond_healthy_motion(
         for use, recording in (("train", train), ("held_out", held_out)):
             reach = np.ptp(recording.inputs[:, column])
             known = np.ptp(healthy.inputs[:, column])
-            if reach > BEYOND * known:
+            if reach > RANGE_RATIO * known:
                 unit = study.model.states[state.name].unit
                 found.append(
                     f"{use}: {state.name} spans {reach:.3g} {unit}, and the healthy recording"

@@ -14,11 +14,11 @@ from rigwatch.workbench.data.columns import Columns, bridged
 
 QUIET = 0.02
 """Change over the range of a signal up to which it counts as at rest."""
-WORTH_CUTTING = 0.05
+MIN_REST_SHARE = 0.05
 """Smallest share of a recording at rest at an end for that end to be cut off."""
 KEPT = 20
 """Samples at rest kept before the motion, as they show the initial state."""
-TOLD = 0.6
+TRAIN_SHARE = 0.6
 """Share of a single recording used for training; the rest is held out."""
 ENERGY, BEYOND = 0.999, 4.0
 """Share of a signal's energy that defines its top frequency, and ratio of low-pass to that."""
@@ -51,8 +51,8 @@ def moving(table: Columns, names: Sequence[str]) -> tuple[float, float]:
     if not len(at):
         return 0.0, float("inf")
     first, last, count = max(int(at[0]) - KEPT, 0), int(at[-1]) + KEPT, len(table)
-    start = first * table.dt if first > WORTH_CUTTING * count else 0.0
-    end = last * table.dt if count - last > WORTH_CUTTING * count else float("inf")
+    start = first * table.dt if first > MIN_REST_SHARE * count else 0.0
+    end = last * table.dt if count - last > MIN_REST_SHARE * count else float("inf")
     return start, end
 
 
@@ -70,14 +70,14 @@ def proposed_split(
     """
     parts = [Part(index, *moving(table, names)) for index, table in enumerate(tables)]
     if len(tables) > 1:
-        decides = min(range(len(tables)), key=lambda index: (_beyond(tables, names, index), -index))
+        decides = min(range(len(tables)), key=lambda index: (_excess(tables, names, index), -index))
         return [p for p in parts if p.recording != decides], [parts[decides]]
     whole, last = parts[0], len(tables[0]) * tables[0].dt
-    cut = round(whole.start + TOLD * (min(whole.end, last) - whole.start), 3)
+    cut = round(whole.start + TRAIN_SHARE * (min(whole.end, last) - whole.start), 3)
     return [Part(0, whole.start, cut)], [Part(0, cut, whole.end)]
 
 
-def _beyond(tables: Sequence[Columns], names: Sequence[str], index: int) -> float:
+def _excess(tables: Sequence[Columns], names: Sequence[str], index: int) -> float:
     """How far one recording's excitation exceeds the others', relative to their range."""
     worst = 0.0
     for name in names:

@@ -174,12 +174,15 @@ def _with_known(study: Study, tables: Mapping[str, list[Columns]]) -> dict[str, 
     """Channels, with the recording's known parameters as further constant channels."""
     spans = {use: getattr(study.file, use) for use in tables}
     return {
-        use: [_beside(span, table) for span, table in zip(spans[use], group, strict=True)]
+        use: [
+            _with_recording_parameters(span, table)
+            for span, table in zip(spans[use], group, strict=True)
+        ]
         for use, group in tables.items()
     }
 
 
-def _beside(span: Span, table: Columns) -> Columns:
+def _with_recording_parameters(span: Span, table: Columns) -> Columns:
     known = {name: np.full(len(table), value) for name, value in span.parameters.items()}
     return replace(table, values={**table.values, **known})
 

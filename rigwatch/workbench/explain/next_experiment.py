@@ -220,10 +220,12 @@ def _separation(
     slopes = slopes.reshape(*flat, slopes.shape[-1])
     m = len(base.compiled.system.free)
     left = Projector(slopes[..., :m], slopes[..., m:]).clean(moved.reshape(*flat, len(rows)))
-    return {row.label: _apart(left, i, rows[0]) for i, row in enumerate(rows[1:], start=1)}
+    return {
+        row.label: _relative_difference(left, i, rows[0]) for i, row in enumerate(rows[1:], start=1)
+    }
 
 
-def _apart(left: FloatArray, rival: int, best: Ranked) -> float:
+def _relative_difference(left: FloatArray, rival: int, best: Ranked) -> float:
     one, other = left[:, 0], left[:, rival]
     energy = max(float(other @ other), 1e-300)
     apart = one - other * float(one @ other) / energy

@@ -74,13 +74,13 @@ def covariance(fitted: Fit) -> tuple[FloatArray, int]:
     # Columns are scaled to equal norm, so that small ones are not truncated as rank-deficient.
     size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
     normal = (whole / size).T @ (whole / size)
-    pairs = zip(_apart(fitted.jacobian / size), _apart(fitted.error), strict=True)
+    pairs = zip(_window_blocks(fitted.jacobian / size), _window_blocks(fitted.error), strict=True)
     moved = np.array([_moved(normal, j, r) for j, r in pairs]) / size
     count = len(moved)
     return np.asarray(moved.T @ moved * ((count - 1) / count)), max(count - m, 1)
 
 
-def _apart(windowed: FloatArray) -> list[FloatArray]:
+def _window_blocks(windowed: FloatArray) -> list[FloatArray]:
     """Windows as blocks if there are enough, as parts of a window share its initial state."""
     return list(windowed) if len(windowed) >= ENOUGH else blocks(windowed)
 

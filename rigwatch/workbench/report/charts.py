@@ -55,13 +55,13 @@ def error_chart(stages: Sequence[Stage], refused: Sequence[Refused]) -> str:
     plot.line(at, held_out, "held", width=3, marks=True, name="held out")
     for k, c in enumerate(found):
         plot.text(k + 0.06, c.held_out_error, f"{c.held_out_error:.3g}", "held", up=9)
-    for place, entry in _beside(refused):
+    for place, entry in _positions(refused):
         told = f"{entry.label} refused: {entry.held_out_error:.4g}"
         plot.mark(place, entry.held_out_error, "refused", told, hollow=True)
     return plot.drawn()
 
 
-def _beside(refused: Sequence[Refused]) -> list[tuple[float, Refused]]:
+def _positions(refused: Sequence[Refused]) -> list[tuple[float, Refused]]:
     """Horizontal positions of refused effects, right of the step at which each was tried."""
     seen: dict[int, int] = {}
     placed = []

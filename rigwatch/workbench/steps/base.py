@@ -19,7 +19,7 @@ from rigwatch.workbench.data import (
     Data,
     along_motion,
     from_residual,
-    goes_along_motion,
+    predicts_along_motion,
     prepare,
     quiet_scale,
 )
@@ -31,9 +31,9 @@ FIT_SHARE = 0.6
 """Share of a single healthy recording used for fitting; the rest decides."""
 WORTH = 0.02
 """Smallest relative fall of the held-out error that justifies more parameters."""
-AS_WELL = 0.002
+TOLERATED_RISE = 0.002
 """Largest relative rise of the held-out error accepted for fewer parameters."""
-HOPELESS = 1.1
+REJECT_RATIO = 1.1
 """Ratio of errors with and without a variant above which it is not combined with others."""
 ROUNDS = 4
 """Largest number of variants added."""
@@ -104,13 +104,13 @@ def find_base(study: Study, progress: Progress = no_progress) -> Bases:
     data = prepare(study)
     if data.healthy is None:
         raise ModelError(f"{study.folder}: {NO_HEALTHY}")
-    search = _Search(varied(study, ()).with_effects(()), _apart(data.healthy, data.horizon))
+    search = _Search(varied(study, ()).with_effects(()), _split_healthy(data.healthy, data.horizon))
     progress("fitting the unmodified model")
     best = search.first()
     tried = [best]
     for _ in range(ROUNDS):
-        wished = _next(study.model, best, search.hopeless)
-        found = [search.attempt(best, names, progress) for names in wished]
+        candidates = _next(study.model, best, search.rejected)
+        found = [search.attempt(best, names, progress) for names in candidates]
         fits = [one for one in found if one is not None]
         tried += fits
         better = [one for one in fits if _improves(best, one)]
@@ -139,20 +139,20 @@ def take_base(study: Study, variants: Sequence[str]) -> Study:
     return changed
 
 
-def _next(model: Model, at: _Tried, hopeless: Container[str]) -> list[tuple[str, ...]]:
+def _next(model: Model, at: _Tried, rejected: Container[str]) -> list[tuple[str, ...]]:
     """Bases to try next: each further variant added, replacing those that it excludes."""
     own = at.base.variants
     return [
         (*(n for n in own if not excludes(model, name, n)), name)
         for name in model.variants
-        if name not in own and name not in hopeless
+        if name not in own and name not in rejected
     ]
 
 
 def _improves(best: _Tried, one: _Tried) -> bool:
     """Whether a base is better by more than chance, or equal with fewer parameters."""
     found = difference(best.fitted.held_out, one.fitted.held_out)
-    if one.base.parameters < best.base.parameters and found.relative > -AS_WELL:
+    if one.base.parameters < best.base.parameters and found.relative > -TOLERATED_RISE:
         return True
     return found.p_falls < STEP and found.relative > WORTH
 
@@ -164,7 +164,7 @@ class _Search:
         self._study, self._data = study, data
         self._known: dict[frozenset[str], _Tried | None] = {}
         self.remarks: tuple[str, ...] = ()
-        self.hopeless: set[str] = set()
+        self.rejected: set[str] = set()
 
     def first(self) -> _Tried:
         """The unmodified model."""
@@ -187,14 +187,14 @@ class _Search:
         except ModelError:
             self._known[key] = None
         found = self._known[key]
-        if found is None or found.base.held_out_error > HOPELESS * at.base.held_out_error:
-            self.hopeless.add(names[-1])
+        if found is None or found.base.held_out_error > REJECT_RATIO * at.base.held_out_error:
+            self.rejected.add(names[-1])
         return found
 
     def _fitted(self, names: tuple[str, ...], start: Mapping[str, float], reason: str) -> _Tried:
         study, data = varied(self._study, names), self._data
         written = study.model
-        if goes_along_motion(study):
+        if predicts_along_motion(study):
             study, data = along_motion(study, data)
         self.remarks = data.remarks
         scale = quiet_scale(data.train)
@@ -228,7 +228,7 @@ def _overall(rms: FloatArray, scale: FloatArray) -> float:
     return float(np.sqrt(np.mean((rms / scale) ** 2)))
 
 
-def _apart(healthy: Recording, horizon: int) -> Data:
+def _split_healthy(healthy: Recording, horizon: int) -> Data:
     """Splits the healthy data: the last of several recordings, or the end of one, is held out."""
     parts = healthy.parts or (len(healthy),)
     if len(parts) > 1:

@@ -42,7 +42,7 @@ def _call(  # noqa: PLR0917 -- numba wants them by name
 
 
 call: Any = intrinsic(_call)
-"""call(address, t, a, u, p, out, slopes): arrays are passed by the address of their first element."""
+"""call(address, t, a, u, p, out, slopes): arrays are passed by their address."""
 
 
 @kernel(error_model="numpy")

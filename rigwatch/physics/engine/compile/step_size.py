@@ -21,7 +21,7 @@ STABLE = 1.0
 """Largest rate times step, with a margin."""
 ACCURATE = 0.1
 """The same near zero crossings of a state, such as speed, where accuracy needs smaller steps."""
-ALONE = 2.0
+PASSIVE = 2.0
 """The same for an effect state that is driven by signals and drives nothing itself."""
 FINEST = 256
 """Most steps between two samples."""
@@ -48,7 +48,7 @@ def pace(system: System) -> Pace:
         return Pace()
     steep = _steep(system)
     asked = [slope / ACCURATE for slope in steep.values()]
-    allowed = STABLE if system.model.states else ALONE
+    allowed = STABLE if system.model.states else PASSIVE
     asked += [slope / allowed for slope in _of_memory(system)]
     order = list(system.states)
     return Pace(tuple(order.index(name) for name in steep), tuple(asked))

@@ -31,36 +31,36 @@ def continued(problem: Problem, parameters: FloatArray) -> Started:
     if not len(problem.hidden):
         return found
     if len(problem.starts) == len(problem.first_windows):
-        return _by_their_beginning(problem, parameters)
+        return _from_first_samples(problem, parameters)
     began = problem.initial.copy()
-    told = _told_by_the_window_before(problem, parameters)
-    if not np.isfinite(told).all():
+    hidden = _continued_from_previous(problem, parameters)
+    if not np.isfinite(hidden).all():
         raise ModelError(
             f"{problem.system.model.name}: states that no channel shows diverged (NaN or infinite)"
             " from one window to the next"
         )
-    began[:, problem.hidden] = told
-    telling = np.zeros(problem.measured.shape[:2], np.bool_)
-    telling[problem.first_windows] = True
-    return _counted(problem, parameters, began, telling)
+    began[:, problem.hidden] = hidden
+    determining = np.zeros(problem.measured.shape[:2], np.bool_)
+    determining[problem.first_windows] = True
+    return _counted(problem, parameters, began, determining)
 
 
-def _told_by_the_window_before(problem: Problem, parameters: FloatArray) -> FloatArray:
+def _continued_from_previous(problem: Problem, parameters: FloatArray) -> FloatArray:
     """Initial hidden states of each window, shape (windows, hidden)."""
     own = set(problem.hidden[problem.hidden < len(problem.system.model.states)].tolist())
-    memory = np.array([column for column in problem.hidden if column not in own], np.int64)
-    told = problem.initial.copy()
-    rest = np.setdiff1d(np.arange(len(told)), problem.first_windows)
-    order = _in_turn(problem) if len(memory) else [rest]
+    effect_states = np.array([column for column in problem.hidden if column not in own], np.int64)
+    initial = problem.initial.copy()
+    rest = np.setdiff1d(np.arange(len(initial)), problem.first_windows)
+    order = _window_order(problem) if len(effect_states) else [rest]
     for rows in order:
         ended = problem.ends_before(parameters, rows)
-        told[rows] = ended
+        initial[rows] = ended
         # Effect states continue; the model's own states are re-initialised in the next window.
-        problem.begin_at(rows, memory, ended[:, memory])
-    return told[:, problem.hidden]
+        problem.begin_at(rows, effect_states, ended[:, effect_states])
+    return initial[:, problem.hidden]
 
 
-def _in_turn(problem: Problem) -> list[IntArray]:
+def _window_order(problem: Problem) -> list[IntArray]:
     """Windows except the first of each recording: all second ones, then all third ones, …"""
     windows = np.arange(len(problem.starts))
     since = (
@@ -70,7 +70,7 @@ def _in_turn(problem: Problem) -> list[IntArray]:
     return [np.nonzero(since == turn)[0] for turn in range(1, int(since.max()) + 1)]
 
 
-def _by_their_beginning(problem: Problem, parameters: FloatArray) -> Started:
+def _from_first_samples(problem: Problem, parameters: FloatArray) -> Started:
     """Windows that are whole recordings, with hidden states from their own first samples."""
     leads = np.maximum(np.round(LEAD * np.array(problem.lengths)), 2)
     beginning = np.arange(problem.length) < leads[:, None]
@@ -85,10 +85,10 @@ def _by_their_beginning(problem: Problem, parameters: FloatArray) -> Started:
 
 
 def _counted(
-    problem: Problem, parameters: FloatArray, began: FloatArray, telling: BoolArray
+    problem: Problem, parameters: FloatArray, began: FloatArray, determining: BoolArray
 ) -> Started:
     """Windows with these initial hidden states; the samples that determine them do not count."""
     problem.hold(began, problem.hidden)
-    problem.measured[telling] = np.nan
+    problem.measured[determining] = np.nan
     error, slopes = problem.settle(parameters)
     return Started(parameters, problem.initial, error, slopes)

@@ -99,7 +99,7 @@ class Problem:
         self.scale = np.where(self.scale > 0, self.scale, 1.0)
         begun = initial_states(system, recording)
         self.initial = begun[self._cut.starts]
-        self._offered = initial
+        self._given_initial = initial
         self._effect_states = RecordedEffectStates(
             system, recording.inputs, begun, recording.dt, compiled.parameters
         )
@@ -160,11 +160,11 @@ class Problem:
 
         Windows start from the channels' states or, if better, from the given ones.
         """
-        self._remember(parameters, self._effect_states.columns)
-        if self._offered is None or len(self._offered) != len(self.initial):
+        self._set_effect_states(parameters, self._effect_states.columns)
+        if self._given_initial is None or len(self._given_initial) != len(self.initial):
             return
         rows, own = np.arange(len(self.initial)), len(self.system.model.states)
-        other = np.column_stack([self._offered[:, :own], self.initial[:, own:]])
+        other = np.column_stack([self._given_initial[:, :own], self.initial[:, own:]])
         shown, offered = (
             np.sum(self.simulated(parameters, rows, each)[0] ** 2, axis=1)
             for each in (self.initial, other)
@@ -173,9 +173,11 @@ class Problem:
 
     def _follow_inputs(self, parameters: FloatArray) -> None:
         """Initialise effect states at actuators from the inputs; the first window's are fitted."""
-        self._remember(parameters, self._effect_states.exact, since=1)
+        self._set_effect_states(parameters, self._effect_states.exact, since=1)
 
-    def _remember(self, parameters: FloatArray, columns: list[int], since: int = 0) -> None:
+    def _set_effect_states(
+        self, parameters: FloatArray, columns: list[int], since: int = 0
+    ) -> None:
         if columns and not self._cut.parts:
             led = self._effect_states.at(parameters)
             self.initial = self.initial.copy()

@@ -12,7 +12,7 @@ from rigwatch.physics.engine.score.candidates import (
     shaped,
     sizes_at_port,
 )
-from rigwatch.physics.engine.score.compatibility import knows, possible, suits
+from rigwatch.physics.engine.score.compatibility import has_variables, possible, suits
 from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
 from rigwatch.physics.engine.score.ranking import Standing, cosines_with, freed, standings
 from rigwatch.physics.engine.score.score_test import ALIKE, Projector, Scores, best_of, score
@@ -30,7 +30,7 @@ __all__ = [
     "cosines_with",
     "directions",
     "freed",
-    "knows",
+    "has_variables",
     "possible",
     "root_mean_square",
     "score",

@@ -17,10 +17,10 @@ def suits(effect: Effect, port: Port, model: Model) -> bool:
         return False
     if port.passive and not _named(effect) & set(port.variables):
         return False
-    return knows(effect, port) and _units_named(effect) <= _told_by(port)
+    return has_variables(effect, port) and _units_named(effect) <= _variables_with_scale(port)
 
 
-def knows(effect: Effect, port: Port) -> bool:
+def has_variables(effect: Effect, port: Port) -> bool:
     """Whether the port has all the variables that the effect's equations use."""
     own = {
         *effect.parameters,
@@ -33,10 +33,10 @@ def knows(effect: Effect, port: Port) -> bool:
     return _named(effect) - own <= set(port.variables)
 
 
-def _told_by(port: Port) -> set[str]:
+def _variables_with_scale(port: Port) -> set[str]:
     """Variables whose unit and size follow from a port's: a distance follows from a speed."""
-    told = {*port.variables, "F" if port.kind == "force" else "u"}
-    return told | ({"x"} if "v" in told else set())
+    names = {*port.variables, "F" if port.kind == "force" else "u"}
+    return names | ({"x"} if "v" in names else set())
 
 
 def _units_named(effect: Effect) -> set[str]:

@@ -212,10 +212,10 @@ class WholeRuns:
         return self._last[1]
 
     def _simulated(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        parameters, initial = self._told(z)
+        parameters, initial = self._split(z)
         with np.errstate(over="ignore", invalid="ignore"):
             error, own = self._problem.simulated(parameters, np.arange(len(initial)), initial)
-            slopes = _beside(own, self._m) * self._unknowns.slope(z)
+            slopes = _block_columns(own, self._m) * self._unknowns.slope(z)
         if not (np.isfinite(error).all() and np.isfinite(slopes).all()):
             error, slopes = np.full_like(error, BLOWN_UP), np.zeros_like(slopes)
         return (
@@ -223,7 +223,7 @@ class WholeRuns:
             np.concatenate([slopes, np.diag(self._pull)]),
         )
 
-    def _told(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _split(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """All parameters, and the initial states, shape (recordings, states)."""
         values = self._unknowns.value(z)
         parameters = self._problem.whole(self._begin, values[: self._m])
@@ -231,13 +231,13 @@ class WholeRuns:
 
     def _fit(self, look: _Look) -> Fit:
         """The fit at the end of a search."""
-        parameters, initial = self._told(look.z)
+        parameters, initial = self._split(look.z)
         problem = self._posed(initial)
         problem.recall(parameters)
         return result_of(problem, problem.start_windows(parameters))
 
 
-def _beside(slopes: FloatArray, m: int) -> FloatArray:
+def _block_columns(slopes: FloatArray, m: int) -> FloatArray:
     """Slopes (recordings, k, m + states) by all unknowns: each recording has its own states."""
     count, k, _ = slopes.shape
     found = np.zeros((count, k, m + count * (slopes.shape[2] - m)))
