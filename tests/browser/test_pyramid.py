@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigwatch.browser.signals.pyramid import FIRST, HIGH, LAST, LOW, Pyramid
-from rigwatch.browser.signals.trace import open_trace, write_trace
+from rigwatch.browser.signals.trace import Trace, open_trace, write_trace
 
 
 @given(st.integers(1, 40_000), st.floats(0, 1), st.floats(0, 1), st.integers(1, 900), st.booleans())
@@ -52,3 +52,18 @@ def test_five_million_samples_are_shown_in_milliseconds(tmp_path):
         trace.between(40.0 * k, 5000.0 - 30.0 * k, 1200)
         took.append(time.perf_counter() - begun)
     assert np.quantile(took, 0.95) < 0.05
+
+
+@given(st.integers(1, 300), st.sampled_from([1 / 256, 0.001, 1e-4, 0.3, 7.0]), st.data())
+def test_equal_steps_need_no_list_of_times(n, step, data):
+    samples = np.arange(n, dtype=np.float32)
+    times = np.arange(n) * step
+    even, listed = Trace(Pyramid(samples), np.array([step])), Trace(Pyramid(samples), times)
+    assert even.even == (n > 1)
+    if n == 1:
+        return
+    exact = st.integers(-2, n + 2).map(lambda k: k * step)
+    start, end = sorted(data.draw(st.tuples(*[exact | st.floats(-step, (n + 1) * step)] * 2)))
+    assert even.within(start, end) == listed.within(start, end)
+    assert even.ends == listed.ends
+    np.testing.assert_array_equal(even.at(np.arange(n)), times)

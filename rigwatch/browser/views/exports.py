@@ -42,8 +42,6 @@ def figure_csv(axis: str, lines: Mapping[str, Trace], span: tuple[float, float])
 
 
 def _samples(trace: Trace, span: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    first, last = (
-        np.searchsorted(trace.times, span[0]),
-        np.searchsorted(trace.times, span[1], "right"),
-    )
-    return trace.times[first:last], np.asarray(trace.pyramid.samples[first:last], np.float64)
+    first, last = trace.within(*span)
+    values = np.asarray(trace.pyramid.samples[first:last], np.float64)
+    return trace.at(np.arange(first, last)), values

@@ -60,9 +60,10 @@ class Worker:
         self.progress("fitting the model")
         bench = self.warm.bench(study)
         self.progress("simulating")
-        _write_signals(kept, bench)
+        compared = self.warm.comparison(study)
+        _write_signals(kept, Stage("", bench, compared))
         _write_regions(kept, bench)
-        kept.write("comparison", self.warm.comparison(study))
+        kept.write("comparison", compared)
         kept.forget_old()
 
     def explain(self) -> None:
@@ -153,10 +154,8 @@ def _lines(bench: Bench, fitted: Fitted, *, held_out: bool) -> tuple[FloatArray,
     return flat[: len(rows)], np.asarray(rows * recording.dt, np.float64)
 
 
-def _write_signals(kept: Results, bench: Bench) -> None:
-    from rigwatch.workbench.compare import comparison
-
-    stage = Stage("", bench, comparison(bench))
+def _write_signals(kept: Results, stage: Stage) -> None:
+    bench = stage.bench
     with kept.whole("signals") as folder:
         for use in ("train", "held_out"):
             shown = signals(stage, held_out=use == "held_out")

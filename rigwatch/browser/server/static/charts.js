@@ -1,7 +1,9 @@
 // Two charts over one span of time: signals, and the residual with the floor as a band.
 import { signals } from "./api.js";
+import { columns, paths } from "./lines.js";
 
 const MARGIN = 62;
+const EVERY = 50; // least time between two loads while the span moves [ms]
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const STYLES = {
   measured: { stroke: "measured", width: 2.6 },
@@ -20,7 +22,8 @@ export class Charts {
   constructor(places, told) {
     this.told = told;
     this.span = null;
-    this.ends = [0, 1];
+    this.ends = null; // first and last time of all lines, once one is known
+    this.other = false; // whether they are those of another recording
     this.marks = [];
     this.band = null;
     this.names = {};
@@ -38,6 +41,7 @@ export class Charts {
     this.unit = unit;
     this.band = floor;
     if (!keep) this.span = null;
+    this.other = true;
     await this.load();
   }
 
@@ -52,9 +56,15 @@ export class Charts {
     this.asked[chart]?.abort();
     const asked = (this.asked[chart] = new AbortController());
     const query = new URLSearchParams(this.query);
+    const width = Math.max(200, Math.round(this.places[chart].clientWidth - MARGIN));
     query.set("chart", chart);
-    query.set("width", Math.max(200, Math.round(this.places[chart].clientWidth - MARGIN)));
-    if (this.span) { query.set("from", this.span[0]); query.set("to", this.span[1]); }
+    query.set("width", this.span ? 2 * width : width);
+    if (this.span) {
+      // Half a chart more on both sides, so that a pan has something to show at once.
+      const beside = (this.span[1] - this.span[0]) / 2;
+      query.set("from", this.span[0] - beside);
+      query.set("to", this.span[1] + beside);
+    }
     if (chart === "residual" && this.previewed) for (const [k, v] of Object.entries(this.previewed)) query.set(k, v);
     const path = this.query.get("path");
     query.delete("path");
@@ -67,7 +77,7 @@ export class Charts {
     const [first, ...rest] = found.lines;
     const same = rest.every((line) => line.count === first.count && line.x[0] === first.x[0] && line.x[line.count - 1] === first.x[first.count - 1]);
     const data = same ? [first.x, ...found.lines.map((line) => line.y)] : uPlot.join(found.lines.map((line) => [line.x, line.y]));
-    if (chart === "signals") this.ends = found.ends;
+    this.reach(found.ends);
     const names = found.lines.map((line) => line.name).join();
     if (!this.plots[chart] || this.names[chart] !== names) {
       this.plots[chart]?.destroy();
@@ -80,8 +90,19 @@ export class Charts {
     this.told("drawn", chart);
   }
 
+  /** The charts share one span, whichever of their answers comes first. */
+  reach([first, last]) {
+    const before = (!this.other && this.ends) || [Infinity, -Infinity];
+    this.other = false;
+    this.ends = [Math.min(first, before[0]), Math.max(last, before[1])];
+    if (this.span || (this.ends[0] === before[0] && this.ends[1] === before[1])) return;
+    for (const chart of Object.keys(this.plots)) this.place(chart);
+  }
+
+  whole() { return this.ends ?? [0, 1]; }
+
   place(chart) {
-    const [from, to] = this.span ?? this.ends;
+    const [from, to] = this.span ?? this.whole();
     this.plots[chart].batch(() => {
       this.plots[chart].setScale("x", { min: from, max: to });
     });
@@ -95,17 +116,19 @@ export class Charts {
       width: box.clientWidth, height: box.clientHeight,
       legend: { show: false },
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, points: { size: 6 } },
-      scales: { x: { time: false, auto: false }, y: { auto: true } },
+      // A span without samples keeps its axis, so that the charts stay below one another.
+      scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => (low === null ? [-1, 1] : uPlot.rangeNum(low, high, 0.1, true)) } },
       axes: [
         { ...axis, show: true, size: last ? 26 : 8, label: last ? "time [s]" : undefined, labelSize: 13, labelFont: "11px system-ui", values: last ? undefined : (_, ticks) => ticks.map(() => "") },
         { ...axis, size: MARGIN, space: 26, label: `${last ? "residual" : this.query.get("channel")} [${this.unit}]`, labelSize: 16, labelFont: "11px system-ui", values: (_, ticks) => ticks.map(label) },
       ],
       series: [{}, ...names.map((name) => ({
-        label: name, spanGaps: false, points: { show: false }, width: STYLES[name].width,
+        label: name, spanGaps: false, points: { show: false }, paths, width: STYLES[name].width,
         stroke: colour(STYLES[name].stroke), dash: STYLES[name].dash,
       }))],
       hooks: {
         drawClear: [(plot) => { this.drawMarks(plot); if (last) this.drawBand(plot); }],
+        drawSeries: [columns],
         setSelect: [(plot) => this.selected(plot)],
         setCursor: [(plot) => this.point(plot, names)],
         ready: [(plot) => this.wheel(plot)],
@@ -161,7 +184,7 @@ export class Charts {
   }
 
   look(span) {
-    const [first, last] = this.ends;
+    const [first, last] = this.whole();
     if (span) {
       const width = Math.min(span[1] - span[0], last - first);
       const from = Math.min(Math.max(span[0], first), last - width);
@@ -170,18 +193,28 @@ export class Charts {
     this.span = span;
     for (const chart of Object.keys(this.plots)) this.place(chart);
     this.told("span", span);
-    clearTimeout(this.later);
-    this.later = setTimeout(() => this.load(), 40);
+    this.loadSoon(EVERY);
+  }
+
+  /** Loads while the span still moves, one load at a time; the last span is always loaded. */
+  loadSoon(within) {
+    if (this.loading) { this.again = true; return; }
+    this.loading = true;
+    setTimeout(async () => {
+      this.again = false;
+      try { await this.load(); } finally { this.loading = false; }
+      if (this.again) this.loadSoon(within);
+    }, within);
   }
 
   zoom(factor, centre) {
-    const [from, to] = this.span ?? this.ends;
+    const [from, to] = this.span ?? this.whole();
     const at = centre ?? (from + to) / 2;
     this.look([at - (at - from) * factor, at + (to - at) * factor]);
   }
 
   pan(share) {
-    const [from, to] = this.span ?? this.ends;
+    const [from, to] = this.span ?? this.whole();
     const by = (to - from) * share;
     this.look([from + by, to + by]);
   }
@@ -191,8 +224,7 @@ export class Charts {
       const box = this.places[chart];
       plot.setSize({ width: box.clientWidth, height: box.clientHeight });
     }
-    clearTimeout(this.later);
-    this.later = setTimeout(() => this.load(), 120);
+    this.loadSoon(120);
   }
 
   rebuild() {

@@ -28,8 +28,14 @@ const use = () => document.querySelector("input[name=use]:checked").value;
 const channel = () => state.channels.find((one) => one.name === $("channel").value) ?? state.channels[0];
 const row = (label) => document.querySelector(`#ranking tr[data-label="${CSS.escape(label ?? "")}"]`);
 
-/** The address holds step, recordings, channel and span, so that it can be sent to a colleague. */
+let remembering = 0;
+/** The address holds step, recordings, channel and span, so that it can be sent to a colleague; written once the charts stand still. */
 function remember() {
+  clearTimeout(remembering);
+  remembering = setTimeout(write, 120);
+}
+
+function write() {
   const query = new URLSearchParams();
   if (!state.latest) query.set("step", state.step);
   if (use() !== "held_out") query.set("use", use());
