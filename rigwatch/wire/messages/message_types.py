@@ -26,6 +26,10 @@ Severity = Literal["info", "warning", "error", "critical"]
 AlarmState = Literal["normal", "unacknowledged", "acknowledged", "cleared_unacknowledged"]
 """States of ISA-18.2: active and not yet seen, active and seen, gone before it was seen."""
 AlarmAction = Literal["acknowledge", "reset", "shelve", "unshelve"]
+Identity = Literal["", "proved", "not proved"]
+"""Whether the user of a command is who it says; "" where nobody acted."""
+PROVED: Identity = "proved"
+NOT_PROVED: Identity = "not proved"
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +154,8 @@ class Health:
 
 
 PROBABLY_MISSING = "PROBABLY MISSING"
+MONITOR_STALE = "monitor_stale"
+"""The alarm that the witness raises, all others are the monitor's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +187,7 @@ class Alarm:
         first_out: it was the first of the flood it stands in.
         user: who acted, for transitions by an operator.
         onset_seq: the first sample at which the condition held; persistence lies between.
+        identity: whether the user was proved by a signature.
     """
 
     name: str
@@ -198,17 +205,22 @@ class Alarm:
     first_out: bool
     user: str
     onset_seq: int
+    identity: Identity = ""
 
 
 @dataclass(frozen=True, slots=True)
 class AlarmCommand:
-    """What an operator asks of an alarm; `name` "*" means all."""
+    """What an operator asks of an alarm; `name` "*" means all.
+
+    `proof` is the operator's signature (`rigwatch.wire.access`), "" on a rig without keys.
+    """
 
     name: str
     action: AlarmAction
     user: str
     t_ns: int
     text: str = ""
+    proof: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,6 +257,7 @@ class ModelChange:
         text: why, in words.
         model: the model file's text.
         previous: the text of the one before.
+        identity: whether the user was proved by a signature.
     """
 
     device: str
@@ -255,6 +268,7 @@ class ModelChange:
     text: str
     model: str
     previous: str
+    identity: Identity = ""
 
 
 Message = (
