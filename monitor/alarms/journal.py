@@ -11,7 +11,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, fields
+from dataclasses import MISSING, asdict, fields
 from pathlib import Path
 from typing import Any, BinaryIO, get_type_hints
 
@@ -196,12 +196,15 @@ def _parse(line: bytes) -> AlarmRecord | None:
 def _typed(plain: dict[str, Any], kind: type, types: dict[str, Any]) -> dict[str, Any]:
     """The fields of `kind` from `plain`, with numbers converted to their types.
 
+    Fields that have a default may be missing: they are younger than some journals.
+
     Raises:
         KeyError: a field is missing.
         TypeError: a field has the wrong type.
     """
     typed: dict[str, Any] = {}
-    for name in [one.name for one in fields(kind) if one.name != "alarm"]:
+    known = [one.name for one in fields(kind) if one.name in plain or one.default is MISSING]
+    for name in [name for name in known if name != "alarm"]:
         value = float(plain[name]) if types[name] is float else plain[name]
         if isinstance(types[name], type) and not isinstance(value, types[name]):
             raise TypeError(name)

@@ -21,12 +21,12 @@ from dataclasses import replace
 from monitor.alarms.debounce import Debouncer
 from monitor.alarms.flood import MOST_IN_WINDOW, FloodWatch
 from monitor.alarms.kinds import ALARM_FLOOD, REFINED, check_settings, order_of, settings_of
-from monitor.alarms.operator import addressed, refusal
+from monitor.alarms.operator import NOBODY, Actor, addressed, refusal
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
 from monitor.signals import Condition
 from rigwatch.wire.arrays import IntArray
-from rigwatch.wire.messages import Alarm, AlarmCommand, Event
+from rigwatch.wire.messages import NOT_PROVED, Alarm, AlarmCommand, Event, Identity
 from rigwatch.wire.rig_config import AlarmSection
 
 Announcement = Alarm | Event
@@ -34,6 +34,7 @@ Announcement = Alarm | Event
 SHELF_LIFE_NS = 8 * 3600 * 1_000_000_000
 """Longest shelving: one shift, so that no alarm is forgotten on the shelf."""
 SOURCE = "monitor/alarms"
+_SHELF_TIME_OVER = Actor(text="its time on the shelf is over")
 
 
 class AlarmManager:
@@ -101,16 +102,22 @@ class AlarmManager:
             self._set(name, at, active=active)
         return self._take_announcements()
 
-    def command(self, command: AlarmCommand) -> list[Announcement]:
-        """Execute an operator's command, or return an event with the reason for its refusal."""
+    def command(self, command: AlarmCommand, identity: Identity = NOT_PROVED) -> list[Announcement]:
+        """Execute an operator's command, or return an event with the reason for its refusal.
+
+        Args:
+            command: of the operator.
+            identity: whether its user is proved by a signature.
+        """
         self._advance(command.t_ns)
         found = addressed(command, self._alarms.values())
         why_not = refusal(command, found)
         if why_not:
             self._tell("alarm_command_refused", why_not, command.t_ns)
             return self._take_announcements()
+        actor = Actor(command.user, identity, command.text)
         for alarm in found:
-            self._obey(alarm, command)
+            self._obey(alarm, command, actor)
         self._raise_unnamed(command.t_ns)
         return self._take_announcements()
 
@@ -213,7 +220,7 @@ class AlarmManager:
             at = replace(at, onset_seq=named.occasion.onset_seq)
             named.superseded = named.dismiss()
             named.occasion = replace(named.occasion, boot=at.boot, seq=at.seq, t_ns=at.t_ns)
-            self._publish(named, at.t_ns, text=f"named {alarm.name}")
+            self._publish(named, at.t_ns, Actor(text=f"named {alarm.name}"))
         alarm.raise_(at, first_out=first_out)
         self._first_out = alarm.name if first_out else self._first_out
         self._count(alarm, is_new=named is None)
@@ -281,7 +288,7 @@ class AlarmManager:
             elif self._alarms[name].flaps.ends_ns == t_ns:
                 self._end_series(self._alarms[name], t_ns)
             else:
-                self._unshelve(self._alarms[name], t_ns, "", "its time on the shelf is over")
+                self._unshelve(self._alarms[name], t_ns, _SHELF_TIME_OVER)
 
     def _deadlines(self) -> list[tuple[int, str]]:
         shelved = [
@@ -311,55 +318,56 @@ class AlarmManager:
         for alarm in self._alarms.values():
             if alarm.grouped:
                 alarm.grouped = False
-                self._publish(alarm, t_ns, text="shown again after the flood")
+                self._publish(alarm, t_ns, Actor(text="shown again after the flood"))
 
-    def _obey(self, alarm: AlarmInstance, command: AlarmCommand) -> None:
-        t_ns, user, text = command.t_ns, command.user, command.text
+    def _obey(self, alarm: AlarmInstance, command: AlarmCommand, actor: Actor) -> None:
+        t_ns = command.t_ns
         if command.action == "shelve":
-            self._shelve(alarm, command)
+            self._shelve(alarm, t_ns, actor)
         elif command.action == "unshelve":
-            self._unshelve(alarm, t_ns, user, text)
+            self._unshelve(alarm, t_ns, actor)
         elif alarm.acknowledge() if command.action == "acknowledge" else alarm.reset():
             alarm.grouped = False
-            self._publish(alarm, t_ns, user, text)
+            self._publish(alarm, t_ns, actor)
             if alarm.name == ALARM_FLOOD and command.action == "acknowledge":
-                self._acknowledge_group(command)
+                self._acknowledge_group(t_ns, actor)
 
-    def _acknowledge_group(self, command: AlarmCommand) -> None:
+    def _acknowledge_group(self, t_ns: int, actor: Actor) -> None:
         """Acknowledge the alarms grouped in an acknowledged flood."""
         for alarm in self._alarms.values():
             if alarm.grouped and alarm.acknowledge():
-                self._publish(alarm, command.t_ns, command.user, command.text)
+                self._publish(alarm, t_ns, actor)
 
-    def _shelve(self, alarm: AlarmInstance, command: AlarmCommand) -> None:
-        alarm.shelved_until_ns = command.t_ns + SHELF_LIFE_NS
+    def _shelve(self, alarm: AlarmInstance, t_ns: int, actor: Actor) -> None:
+        alarm.shelved_until_ns = t_ns + SHELF_LIFE_NS
         alarm.dismiss()
-        self._publish(alarm, command.t_ns, command.user, command.text)
+        self._publish(alarm, t_ns, actor)
         hours = SHELF_LIFE_NS // 3_600_000_000_000
-        text = f"{alarm.name} shelved by {command.user} for {hours} h: {command.text}"
-        self._tell("alarm_shelved", text, command.t_ns)
+        text = f"{alarm.name} shelved by {actor.user} for {hours} h: {actor.text}"
+        self._tell("alarm_shelved", text, t_ns)
 
-    def _unshelve(self, alarm: AlarmInstance, t_ns: int, user: str, text: str) -> None:
+    def _unshelve(self, alarm: AlarmInstance, t_ns: int, actor: Actor) -> None:
         alarm.shelved_until_ns = 0
-        self._tell("alarm_unshelved", f"{alarm.name} taken off the shelf: {user or text}", t_ns)
+        why = actor.user or actor.text
+        self._tell("alarm_unshelved", f"{alarm.name} taken off the shelf: {why}", t_ns)
         if alarm.active and alarm.settings.enabled:
             self._raise(alarm, replace(alarm.occasion, t_ns=t_ns))
         else:
-            self._note(alarm, t_ns, user, text)
+            self._note(alarm, t_ns, actor)
 
-    def _publish(self, alarm: AlarmInstance, t_ns: int, user: str = "", text: str = "") -> None:
-        self._note(alarm, t_ns, user, text)
+    def _publish(self, alarm: AlarmInstance, t_ns: int, actor: Actor = NOBODY) -> None:
+        self._note(alarm, t_ns, actor)
         if alarm.grouped:
             self._tell("alarm_grouped", f"{alarm.name} is {alarm.state}, grouped in a flood", t_ns)
         else:
-            self._said.append(alarm.message(user, t_ns))
+            self._said.append(alarm.message(actor.user, t_ns, actor.identity))
 
-    def _note(self, alarm: AlarmInstance, t_ns: int, user: str = "", text: str = "") -> None:
+    def _note(self, alarm: AlarmInstance, t_ns: int, actor: Actor = NOBODY) -> None:
         """Add a record for the journal."""
         self._changes.append(
             AlarmRecord(
-                alarm.message(user, t_ns), alarm.active, alarm.latched, alarm.shelved_until_ns,
-                alarm.grouped, text,
+                alarm.message(actor.user, t_ns, actor.identity), alarm.active, alarm.latched,
+                alarm.shelved_until_ns, alarm.grouped, actor.text,
             )
         )  # fmt: skip
 

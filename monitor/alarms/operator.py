@@ -1,17 +1,35 @@
 """Operator commands: the alarms that they address, and reasons for refusing them."""
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from monitor.alarms.kinds import split
 from monitor.alarms.state import UNSEEN, AlarmInstance
-from rigwatch.wire.messages import AlarmCommand
+from rigwatch.wire.messages import AlarmCommand, Identity
 
 EVERY = "*"
 LONGEST_NAME, LONGEST_TEXT = 100, 500
 """Longest names and text of a command that are kept [characters]."""
 MAX_CLOCK_DIFFERENCE_NS = 60_000_000_000
 """Largest difference between a command's time and the monitor's; beyond it, it is wrong [ns]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Actor:
+    """Who or what caused a transition.
+
+    Attributes:
+        user: the operator, "" if nobody acted.
+        identity: whether the operator is proved by a signature.
+        text: the operator's remark, or the reason of the transition.
+    """
+
+    user: str = ""
+    identity: Identity = ""
+    text: str = ""
+
+
+NOBODY = Actor()
 
 
 def bounded(command: AlarmCommand, now_ns: int) -> AlarmCommand:

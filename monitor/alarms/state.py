@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 
 from monitor.alarms.flapping import FlapWatch
 from monitor.alarms.kinds import REFINED, AlarmKind, AlarmSettings, kind_of, split
-from rigwatch.wire.messages import Alarm, AlarmState
+from rigwatch.wire.messages import Alarm, AlarmState, Identity
 
 UNSEEN: tuple[AlarmState, ...] = ("unacknowledged", "cleared_unacknowledged")
 
@@ -147,7 +147,7 @@ class AlarmInstance:
         self.state, self.latched, self.grouped = "normal", False, False
         return was_standing
 
-    def message(self, user: str = "", t_ns: int | None = None) -> Alarm:
+    def message(self, user: str = "", t_ns: int | None = None, identity: Identity = "") -> Alarm:
         """The alarm as published; changed at `t_ns` [ns] by `user`, otherwise by its occasion."""
         at = self.occasion
         counted = f"came {self.flaps.count} times" if self.flaps.holding else ""
@@ -168,4 +168,5 @@ class AlarmInstance:
             first_out=self.first_out,
             user=user,
             onset_seq=at.onset_seq,
+            identity=identity,
         )

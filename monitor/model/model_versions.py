@@ -3,18 +3,29 @@
 model.toml                the current model, read at the monitor's start
 model.v1.toml, .v2.toml   former versions, the newest with the highest number
 model.undone-….toml       rolled-back versions, named by the start of their SHA-256
-model.history.jsonl       user, time, action and reason of each change, one line each
+model.history.jsonl       who, whether proved, when, what and why: a line for each change
 """
 
 import hashlib
 import json
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import replace_file
+from rigwatch.wire.messages import NOT_PROVED, Identity
 
 
-def install(path: Path, text: str, t_ns: int, user: str, why: str) -> None:
+@dataclass(frozen=True, slots=True)
+class Author:
+    """Who changes the model, why, and whether the user is proved by a signature."""
+
+    user: str
+    why: str
+    identity: Identity = NOT_PROVED
+
+
+def install(path: Path, text: str, t_ns: int, author: Author) -> None:
     """Install a new version and keep the previous one.
 
     Raises:
@@ -25,7 +36,7 @@ def install(path: Path, text: str, t_ns: int, user: str, why: str) -> None:
         number = max(_numbers(path), default=0) + 1
         replace_file(_version(path, number), before)
         replace_file(path, text)
-        _note(path, "promote", text, t_ns=t_ns, user=user, why=why)
+        _note(path, "promote", text, t_ns, author)
     except OSError as error:
         raise ConfigError(path, "", error.strerror or str(error), "a file to write") from error
 
@@ -44,7 +55,7 @@ def version_before(path: Path) -> str:
         raise ConfigError(path, "", error.strerror or str(error), "a readable file") from error
 
 
-def roll_back(path: Path, t_ns: int, user: str, why: str) -> str:
+def roll_back(path: Path, t_ns: int, author: Author) -> str:
     """Restore the previous version; returns its text.
 
     Raises:
@@ -56,7 +67,7 @@ def roll_back(path: Path, t_ns: int, user: str, why: str) -> str:
         replace_file(path.with_name(f"{path.stem}.undone-{_sha256(undone)[:8]}.toml"), undone)
         replace_file(path, text)
         _version(path, max(_numbers(path))).unlink()
-        _note(path, "rollback", text, t_ns=t_ns, user=user, why=why)
+        _note(path, "rollback", text, t_ns, author)
     except OSError as error:
         raise ConfigError(path, "", error.strerror or str(error), "a file to write") from error
     return text
@@ -73,8 +84,8 @@ def _version(path: Path, number: int) -> Path:
     return path.with_name(f"{path.stem}.v{number}.toml")
 
 
-def _note(path: Path, step: str, text: str, *, t_ns: int, user: str, why: str) -> None:
-    line = {"t_ns": t_ns, "step": step, "user": user, "why": why, "sha256": _sha256(text)}
+def _note(path: Path, step: str, text: str, t_ns: int, author: Author) -> None:
+    line = {"t_ns": t_ns, "step": step, **asdict(author), "sha256": _sha256(text)}
     with path.with_name(f"{path.stem}.history.jsonl").open("a", encoding="utf-8") as file:
         file.write(json.dumps(line, ensure_ascii=False) + "\n")
 

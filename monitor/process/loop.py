@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from monitor.alarms import AlarmJournal, Announcement, bounded
+from monitor.alarms import AlarmJournal, Announcement
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
@@ -18,8 +18,9 @@ from monitor.process.cursor import Cursor
 from monitor.process.health import HealthBook
 from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_reports
 from monitor.process.model_requests import ModelDesk, Place
+from monitor.process.operator_desk import OperatorDesk
 from monitor.process.startup_grace import Patience
-from rigwatch.wire.bus import Bus, connect, serve_alarm_list
+from rigwatch.wire.bus import Bus, CommandCheck, connect, serve_alarm_list
 from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
@@ -32,7 +33,6 @@ from rigwatch.wire.host import (
 from rigwatch.wire.messages import (
     ALARMS,
     ALIVE_KEY,
-    COMMANDS,
     ESTIMATES,
     EVENTS,
     HEALTH,
@@ -89,7 +89,8 @@ class MonitorProcess:
         self._recorder_alive = False
         self._unsuitable = ""
         self._standing = self.rig.alarms.standing()
-        self._commands = bus.subscribe(COMMANDS)
+        check = CommandCheck(bus, config.bus.security.keys)
+        self._operators = OperatorDesk(bus, check)
         self._healths = bus.subscribe(HEALTH)
         bus.watch_tokens(f"{ALIVE_KEY}/daq", self._daq_changed)
         bus.watch_tokens(f"{ALIVE_KEY}/recorder", self._recorder_changed)
@@ -97,7 +98,7 @@ class MonitorProcess:
         serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
         if self._journal:
             self.say(self.rig.alarms.restore(self._journal.newest(), time.time_ns()))
-        self._models = ModelDesk(bus, self.rig, Path(section.model))
+        self._models = ModelDesk(bus, self.rig, Path(section.model), check)
         self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
 
@@ -117,8 +118,8 @@ class MonitorProcess:
         """Store the position, execute commands, check the link, publish the health."""
         if self._cursor and (position := self.reader.position):
             self._cursor.write(*position)
-        for command in self._commands.drain():
-            self.say(self.rig.alarms.command(bounded(command, time.time_ns())))
+        for announced in self._operators.execute(self.rig.alarms, time.time_ns()):
+            self.say(announced)
         self._change_models()
         for event in self._explainer.results():
             self.bus.publish(EVENTS, event)
@@ -171,7 +172,7 @@ class MonitorProcess:
         at = self._judged_ns + 1 if last >= 0 else time.time_ns()
         for change in self._models.changes(Place(self._device, boot, last + 1, at)):
             self.bus.publish(MODELS, change)
-            text = f"{change.text} ({change.user}), from sample {change.seq} on"
+            text = f"{change.text} ({change.user}, {change.identity}), from sample {change.seq} on"
             self.bus.publish(EVENTS, Event("monitor", at, "info", "MODEL", text))
 
     def _judge(self, block: SampleBlock) -> None:
@@ -249,6 +250,7 @@ class MonitorProcess:
             "queue_length": float(len(self.reader)),
             "rejected": float(self.reader.rejected),
             "dropped": float(self.reader.dropped),
+            **self._operators.counters,
         }
         self.bus.publish(
             HEALTH, self._health.message(seen.t_ns, state, text, self.reader.counters, extra)

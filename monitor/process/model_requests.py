@@ -11,9 +11,9 @@ from monitor.alarms import LONGEST_NAME, LONGEST_TEXT
 from monitor.model import RigModel, model_text, parse_model
 from monitor.model import model_versions as versions
 from monitor.pipeline import RigMonitor, check_can_follow
-from rigwatch.wire.bus import KEY, PATIENCE, Bus, ModelReply, ModelRequest
+from rigwatch.wire.bus import KEY, PATIENCE, Bus, CommandCheck, ModelReply, ModelRequest
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.messages import ModelChange
+from rigwatch.wire.messages import Identity, ModelChange
 
 
 @dataclass(eq=False)
@@ -21,6 +21,7 @@ class _Waiting:
     """A request whose sender waits for the answer."""
 
     wish: ModelRequest
+    identity: Identity
     withdrawn: bool = False
     answered: threading.Event = field(default_factory=threading.Event)
     answer: ModelReply = field(default_factory=lambda: ModelReply(False, "the monitor is busy"))
@@ -43,10 +44,11 @@ class ModelDesk:
         bus: source of requests.
         rig: the pipeline that uses the model.
         path: the model file.
+        check: verifies who makes a request.
     """
 
-    def __init__(self, bus: Bus, rig: RigMonitor, path: Path) -> None:
-        self._rig, self._path = rig, path
+    def __init__(self, bus: Bus, rig: RigMonitor, path: Path, check: CommandCheck) -> None:
+        self._rig, self._path, self._check = rig, path, check
         self._waiting: queue.SimpleQueue[_Waiting] = queue.SimpleQueue()
         self._close = bus.serve(KEY, self._take)
 
@@ -58,7 +60,7 @@ class ModelDesk:
             if one.withdrawn:
                 continue
             try:
-                found.append(self._grant(one.wish, place))
+                found.append(self._grant(one.wish, one.identity, place))
                 text = f"in force from sample {place.seq} of boot {place.boot} on"
                 one.answer = ModelReply(True, text, place.boot, place.seq)
             except RigwatchError as error:
@@ -76,22 +78,27 @@ class ModelDesk:
     def _take(self, question: bytes) -> list[bytes]:
         """In a thread of the bus: queue the request and wait."""
         try:
-            one = _Waiting(_bounded(msgspec.json.decode(question, type=ModelRequest)))
+            request = msgspec.json.decode(question, type=ModelRequest)
         except (msgspec.DecodeError, RecursionError) as error:
             return [msgspec.json.encode(ModelReply(False, f"not a model request: {error}"))]
+        verdict = self._check.judge(request)
+        if verdict.refusal:
+            return [msgspec.json.encode(ModelReply(False, f"refused: {verdict.refusal}"))]
+        one = _Waiting(_bounded(request), verdict.identity)
         self._waiting.put(one)
         one.withdrawn = not one.answered.wait(0.8 * PATIENCE)
         return [msgspec.json.encode(one.answer)]
 
-    def _grant(self, wish: ModelRequest, place: Place) -> ModelChange:
+    def _grant(self, wish: ModelRequest, identity: Identity, place: Place) -> ModelChange:
         """Apply one request; the file is written first, so the model survives a restart."""
         previous = self._rig.model
         model = self._wanted(wish)
         check_can_follow(previous, model)
+        author = versions.Author(wish.user, wish.text, identity)
         if wish.action == "rollback":
-            versions.roll_back(self._path, place.t_ns, wish.user, wish.text)
+            versions.roll_back(self._path, place.t_ns, author)
         else:
-            versions.install(self._path, wish.model, place.t_ns, wish.user, wish.text)
+            versions.install(self._path, wish.model, place.t_ns, author)
         self._rig.adopt(model)
         return ModelChange(
             place.device,
@@ -102,6 +109,7 @@ class ModelDesk:
             wish.text or wish.action,
             model_text(model),
             model_text(previous),
+            identity,
         )
 
     def _wanted(self, wish: ModelRequest) -> RigModel:

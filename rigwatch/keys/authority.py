@@ -17,7 +17,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from rigwatch.wire.bus import REGISTER, ROLES, Issued, Register, authority_file, key_files
+from rigwatch.wire.access import REGISTER, ROLES, Issued, Register, authority_file, key_files
 from rigwatch.wire.errors import KeysError
 
 AUTHORITY_KEY = "authority.key"

@@ -14,7 +14,15 @@ from monitor.model import RigModel, parse_model
 from monitor.pipeline import RigMonitor, Watched
 from rigwatch.replay.source import Item, items
 from rigwatch.wire.errors import RigwatchError, SessionError
-from rigwatch.wire.messages import Alarm, AlarmCommand, Event, ModelChange, SampleBlock
+from rigwatch.wire.messages import (
+    NOT_PROVED,
+    PROVED,
+    Alarm,
+    AlarmCommand,
+    Event,
+    ModelChange,
+    SampleBlock,
+)
 from rigwatch.wire.session import MERGED_SAMPLES, LostSpan, Session, SessionWriter
 
 PACED_BLOCK = 0.05
@@ -94,7 +102,7 @@ def judge(session: Session, monitor: RigMonitor, found: Iterable[Item]) -> Itera
     """
     for item in found:
         if isinstance(item, AlarmCommand):
-            yield Judged(item, None, monitor.alarms.command(item))
+            yield Judged(item, None, _commanded(monitor, item))
             continue
         if isinstance(item, ModelChange):
             yield Judged(item, None, _adopted(monitor, item, session))
@@ -106,6 +114,10 @@ def judge(session: Session, monitor: RigMonitor, found: Iterable[Item]) -> Itera
             text = f"found the channels {names}, expected {error} that the model needs"
             raise SessionError(f"{session.path}: {text}") from None
         yield Judged(item, watched, watched.announcements if watched else [])
+
+
+def _commanded(monitor: RigMonitor, command: AlarmCommand) -> list[Announcement]:
+    return monitor.alarms.command(command, PROVED if command.proof else NOT_PROVED)
 
 
 def _adopted(monitor: RigMonitor, change: ModelChange, session: Session) -> list[Announcement]:

@@ -4,15 +4,19 @@ A command takes effect between two samples, so its position does not depend on h
 were cut into blocks.
 """
 
+import re
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 
-from rigwatch.wire.messages import AlarmCommand, ModelChange, SampleBlock, cut, pieces
+from rigwatch.wire.bus import command_mark
+from rigwatch.wire.messages import AlarmCommand, Event, ModelChange, SampleBlock, cut, pieces
 from rigwatch.wire.session import MERGED_SAMPLES, Session
 
 Order = AlarmCommand | ModelChange
 Item = SampleBlock | Order
+_MARK = re.compile(r"\((command [0-9a-f]{16})\)$")
 
 
 def items(
@@ -35,9 +39,26 @@ def _orders(session: Session, start: int | None, end: int | None) -> list[Order]
     topics = [name for name in ("commands", "models") if session.may_hold(name)]
     if not topics:
         return []
-    recorded = (item.message for item in session.messages(topics, start, end))
+    recorded = [item.message for item in session.messages([*topics, "events"], start, end)]
     found = [message for message in recorded if isinstance(message, Order)]
-    return sorted(found, key=lambda message: message.t_ns)
+    refused = Counter(
+        mark[1]
+        for message in recorded
+        if isinstance(message, Event) and message.code == "alarm_command_refused"
+        if message.source == "monitor/alarms" and (mark := _MARK.search(message.text))
+    )
+    return sorted(_executed(found, refused), key=lambda message: message.t_ns)
+
+
+def _executed(found: list[Order], refused: Counter[str]) -> list[Order]:
+    """From the last, those that the monitor did not refuse; of equal ones it executed the first."""
+    kept = []
+    for order in reversed(found):
+        if isinstance(order, AlarmCommand) and refused[mark := command_mark(order)] > 0:
+            refused[mark] -= 1
+        else:
+            kept.append(order)
+    return kept[::-1]
 
 
 def _interleaved(block: SampleBlock, waiting: list[Order]) -> Iterator[Item]:

@@ -13,18 +13,28 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
-from rigwatch.wire.bus import Bus, connect, serve_alarm_list
+from rigwatch.wire.bus import Bus, CommandCheck, connect, serve_alarm_list
 from rigwatch.wire.host import Heartbeat
-from rigwatch.wire.messages import ALARMS, ESTIMATES, HEALTH, Alarm, AlarmState, Health
+from rigwatch.wire.messages import (
+    ALARMS,
+    COMMANDS,
+    ESTIMATES,
+    EVENTS,
+    HEALTH,
+    MONITOR_STALE,
+    Alarm,
+    Health,
+)
 from rigwatch.wire.rig_config import RigConfig, WitnessSection
 from rigwatch.witness.notices import Notices
+from rigwatch.witness.stale_alarm import StaleAlarm
 
 PROCESS = "witness"
-STALE = "monitor_stale"
 TURN = 0.1
+MOST_COMMANDS = 8
+"""Commands executed per turn."""
 FOR_MONITOR = 30.0
 """Time allowed until a monitor's first estimate [s]."""
-_NONE = float("nan")
 
 
 class Witness:
@@ -34,25 +44,29 @@ class Witness:
         settings: section [witness].
         bus: on which the monitor publishes.
         now: monotonic time [s].
+        keys: folder of the rig's keys, "" for none.
     """
 
-    def __init__(self, settings: WitnessSection, bus: Bus, now: float) -> None:
+    def __init__(self, settings: WitnessSection, bus: Bus, now: float, keys: str = "") -> None:
         self.settings, self._bus = settings, bus
         self._estimates = bus.subscribe_lossy(ESTIMATES)
         self._alarms = bus.listen(ALARMS)
         self._notices = Notices(settings)
         self._heard_at = now + max(0.0, FOR_MONITOR - settings.stale_after)
-        self._stale: Alarm | None = None
+        self._stale = StaleAlarm(CommandCheck(bus, keys))
+        self._commands = bus.subscribe(COMMANDS)
         self._running: list[subprocess.Popen[bytes]] = []
         self._told_at = now - 1.0
-        serve_alarm_list(bus, lambda: [self._stale] if self._stale else [])
+        serve_alarm_list(bus, lambda: list(filter(None, [self._stale.standing])))
 
     def turn(self, now: float, t_ns: int) -> None:
         """Check once; `now` is monotonic time [s], `t_ns` Unix time [ns]."""
         if self._estimates.drain():
             self._heard_at = now
         silent = now - self._heard_at
-        self._judge(silent > self.settings.stale_after, silent, t_ns)
+        for alarm in self._stale.judge(silent > self.settings.stale_after, silent, t_ns):
+            self._bus.publish(ALARMS, alarm)
+        self._obey(t_ns)
         for alarm in self._alarms.drain():
             self._notify(self._notices.hear(alarm, now))
         self._notify(self._notices.due(now))
@@ -60,22 +74,14 @@ class Witness:
             self._told_at = now
             self._report(silent, t_ns)
 
-    def _judge(self, stale: bool, silent: float, t_ns: int) -> None:
-        if stale and self._stale is None:
-            self._stale = self._say("unacknowledged", f"for {silent:.1f} s", t_ns)
-        elif not stale and self._stale is not None:
-            self._say("cleared_unacknowledged", "estimates come again", t_ns)
-            self._stale = None
-
-    def _say(self, state: AlarmState, text: str, t_ns: int) -> Alarm:
-        alarm = Alarm(
-            STALE, state, "critical", f"the monitor sends no estimates: {text}",
-            "The rig is not being watched. Check the monitor's process and its last message, then "
-            "data acquisition and router.",
-            "", 0, -1, t_ns, _NONE, _NONE, _NONE, False, "", -1,
-        )  # fmt: skip
-        self._bus.publish(ALARMS, alarm)
-        return alarm
+    def _obey(self, t_ns: int) -> None:
+        """Execute operators' commands, a few per turn."""
+        for _ in range(MOST_COMMANDS):
+            command = self._commands.get(timeout=0)
+            if command is None:
+                return
+            for said in self._stale.command(command, t_ns):
+                self._bus.publish(ALARMS if isinstance(said, Alarm) else EVENTS, said)
 
     def _notify(self, alarms: list[Alarm]) -> None:
         """Start the command for each alarm without waiting for it."""
@@ -100,10 +106,10 @@ class Witness:
         self._running.append(started)
 
     def _report(self, silent: float, t_ns: int) -> None:
-        state = STALE if self._stale else "running"
+        state = MONITOR_STALE if self._stale.standing else "running"
         counters = {"estimates_silent_s": max(0.0, silent), "lost_alarms": float(self._alarms.lost)}
         self._bus.publish(HEALTH, Health(PROCESS, t_ns, state, "", counters))
-        if self.settings.heartbeat_file and not self._stale:
+        if self.settings.heartbeat_file and not self._stale.standing:
             self._beat(Path(self.settings.heartbeat_file), t_ns)
 
     def _beat(self, path: Path, t_ns: int) -> None:
@@ -127,7 +133,12 @@ def run(config: RigConfig, stop: threading.Event) -> None:
     """
     bus = connect(config, PROCESS)
     try:
-        witness = Witness(config.witness or WitnessSection(), bus, time.monotonic())
+        witness = Witness(
+            config.witness or WitnessSection(),
+            bus,
+            time.monotonic(),
+            config.bus.security.keys,
+        )
         heartbeat = Heartbeat(PROCESS)
         heartbeat.ready()
         turns = 0

@@ -1,6 +1,5 @@
 """Routes of the rig's page: live signals, alarms, a study from an alarm."""
 
-import getpass
 import time
 
 from starlette.concurrency import run_in_threadpool
@@ -12,6 +11,7 @@ from rigwatch.browser.rig import RigLink, study_of_alarm
 from rigwatch.browser.server.context import answer, body_of, context_of, told
 from rigwatch.browser.server.places import PlaceError
 from rigwatch.browser.views import render
+from rigwatch.wire.access import operator_name
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages import AlarmCommand
 
@@ -50,7 +50,8 @@ async def rig_alarm(request: Request) -> Response:
     name, action = str(wanted.get("name", "")), wanted.get("action")
     if action not in ACTIONS:
         raise RigwatchError(f"found action {action!r}, expected one of {', '.join(ACTIONS)}")
-    command = AlarmCommand(name, action, getpass.getuser(), time.time_ns(), "from the workbench")
+    user = operator_name(_link(request).config.bus)
+    command = AlarmCommand(name, action, user, time.time_ns(), "from the workbench")
     changed, refusal = await run_in_threadpool(_link(request).command, command)
     if refusal:
         raise RigwatchError(refusal)

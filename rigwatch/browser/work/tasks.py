@@ -1,6 +1,5 @@
 """Tasks of a study's process: fit a step, explain, preview, add, undo, report."""
 
-import getpass
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -134,8 +133,8 @@ class Worker:
         return self._handed(rig, rollback=True)
 
     def _handed(self, rig: str, *, rollback: bool) -> dict[str, Any]:
-        study, user = open_study(self.folder), getpass.getuser()
-        done = hand_over(study, Path(rig), user, rollback=rollback, say=self.progress)
+        study = open_study(self.folder)
+        done = hand_over(study, Path(rig), rollback=rollback, say=self.progress)
         return {"step": "done" if done.granted.done else "refused", "text": done.granted.text}
 
     def _done(self, trial: Trial) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """`rigwatch ack`: acknowledges alarms, or resets those whose cause is gone."""
 
 import argparse
-import getpass
 import json
 import sys
 import time
@@ -21,7 +20,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
     parser.add_argument("name", nargs="?", default="*", metavar="NAME", help="alarm; else all")
-    parser.add_argument("--user", default="", help="who acts; else the user logged in")
+    parser.add_argument(
+        "--user",
+        default="",
+        help="who acts; else the operator's certificate, or without keys the login name",
+    )
     parser.add_argument("--reset", action="store_true", help="release the latch, once seen")
     parser.add_argument("--text", default="", help="remark kept in the journal")
 
@@ -29,12 +32,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Send the command and print the changes; 1 if there are none."""
     from rigwatch.commands.alarms.alarms import as_dict, as_line
+    from rigwatch.wire.access import operator_name
     from rigwatch.wire.bus import command_alarms, connect, unique_process
     from rigwatch.wire.rig_config import load_rig
 
-    bus = connect(load_rig(arguments.config), unique_process("ack"), TIMEOUT)
+    config = load_rig(arguments.config)
+    command = command_of(arguments, operator_name(config.bus, arguments.user))
+    bus = connect(config, unique_process("ack"), TIMEOUT)
     try:
-        changed, refusal = command_alarms(bus, command_of(arguments))
+        changed, refusal = command_alarms(bus, command)
     finally:
         bus.close()
     if arguments.json:
@@ -46,10 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if changed else 1
 
 
-def command_of(arguments: argparse.Namespace) -> "AlarmCommand":
-    """The command of the operator."""
+def command_of(arguments: argparse.Namespace, user: str) -> "AlarmCommand":
+    """The command of an operator."""
     from rigwatch.wire.messages import AlarmCommand
 
     action = "reset" if arguments.reset else "acknowledge"
-    user = arguments.user or getpass.getuser()
     return AlarmCommand(arguments.name, action, user, time.time_ns(), arguments.text)  # type: ignore[arg-type]

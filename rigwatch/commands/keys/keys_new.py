@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
     """0 when all are written."""
     from rigwatch.commands.keys.keys_show import print_register
     from rigwatch.keys import Authority
-    from rigwatch.wire.bus import ROLES
+    from rigwatch.wire.access import ROLES
 
     authority = Authority.create(arguments.folder, arguments.rig)
     for role in ROLES:

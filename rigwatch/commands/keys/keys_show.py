@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rigwatch.wire.bus import Register
+    from rigwatch.wire.access import Register
 
 HELP = "show the certificates of a rig"
 EXAMPLE = "  rigwatch keys show keys --json"

@@ -1,7 +1,6 @@
 """`rigwatch study promote`: passes the model to the running monitor, else to its file."""
 
 import argparse
-import getpass
 from pathlib import Path
 
 from rigwatch.commands.common import print_json, say
@@ -19,7 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rig", type=Path, required=True, metavar="CONFIG", help="the rig's configuration"
     )
     parser.add_argument("--rollback", action="store_true", help="roll back to the previous model")
-    parser.add_argument("--user", default="", help="who acts; else the user logged in")
+    parser.add_argument(
+        "--user",
+        default="",
+        help="who acts; else the operator's certificate, or without keys the login name",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -27,8 +30,8 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.workbench.steps import hand_over, model_path
     from rigwatch.workbench.study import open_study
 
-    user, study = arguments.user or getpass.getuser(), open_study(arguments.study)
-    done = hand_over(study, arguments.rig, user, rollback=arguments.rollback, say=say)
+    study = open_study(arguments.study)
+    done = hand_over(study, arguments.rig, arguments.user, rollback=arguments.rollback, say=say)
     found, granted = done.found, done.granted
     if arguments.json:
         residual = {"before": found.before, "after": found.after} if found else None

@@ -10,18 +10,11 @@ monitor answers.
 from rigwatch.wire.bus.alarm_command import command_alarms
 from rigwatch.wire.bus.alarm_list import ask_alarm_list, serve_alarm_list
 from rigwatch.wire.bus.bus import Bus, unique_process
+from rigwatch.wire.bus.command_check import CommandCheck, Verdict, command_mark, proved_here
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
 from rigwatch.wire.bus.connection import connect, open_router
 from rigwatch.wire.bus.model_change import KEY, PATIENCE, ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.bus.ring_questions import RingQuestions
-from rigwatch.wire.bus.security import (
-    REGISTER,
-    ROLES,
-    Issued,
-    Register,
-    authority_file,
-    key_files,
-)
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Close
 
@@ -30,25 +23,23 @@ __all__ = [
     "MAX_PAYLOAD",
     "PATIENCE",
     "QUEUE_CAPACITY",
-    "REGISTER",
-    "ROLES",
     "Bus",
     "Close",
+    "CommandCheck",
     "CompleteSubscription",
-    "Issued",
     "ModelReply",
     "ModelRequest",
     "Place",
-    "Register",
     "RingQuestions",
     "Subscription",
+    "Verdict",
     "ask_alarm_list",
     "ask_for_model",
-    "authority_file",
     "command_alarms",
+    "command_mark",
     "connect",
-    "key_files",
     "open_router",
+    "proved_here",
     "serve_alarm_list",
     "unique_process",
 ]

@@ -4,6 +4,7 @@ import time
 
 from rigwatch.wire.bus.alarm_list import ask_alarm_list
 from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.command_check import signed
 from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, Alarm, AlarmCommand
 
 TIMEOUT = 3.0
@@ -12,15 +13,16 @@ SETTLE = 0.2
 
 
 def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
-    """Send a command; the transitions in the monitor's reply, and the reason of a refusal.
+    """Sign and send a command; the transitions in the monitor's reply, and the reason of a refusal.
 
     Raises:
         BusError: no monitor answers.
+        KeysError: the operator's key cannot be read.
     """
     changes, events = bus.subscribe(ALARMS), bus.subscribe(EVENTS)
     try:
         ask_alarm_list(bus, TIMEOUT)
-        bus.publish(COMMANDS, command)
+        bus.publish(COMMANDS, signed(bus, command))
         done: list[Alarm] = []
         refusal = ""
         deadline = time.monotonic() + TIMEOUT / 2

@@ -3,13 +3,16 @@
 Zenoh is slow to import and not needed for a bus in memory, so it is imported on first use.
 """
 
-from rigwatch.wire.bus.bus import Bus
-from rigwatch.wire.bus.security import (
+from pathlib import Path
+
+from rigwatch.wire.access import (
+    Signer,
     access_settings,
     certificate_name,
     check_exposure,
     tls_settings,
 )
+from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.transport import Close
 from rigwatch.wire.rig_config import RigConfig
 
@@ -30,9 +33,10 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
         ZenohTransport,  # slow to import, not needed in memory
     )
 
-    tls = tls_settings(config.bus, certificate_name(config.bus, process))
+    name, keys = certificate_name(config.bus, process), config.bus.security.keys
+    tls = tls_settings(config.bus, name)
     transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease, tls)
-    return Bus(transport, config.rig.id, process)
+    return Bus(transport, config.rig.id, process, Signer(Path(keys), name) if keys else None)
 
 
 def open_router(config: RigConfig) -> Close:

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
+from rigwatch.wire.access import Signer
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, answered
 
@@ -27,9 +28,9 @@ class MemoryNetwork:
         self.watchers: list[tuple[str, Callable[[str, bool], None]]] = []
         self.up = True
 
-    def bus(self, rig: str, process: str) -> Bus:
+    def bus(self, rig: str, process: str, signer: Signer | None = None) -> Bus:
         """A process's bus on this network."""
-        return Bus(MemoryTransport(self), rig, process)
+        return Bus(MemoryTransport(self), rig, process, signer)
 
     def deliver(self, key: str, payload: bytes, sender: str, mark: bytes) -> None:
         """Deliver a payload to all subscribers, unless it is too large or the network is down."""

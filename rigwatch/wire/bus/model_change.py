@@ -6,6 +6,7 @@ from typing import Literal
 import msgspec
 
 from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.command_check import signed
 from rigwatch.wire.errors import BusError
 
 KEY = "monitor/model"
@@ -22,12 +23,14 @@ class ModelRequest:
         model: the model file's text; empty for a rollback.
         user: who makes the request.
         text: the reason.
+        proof: the operator's signature, "" on a rig without keys.
     """
 
     action: Literal["promote", "rollback"]
     model: str
     user: str
     text: str
+    proof: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +50,14 @@ class ModelReply:
 
 
 def ask_for_model(bus: Bus, wish: ModelRequest, timeout: float = PATIENCE) -> ModelReply:
-    """Send the request and wait for the reply.
+    """Sign and send the request, and wait for the reply.
 
     Raises:
         BusError: no monitor answers.
+        KeysError: the operator's key cannot be read.
     """
-    for reply in bus.query(KEY, msgspec.json.encode(wish), timeout):
+    question = msgspec.json.encode(signed(bus, wish))
+    for reply in bus.query(KEY, question, timeout):
         try:
             return msgspec.json.decode(reply, type=ModelReply)
         except msgspec.DecodeError:

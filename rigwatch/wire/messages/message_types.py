@@ -26,6 +26,10 @@ Severity = Literal["info", "warning", "error", "critical"]
 AlarmState = Literal["normal", "unacknowledged", "acknowledged", "cleared_unacknowledged"]
 """States of ISA-18.2: active and not yet seen, active and seen, gone before it was seen."""
 AlarmAction = Literal["acknowledge", "reset", "shelve", "unshelve"]
+Identity = Literal["", "proved", "not proved"]
+"""Whether the user of a command is who it says; "" where nobody acted."""
+PROVED: Identity = "proved"
+NOT_PROVED: Identity = "not proved"
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +154,8 @@ class Health:
 
 
 PROBABLY_MISSING = "PROBABLY MISSING"
+MONITOR_STALE = "monitor_stale"
+"""The alarm that the witness raises, all others are the monitor's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,13 +178,18 @@ class Alarm:
     """One transition of one alarm.
 
     Attributes:
-        name: the alarm, such as "dry_friction" or "link". state: the state it is in from now on.
-        severity: from info to critical. cause: the probable cause, in words. guidance: the
-        recommended action, in words. device, boot, seq, t_ns: the sample that decided; seq -1 if no
-        sample did. value, low, high: the value and the limits it exceeded; NaN if there are none.
-        first_out: whether it was the first of its flood. user: the operator, for transitions by an
-        operator. onset_seq: the first sample at which the condition held; earlier than the alarm by
-        its persistence.
+        name: the alarm, such as "dry_friction" or "link".
+        state: the state it is in from now on.
+        severity: from info to critical.
+        cause: the probable cause, in words.
+        guidance: the recommended action, in words.
+        device, boot, seq, t_ns: the sample that decided; seq -1 if no sample did.
+        value, low, high: the value and the limits it exceeded; NaN if there are none.
+        first_out: whether it was the first of its flood.
+        user: the operator, for transitions by an operator.
+        onset_seq: the first sample at which the condition held; earlier than the alarm by its
+            persistence.
+        identity: whether the user was proved by a signature.
     """
 
     name: str
@@ -196,17 +207,22 @@ class Alarm:
     first_out: bool
     user: str
     onset_seq: int
+    identity: Identity = ""
 
 
 @dataclass(frozen=True, slots=True)
 class AlarmCommand:
-    """An operator's command for an alarm; `name` "*" means all."""
+    """An operator's command for an alarm; `name` "*" means all.
+
+    `proof` is the operator's signature (`rigwatch.wire.access`), "" on a rig without keys.
+    """
 
     name: str
     action: AlarmAction
     user: str
     t_ns: int
     text: str = ""
+    proof: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,6 +259,7 @@ class ModelChange:
         text: the reason, in words.
         model: the model file's text.
         previous: the text of the previous one.
+        identity: whether the user was proved by a signature.
     """
 
     device: str
@@ -253,6 +270,7 @@ class ModelChange:
     text: str
     model: str
     previous: str
+    identity: Identity = ""
 
 
 Message = (

@@ -14,10 +14,18 @@ import numpy as np
 from monitor.model import RigModel, load_model, model_versions
 from monitor.pipeline import RigMonitor
 from monitor.process import monitor_section
-from rigwatch.wire.bus import ModelReply, ModelRequest, ask_for_model, connect, unique_process
+from rigwatch.wire.access import operator_name
+from rigwatch.wire.bus import (
+    ModelReply,
+    ModelRequest,
+    ask_for_model,
+    connect,
+    proved_here,
+    unique_process,
+)
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import Alarm, SampleBlock
-from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.workbench.steps.promotion import Promotion, promotion
 from rigwatch.workbench.study import Study, ledger
 
@@ -58,7 +66,7 @@ class Rehearsal:
 def hand_over(
     study: Study,
     rig: Path,
-    user: str,
+    user: str = "",
     *,
     rollback: bool = False,
     say: Callable[[str], None] = lambda _: None,
@@ -68,15 +76,16 @@ def hand_over(
     Args:
         study: the study whose accepted effects are promoted.
         rig: the rig's configuration.
-        user: who makes the request.
+        user: who makes the request; "" for the operator of this machine.
         rollback: restore the previous model instead.
         say: called with remarks for the user.
 
     Raises:
         ModelError: the monitor's model does not support an effect, or the residual does not fall.
         ConfigError: the rig's configuration or model cannot be read.
+        KeysError: the rig has keys, and `user` is not the operator of this machine.
     """
-    path = model_path(rig)
+    path, user = model_path(rig), operator_name(load_rig(rig).bus, user)
     name, found = study.folder.resolve().name, None
     if rollback:
         wish = ModelRequest("rollback", "", user, f"rolled back from study {name}")
@@ -118,21 +127,23 @@ def _send(
     rig: Path, path: Path, wish: ModelRequest, say: Callable[[str], None]
 ) -> tuple[ModelReply, bool]:
     """The monitor's answer and True; if none runs, the file is changed, and False."""
+    config = load_rig(rig)
     try:
-        bus = connect(load_rig(rig), unique_process("promote"), LINK_TIMEOUT)
+        bus = connect(config, unique_process("promote"), LINK_TIMEOUT)
         try:
             return ask_for_model(bus, wish), True
         finally:
             bus.close()
     except BusError as error:
         say(f"{error}; the model file is changed for the monitor's next start")
-        return _in_file(path, wish), False
+        return _in_file(config, path, wish), False
 
 
-def _in_file(path: Path, wish: ModelRequest) -> ModelReply:
-    now = time.time_ns()
+def _in_file(config: RigConfig, path: Path, wish: ModelRequest) -> ModelReply:
+    identity = proved_here(config.bus, config.rig.id, wish)
+    now, author = time.time_ns(), model_versions.Author(wish.user, wish.text, identity)
     if wish.action == "rollback":
-        model_versions.roll_back(path, now, wish.user, wish.text)
+        model_versions.roll_back(path, now, author)
     else:
-        model_versions.install(path, wish.model, now, wish.user, wish.text)
+        model_versions.install(path, wish.model, now, author)
     return ModelReply(True, "in force from the monitor's next start on")

@@ -1,0 +1,54 @@
+"""Executes operators' commands for alarms, after verifying who sends them."""
+
+from collections.abc import Iterator
+
+from monitor.alarms import AlarmManager, Announcement, bounded
+from rigwatch.wire.bus import Bus, CommandCheck, command_mark
+from rigwatch.wire.messages import COMMANDS, MONITOR_STALE, AlarmCommand, Event
+
+MOST_PER_TURN = 8
+"""Commands executed per turn of the loop, so that a flood of them does not delay samples."""
+SOURCE = "monitor/alarms"
+
+
+class OperatorDesk:
+    """The commands that the monitor receives.
+
+    Args:
+        bus: source of commands.
+        check: verifies them.
+    """
+
+    def __init__(self, bus: Bus, check: CommandCheck) -> None:
+        self._commands = bus.subscribe(COMMANDS)
+        self._check = check
+
+    @property
+    def counters(self) -> dict[str, float]:
+        """Commands refused because of their sender, and commands lost in a flood."""
+        lost = self._commands.dropped + self._commands.rejected
+        return {"commands_refused": float(self._check.refused), "commands_lost": float(lost)}
+
+    def execute(self, alarms: AlarmManager, now_ns: int) -> Iterator[list[Announcement]]:
+        """Execute waiting commands; what to publish for each.
+
+        Args:
+            alarms: of the rig.
+            now_ns: the monitor's Unix time [ns].
+        """
+        for _ in range(MOST_PER_TURN):
+            command = self._commands.get(timeout=0)
+            if command is None:
+                return
+            if command.name != MONITOR_STALE:  # the witness's own alarm
+                yield self._executed(alarms, command, now_ns)
+
+    def _executed(
+        self, alarms: AlarmManager, command: AlarmCommand, now_ns: int
+    ) -> list[Announcement]:
+        verdict, kept = self._check.judge(command), bounded(command, now_ns)
+        if not verdict.refusal:
+            return alarms.command(kept, verdict.identity)
+        text = f"{kept.action} of {kept.name} by {kept.user} refused: {verdict.refusal}"
+        mark = command_mark(command)
+        return [Event(SOURCE, now_ns, "warning", "alarm_command_refused", f"{text} ({mark})")]

@@ -1,0 +1,44 @@
+"""Who may speak on a rig's bus: certificates, roles, and signed commands.
+
+register        the certificates that a rig's authority has issued or revoked
+certificates    mutual TLS of a process; the operator of a machine
+access_list     topics allowed for each role, enforced by the router
+signing         Signer: an operator signs a command ─▶ proof (`statement`)
+verifying       Verifier: monitor and witness check it against authority and register
+"""
+
+from rigwatch.wire.access.access_list import access_settings
+from rigwatch.wire.access.certificates import (
+    certificate_name,
+    check_exposure,
+    operator_name,
+    tls_settings,
+)
+from rigwatch.wire.access.register import (
+    REGISTER,
+    ROLES,
+    Issued,
+    Register,
+    authority_file,
+    key_files,
+    read_register,
+)
+from rigwatch.wire.access.signing import Signer
+from rigwatch.wire.access.verifying import Verifier
+
+__all__ = [
+    "REGISTER",
+    "ROLES",
+    "Issued",
+    "Register",
+    "Signer",
+    "Verifier",
+    "access_settings",
+    "authority_file",
+    "certificate_name",
+    "check_exposure",
+    "key_files",
+    "operator_name",
+    "read_register",
+    "tls_settings",
+]

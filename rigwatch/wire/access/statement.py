@@ -1,0 +1,68 @@
+"""What an operator signs: the command, its rig, its receivers' runs, a nonce and the time.
+
+    certificate ─┐
+    signature ───┼─▶ Proof ─▶ text in the field `proof` of a command or model request
+    runs, nonce ─┘
+
+The signed bytes are the parts of the statement, each preceded by its length, so that no two
+statements have the same bytes.
+"""
+
+import msgspec
+
+from rigwatch.wire.errors import KeysError
+
+VERSION = "rigwatch command 1"
+LARGEST_PROOF = 1 << 13
+"""Longest proof that is read; one with a certificate has about 1500 characters."""
+
+
+class Proof(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The signature of a command and what is needed to verify it.
+
+    Attributes:
+        certificate: the operator's, PEM.
+        runs: runs of the receivers that may execute the command.
+        nonce: random, different for each command.
+        t_ns: time of signing [ns].
+        signature: ECDSA with SHA-256 over `statement`, hexadecimal.
+    """
+
+    certificate: str
+    runs: tuple[str, ...]
+    nonce: str
+    t_ns: int
+    signature: str = ""
+
+    def to_text(self) -> str:
+        """The proof as sent."""
+        return msgspec.json.encode(self).decode()
+
+
+def statement(rig: str, proof: Proof, said: tuple[str, ...]) -> bytes:
+    """The bytes that are signed.
+
+    Args:
+        rig: id of the rig.
+        proof: runs, nonce and time are part of the statement.
+        said: fields of the command, its kind first.
+    """
+    parts = (VERSION, rig, proof.nonce, str(proof.t_ns), str(len(proof.runs)), *proof.runs, *said)
+    texts = [part.encode("utf-8", "surrogatepass") for part in parts]
+    return b"".join(len(text).to_bytes(4, "big") + text for text in texts)
+
+
+def read_proof(text: str) -> Proof:
+    """The proof in a command.
+
+    Raises:
+        KeysError: it is missing, too long or malformed.
+    """
+    if not text:
+        raise KeysError("it is not signed")
+    if len(text) > LARGEST_PROOF:
+        raise KeysError(f"its proof has {len(text)} characters, expected at most {LARGEST_PROOF}")
+    try:
+        return msgspec.json.decode(text.encode(), type=Proof)
+    except (ValueError, RecursionError):
+        raise KeysError("its proof cannot be read") from None

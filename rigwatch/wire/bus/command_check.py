@@ -1,0 +1,110 @@
+"""Signed commands: an operator's side asks for the receivers' runs, a receiver's side verifies.
+
+Without keys commands are not signed, and the user's name is not proved.
+"""
+
+import contextlib
+import hashlib
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from rigwatch.wire.access import Signer, Verifier
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.errors import BusError, KeysError
+from rigwatch.wire.messages import NOT_PROVED, PROVED, AlarmCommand, Identity, encode
+from rigwatch.wire.rig_config import BusSection
+
+if TYPE_CHECKING:
+    from rigwatch.wire.bus.model_change import ModelRequest
+
+RUN_KEY = "monitor/receiver"
+TIMEOUT = 3.0
+"""Longest wait for the receivers' runs [s]."""
+Command = TypeVar("Command", AlarmCommand, "ModelRequest")
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Whether a command may be executed.
+
+    Attributes:
+        identity: whether its user is proved.
+        refusal: why it may not be executed, "" if it may.
+    """
+
+    identity: Identity
+    refusal: str = ""
+
+
+class CommandCheck:
+    """Verifies the commands that one process receives.
+
+    Args:
+        bus: of the process.
+        keys: folder of the rig's keys, "" for none.
+
+    Attributes:
+        refused: number of commands refused.
+    """
+
+    def __init__(self, bus: Bus, keys: str) -> None:
+        self.refused = 0
+        self._verifier = Verifier(Path(keys), bus.rig) if keys else None
+        if self._verifier:
+            run = self._verifier.run.encode()
+            bus.serve(RUN_KEY, lambda _: [run])
+
+    def judge(self, command: "AlarmCommand | ModelRequest") -> Verdict:
+        """Whether `command` may be executed."""
+        if self._verifier is None:
+            return Verdict(NOT_PROVED)
+        try:
+            self._verifier.check(command.user, command.proof, _said(command))
+        except KeysError as error:
+            self.refused += 1
+            return Verdict(NOT_PROVED, str(error))
+        return Verdict(PROVED)
+
+
+def signed(bus: Bus, command: Command) -> Command:
+    """The command with the operator's proof; unchanged without keys.
+
+    Raises:
+        BusError: no monitor answers.
+        KeysError: the operator's key cannot be read.
+    """
+    if bus.signer is None:
+        return command
+    runs = []
+    for reply in bus.query(RUN_KEY, timeout=TIMEOUT):
+        with contextlib.suppress(UnicodeDecodeError):
+            runs.append(reply.decode("ascii"))
+    if not runs:
+        raise BusError(f"no monitor of rig {bus.rig} answers: start `rigwatch monitor`")
+    return replace(command, proof=bus.signer.sign(bus.rig, tuple(runs), _said(command)))
+
+
+def command_mark(command: AlarmCommand) -> str:
+    """Identifies a recorded command, so that a replay skips those that were refused."""
+    return f"command {hashlib.sha256(encode(command)).hexdigest()[:16]}"
+
+
+def proved_here(bus: BusSection, rig: str, command: "AlarmCommand | ModelRequest") -> Identity:
+    """Prove the operator of this machine without a monitor, for a change of files.
+
+    Raises:
+        KeysError: why the operator may not act.
+    """
+    if not (keys := bus.security.keys):
+        return NOT_PROVED
+    verifier, said = Verifier(Path(keys), rig), _said(command)
+    proof = Signer(Path(keys), bus.security.operator).sign(rig, (verifier.run,), said)
+    verifier.check(command.user, proof, said)
+    return PROVED
+
+
+def _said(command: "AlarmCommand | ModelRequest") -> tuple[str, ...]:
+    """What is signed: the class of the command, then all its fields except the proof."""
+    names = [one.name for one in fields(command) if one.name != "proof"]
+    return type(command).__name__, *(str(getattr(command, name)) for name in names)

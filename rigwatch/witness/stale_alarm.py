@@ -1,0 +1,79 @@
+"""The witness's own alarm: the monitor sends no estimates."""
+
+from collections.abc import Iterator
+
+from rigwatch.wire.bus import CommandCheck
+from rigwatch.wire.messages import MONITOR_STALE, Alarm, AlarmCommand, AlarmState, Event, Identity
+
+_NONE = float("nan")
+EVERY = "*"
+
+
+class StaleAlarm:
+    """State of the alarm `monitor_stale`; receives the time and reads no clock.
+
+    Args:
+        check: verifies the commands of operators.
+
+    Attributes:
+        standing: the alarm while estimates are missing, otherwise None.
+    """
+
+    def __init__(self, check: CommandCheck) -> None:
+        self.standing: Alarm | None = None
+        self._check = check
+
+    def judge(self, stale: bool, silent: float, t_ns: int) -> Iterator[Alarm]:
+        """The transition, if there is one.
+
+        Args:
+            stale: whether estimates are missing.
+            silent: time since the last one [s].
+            t_ns: Unix time [ns].
+        """
+        if stale and self.standing is None:
+            self.standing = _alarm("unacknowledged", f"for {silent:.1f} s", t_ns)
+            yield self.standing
+        elif not stale and self.standing is not None:
+            seen = self.standing.state == "acknowledged"
+            self.standing = None
+            state: AlarmState = "normal" if seen else "cleared_unacknowledged"
+            yield _alarm(state, "estimates come again", t_ns)
+
+    def command(self, command: AlarmCommand, t_ns: int) -> Iterator[Alarm | Event]:
+        """Execute an operator's command for this alarm, or say why not."""
+        if command.name not in (MONITOR_STALE, EVERY):
+            return
+        if why_not := self._obstacle(command):
+            # Commands for all alarms are answered by the monitor.
+            if command.name == MONITOR_STALE:
+                user = command.user[:100]
+                text = f"{command.action} of {MONITOR_STALE} by {user} refused: {why_not}"
+                yield Event("witness", t_ns, "warning", "alarm_command_refused", text)
+            return
+        verdict = self._check.judge(command)
+        if verdict.refusal:
+            text = f"{command.action} of {command.name} refused: {verdict.refusal}"
+            yield Event("witness", t_ns, "warning", "alarm_command_refused", text)
+            return
+        user = command.user[:100]
+        self.standing = _alarm("acknowledged", "seen", t_ns, user, verdict.identity)
+        yield self.standing
+
+    def _obstacle(self, command: AlarmCommand) -> str:
+        if command.action != "acknowledge":
+            return "it can only be acknowledged"
+        if self.standing is None or self.standing.state != "unacknowledged":
+            return "it is not unacknowledged"
+        return "" if command.user else "no user given"
+
+
+def _alarm(
+    state: AlarmState, text: str, t_ns: int, user: str = "", identity: Identity = ""
+) -> Alarm:
+    return Alarm(
+        MONITOR_STALE, state, "critical", f"the monitor sends no estimates: {text}",
+        "The rig is not being watched. Check the monitor's process and its last message, then "
+        "data acquisition and router.",
+        "", 0, -1, t_ns, _NONE, _NONE, _NONE, False, user, -1, identity,
+    )  # fmt: skip

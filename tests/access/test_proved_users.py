@@ -1,0 +1,121 @@
+"""On a rig with keys, commands act only in the name of the operator who signs them."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rigwatch.keys import Authority
+from rigwatch.wire.bus import Bus, ask_alarm_list, ask_for_model, command_alarms
+from rigwatch.wire.bus.model_change import ModelRequest
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.messages import COMMANDS, ESTIMATES, EVENTS, AlarmCommand
+from tests.access.secured_rig import SecuredRig, make_keys
+from tests.bus.rig import ROOT, kill
+from tests.monitor_process.model import monitor_section
+from tests.waiting import PATIENCE, eventually
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[SecuredRig]:
+    keys = make_keys(tmp_path / "keys")
+    section = monitor_section(tmp_path) + "\n[witness]\n"
+    with SecuredRig(tmp_path, keys, section) as made:
+        made.router()
+        yield made
+
+
+def rigwatch(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-m", "rigwatch", *arguments],
+        cwd=ROOT, capture_output=True, text=True, timeout=2 * PATIENCE, check=False,
+    )  # fmt: skip
+
+
+def standing(bus: Bus) -> dict[str, str]:
+    try:
+        return {alarm.name: alarm.state for alarm in ask_alarm_list(bus)}
+    except BusError:
+        return {}
+
+
+def journal(rig: SecuredRig) -> list[tuple[str, str, str]]:
+    lines = (rig.folder / "alarms.jsonl").read_text().splitlines()
+    alarms = [json.loads(line)["alarm"] for line in lines]
+    return [(a["name"], a["user"], a["identity"]) for a in alarms if a["user"]]
+
+
+def refusal(bus: Bus, command: AlarmCommand) -> str:
+    """Publish a command as it is; the event that refuses it."""
+    events = bus.subscribe(EVENTS)
+    bus.publish(COMMANDS, command)
+    said: list[str] = []
+
+    def refused() -> bool:
+        said.extend(e.text for e in events.drain() if e.code == "alarm_command_refused")
+        return bool(said)
+
+    eventually(refused, "the refusal")
+    events.close()
+    return said[0]
+
+
+def test_an_operator_acts_in_the_own_name_only_and_a_revoked_one_not_at_all(
+    rig: SecuredRig,
+) -> None:
+    monitor = rig.start("-m", "rigwatch", "monitor", str(rig.path))
+    rig.start("-m", "rigwatch", "witness", str(rig.path))
+    publisher = rig.publisher(5, "--wave")
+    ann = rig.bus("ack-ann")
+    judged = ann.subscribe(ESTIMATES)
+    eventually(lambda: "alive/witness" in ann.tokens("alive/*"), "the witness")
+    eventually(lambda: bool(judged.drain()), "the monitor")
+    recorded = rig.bus("recorder").subscribe(COMMANDS)
+    kill(publisher)
+    eventually(lambda: {"stale", "monitor_stale"} <= set(standing(ann)), "the alarms")
+
+    seen, why = command_alarms(ann, AlarmCommand("monitor_stale", "acknowledge", "bob", 1))
+    assert not seen
+    assert "it is signed by ann, expected bob" in why
+    seen, why = command_alarms(ann, AlarmCommand("monitor_stale", "acknowledge", "ann", 1))
+    assert [(a.state, a.user, a.identity) for a in seen] == [("acknowledged", "ann", "proved")]
+
+    recorded.drain()
+    done = rigwatch("ack", str(rig.path), "--json")
+    assert done.returncode == 0, done.stderr
+    changed = json.loads(done.stdout)["changed"]
+    assert {(a["user"], a["identity"]) for a in changed} == {("ann", "proved")}
+    eventually(lambda: ("ann", "proved") in {entry[1:] for entry in journal(rig)}, "the journal")
+    done = rigwatch("ack", str(rig.path), "--user", "bob")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "user: found bob, expected ann" in done.stderr
+
+    # The command line could be changed: the monitor verifies.
+    genuine: AlarmCommand = recorded.get(timeout=PATIENCE)
+    _, why = command_alarms(ann, AlarmCommand("*", "acknowledge", "bob", 1))
+    assert "it is signed by ann, expected bob" in why
+    assert "it is not signed" in refusal(ann, AlarmCommand("*", "reset", "ann", 1))
+    assert "it was received before" in refusal(ann, genuine)
+    answer = ask_for_model(ann, ModelRequest("rollback", "", "bob", ""))
+    assert "it is signed by ann, expected bob" in answer.text
+    # Verified, then refused for another reason: there is nothing to roll back to.
+    assert "no version before" in ask_for_model(ann, ModelRequest("rollback", "", "ann", "")).text
+
+    kill(monitor)
+    eventually(lambda: "alive/monitor" not in ann.tokens("alive/*"), "its end")
+    rig.start("-m", "rigwatch", "monitor", str(rig.path))
+    eventually(lambda: "alive/monitor" in ann.tokens("alive/*"), "the monitor again")
+    eventually(lambda: "stale" in standing(ann), "its list")
+    assert "it is signed for another run" in refusal(ann, genuine)
+
+    Authority(rig.keys).revoke("ann")
+    _, why = command_alarms(ann, AlarmCommand("*", "reset", "ann", 1))
+    assert "the certificate of ann is revoked" in why
+    bob = rig.bus("ack-bob", rig.of("bob"))
+    _, why = command_alarms(bob, AlarmCommand("nothing", "reset", "bob", 1))
+    assert "no such alarm" in why
+    assert {entry[1:] for entry in journal(rig)} == {("ann", "proved")}
