@@ -56,8 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
         study, remarks = study_from_logs(arguments.study, _logs(arguments))
     else:
         study = create(arguments.study, arguments.template, arguments.sessions)
-    line = ledger.append(study, "new")
     if arguments.json:
+        *_, line = ledger.lines(study)
         print_json(line | {"remarks": remarks})
         return 0
     print(f"{study.folder}: model {study.model.name}: {study.model.summary}")
