@@ -93,9 +93,7 @@ class Study:
             ImportDataError: a recording cannot be read.
             ModelError: the model is unknown, or its signals are not among the columns.
         """
-        mapping = ImportMapping(
-            channels=dict(channels or {}), time=time, rate=rate, flag_missing=True
-        )
+        mapping = ImportMapping(channels=dict(channels or {}), time=time, rate=rate)
         with tempfile.TemporaryDirectory() as place:
             logs = Logs(
                 _files(data, Path(place)), model, _files(healthy, Path(place)), mapping,

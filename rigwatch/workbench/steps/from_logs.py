@@ -41,7 +41,7 @@ class Logs:
         data: log files: CSV, MAT, Parquet, JSON; or sessions.
         model: a shipped model's name, or a model file.
         healthy: logs of the healthy machine.
-        mapping: how logs are read where their headers are not sufficient.
+        mapping: columns, time and rate, if headers are not sufficient.
         start: known values of the model's parameters, in their units.
     """
 
@@ -100,8 +100,12 @@ def _imported(
             found = matched(table.names, model, logs.mapping.channels)
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
+        # A log of a real machine has gaps: missing values are invalid samples, not errors.
         mapping = structs.replace(
-            logs.mapping, channels=found.channels, time=logs.mapping.time or found.time
+            logs.mapping,
+            channels=found.channels,
+            time=logs.mapping.time or found.time,
+            flag_missing=True,
         )
         made = import_file(path, target, mapping)
         written.append(target)
