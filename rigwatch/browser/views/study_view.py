@@ -6,7 +6,7 @@ from typing import Any
 from rigwatch.browser.views.motion_map import motion_map
 from rigwatch.browser.views.pages import render
 from rigwatch.browser.views.study_state import State
-from rigwatch.workbench.data import goes_along_motion
+from rigwatch.workbench.data import predicts_along_motion
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.report import VERDICTS, doubt_of
 
@@ -160,7 +160,7 @@ def no_experiment(state: State) -> str:
         return ""
     if not found.rivals:
         return "None is needed: no effect of other physics explains this recording as well."
-    if goes_along_motion(state.study):
+    if predicts_along_motion(state.study):
         return (
             "None can be predicted: the model goes along the measured motion, which another"
             " excitation would change."
