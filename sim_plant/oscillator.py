@@ -15,18 +15,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
+from sim_plant.strengths import largest_share, strength_at
 
 RATE = 256.0
 """Sample rate [Hz]."""
 LARGEST = 40.0
 """Force at which the drive saturates, divided by 1 + the strength [N]."""
-LIMIT = 1e6
-"""Share assigned to a plant that diverges (NaN or infinite)."""
 STEPS = 64
 """Integration steps between two samples."""
 MASS, DAMPING, STIFFNESS = 0.8, 1.5, 60.0
@@ -118,19 +116,9 @@ def strength_for(name: str, force: FloatArray, share: float, *, held: bool = Fal
 
     def caused(strength: float) -> float:
         moved = oscillate(force, (Hidden(name, strength),), silent, 0, held=held) - healthy
-        found = float(np.max(np.sqrt(np.mean(moved**2, axis=0)) / size))
-        return found if np.isfinite(found) else LIMIT
+        return largest_share(moved, size)
 
-    low, high = 1e-6, 1e-6
-    while caused(high) < share and high < 1e9:
-        low, high = high, high * 4
-    if low == high or caused(high) < share:
-        return high
-
-    def surplus(logarithm: float) -> float:
-        return float(np.log(max(caused(np.exp(logarithm)), 1e-12) / share))
-
-    return float(np.exp(brentq(surplus, np.log(low), np.log(high), xtol=1e-3)))
+    return strength_at(share, caused, least=1e-6)
 
 
 @kernel()

@@ -20,18 +20,37 @@ def strength_that_causes(share: float, read: Callable[[float], FloatArray]) -> f
 
     Args:
         share: for example 0.05.
-        read: noise-free sensor signals at a strength, shape (n, outputs); at 0 the
-            plant is healthy.
+        read: noise-free sensor signals at a strength, shape (n, outputs); healthy at 0.
     """
     healthy = read(0.0)
     size = np.std(healthy, axis=0)
 
     def caused(strength: float) -> float:
-        moved = read(strength) - healthy
-        found = float(np.max(np.sqrt(np.mean(moved**2, axis=0)) / size))
-        return found if np.isfinite(found) else LIMIT
+        return largest_share(read(strength) - healthy, size)
 
-    low = high = LEAST
+    return strength_at(share, caused)
+
+
+def largest_share(moved: FloatArray, size: FloatArray) -> float:
+    """Largest rms change of a channel relative to its size; `LIMIT` if the plant diverges.
+
+    Args:
+        moved: change of the signals, shape (n, outputs).
+        size: of each signal, shape (outputs,).
+    """
+    found = float(np.max(np.sqrt(np.mean(moved**2, axis=0)) / size))
+    return found if np.isfinite(found) else LIMIT
+
+
+def strength_at(share: float, caused: Callable[[float], float], least: float = LEAST) -> float:
+    """The strength that causes a share; the last one tried if none does.
+
+    Args:
+        share: for example 0.05.
+        caused: share that a strength causes.
+        least: smallest strength that is tried.
+    """
+    low = high = least
     while caused(high) < share and high < MOST:
         low, high = high, high * 4
     if low == high or caused(high) < share:

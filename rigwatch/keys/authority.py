@@ -5,7 +5,6 @@ register lists as valid, so a revoked certificate stays invalid when its name is
 """
 
 import ipaddress
-import os
 import socket
 from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
@@ -19,6 +18,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from rigwatch.wire.access import REGISTER, ROLES, Issued, Register, authority_file, key_files
 from rigwatch.wire.errors import KeysError
+from rigwatch.wire.host import replace_file
 
 AUTHORITY_KEY = "authority.key"
 AUTHORITY_DAYS, CERTIFICATE_DAYS = 3650, 730
@@ -169,12 +169,6 @@ def _write(folder: Path, name: str, data: bytes, *, secret: bool = False) -> Non
     """Write a file atomically; a private key is never readable by others."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        new = folder / f"{name}.new"
-        new.unlink(missing_ok=True)
-        mode = 0o600 if secret else 0o644
-        handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        new.replace(folder / name)
+        replace_file(folder / name, data, mode=0o600 if secret else 0o644)
     except OSError as error:
         raise KeysError(f"{folder / name}: cannot be written: {error.strerror}") from error

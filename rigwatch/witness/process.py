@@ -14,7 +14,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rigwatch.wire.bus import Bus, CommandCheck, connect, serve_alarm_list
-from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.host import Heartbeat, replace_file
 from rigwatch.wire.messages import (
     ALARMS,
     COMMANDS,
@@ -114,10 +114,9 @@ class Witness:
 
     def _beat(self, path: Path, t_ns: int) -> None:
         """Update the heartbeat file, whose age shows when the monitor last published."""
-        new = path.with_name(f"{path.name}.new")
         with contextlib.suppress(OSError):
-            new.write_text(f"{t_ns / 1e9:.3f} {self._bus.rig} running\n", encoding="utf-8")
-            new.replace(path)
+            text = f"{t_ns / 1e9:.3f} {self._bus.rig} running\n"
+            replace_file(path, text, durable=False)
 
     def close(self) -> None:
         """Close the connection to the bus."""

@@ -12,7 +12,7 @@ import pytest
 from rigwatch.browser.work.desk import BusyError, Desk, Desks, warm_up
 from rigwatch.browser.work.results import FOLDER, results_of
 from rigwatch.workbench.study.folder import FILE
-from rigwatch.workbench.study.ledger import append, lines
+from rigwatch.workbench.study.ledger import lines
 from rigwatch.workbench.study.study import open_study
 from tests.waiting import PATIENCE
 from tests.workbench.fits.test_accepted_fit import UNITS, WAVES, waves
@@ -24,7 +24,6 @@ pytestmark = pytest.mark.xdist_group("browser")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = studied(tmp_path_factory.mktemp("work"), WAVES, [waves(0)], [waves(1)], UNITS)
-    append(made, "new")
     return made.folder
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from rigwatch.workbench.steps.change import add
-from rigwatch.workbench.study import ledger
 from rigwatch.workbench.study.study import Study, open_study
 from tests.report.drive import make_study
 
@@ -13,7 +12,6 @@ from tests.report.drive import make_study
 @pytest.fixture(scope="session")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     made = make_study(Path(tmp_path_factory.mktemp("drive")))
-    ledger.append(made, "new")
     assert add(made, "coulomb").step == "add"
     assert add(open_study(made.folder), "constant_force").step == "add"
     assert add(open_study(made.folder), "stribeck").step == "refused"

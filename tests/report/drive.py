@@ -15,7 +15,8 @@ from monitor.model.model_file import (
 )
 from rigwatch.wire.messages.message_types import Column, SampleBlock
 from rigwatch.wire.session import SessionWriter, run_info
-from rigwatch.workbench.study.study import Study, create
+from rigwatch.workbench.study.creation import create
+from rigwatch.workbench.study.study import Study
 
 RATE = 500.0
 SAMPLES = 6000

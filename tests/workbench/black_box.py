@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from rigwatch.simulated import write_session
-from rigwatch.workbench.study.study import Study, create
+from rigwatch.workbench.study.creation import create
+from rigwatch.workbench.study.study import Study
 from sim_plant.excitation import Multisine
 from sim_plant.scenario import Scenario
 

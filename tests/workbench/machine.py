@@ -7,7 +7,8 @@ import numpy as np
 
 from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping
-from rigwatch.workbench.study.study import Study, create
+from rigwatch.workbench.study.creation import create
+from rigwatch.workbench.study.study import Study
 
 Table = Mapping[str, np.ndarray]
 

@@ -12,7 +12,7 @@ from msgspec import structs
 from rigwatch.physics.engine.equations import shipped_models
 from rigwatch.wire.errors import ConfigError, RigwatchError
 from rigwatch.wire.typed_files import as_toml, find_file, load, shipped_names
-from rigwatch.workbench.study import FILE, Span, Study, StudyFile, ledger, open_study
+from rigwatch.workbench.study import FILE, Span, Study, StudyFile, start_study
 
 USES = ("train", "held_out", "healthy")
 
@@ -78,15 +78,7 @@ def make_study(
         file = StudyFile(model=model, train=train, held_out=held_out, healthy=healthy)
     else:
         file = structs.replace(_template(kind), train=train, held_out=held_out, healthy=healthy)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / FILE).write_text(as_toml(_said(file)), encoding="utf-8")
-    try:
-        study = open_study(folder)
-        ledger.append(study, "new")
-    except RigwatchError:
-        (folder / FILE).unlink()
-        raise
-    return study
+    return start_study(folder, as_toml(_said(file)))
 
 
 def _said(section: msgspec.Struct) -> dict[str, Any]:

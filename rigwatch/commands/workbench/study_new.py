@@ -56,8 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
         study, remarks = study_from_logs(arguments.study, _logs(arguments))
     else:
         study = create(arguments.study, arguments.template, arguments.sessions)
-    line = ledger.append(study, "new")
     if arguments.json:
+        *_, line = ledger.lines(study)
         print_json(line | {"remarks": remarks})
         return 0
     print(f"{study.folder}: model {study.model.name}: {study.model.summary}")
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _logs(arguments: argparse.Namespace) -> "Logs":
-    """What the options say about the logs."""
+    """The logs described by the options."""
     from rigwatch.wire.errors import ModelError
     from rigwatch.wire.exchange import ImportMapping, parse_map_option
     from rigwatch.workbench.steps import Logs
@@ -81,7 +81,6 @@ def _logs(arguments: argparse.Namespace) -> "Logs":
         time=arguments.time or "",
         rate=arguments.rate,
         columns=columns,
-        flag_missing=True,
     )
     return Logs(
         tuple(arguments.data),

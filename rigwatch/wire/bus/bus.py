@@ -124,14 +124,19 @@ class Bus:
         """Whether the router is currently connected."""
         return self.transport.connected()
 
-    def at_close(self, end: Close) -> None:
-        """Register `end` to be called by `close`; it returns when a thread has left the bus."""
+    def at_close(self, end: Close) -> Close:
+        """Register `end` to be called by `close`; it returns when a thread has left the bus.
+
+        Returns:
+            Removes the registration.
+        """
         self._at_close.append(end)
+        return lambda: self._at_close.remove(end)
 
     def close(self) -> None:
         """Leave the bus: the process's tokens vanish, and waiting queries end."""
         self.transport.close()
-        for end in self._at_close:
+        for end in tuple(self._at_close):
             end()
 
 

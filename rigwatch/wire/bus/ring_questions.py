@@ -34,8 +34,8 @@ class RingQuestions:
         self._questions: SimpleQueue[tuple[str, Ask] | None] = SimpleQueue()
         self._closed = False
         self._thread = threading.Thread(target=self._ask_on, name="ring-questions", daemon=True)
+        self._left = bus.at_close(self._end)
         self._thread.start()
-        bus.at_close(self._end)
 
     def ask(self, key: str, ask: Ask) -> None:
         """Send a query to the rings at `key`."""
@@ -61,6 +61,7 @@ class RingQuestions:
             if count:
                 time.sleep(PAUSES[min(count, len(PAUSES)) - 1])
             self._answered(key, ask, self._replies(key, ask))
+        self._left()
 
     def _replies(self, key: str, ask: Ask) -> list[bytes]:
         while not (self._bus.connected() or self._closed):

@@ -12,8 +12,24 @@ def write_through(path: Path, text: str) -> None:
         os.fsync(file.fileno())
 
 
-def replace_file(path: Path, text: str) -> None:
-    """Write a text file completely or not at all."""
-    beside = path.with_name(f"{path.name}.{os.getpid()}.part")
-    write_through(beside, text)
-    beside.replace(path)
+def replace_file(
+    path: Path, content: str | bytes, *, mode: int = 0o666, durable: bool = True
+) -> None:
+    """Write a file completely or not at all.
+
+    Args:
+        path: the file, replaced if it exists.
+        content: text, written as UTF-8, or bytes.
+        mode: permissions of the file, limited by the process's umask.
+        durable: return only once the file is on the disk.
+    """
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part.unlink(missing_ok=True)
+    # Created here with its final permissions, so that a secret is never readable by others.
+    handle = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+    with os.fdopen(handle, "wb") as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+        if durable:
+            file.flush()
+            os.fsync(file.fileno())
+    part.replace(path)

@@ -37,7 +37,7 @@ from rigwatch.workbench.steps import (
     try_undo,
 )
 from rigwatch.workbench.study import Study as Opened
-from rigwatch.workbench.study import create, ledger, open_study, stands_on
+from rigwatch.workbench.study import create, open_study, stands_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -93,16 +93,13 @@ class Study:
             ImportDataError: a recording cannot be read.
             ModelError: the model is unknown, or its signals are not among the columns.
         """
-        mapping = ImportMapping(
-            channels=dict(channels or {}), time=time, rate=rate, flag_missing=True
-        )
+        mapping = ImportMapping(channels=dict(channels or {}), time=time, rate=rate)
         with tempfile.TemporaryDirectory() as place:
             logs = Logs(
                 _files(data, Path(place)), model, _files(healthy, Path(place)), mapping,
                 dict(start or {}),
             )  # fmt: skip
-            made, _ = study_from_logs(Path(folder), logs)
-        ledger.append(made, "new")
+            study_from_logs(Path(folder), logs)
         return cls(folder)
 
     @classmethod
@@ -110,7 +107,7 @@ class Study:
         cls, folder: Path | str, template: Path | str, sessions: Path | str | None = None
     ) -> "Study":
         """Create a study from a template (`rigwatch study new --template`)."""
-        ledger.append(create(folder, template, sessions), "new")
+        create(folder, template, sessions)
         return cls(folder)
 
     def compare(self) -> Shown[Comparison]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from msgspec import structs
 
 from rigwatch.physics.engine.equations import Input, Model, Output, model_named
-from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError
+from rigwatch.wire.errors import ModelError, RigwatchError
 from rigwatch.wire.exchange import ImportMapping, import_file, read_table
 from rigwatch.workbench.data import (
     RATES_ALIKE,
@@ -23,7 +23,7 @@ from rigwatch.workbench.data import (
     read_columns,
 )
 from rigwatch.workbench.steps.log_columns import Matched, matched
-from rigwatch.workbench.study import FILE, Span, Study, open_study
+from rigwatch.workbench.study import Span, Study, check_new, discard, start_study
 
 SAMPLES_PER_PERIOD = 2.5
 """Residual samples kept in a period of the low-pass's corner frequency."""
@@ -41,7 +41,7 @@ class Logs:
         data: log files: CSV, MAT, Parquet, JSON; or sessions.
         model: a shipped model's name, or a model file.
         healthy: logs of the healthy machine.
-        mapping: how logs are read where their headers are not sufficient.
+        mapping: columns, time and rate, if headers are not sufficient.
         start: known values of the model's parameters, in their units.
     """
 
@@ -64,18 +64,16 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
         ImportDataError: a log cannot be read.
         ModelError: the model is unknown, or columns cannot be matched to its signals.
     """
-    if (folder / FILE).exists():
-        raise ConfigError(folder / FILE, "", "a study", "a folder without one")
+    check_new(folder)
     model, made_folder, written = model_named(logs.model), not folder.exists(), list[Path]()
     folder.mkdir(parents=True, exist_ok=True)
     try:
         reading, remarks = _imported(folder, logs, model, written)
-        text, said = _file(folder, logs, model, reading)
-        written.append(folder / FILE)
-        (folder / FILE).write_text(text, encoding="utf-8")
-        study = open_study(folder)
-        return study, [*remarks, *said, *prepare(study).remarks]
+        text, choices = _file(folder, logs, model, reading)
+        study = start_study(folder, text)
+        return study, [*remarks, *choices, *prepare(study).remarks]
     except RigwatchError:
+        discard(folder)
         for path in written:
             path.unlink(missing_ok=True)
         if made_folder:
@@ -102,8 +100,12 @@ def _imported(
             found = matched(table.names, model, logs.mapping.channels)
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
+        # A log of a real machine has gaps: missing values are invalid samples, not errors.
         mapping = structs.replace(
-            logs.mapping, channels=found.channels, time=logs.mapping.time or found.time
+            logs.mapping,
+            channels=found.channels,
+            time=logs.mapping.time or found.time,
+            flag_missing=True,
         )
         made = import_file(path, target, mapping)
         written.append(target)
@@ -119,7 +121,7 @@ def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str
     driving = [n for n in _channels(model.inputs) if n in tables[0].values]
     outputs = [n for n in _channels(model.outputs) if n in tables[0].values]
     train, held_out = proposed_split(tables, driving or outputs)
-    lines, said = [f'model = "{_named(folder, logs.model)}"'], list[str]()
+    lines, choices = [f'model = "{_named(folder, logs.model)}"'], list[str]()
     rates = [1 / table.dt for table in tables]
     if max(rates) / min(rates) > 1 + RATES_ALIKE:
         lines.append(f"rate = {min(rates):.6g}  # the slowest log's")
@@ -134,26 +136,26 @@ def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str
             f'signals.{name} = {{ channel = "{channel}", order = {order} }}'
             for name, (channel, order) in reading.rates.items()
         ]
-        said.append(f"{', '.join(reading.rates)} made from {', '.join(sources)}, low-passed at"
+        choices.append(f"{', '.join(reading.rates)} made from {', '.join(sources)}, low-passed at"
                     f" {low_pass:g} Hz")  # fmt: skip
         factor = int(min(rates) / (SAMPLES_PER_PERIOD * low_pass))
         enough = min(map(len, tables)) >= FEWEST * factor
         if factor > 1 and enough and not model.states:
             lines += ["", "[thin]", f"factor = {factor}", f"edge = {EDGE}"]
-            said.append(f"residuals low-passed alike: every {factor}th sample counts")
+            choices.append(f"residuals low-passed alike: every {factor}th sample counts")
     for use, parts in (("train", train), ("held_out", held_out)):
         for part in parts:
             lines += _span(use, logs.data[part.recording].stem, part)
-            said.append(f"{use.replace('_', ' ')}: {_in_words(logs, part)}")
+            choices.append(f"{use.replace('_', ' ')}: {_in_words(logs, part)}")
     for path in logs.healthy:
         lines += _span("healthy", path.stem, Part(0))
     known = [n for n, p in model.parameters.items() if p.fixed and n not in logs.start]
     if known:
-        said.append(
+        choices.append(
             f"{', '.join(known)}: not fitted, taken from the model file; set known values with"
             f" --set {known[0]}=VALUE"
         )
-    return "\n".join(lines) + "\n", said
+    return "\n".join(lines) + "\n", choices
 
 
 def _channels(signals: Mapping[str, Input] | Mapping[str, Output]) -> list[str]:

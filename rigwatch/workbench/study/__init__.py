@@ -1,6 +1,7 @@
 """A study on disk: its TOML file, its recordings, and the hashed ledger of every step."""
 
 from rigwatch.workbench.study import ledger
+from rigwatch.workbench.study.creation import check_new, create, discard, start_study
 from rigwatch.workbench.study.edits import (
     append_effect,
     drop_effect,
@@ -21,7 +22,6 @@ from rigwatch.workbench.study.study import (
     Span,
     Study,
     StudyFile,
-    create,
     open_study,
     study_of,
     varied,
@@ -41,9 +41,11 @@ __all__ = [
     "append",
     "append_effect",
     "check_data",
+    "check_new",
     "commit",
     "create",
     "digest",
+    "discard",
     "drop_effect",
     "keep_holds",
     "ledger",
@@ -51,6 +53,7 @@ __all__ = [
     "model_hash",
     "open_study",
     "stands_on",
+    "start_study",
     "study_of",
     "use_effect_file",
     "use_model_file",

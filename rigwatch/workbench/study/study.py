@@ -5,7 +5,6 @@ The file names a model, training and held-out recordings, and lists the accepted
 the rest of the file, including comments, is left unchanged.
 """
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
@@ -32,8 +31,8 @@ from rigwatch.physics.engine.equations import (
     with_variants,
 )
 from rigwatch.physics.engine.search import Convergence
-from rigwatch.wire.errors import ConfigError, ModelError, RigwatchError, nearest
-from rigwatch.wire.typed_files import Section, load, parse, read_text
+from rigwatch.wire.errors import ConfigError, ModelError, nearest
+from rigwatch.wire.typed_files import Section, parse, read_text
 from rigwatch.wire.units import Unit, unit_of
 from rigwatch.workbench.study.folder import FILE, LEDGER, settle
 from rigwatch.workbench.study.own_files import NOTHING_UNSAVED, Unsaved, content
@@ -394,40 +393,3 @@ def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
         if hold:
             holds[name] = Held(hold, late, 0.0, source)
     return structs.replace(model, inputs=inputs), holds
-
-
-def create(folder: Path | str, template: Path | str, sessions: Path | str | None = None) -> Study:
-    """Create a study in `folder` from the study file `template`.
-
-    Args:
-        folder: created if it does not exist.
-        template: its comments are kept.
-        sessions: folder of the template's sessions; the template's own folder if None.
-
-    Raises:
-        ConfigError: the folder holds a study already, the template is invalid, or a session or
-            effect file that it names is missing.
-    """
-    folder, template = Path(folder), Path(template)
-    if (folder / FILE).exists():
-        raise ConfigError(folder / FILE, "", "a study", "a folder without one")
-    file = load(template, StudyFile)
-    beside = template.parent if sessions is None else Path(sessions)
-    text = template.read_text(encoding="utf-8")
-    spans = {span.session: beside for span in (*file.train, *file.held_out, *file.healthy)}
-    files = spans | dict.fromkeys(file.effect_files, template.parent)
-    if file.model.endswith(".toml"):
-        files[file.model] = template.parent
-    for name, where in files.items():
-        path = where / name
-        if not path.exists():
-            raise ConfigError(template, name, "no such file or folder", f"it in {where}")
-        from_study = os.path.relpath(path.resolve(), folder.resolve())
-        text = text.replace(f'"{name}"', f'"{Path(from_study).as_posix()}"')
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / FILE).write_text(text, encoding="utf-8")
-    try:
-        return open_study(folder)
-    except RigwatchError:
-        (folder / FILE).unlink()
-        raise

@@ -12,7 +12,7 @@ from rigwatch.physics.engine.equations.system import compose
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.fit import learning
+from rigwatch.workbench.fit import term_selection
 from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_products
 from tests.workbench.black_box import TEMPLATE, study
 from tests.workbench.black_box import record as multisine
@@ -35,7 +35,7 @@ def test_what_is_learned_holds_under_an_excitation_that_was_not_learned(
     record(tmp_path, "rig", 2, phases=2)
     opened = study(tmp_path)
     taught = open_bench(opened)
-    monkeypatch.setattr(learning, "TERMS", {})
+    monkeypatch.setattr(term_selection, "TERMS", {})
     bare = open_bench(opened)
     assert taught.floor.rms[0] < bare.floor.rms[0]
     assert taught.base.held_out_error < bare.base.held_out_error

@@ -13,7 +13,7 @@ from rigwatch.physics.engine.equations.system import compose
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.data.motion import along_motion
 from rigwatch.workbench.data.signals import prepare
-from rigwatch.workbench.fit import learning
+from rigwatch.workbench.fit import term_selection
 from rigwatch.workbench.fit.boundedness import BoundednessTest
 from rigwatch.workbench.fit.learned_terms import LEARNED, with_products
 from rigwatch.workbench.fit.term_selection import Learned, learn_terms
@@ -50,7 +50,7 @@ def taught(healthy: Callable[[int], Case]) -> Learned:
 
 def bare(case: Case) -> Learned:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(learning, "TERMS", {})
+        patch.setattr(term_selection, "TERMS", {})
         return learn_terms(*case, HORIZON)
 
 
@@ -81,8 +81,8 @@ def test_what_is_learned_does_not_hinge_on_the_last_digits(
 def test_the_order_of_terms_makes_no_difference(
     healthy: Callable[[int], Case], taught: Learned, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    backwards = dict(reversed(learning.TERMS.items()))
-    monkeypatch.setattr(learning, "TERMS", backwards)
+    backwards = dict(reversed(term_selection.TERMS.items()))
+    monkeypatch.setattr(term_selection, "TERMS", backwards)
 
     found = learn_terms(*healthy(2), HORIZON)
 
@@ -94,7 +94,7 @@ def test_a_fit_that_begins_blown_up_ends_as_one_that_is_not(
     healthy: Callable[[int], Case], taught: Learned
 ) -> None:
     opened, recording = healthy(2)
-    data = learning._split(recording, HORIZON)
+    data = term_selection._split(recording, HORIZON)
     start = taught.fitted.train.values() | {f"{LEARNED}push_push_push": 1e4}
 
     found = fit_whole(opened, taught.model, data, start)

@@ -8,7 +8,8 @@ from rigwatch.wire.errors import ConfigError
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.steps.change import add
-from rigwatch.workbench.study.study import create, open_study
+from rigwatch.workbench.study.creation import create
+from rigwatch.workbench.study.study import open_study
 from tests.workbench.conftest import CONFIGS
 
 

@@ -8,7 +8,7 @@ from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.fit.intervals import values
-from rigwatch.workbench.study.study import create
+from rigwatch.workbench.study.creation import create
 from tests.workbench.rigs.test_black_box import record
 from tests.workbench.simulated import multisine, opened
 

@@ -17,7 +17,8 @@ from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option
 from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.fit.intervals import identifiability
-from rigwatch.workbench.study.study import Study, create
+from rigwatch.workbench.study.creation import create
+from rigwatch.workbench.study.study import Study
 
 MODEL = """
 name = "line"

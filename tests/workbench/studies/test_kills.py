@@ -23,9 +23,7 @@ KILLS = 20
 
 @pytest.fixture
 def study(tmp_path: Path) -> Study:
-    made = studied(tmp_path, WAVES, [waves(0)], [waves(1)], UNITS)
-    append(made, "new")
-    return made
+    return studied(tmp_path, WAVES, [waves(0)], [waves(1)], UNITS)
 
 
 def change_for_ever(folder: Path, done: Path) -> None:

@@ -11,7 +11,7 @@ from rigwatch.workbench.catalogue.drafts import draft_of_effects, draft_of_model
 from rigwatch.workbench.steps.change import learn_text, remodel
 from rigwatch.workbench.study.edits import append_effect, use_effect_file
 from rigwatch.workbench.study.folder import FILE, LEDGER
-from rigwatch.workbench.study.ledger import append, commit, lines
+from rigwatch.workbench.study.ledger import commit, lines
 from rigwatch.workbench.study.study import Accepted, Study, open_study
 from tests.workbench.fits.test_accepted_fit import UNITS, WAVES, waves
 from tests.workbench.machine import studied
@@ -31,9 +31,7 @@ NAME = "own.toml"
 
 @pytest.fixture
 def study(tmp_path: Path) -> Study:
-    made = studied(tmp_path, WAVES, [waves(0)], [waves(1)], UNITS)
-    append(made, "new")
-    return made
+    return studied(tmp_path, WAVES, [waves(0)], [waves(1)], UNITS)
 
 
 def files(study: Study) -> dict[str, bytes]:

@@ -7,7 +7,7 @@ import pytest
 
 from rigwatch.wire.errors import ConfigError
 from rigwatch.workbench.explain.explain import explain
-from rigwatch.workbench.study.study import create
+from rigwatch.workbench.study.creation import create
 from tests.workbench.machine import recorded
 
 SLED = """

@@ -17,7 +17,8 @@ from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.report.text_report import comparison_lines
 from rigwatch.workbench.steps.change import add
 from rigwatch.workbench.steps.ledger_replay import replay
-from rigwatch.workbench.study.study import Study, create, open_study
+from rigwatch.workbench.study.creation import create
+from rigwatch.workbench.study.study import Study, open_study
 
 RATE = 200.0
 SI = {

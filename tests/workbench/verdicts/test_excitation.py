@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from rigwatch.workbench.explain.explain import explain
-from rigwatch.workbench.study.study import create
+from rigwatch.workbench.study.creation import create
 from tests.workbench.machine import recorded, studied
 from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS
 
