@@ -22,5 +22,9 @@ def run(arguments: argparse.Namespace) -> int:
     authority = Authority(arguments.folder)
     authority.revoke(arguments.name)
     print_register(authority.register, arguments.json)
-    print("in force once the router has been restarted with this register", file=sys.stderr)
+    print(
+        "in force at once where router and monitor read this register; copy it where they read "
+        "another",
+        file=sys.stderr,
+    )
     return 0

@@ -25,6 +25,7 @@ from rigwatch.wire.rig_config import BusSection
 
 _EVERYBODY = (EVENTS.key, GAPS.key, HEALTH.key)
 _SAYS: dict[str, tuple[str, ...]] = {
+    "router": (),
     "device": (),
     "daq": (SAMPLES.key,),
     "monitor": (ALARMS.key, ESTIMATES.key, MODELS.key),

@@ -12,17 +12,19 @@ from rigwatch.wire.bus.alarm_list import ask_alarm_list, serve_alarm_list
 from rigwatch.wire.bus.bus import Bus, unique_process
 from rigwatch.wire.bus.command_check import CommandCheck, Verdict, command_mark, proved_here
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
-from rigwatch.wire.bus.connection import connect, open_router
+from rigwatch.wire.bus.connection import connect, log_refusals, open_router
 from rigwatch.wire.bus.model_change import KEY, PATIENCE, ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Close
+from rigwatch.wire.bus.transport import DENIED_MARK, MAX_PAYLOAD, REFUSED_MARK, Close
 
 __all__ = [
+    "DENIED_MARK",
     "KEY",
     "MAX_PAYLOAD",
     "PATIENCE",
     "QUEUE_CAPACITY",
+    "REFUSED_MARK",
     "Bus",
     "Close",
     "CommandCheck",
@@ -38,6 +40,7 @@ __all__ = [
     "command_alarms",
     "command_mark",
     "connect",
+    "log_refusals",
     "open_router",
     "proved_here",
     "serve_alarm_list",

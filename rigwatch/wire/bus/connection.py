@@ -39,6 +39,13 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
     return Bus(transport, config.rig.id, process, Signer(Path(keys), name) if keys else None)
 
 
+def log_refusals() -> None:
+    """Log refused connections and messages of this process's router to standard output."""
+    from rigwatch.wire.bus import zenoh_transport
+
+    zenoh_transport.log_refusals()
+
+
 def open_router(config: RigConfig) -> Close:
     """Run the router of a rig's bus until the returned function is called.
 

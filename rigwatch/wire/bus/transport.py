@@ -6,6 +6,9 @@ from typing import Protocol
 MAX_PAYLOAD = 1 << 18
 """Largest payload of a message or reply [bytes]; larger ones are refused."""
 
+REFUSED_MARK, DENIED_MARK = b"zenoh_link_tls::unicast", b"Msg intercepted!"
+"""In each line of Zenoh's log about a refused connection, and about a denied message."""
+
 Close = Callable[[], None]
 Receive = Callable[[bytes, str, bytes], None]
 """Called with a payload, the identity of its sender and its mark."""

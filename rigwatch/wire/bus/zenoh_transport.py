@@ -14,6 +14,7 @@ Reasons for the settings:
 import contextlib
 import json
 import logging
+import os
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -32,6 +33,11 @@ ACCEPT_MS, MOST_PENDING = 1000, 1000
 """Router's time limit for a connection to identify itself [ms], and number of pending ones."""
 ATTEMPT_MS = 300
 """Time of one connection attempt [ms]; short, since signals are handled only between attempts."""
+_INTERCEPTORS = "zenoh::net::routing::interceptor"
+_LOGGED = (
+    "zenoh=error,zenoh_link_tls=warn,"
+    f"{_INTERCEPTORS}=trace,{_INTERCEPTORS}::access_control=off,{_INTERCEPTORS}::low_pass=off"
+)
 _log = logging.getLogger(__name__)
 
 
@@ -87,6 +93,12 @@ def _configured(settings: dict[str, Any], endpoint: str) -> Any:
         expected = "expected an endpoint such as tcp/127.0.0.1:7447"
         raise BusError(f"bus: found {endpoint!r}, {expected}") from None
     return config
+
+
+def log_refusals() -> None:
+    """Log refused connections and messages to standard output."""
+    os.environ["RUST_LOG"] = _LOGGED
+    zenoh.init_log_from_env_or("error")
 
 
 def open_router(

@@ -1,0 +1,104 @@
+"""The router of a rig with keys follows the register, and counts what it refuses."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rigwatch.keys import Authority
+from rigwatch.router import RefusalLog
+from rigwatch.wire.bus import DENIED_MARK, REFUSED_MARK, Bus, connect
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, HEALTH, AlarmCommand, encode
+from rigwatch.wire.rig_config import load_rig
+from tests.access.secured_rig import SecuredRig, make_keys
+from tests.bus.test_complete_subscription import alarm
+from tests.waiting import eventually
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[SecuredRig]:
+    with SecuredRig(tmp_path, make_keys(tmp_path / "keys")) as made:
+        made.router()
+        yield made
+
+
+def heard_from(senders: dict[str, Bus], receiver: Bus) -> set[str]:
+    """Whose commands arrive, when each sends one, until that of bob does."""
+    commands = receiver.subscribe(COMMANDS)
+    users: set[str] = set()
+
+    def bob_heard() -> bool:
+        for name, bus in senders.items():
+            bus.publish(COMMANDS, AlarmCommand("*", "reset", name, 1))
+        users.update(command.user for command in commands.drain())
+        return "bob" in users
+
+    eventually(bob_heard, "a command of bob")
+    commands.close()
+    return users
+
+
+def test_a_revocation_and_a_new_certificate_are_in_force_without_a_restart(
+    rig: SecuredRig,
+) -> None:
+    senders = {name: rig.bus(f"ack-{name}", rig.of(name)) for name in ("ann", "bob")}
+    monitor, told = rig.bus("monitor"), rig.bus("recorder").subscribe(HEALTH)
+    eventually(lambda: heard_from(senders, monitor) == {"ann", "bob"}, "both are heard")
+
+    def reloads() -> float:
+        found = [h.counters["register_reloads"] for h in told.drain() if h.source == "router"]
+        return max(found, default=0.0)
+
+    Authority(rig.keys).revoke("ann")
+    eventually(lambda: reloads() == 1.0, "the register is read again")
+    assert heard_from(senders, monitor) == {"bob"}
+    Authority(rig.keys).issue("carl", "operator")
+    senders["carl"] = rig.bus("ack-carl", rig.of("carl"))
+    eventually(lambda: heard_from(senders, monitor) == {"bob", "carl"}, "carl is heard")
+    (rig.keys / "register.json").write_text("{")
+    assert "bob" in heard_from(senders, monitor)
+
+
+def test_refused_connections_and_denied_messages_are_counted_and_told(
+    rig: SecuredRig, tmp_path: Path
+) -> None:
+    observer = rig.bus("recorder")
+    healths, events = observer.subscribe(HEALTH), observer.subscribe(EVENTS)
+    alarms = observer.subscribe(ALARMS)  # without a subscriber the sender itself drops them
+    newest: dict[str, float] = {}
+
+    def counted(name: str) -> float:
+        for health in healths.drain():
+            if health.source == "router":
+                newest.update(health.counters)
+        return newest.get(name, -1.0)
+
+    eventually(lambda: counted("denied_messages") >= 0, "the router reports")
+    denied = counted("denied_messages")
+    stranger = rig.bus("dashboard")
+    for _ in range(3):
+        stranger.transport.put(stranger.key(ALARMS.key), encode(alarm(666)))
+    assert stranger.query("monitor/model", b"{}", 0.2) == []
+    eventually(lambda: counted("denied_messages") >= denied + 4, "four denials")
+    assert counted("denied_messages") == denied + 4
+    assert alarms.drain() == []
+
+    refused = counted("refused_connections")
+    other = make_keys(tmp_path / "other")
+    (tmp_path / "other.toml").write_text(rig.path.read_text().replace(str(rig.keys), str(other)))
+    with pytest.raises(BusError, match="no router answers"):
+        connect(load_rig(tmp_path / "other.toml"), "monitor", 0.5)
+    eventually(lambda: counted("refused_connections") > refused, "the refusal is counted")
+    eventually(lambda: any(e.code == "ACCESS REFUSED" for e in events.drain()), "an event")
+
+
+def test_the_log_of_refusals_passes_everything_else_on() -> None:
+    log = RefusalLog()
+    lines = [b"WARN " + REFUSED_MARK + b": eof", b"something else", b"x " + DENIED_MARK, b"last"]
+    text = b"\n".join(lines) + b"\n"
+    passed = b"".join(log.take(text[i : i + 7]) for i in range(0, len(text), 7))
+    assert passed == b"something else\nlast\n"
+    assert (log.connections, log.messages) == (1, 1)
+    passed = log.take(b"y" * 70_000)
+    assert len(passed) == 70_001
