@@ -12,6 +12,8 @@ RigwatchError             one plain line, shown by the command line without a tr
 ├── SessionError          a session file cannot be read or written
 ├── ImportDataError       foreign data cannot be imported as a session (column, unit, rate)
 ├── ModelError            a model cannot be fitted or does not match the data
+├── BatchError            work over many recordings cannot begin or continue
+├── ArchiveError          an archive cannot be read, written or queried
 └── MissingExtraError     an optional package is not installed
 """
 
@@ -82,6 +84,14 @@ class ImportDataError(RigwatchError):
 
 class ModelError(RigwatchError):
     """A model cannot be fitted or does not match the data."""
+
+
+class BatchError(RigwatchError):
+    """Work over many recordings that cannot begin or continue."""
+
+
+class ArchiveError(RigwatchError):
+    """An archive that cannot be read, written or queried."""
 
 
 class MissingExtraError(RigwatchError):

@@ -3,6 +3,8 @@
 from rigwatch.commands.common import watched
 from rigwatch.commands.common.drawing import ready_to_draw, show_until_closed
 from rigwatch.commands.common.log_arguments import add_log_columns
+from rigwatch.commands.common.many import add_many, run_many, the_one
+from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
 from rigwatch.commands.common.session_files import (
     add_session_and_target,
@@ -12,6 +14,7 @@ from rigwatch.commands.common.session_files import (
     print_json,
     report_written,
     say,
+    span_between,
     span_of,
     unix_time,
 )
@@ -19,8 +22,10 @@ from rigwatch.commands.common.shipped_argument import file_or_name
 
 __all__ = [
     "add_log_columns",
+    "add_many",
     "add_session_and_target",
     "add_span",
+    "add_studies",
     "check_folder",
     "damage_lines",
     "file_or_name",
@@ -28,9 +33,14 @@ __all__ = [
     "print_json",
     "ready_to_draw",
     "report_written",
+    "run_many",
+    "run_studies",
     "say",
     "show_until_closed",
+    "span_between",
     "span_of",
+    "the_one",
+    "the_study",
     "unix_time",
     "watched",
 ]

@@ -61,7 +61,17 @@ def span_of(arguments: argparse.Namespace, session: "Session") -> tuple[int | No
     Raises:
         SessionError: one of them is not a time.
     """
-    start, end = arguments.start, arguments.end
+    return span_between(arguments.start, arguments.end, session)
+
+
+def span_between(
+    start: str | None, end: str | None, session: "Session"
+) -> tuple[int | None, int | None]:
+    """Times given as texts [ns], None if not given.
+
+    Raises:
+        SessionError: one of them is not a time.
+    """
     return (
         None if start is None else point_in_time(start, session, "--start"),
         None if end is None else point_in_time(end, session, "--end"),

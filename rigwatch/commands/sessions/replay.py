@@ -1,26 +1,38 @@
-"""`rigwatch replay`: runs the monitor over a recording."""
+"""`rigwatch replay`: runs the monitor over recordings."""
 
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import add_span, damage_lines, print_json, say, span_of
+from rigwatch.commands.common import (
+    add_many,
+    add_span,
+    damage_lines,
+    print_json,
+    run_many,
+    say,
+    span_between,
+    span_of,
+    the_one,
+)
+from rigwatch.wire.errors import SessionError
 
 if TYPE_CHECKING:
     from rigwatch.replay import Replay
     from rigwatch.wire.messages import Alarm
 
-HELP = "run the monitor over a recording, as fast as possible or at a given speed"
+HELP = "run the monitor over recordings, as fast as possible or at a given speed"
 EXAMPLE = """\
   rigwatch replay run.mcap --model model.toml
   rigwatch replay sessions/bench1-20260501T120000Z --speed 1 --start 60
-  rigwatch replay run.mcap --model model.toml --out judged.mcap --json"""
+  rigwatch replay run.mcap --model model.toml --out judged.mcap --json
+  rigwatch replay sessions 'more/*.mcap' --model model.toml --on local:4 --results judged.parquet"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("session", type=Path, help="session file or folder of segments")
+    add_many(parser, "session", "session file or folder of segments")
     parser.add_argument("--model", type=Path, help="model file; default: the configuration's")
     parser.add_argument(
         "--config", type=Path, help="configuration of the rig; default: the one recorded with it"
@@ -42,11 +54,48 @@ def _speed(text: str) -> float:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 if the whole recording is judged, with or without alarms."""
+    """0 if everything is judged, with or without alarms; 1 if some of several recordings failed."""
+    path = the_one(arguments, arguments.session)
+    return _run_many(arguments) if path is None else _run_one(arguments, path)
+
+
+def _run_many(arguments: argparse.Namespace) -> int:
+    from rigwatch.batch import Job
+
+    if arguments.out is not None or arguments.speed:
+        option = "--out" if arguments.out is not None else "--speed"
+        raise SessionError(f"{option}: found several recordings, expected one")
+    names = ("model", "config", "start", "end")
+    settings = {name: getattr(arguments, name) for name in names}
+    return run_many(arguments, arguments.session, Job("replay", judged), settings, line=_line)
+
+
+def judged(
+    path: Path, model: Path | None, config: Path | None, start: str | None, end: str | None
+) -> dict[str, Any]:
+    """The result of one of several recordings: as for one, without the time it took."""
     from rigwatch.replay import monitor_for, replay
     from rigwatch.wire.session import open_session
 
-    session = open_session(arguments.session)
+    session = open_session(path)
+    monitor = monitor_for(session, model, config)
+    found = _as_data(replay(session, monitor, span_between(start, end, session)), None)
+    raised = [alarm.name for alarm in found["alarms"] if alarm.state == "unacknowledged"]
+    kept = ("samples", "duration_s", "alarms", "events", "lost")
+    return {"raised": raised, "raised_count": len(raised)} | {name: found[name] for name in kept}
+
+
+def _line(found: dict[str, Any]) -> str:
+    lost = f"; {len(found['lost'])} damaged part(s)" if found["lost"] else ""
+    size = f"{found['samples']} samples, {found['duration_s']:.1f} s"
+    return f"{size}; {_alarms(found['raised'])}{lost}"
+
+
+def _run_one(arguments: argparse.Namespace, path: Path) -> int:
+    from rigwatch.replay import monitor_for, replay
+    from rigwatch.wire.session import open_session
+
+    session = open_session(path)
     monitor = monitor_for(session, arguments.model, arguments.config)
     span = span_of(arguments, session)
     announce = _ignore if arguments.json else _Announcer()
@@ -78,12 +127,15 @@ class _Announcer:
 
 def _summary(done: "Replay") -> str:
     raised = [alarm.name for alarm in done.alarms if alarm.state == "unacknowledged"]
-    alarms = f"alarms raised: {', '.join(raised)}" if raised else "no alarm was raised"
     speed = f"{done.elapsed_s:.2f} s ({done.times_real_time:,.0f} × real time)"
-    return f"{done.samples} samples, {done.duration_s:.1f} s in {speed}; {alarms}"
+    return f"{done.samples} samples, {done.duration_s:.1f} s in {speed}; {_alarms(raised)}"
 
 
-def _as_data(done: "Replay", out: Path | None) -> dict[str, object]:
+def _alarms(raised: list[str]) -> str:
+    return f"alarms raised: {', '.join(raised)}" if raised else "no alarm was raised"
+
+
+def _as_data(done: "Replay", out: Path | None) -> dict[str, Any]:
     return {
         "samples": done.samples,
         "duration_s": done.duration_s,

@@ -2,25 +2,47 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import add_studies, print_json, run_studies, say, the_study
 
 HELP = "rank the effects that the model may lack and give a verdict"
-EXAMPLE = "  rigwatch explain emps"
+EXAMPLE = """\
+  rigwatch explain emps
+  rigwatch explain 'studies/*' --on local:4 --results verdicts.jsonl"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("study", type=Path, help="the study's folder")
+    add_studies(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 on success."""
+    """0 on success; 1 if some of several studies failed."""
+    folder = the_study(arguments)
+    if folder is None:
+        return run_studies(arguments, "explain", explained, _line)
+    return _run_one(arguments, folder)
+
+
+def explained(folder: Path) -> dict[str, object]:
+    """The result of one of several studies, as for one."""
+    from rigwatch.workbench.explain import as_data, explain
+    from rigwatch.workbench.study import open_study
+
+    return as_data(explain(open_study(folder)))
+
+
+def _line(found: dict[str, Any]) -> str:
+    return f"{found['verdict']}: {found['text']}"
+
+
+def _run_one(arguments: argparse.Namespace, folder: Path) -> int:
     from rigwatch.workbench.explain import as_data, explain
     from rigwatch.workbench.report import explanation_lines
     from rigwatch.workbench.study import open_study
 
-    found = explain(open_study(arguments.study), progress=say)
+    found = explain(open_study(folder), progress=say)
     if arguments.json:
         print_json(as_data(found))
         return 0

@@ -1,0 +1,135 @@
+"""Hands units to workers, several at a time, and deals with workers that die.
+
+A worker that dies takes all its waiting units with it, and nobody knows which one was at fault. So
+a lost unit is submitted again by itself; one that is lost again waits until the end, where it runs
+alone in the pool. Only a unit whose worker dies while it runs alone is called its cause, after
+`retries` such deaths. Dask tries a lost task again by itself before it reports `KilledWorker`, so
+one report about a unit that ran alone is enough.
+"""
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from dataclasses import dataclass
+
+from rigwatch.batch.job import WORKER_DIED, Outcome
+from rigwatch.batch.pool import Pool
+from rigwatch.wire.errors import BatchError
+
+TASK_S = 0.3
+"""Intended length of a task: far longer than it takes to hand it over [s]."""
+LARGEST_TASK = 256
+RETRIES = 3
+_LOOK_AGAIN_S = 5.0
+Run = Callable[[Sequence[str]], list[Outcome]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    units: tuple[str, ...]
+    generation: int
+    alone: bool
+
+
+class Drive:
+    """Work over units on a pool.
+
+    Args:
+        pool: the workers.
+        run: a function of some paths that returns their outcomes; sent to the workers.
+        units: paths.
+        retries: deaths of workers that a unit running alone may cause before it has failed.
+        say: called with remarks for people.
+    """
+
+    def __init__(
+        self, pool: Pool, run: Run, units: Iterable[str], retries: int, say: Callable[[str], None]
+    ) -> None:
+        self._pool, self._run, self._retries, self._say = pool, run, retries, say
+        self._waiting = deque(units)
+        self._again: deque[str] = deque()
+        self._suspects: deque[str] = deque()
+        self._lost: Counter[str] = Counter()
+        self._alone: Counter[str] = Counter()
+        self._running: dict[Future[list[Outcome]], _Task] = {}
+        self._seconds = 0.0
+
+    def __iter__(self) -> Iterator[Outcome]:
+        """Outcomes as they come."""
+        self._fill()
+        while self._running:
+            done, _ = wait(self._running, _LOOK_AGAIN_S, FIRST_COMPLETED)
+            if not done and not self._pool.workers:
+                self._say("no worker is left: waiting for one")
+            for future in done:
+                yield from self._collected(future)
+            self._fill()
+
+    def _fill(self) -> None:
+        window = 2 * max(1, self._pool.workers)
+        while len(self._running) < window and (self._again or self._waiting):
+            self._submit(self._next(window), alone=False)
+        if not self._running and self._suspects:
+            self._submit((self._suspects.popleft(),), alone=True)
+
+    def _next(self, window: int) -> tuple[str, ...]:
+        """Units of the next task; towards the end tasks get shorter, so that all workers work."""
+        if self._again:
+            return (self._again.popleft(),)
+        fitting = int(TASK_S / self._seconds) if self._seconds else 1
+        count = max(1, min(fitting, LARGEST_TASK, len(self._waiting) // window))
+        return tuple(self._waiting.popleft() for _ in range(count))
+
+    def _submit(self, units: tuple[str, ...], *, alone: bool) -> None:
+        future = self._pool.submit(self._run, units)
+        self._running[future] = _Task(units, self._pool.generation, alone)
+
+    def _collected(self, future: "Future[list[Outcome]]") -> Iterator[Outcome]:
+        task = self._running.pop(future)
+        try:
+            outcomes = future.result()
+        except BrokenExecutor:
+            self._pool.renew(task.generation)
+            yield from self._died(task)
+            return
+        except CancelledError:
+            raise BatchError("the scheduler is gone or has cancelled the work") from None
+        except BatchError:
+            raise
+        except Exception as error:
+            if type(error).__name__ == "KilledWorker":  # Dask's, which need not be installed
+                yield from self._died(task, self._retries)
+            else:
+                yield from self._refused(task, error)
+            return
+        for outcome in outcomes:
+            self._measure(outcome.seconds)
+            yield outcome
+
+    def _measure(self, seconds: float) -> None:
+        self._seconds += 0.2 * (seconds - self._seconds) if self._seconds else seconds
+
+    def _died(self, task: _Task, deaths: int = 1) -> Iterator[Outcome]:
+        """Units of a worker that died so many times."""
+        for unit in task.units:
+            self._lost[unit] += 1
+            self._alone[unit] += deaths * task.alone
+            if self._alone[unit] >= self._retries:
+                yield _dead(unit)
+            elif self._lost[unit] > 1:
+                self._suspects.append(unit)
+            else:
+                self._again.append(unit)
+
+    def _refused(self, task: _Task, error: Exception) -> Iterator[Outcome]:
+        """A task that could not be sent or answered: alone, each unit shows whether it can."""
+        if len(task.units) > 1:
+            self._again.extend(task.units)
+            return
+        text = " ".join(str(error).split())
+        yield Outcome(task.units[0], "", b"", type(error).__name__, f"{task.units[0]}: {text}")
+
+
+def _dead(unit: str) -> Outcome:
+    text = f"{unit}: its worker died each time it ran, alone too"
+    return Outcome(unit, "", b"", WORKER_DIED, text)

@@ -1,0 +1,58 @@
+"""Paths, globs and folders as recordings or studies."""
+
+import glob
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from rigwatch.wire.errors import BatchError
+from rigwatch.wire.session import SUFFIX
+
+_SEGMENT = re.compile(rf"\d{{6}}{re.escape(SUFFIX)}")
+"""Name of a segment, as the recorder writes it."""
+Finder = Callable[[Path], list[Path]]
+
+
+def recording_at(folder: Path) -> list[Path]:
+    """The recordings in a folder, at any depth: session files, and folders of segments."""
+    if is_segmented(folder):
+        return [folder]
+    found: dict[Path, None] = {}
+    for file in sorted(folder.rglob(f"*{SUFFIX}")):
+        whole = file.parent if _SEGMENT.fullmatch(file.name) else file
+        found[whole] = None
+    return list(found)
+
+
+def is_segmented(folder: Path) -> bool:
+    """Whether a folder is one session, written by a recorder in segments."""
+    return any(_SEGMENT.fullmatch(file.name) for file in folder.glob(f"*{SUFFIX}"))
+
+
+def expand(given: Iterable[Path | str], inside: Finder = recording_at) -> list[str]:
+    """The units named by paths, globs and folders: each once, in order of their names.
+
+    Args:
+        given: paths of units or of folders with units in them, and globs (`**` for any depth).
+        inside: units of a folder.
+
+    Raises:
+        BatchError: a path does not exist, or a glob or a folder holds nothing.
+    """
+    found: dict[Path, str] = {}
+    for text in given:
+        for path in _paths(str(text)):
+            for unit in inside(path) if path.is_dir() else [path]:
+                found.setdefault(unit.resolve(), str(unit))
+    if not found:
+        names = ", ".join(map(str, given)) or "no path"
+        raise BatchError(f"{names}: found nothing to work on, expected recordings or studies")
+    return sorted(found.values())
+
+
+def _paths(text: str) -> list[Path]:
+    if Path(text).exists():
+        return [Path(text)]
+    if not glob.has_magic(text):
+        raise BatchError(f"{text}: no such file or folder")
+    return [Path(name) for name in sorted(glob.glob(text, recursive=True))]  # noqa: PTH207

@@ -1,0 +1,162 @@
+"""A job: a function of one recording or study, and what identifies its results.
+
+A result is identified by the path and the content of its recording, the job, the job's settings
+and the version of rigwatch. Settings that are files count with their content.
+"""
+
+import hashlib
+import inspect
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from rigwatch.version import __version__
+from rigwatch.wire.errors import BatchError, RigwatchError
+
+WORKER_DIED = "WorkerDied"
+"""Kind of failure of a unit whose worker ended each time."""
+
+
+def content_hash(path: Path) -> str:
+    """SHA-256 of a file, or of the names and contents of all files of a folder.
+
+    Raises:
+        OSError: a file cannot be read.
+    """
+    if path.is_dir():
+        files = sorted(file for file in path.rglob("*") if file.is_file())
+        listed = [(str(file.relative_to(path)), content_hash(file)) for file in files]
+        return hashlib.sha256(msgspec.json.encode(listed)).hexdigest()
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is done with each unit.
+
+    Attributes:
+        name: names the job in results.
+        call: called with the path of a unit and the settings; returns plain data. A function of
+            a module, so that it can be sent to a worker.
+        content: hash of everything that the unit's result depends on.
+    """
+
+    name: str
+    call: Callable[..., Any]
+    content: Callable[[Path], str] = content_hash
+
+    def identity(self, settings: Mapping[str, Any]) -> str:
+        """SHA-256 of the job, its settings and the version of rigwatch.
+
+        Raises:
+            BatchError: a setting has no plain form, or names a missing file.
+        """
+        settled = {name: _settled(name, value) for name, value in settings.items()}
+        whole = (self.name, _code(self.call), settled, __version__)
+        return hashlib.sha256(msgspec.json.encode(whole, order="deterministic")).hexdigest()
+
+
+def job_of(job: "Job | Callable[..., Any]") -> Job:
+    """A plain function as a job, named by its module and its name."""
+    if isinstance(job, Job):
+        return job
+    function = job.func if isinstance(job, partial) else job
+    name = getattr(function, "__qualname__", type(function).__qualname__)
+    return Job(f"{function.__module__}.{name}", job)
+
+
+def _code(call: Callable[..., Any]) -> str:
+    """The source of a user's function, so that an edited one does not keep old results."""
+    if isinstance(call, partial):
+        return f"{_code(call.func)}{call.args}{sorted(call.keywords.items())}"
+    if call.__module__.partition(".")[0] == "rigwatch":
+        return ""  # its version stands for it
+    try:
+        return inspect.getsource(call)
+    except (OSError, TypeError):
+        return ""
+
+
+def _settled(name: str, value: Any) -> Any:
+    """A setting as plain data; a file is its content."""
+    try:
+        if isinstance(value, Path):
+            return ["file", content_hash(value)]
+        msgspec.json.encode(value)
+    except OSError as error:
+        raise BatchError(f"{value}: {error.strerror}, expected a file for {name}") from None
+    except (TypeError, NotImplementedError):
+        kind = type(value).__name__
+        raise BatchError(f"setting {name}: found {kind}, expected plain data or a path") from None
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The result of one unit, or why there is none.
+
+    Attributes:
+        path: the recording or study.
+        content: hash of its content; "" if it was not read.
+        value: the result as JSON; b"" for a failure.
+        kind: class of the error; "" for a result.
+        error: the error in one line.
+        seconds: time that the job took [s]; not part of the result.
+    """
+
+    path: str
+    content: str
+    value: bytes = b""
+    kind: str = ""
+    error: str = ""
+    seconds: float = 0.0
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no result."""
+        return bool(self.kind)
+
+
+def run_units(
+    job: Job, settings: Mapping[str, Any], paths: Sequence[str], version: str
+) -> list[Outcome]:
+    """Run the job on some units: what a worker does.
+
+    Raises:
+        BatchError: the worker has another version of rigwatch than the client.
+    """
+    if version != __version__:
+        found = f"a worker has rigwatch {__version__}, the client {version}"
+        raise BatchError(f"{found}: install the same version on both")
+    return [_run_unit(job, settings, path) for path in paths]
+
+
+def _run_unit(job: Job, settings: Mapping[str, Any], path: str) -> Outcome:
+    content, began = "", time.perf_counter()
+    try:
+        content = job.content(Path(path))
+        value = job.call(Path(path), **settings)
+        encoded = msgspec.json.encode(value, enc_hook=_plain, order="deterministic")
+        return Outcome(path, content, encoded, seconds=time.perf_counter() - began)
+    except RigwatchError as error:
+        kind, text = type(error).__name__, str(error)
+    except OSError as error:
+        kind, text = type(error).__name__, f"{error.filename or path}: {error.strerror or error}"
+    except Exception as error:  # one unit's failure is not that of the others
+        kind, text = type(error).__name__, f"{path}: {error}"
+    line = " ".join(text.split())
+    return Outcome(path, content, b"", kind, line, time.perf_counter() - began)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise NotImplementedError(f"a result holds {type(value).__name__}, which has no JSON form")

@@ -1,0 +1,210 @@
+"""The file of results: JSON lines as they come, at the end one file in the order of the paths.
+
+A line is appended whole, so a client that is killed leaves at most one torn line, which is cut off.
+For Parquet the lines are kept beside the file until all results are there.
+"""
+
+import fcntl
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import msgspec
+
+from rigwatch.batch.job import Outcome
+from rigwatch.batch.parquet import lines_of, write_parquet
+from rigwatch.wire.errors import BatchError
+
+PARQUET = ".parquet"
+
+
+class Line(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One line: a result (`value`) or a failure (`kind`, `error`) of a unit.
+
+    Attributes:
+        path: the recording or study.
+        content: hash of its content.
+        work: hash of job, settings and version.
+    """
+
+    path: str
+    content: str
+    work: str
+    value: msgspec.Raw
+    kind: str = ""
+    error: str = ""
+
+    def outcome(self) -> Outcome:
+        """The result without the identity of the work."""
+        value = b"" if self.kind else bytes(self.value)
+        return Outcome(self.path, self.content, value, self.kind, self.error)
+
+
+_DECODER = msgspec.json.Decoder(Line)
+
+
+def as_line(outcome: Outcome, work: str) -> bytes:
+    """An outcome as a line with its end."""
+    value = msgspec.Raw(outcome.value or b"null")
+    line = Line(outcome.path, outcome.content, work, value, outcome.kind, outcome.error)
+    return msgspec.json.encode(line) + b"\n"
+
+
+class Journal:
+    """The results so far, in a file or in memory.
+
+    Args:
+        file: `.jsonl` or `.parquet`; None keeps results in memory.
+        work: hash of job, settings and version; results of other work are refused.
+
+    Raises:
+        BatchError: the file cannot be used, is in use, or holds results of other work.
+        MissingExtraError: Parquet without pyarrow.
+    """
+
+    def __init__(self, file: Path | None, work: str) -> None:
+        self.file, self.work = file, work
+        self._lines: dict[str, tuple[int, int]] = {}
+        self._memory = bytearray()
+        self._file = None if file is None else self._opened(file)
+        try:
+            self._read()
+        except BaseException:
+            self.close()
+            raise
+
+    def _opened(self, file: Path) -> BinaryIO:
+        beside = journal_of(file)
+        try:
+            if file.suffix == PARQUET and file.exists() and not beside.exists():
+                beside.write_bytes(b"".join(lines_of(file)))
+            opened = beside.open("a+b")
+        except OSError as error:
+            raise BatchError(f"{file}: cannot be written: {error.strerror}") from None
+        try:
+            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            opened.close()
+            raise BatchError(f"{file}: is in use by another run") from None
+        return opened
+
+    def _read(self) -> None:
+        """Take notice of the lines that are there; cut off a torn one."""
+        if self._file is None:
+            return
+        self._file.seek(0)
+        end = 0
+        for raw in self._file:
+            if not raw.endswith(b"\n"):
+                break
+            self._take(raw, end)
+            end += len(raw)
+        self._file.truncate(end)
+
+    def _take(self, raw: bytes, at: int) -> None:
+        try:
+            line = _DECODER.decode(raw)
+        except msgspec.DecodeError:
+            text = "holds a line that is no result, expected another name for new results"
+            raise BatchError(f"{self.file}: {text}") from None
+        if line.work != self.work:
+            text = "holds results of another job, other settings or another version of rigwatch"
+            raise BatchError(f"{self.file}: {text}, expected a new file")
+        self._lines[line.path] = at, len(raw)
+
+    def get(self, path: str) -> Outcome | None:
+        """The result of a unit, None if there is none."""
+        place = self._lines.get(path)
+        return None if place is None else _DECODER.decode(self._at(place)).outcome()
+
+    def add(self, outcome: Outcome) -> None:
+        """Append a result; it replaces an earlier one of the same unit.
+
+        Raises:
+            BatchError: the disk is full or gone.
+        """
+        raw = as_line(outcome, self.work)
+        if self._file is None:
+            self._lines[outcome.path] = len(self._memory), len(raw)
+            self._memory += raw
+            return
+        try:
+            at = self._file.seek(0, os.SEEK_END)
+            self._file.write(raw)
+            self._file.flush()
+        except OSError as error:
+            raise BatchError(f"{self.file}: cannot be written: {error.strerror}") from None
+        self._lines[outcome.path] = at, len(raw)
+
+    def outcomes(self, paths: Iterable[str]) -> Iterator[Outcome]:
+        """Results of the units, in the given order."""
+        for path in paths:
+            if (found := self.get(path)) is not None:
+                yield found
+
+    def finish(self, paths: Iterable[str]) -> None:
+        """Write the results of these units alone, in the given order, in place of the journal."""
+        if self.file is None:
+            return
+        lines = (self._at(self._lines[path]) for path in paths if path in self._lines)
+        beside = journal_of(self.file)
+        temporary = self.file.with_name(f".{self.file.name}.new")
+        if self.file.suffix == PARQUET:
+            write_parquet(temporary, lines)
+        else:
+            with temporary.open("wb") as file:
+                file.writelines(lines)
+        _replace(temporary, self.file)
+        if beside != self.file:
+            beside.unlink()
+
+    def _at(self, place: tuple[int, int]) -> bytes:
+        at, length = place
+        if self._file is None:
+            return bytes(self._memory[at : at + length])
+        return os.pread(self._file.fileno(), length, at)
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+
+
+def journal_of(file: Path) -> Path:
+    """Where results are appended until all are there."""
+    return file.with_name(f"{file.name}.jsonl") if file.suffix == PARQUET else file
+
+
+def _replace(temporary: Path, file: Path) -> None:
+    """Put a whole file in place, on the disk before anything is removed."""
+    descriptor = os.open(temporary, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+    temporary.replace(file)
+
+
+def check_target(file: Path | None) -> None:
+    """Refuse a file of results that cannot be written, before long work begins.
+
+    Raises:
+        BatchError: its ending is unknown, or its folder does not exist.
+    """
+    if file is None:
+        return
+    if file.suffix not in (PARQUET, ".jsonl"):
+        raise BatchError(f"{file}: found the ending {file.suffix!r}, expected .jsonl or .parquet")
+    if not file.absolute().parent.is_dir():
+        raise BatchError(f"{file}: found no folder {file.parent}, expected one to write to")
+
+
+def read_outcomes(file: Path) -> Iterator[Outcome]:
+    """The outcomes in a finished file of results."""
+    if file.suffix == PARQUET:
+        yield from (_DECODER.decode(line).outcome() for line in lines_of(file))
+        return
+    with file.open("rb") as lines:
+        for line in lines:
+            yield _DECODER.decode(line).outcome()

@@ -1,0 +1,107 @@
+"""An executor that can be replaced when its processes have died."""
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from typing import Any
+
+from rigwatch.batch.executors import Here, Maker
+from rigwatch.wire.errors import BatchError
+
+_COUNT_AGAIN_S = 5.0
+
+
+class Pool:
+    """The executor in use, and how to make another one.
+
+    Args:
+        executor: an executor, a function that makes one, or None for this process. A broken
+            `ProcessPoolExecutor` is replaced by one of the same kind.
+    """
+
+    def __init__(self, executor: Executor | Maker | None) -> None:
+        self._make: Maker | None
+        if executor is None:
+            self._make = Here
+        elif isinstance(executor, Executor):
+            self._make = _maker_of(executor)
+        else:
+            self._make = executor
+        given = isinstance(executor, Executor)
+        self.executor: Executor = executor if isinstance(executor, Executor) else self._made()
+        self._own = not given
+        self.generation = 0
+        self._workers, self._counted = 0, 0.0
+
+    def _made(self) -> Executor:
+        assert self._make is not None
+        return self._make()
+
+    def submit(self, call: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Submit a call; a broken executor is replaced first."""
+        while True:
+            try:
+                return self.executor.submit(call, *arguments)
+            except BrokenExecutor:
+                self.renew(self.generation)
+
+    def renew(self, generation: int) -> None:
+        """Replace the executor of a generation that broke; once for all its calls.
+
+        Raises:
+            BatchError: the executor was given and is of a kind that cannot be made again.
+        """
+        if generation != self.generation:
+            return
+        if self._make is None:
+            kind = type(self.executor).__name__
+            raise BatchError(f"{kind} is broken, expected a function that makes it anew")
+        if self._own:
+            self.executor.shutdown(wait=False, cancel_futures=True)
+        self.executor, self._own = self._made(), True
+        self.generation += 1
+
+    @property
+    def workers(self) -> int:
+        """Number of workers now, 0 if all are gone; the number of cores if it is unknown."""
+        if time.monotonic() >= self._counted + _COUNT_AGAIN_S or not self._counted:
+            self._workers, self._counted = _workers(self.executor), time.monotonic()
+        return self._workers
+
+    def close(self) -> None:
+        """End the executor, unless it is the caller's."""
+        if self._own:
+            self.executor.shutdown(wait=True, cancel_futures=True)
+
+    def abandon(self) -> None:
+        """End the executor without waiting for what runs, unless it is the caller's."""
+        if self._own:
+            running = list((vars(self.executor).get("_processes") or {}).values())
+            self.executor.shutdown(wait=False, cancel_futures=True)
+            for process in running:
+                process.terminate()
+
+
+def _maker_of(executor: Executor) -> Maker | None:
+    if type(executor) is not ProcessPoolExecutor:
+        return None
+    known = vars(executor)
+    return lambda: ProcessPoolExecutor(
+        known.get("_max_workers"),
+        known.get("_mp_context"),
+        known.get("_initializer"),
+        known.get("_initargs", ()),
+    )
+
+
+def _workers(executor: Executor) -> int:
+    if isinstance(executor, Here):
+        return 1
+    client: Any = getattr(executor, "_client", None)
+    if hasattr(client, "nthreads"):  # Dask
+        return sum(client.nthreads().values())
+    for name in ("_max_workers", "num_workers"):
+        if isinstance(count := getattr(executor, name, None), int):
+            return count
+    return os.cpu_count() or 1

@@ -1,0 +1,99 @@
+"""The same on a real Dask scheduler with workers that are killed."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import rigwatch
+from rigwatch.batch import executor_on
+from rigwatch.commands import main
+from rigwatch.wire.errors import BatchError
+from tests.batch.cluster import Cluster
+from tests.batch.jobs import ROOT, deadly, make_files, sizes
+from tests.waiting import eventually
+
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("dask")]
+COUNT = 60
+PAUSE = 0.05
+CLIENT = """\
+import sys, rigwatch
+from rigwatch.batch import executor_on
+from tests.batch.jobs import sizes
+with executor_on(sys.argv[3]) as executor:
+    rigwatch.map(sizes, [sys.argv[1]], executor=executor, results=sys.argv[2], pause=0.05)
+"""
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    with Cluster(tmp_path_factory.mktemp("dask"), 2, allowed_failures=1) as made:
+        yield made
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    return make_files(tmp_path / "sessions", COUNT)
+
+
+def _lines(file: Path) -> int:
+    return file.read_bytes().count(b"\n") if file.exists() else 0
+
+
+def test_killed_workers_and_a_killed_client_change_no_byte(cluster, files, tmp_path):
+    target = tmp_path / "out.jsonl"
+    client = subprocess.Popen(
+        [sys.executable, "-c", CLIENT, str(files), str(target), cluster.address],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    eventually(lambda: _lines(target) >= 5, "some results")
+    victim = cluster.workers()[0]
+    victim.kill()
+    eventually(lambda: _lines(target) >= 20 or client.poll() is not None, "more results")
+    client.send_signal(signal.SIGKILL)
+    client.wait()
+    assert 5 <= _lines(target) < COUNT
+    with executor_on(cluster.address) as executor:
+        again = rigwatch.map(sizes, [files], executor=executor, results=target, pause=PAUSE)
+    rigwatch.map(sizes, [files], results=tmp_path / "plain.jsonl", pause=PAUSE)
+    assert again.failed == {}
+    assert target.read_bytes() == (tmp_path / "plain.jsonl").read_bytes()
+
+
+def test_a_unit_that_kills_every_worker_is_named(cluster, files):
+    with executor_on(cluster.address) as executor:
+        found = rigwatch.map(deadly, [files], executor=executor, always="7")
+    assert found.failed == {"WorkerDied": 1}
+    assert [value for _, value in found] == [n for n in range(COUNT) if n != 7]
+
+
+def test_a_command_runs_on_the_cluster(cluster, tmp_path, capsys):
+    recordings = ROOT / "tests" / "verify"
+    given = [str(recordings / f"{name}.mcap") for name in ("friction", "stiction")]
+    words = ["replay", *given, "--model", str(recordings / "model.toml"), "--json"]
+    assert main([*words, "--results", str(tmp_path / "here.jsonl")]) == 0
+    assert main([*words, "--results", str(tmp_path / "dask.jsonl"), "--on", cluster.address]) == 0
+    assert "dry_friction" in capsys.readouterr().out
+    assert (tmp_path / "dask.jsonl").read_bytes() == (tmp_path / "here.jsonl").read_bytes()
+
+
+def test_at_last_a_scheduler_that_goes_away_is_said_and_results_are_kept(cluster, files, tmp_path):
+    target = tmp_path / "out.jsonl"
+    seen: list[object] = []
+
+    def gone(outcome: object) -> None:
+        seen.append(outcome)
+        if len(seen) == 5:
+            cluster.end_scheduler()
+
+    with (
+        executor_on(cluster.address) as executor,
+        pytest.raises(BatchError, match="scheduler is gone"),
+    ):
+        rigwatch.map(sizes, [files], executor=executor, results=target, pause=PAUSE, seen=gone)
+    assert _lines(target) >= 5
+    assert rigwatch.map(sizes, [files], results=target, pause=PAUSE).done == COUNT

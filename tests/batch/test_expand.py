@@ -1,0 +1,31 @@
+"""Paths, globs and folders as units."""
+
+import pytest
+
+from rigwatch.batch import expand, recording_at
+from rigwatch.wire.errors import BatchError
+
+
+def test_folders_hold_sessions_at_any_depth_and_segments_are_one(tmp_path):
+    for name in ("a/one.mcap", "a/deep/two.mcap", "rig-1/000001.mcap", "rig-1/000002.mcap"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    (tmp_path / "a/notes.txt").touch()
+    names = ["a/deep/two.mcap", "a/one.mcap", "rig-1"]
+    assert expand([tmp_path]) == [str(tmp_path / name) for name in names]
+    assert recording_at(tmp_path / "rig-1") == [tmp_path / "rig-1"]
+
+
+def test_each_unit_is_there_once_in_order_of_names(tmp_path):
+    for name in ("b.mcap", "a.mcap", "c.txt"):
+        (tmp_path / name).touch()
+    given = [tmp_path / "b.mcap", f"{tmp_path}/*.mcap", tmp_path, f"{tmp_path}/c.*"]
+    names = ("a.mcap", "b.mcap", "c.txt")
+    assert expand(given) == [str(tmp_path / name) for name in names]
+
+
+def test_what_is_not_there_is_said(tmp_path):
+    with pytest.raises(BatchError, match="no such file or folder"):
+        expand([tmp_path / "none.mcap"])
+    with pytest.raises(BatchError, match="found nothing to work on"):
+        expand([tmp_path, f"{tmp_path}/*.mcap"])
