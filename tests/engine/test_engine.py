@@ -101,6 +101,19 @@ def test_sensitivities_agree_with_finite_differences(name):
         assert np.sqrt(np.mean(wrong**2)) <= 2e-3 * size + 1e-9, parameter
 
 
+@pytest.mark.parametrize("samples", [0.5, 3.0, 8.0])
+def test_a_delay_shifts_and_leaves_the_signal_whole(samples):
+    effect, u = ready("delay"), excitation()
+    placed = compose(MASS_SPRING_DAMPER, [Placement("delay", effect, "position_sensor")])
+    compiled = compile_system(placed)
+    given = {**TRUE, "position_sensor_delay_tau": samples * DT}
+    late = simulated(compiled, given, u).outputs[:, 0]
+    whole = simulated(compile_system(compose(MASS_SPRING_DAMPER)), TRUE, u).outputs[:, 0]
+    time = np.arange(SAMPLES) * DT
+    shifted = np.interp(time - samples * DT, time, whole)
+    assert np.abs(late - shifted).max() < 2e-3 * np.abs(whole).max()
+
+
 def test_simulation_agrees_with_the_closed_form():
     compiled = compile_system(compose(MASS_SPRING_DAMPER))
     u = excitation()

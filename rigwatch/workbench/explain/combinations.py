@@ -3,6 +3,8 @@
 Each of the best sets of one size is put into the model, every other effect is scored against the
 remaining residual, and the most promising are fitted with it: sets of the next size. The training
 error selects the sets that are extended, so the held-out recordings are used only once, at the end.
+It is that of states of effects which run through all windows, as on held-out recordings: fitted
+window by window, they are a free constant each, and such a set leaves no place for others.
 The search ends when a set reduces the residual to noise.
 """
 
@@ -10,10 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from rigwatch.physics.engine.fit import Fit
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import NoiseFloor, from_residual
 from rigwatch.workbench.explain.verdict import LITTLE_MORE, MUCH_WORSE
-from rigwatch.workbench.fit import Fitted, fit_model
+from rigwatch.workbench.fit import Fitted, continued_train_error, fit_model
 from rigwatch.workbench.ranking import (
     MATERIAL,
     STEP,
@@ -44,9 +47,11 @@ class Combination:
 
     Attributes:
         rows: each effect as fitted with those before it in the model.
+        search_error: training error by which the search compares sets of one size.
     """
 
     rows: tuple[Ranked, ...]
+    search_error: float = float("inf")
 
     @property
     def fitted(self) -> Fitted:
@@ -98,8 +103,8 @@ def combinations(
         progress: called with a line of text as each size begins.
         free: largest number of free parameters of a set.
     """
-    found = [Combination((row,)) for row in rows if row.fitted is not None]
-    first = [each for each in found if each.free < free and _lowers_error(each.fitted, bench.base)]
+    found = [_combination(bench, (row,)) for row in rows if row.fitted is not None]
+    first = [each for each in found if each.free < free and _lowers(each, bench.base.train_error)]
     level = _best_in_training(first)
     for size in range(2, MAX_EFFECTS + 1):
         if not level:
@@ -112,14 +117,24 @@ def combinations(
     return found
 
 
-def _lowers_error(larger: Fitted, smaller: Fitted) -> bool:
+def _combination(bench: Bench, rows: tuple[Ranked, ...]) -> Combination:
+    """A set of the search."""
+    fitted = rows[-1].fitted
+    assert fitted is not None
+    try:
+        return Combination(rows, continued_train_error(fitted, bench.data))
+    except ModelError:
+        return Combination(rows)
+
+
+def _lowers(larger: Combination, smaller: float) -> bool:
     """Whether the training error falls by the amount required for acceptance."""
-    return larger.train_error <= (1 - MATERIAL) * smaller.train_error
+    return larger.search_error <= (1 - MATERIAL) * smaller
 
 
 def _best_in_training(level: Sequence[Combination]) -> list[Combination]:
     """The sets of one size with the smallest training errors."""
-    return sorted(level, key=lambda each: each.fitted.train_error)[:BEAM_WIDTH]
+    return sorted(level, key=lambda each: each.search_error)[:BEAM_WIDTH]
 
 
 def _extended(bench: Bench, level: Sequence[Combination], free: int) -> list[Combination]:
@@ -130,8 +145,11 @@ def _extended(bench: Bench, level: Sequence[Combination], free: int) -> list[Com
             if known.labels | {row.label} in found or known.free + row.free > free:
                 continue
             _fit_with(bench, known.rows, known.fitted, row)
-            if row.fitted is not None and _lowers_error(row.fitted, known.fitted):
-                found[known.labels | {row.label}] = Combination((*known.rows, row))
+            if row.fitted is None:
+                continue
+            larger = _combination(bench, (*known.rows, row))
+            if _lowers(larger, known.search_error):
+                found[larger.labels] = larger
     return list(found.values())
 
 

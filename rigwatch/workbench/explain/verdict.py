@@ -150,7 +150,9 @@ def _undistinguished(
         if row is best:
             continue
         cosine = best.cosines.get(row.label, 0.0)
-        if cosine > SAME or _kin(best, row):
+        if _same_shift(best, row):
+            members.append(row.label)
+        elif cosine > SAME or _kin(best, row):
             if _one_with(best, row, cosine, trusted=trusted):
                 members.append(row.label)
         elif _rivals(best, row, cosine, trusted=trusted):
@@ -177,6 +179,18 @@ def _one_with(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> boo
         return _earns(best, row) or (cosine > SAME and row.port != best.port)
     near = row.held_out_error < MUCH_WORSE * best.held_out_error
     return not trusted and row.accepted and cosine > ALIKE and near and _earns(best, row)
+
+
+def _same_shift(best: Ranked, row: Ranked) -> bool:
+    """Whether both shift the machine's only input or only output in time, with the same result.
+
+    A machine that does not change in time answers a late input with the same motion, later.
+    """
+    shifts = best.placement.effect.time_shift and row.placement.effect.time_shift
+    if not shifts or best.fitted is None or row.port == best.port:
+        return False
+    model = best.fitted.compiled.system.model
+    return len(model.inputs) == len(model.outputs) == 1 and best.cosines[row.label] > SIMILAR
 
 
 def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:

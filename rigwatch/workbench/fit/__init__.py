@@ -1,5 +1,6 @@
 """Fits a study's model to its recordings: intervals, healthy parameters, holds, free run."""
 
+from rigwatch.workbench.fit.continued_error import continued_train_error
 from rigwatch.workbench.fit.fitted_model import (
     Fitted,
     block_differences,
@@ -36,6 +37,7 @@ __all__ = [
     "Value",
     "as_written",
     "block_differences",
+    "continued_train_error",
     "covariance",
     "eigenvalues",
     "fit_base",

@@ -7,7 +7,9 @@ import pytest
 
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.fit.continued_error import continued_train_error
 from rigwatch.workbench.steps.change import add, learn
+from rigwatch.workbench.steps.trial import try_effect
 from rigwatch.workbench.study.study import Accepted
 from tests.workbench.dampers import effect
 from tests.workbench.machine import studied
@@ -22,6 +24,11 @@ GHOST = (
     )
     + 'states.z = { unit = "1", derivative = "-z/tau", start = 1.0 }\n'
 )
+SENSOR = """
+[ports.reading]
+kind = "sensor"
+signal = "v"
+"""
 CURRENT = """
 name = "motor with a winding"
 summary = "Speed of a motor whose current no channel shows."
@@ -56,6 +63,17 @@ def test_what_remembers_is_no_free_constant_of_each_window(tmp_path: Path) -> No
     assert change.step == "refused"
     assert change.tried is not None
     assert change.tried[1] > 0.95 * change.before.held_out_error
+
+
+def test_training_errors_are_compared_with_states_that_run_on(tmp_path: Path) -> None:
+    made = [pushed(seed) for seed in range(2)]
+    study = studied(tmp_path, SPEED + PORT + SENSOR, made[:1], made[1:], UNITS, "horizon = 0.5")
+    bench, row = open_bench(study), try_effect(study, "ac_coupling", "reading")
+    assert row.fitted is not None
+    without = bench.base.train_error
+    assert row.fitted.train_error < 0.9 * without
+    assert continued_train_error(row.fitted, bench.data) > 0.95 * without
+    assert continued_train_error(bench.base, bench.data) == without
 
 
 def wound(seed: int, friction: float, samples: int = 2000) -> dict[str, np.ndarray]:

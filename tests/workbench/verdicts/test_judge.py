@@ -24,11 +24,13 @@ MOTION = NoiseFloor(np.ones(1), "healthy motion")
 QUIET = NoiseFloor(np.ones(1), "quiet band")
 
 
-def leaving(squares: np.ndarray) -> Fitted:
+def leaving(squares: np.ndarray, outputs: int = 1) -> Fitted:
     """A fit that leaves these mean squares in the windows held out."""
     residuals = np.sqrt(squares)[:, None, None] * np.ones((1, 4, 1))
     unused: Any = None
-    fit = Fit(unused, unused, unused, unused, residuals, np.ones(1), unused, unused)
+    model = SimpleNamespace(inputs=["u"], outputs=range(outputs))
+    compiled: Any = SimpleNamespace(system=SimpleNamespace(model=model))
+    fit = Fit(compiled, unused, unused, unused, residuals, np.ones(1), unused, unused)
     return Fitted((), fit, fit, 1, 1)
 
 
@@ -52,16 +54,20 @@ def row(
     accepted: bool = True,
     fitted: bool = True,
     jitter: float = JITTER,
+    shift: bool = False,
+    outputs: int = 1,
 ) -> Ranked:
     """An effect with a held-out error, worse than a steady one of it by standard deviations."""
     name, port = label.split("@")
-    effect: Any = SimpleNamespace(free=free, family=family, refines=refines, sampled=sampled)
+    effect: Any = SimpleNamespace(
+        free=free, family=family, refines=refines, sampled=sampled, time_shift=shift
+    )
     found = Ranked(
         Placement(name, effect, port), kind, 0.0, 0.5, {}, list(alike), cosines or {}, {}
     )
     if fitted:
         worse = behind * JITTER / np.sqrt(WINDOWS - 1)
-        found.fitted = leaving(error**2 + worse + jitter * TURNS)
+        found.fitted = leaving(error**2 + worse + jitter * TURNS, outputs)
         found.gain, found.accepted = gain, accepted
     return found
 
@@ -390,3 +396,16 @@ def test_a_higher_order_without_a_lower_one_is_named() -> None:
     assert name_of(cubic, row("gap@x", 2.4, gain=0.99)) == "cubic@x"
     unaccepted = row("spring@x", 2.4, gain=0.99, accepted=False)
     assert name_of(cubic, unaccepted) == "cubic@x"
+
+
+@pytest.mark.parametrize(("outputs", "told_apart"), [(1, False), (2, True)])
+def test_a_late_input_is_a_late_output_where_there_is_one_of_each(
+    outputs: int, *, told_apart: bool
+) -> None:
+    sensor = best(
+        "delay@sensor", kind="sensor", shift=True, outputs=outputs, cosines={"delay@drive": 0.9}
+    )
+    drive = row("delay@drive", 1.5, kind="actuator", shift=True, cosines={"delay@sensor": 0.9})
+    found = judge(base(), [sensor, drive], PERIODS)
+    assert found.word == "missing_effect"
+    assert ("delay@drive" in found.members) is not told_apart

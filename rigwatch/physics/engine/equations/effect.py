@@ -98,6 +98,9 @@ class Effect(Section, frozen=True, kw_only=True):
     refines: Annotated[
         str, Meta(description="effect of lower order, tried first if it explains most of the same")
     ] = ""
+    time_shift: Annotated[
+        bool, Meta(description="only delays: between one input and one output its port is unknown")
+    ] = False
     elective: Annotated[
         bool, Meta(description="ranked only in studies that say whole_library = true")
     ] = False
