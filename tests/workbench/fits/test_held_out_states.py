@@ -8,7 +8,7 @@ import pytest
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.steps.change import add, learn
-from rigwatch.workbench.study.study import Accepted
+from rigwatch.workbench.study.study_file import Accepted
 from tests.workbench.dampers import effect
 from tests.workbench.machine import studied
 from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS

@@ -19,7 +19,8 @@ from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit.input_hold import with_hold, with_holds
 from rigwatch.workbench.report.text_report import fit_lines
 from rigwatch.workbench.study.edits import keep_holds
-from rigwatch.workbench.study.study import Accepted, Span, Study, StudyFile, open_study
+from rigwatch.workbench.study.study import Study, open_study
+from rigwatch.workbench.study.study_file import Accepted, Span, StudyFile
 from sim_plant.oscillator import RATE, Hidden, oscillate
 
 SAMPLES, HORIZON, NOISE = 2560, 256, 2e-3
