@@ -5,7 +5,8 @@ import time
 import pytest
 import sympy
 
-from rigwatch.physics.engine.equations.expression import dimension_of, parse
+from rigwatch.physics.engine.equations.expression import parse
+from rigwatch.physics.engine.equations.expression_dimension import dimension_of
 from rigwatch.wire.errors import ModelError
 
 X = {"x": sympy.Symbol("x", real=True)}

@@ -17,7 +17,7 @@ from rigwatch.commands import main
 from rigwatch.wire.errors import ImportDataError, SessionError
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
 from rigwatch.wire.exchange.mat5 import MatError, read_mat5
-from rigwatch.wire.exchange.tables import read_table
+from rigwatch.wire.exchange.table_files import read_table
 from rigwatch.wire.session import open_session
 from rigwatch.wire.session.chunks import MAGIC
 from rigwatch.wire.typed_files import parse
