@@ -49,7 +49,8 @@ from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit.healthy_parameters import with_healthy_parameters
 from rigwatch.workbench.fit.healthy_reference import with_healthy_reference
 from rigwatch.workbench.ranking.ranked import Ranked, accepted_from
-from rigwatch.workbench.study.study import Span, Study, StudyFile
+from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study_file import Span, StudyFile
 from tools.benchmark_table import Row, as_text
 
 HORIZON = 128

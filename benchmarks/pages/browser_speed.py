@@ -15,7 +15,8 @@ import numpy as np
 from rigwatch.browser.signals import write_trace
 from rigwatch.browser.work import RESULTS, signal_key
 from rigwatch.workbench.study import append_effect, commit, drop_effect, open_study
-from rigwatch.workbench.study.study import Accepted, Study
+from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study_file import Accepted
 from tools.benchmark_table import Row
 
 SAMPLES = 5_000_000

@@ -72,6 +72,7 @@ def follow(  # noqa: PLR0917
     counts = state.counts
     _count(out, state)
     if counts.episode == 0:
+        # A wide margin: a fault that grows slowly must not become part of the healthy average.
         if state.held[DEVIATION] < PLAINLY_HEALTHY * rules.factor:
             refine(ref, place, row)
     elif counts.episode >= FIRST_LOOK and seq % LOOK_EVERY == 0:
@@ -93,6 +94,7 @@ def _count(out: bool, state: WatchState) -> None:
     elif counts.episode > 0:
         counts.quiet += 1
         counts.episode += 1
+        # The statistics of a fault pass through zero; only a long quiet time ends the episode.
         if counts.quiet >= ENDS_AFTER:
             counts.episode = counts.quiet = 0
             held[VERDICT] = NO_VERDICT
@@ -103,6 +105,7 @@ def _count(out: bool, state: WatchState) -> None:
 def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
     """Evaluate the evidence since the departure and update the verdict."""
     held, since = state.held, state.counts.episode
+    # Fixed limits come without a healthy period, so no rival can be compared: θ1 decides.
     if ref.counts.source == FIXED:
         held[VERDICT] = FRICTION if held[THETA1] > rules.high1 else OTHER
         return

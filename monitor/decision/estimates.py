@@ -68,10 +68,12 @@ def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
         return
     spread = spread_of_change(ref)
     determinant = s[0] * s[3] - s[1] * s[1]
+    # Standard deviations of the estimates for white noise, from the inverse normal matrix.
     reach1 = rules.factor * spread * np.sqrt(s[3] / determinant)
     reach2 = rules.factor * spread * np.sqrt(s[0] / determinant)
     held[THETA1], held[THETA2] = theta1, theta2
     held[LOW1], held[HIGH1], held[LOW2], held[HIGH2] = -reach1, reach1, -reach2, reach2
+    # Energy explained by both terms, which is χ²(2) distributed for a healthy rig.
     held[DEVIATION] = np.sqrt(max(theta1 * s[2] + theta2 * s[4], 0.0)) / spread
     if ref.counts.source == FIXED:
         _judge_by_band(rules, state)

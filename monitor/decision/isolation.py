@@ -113,6 +113,7 @@ def weigh(history: History, ref: Reference, seq: int, since: int, count: int) ->
         at = (history.head[0] - n + k) % HISTORY
         data[k, _RIVALS + 2] = history.rows[at, Y]
         at_rest = history.rows[at, AT_REST]
+        # Rest in both halves separates repeated sticking from a single stop.
         if 2 * k < n:
             first += at_rest
         else:
@@ -143,6 +144,8 @@ def _fill_rivals(data: FloatArray, ref: Reference, seq: int, n: int) -> None:
     for k in range(n):
         place = place_in_period(ref, seq - n + 1 + k)
         later, earlier = (place + 1) % period, (place - 1) % period
+        # Smooth changes of the healthy motion: acceleration by gain and phase, stiffness, damping,
+        # offset, the gain and phase drifting over the window, nonlinear stiffness and damping.
         data[k, 0] = ref.template[2, place]
         data[k, 1] = ref.template[2, later] - ref.template[2, earlier]
         data[k, 2] = x = (ref.template[1, place] - mean) / swing
@@ -163,6 +166,7 @@ def _fill_friction(data: FloatArray, history: History, since: int, n: int) -> No
             data[k, _RIVALS] = rows[at, SIGN_PART]
             data[k, _RIVALS + 1] = rows[at, SPEED_PART]
         return
+    # The onset is still stored: friction did not act before it, so its filter starts from rest.
     order = max(history.b.size - 1, 1)
     sign_state, speed_state = np.zeros(order), np.zeros(order)
     for k in range(since):
@@ -201,6 +205,7 @@ def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
     """Shares of y² explained by both friction terms and contained in the Coulomb term alone."""
     y, g1, g2 = gram.shape[0] - 1, _RIVALS, _RIVALS + 1
     determinant = gram[g1, g1] * gram[g2, g2] - gram[g1, g2] ** 2
+    # At nearly constant speed both terms are parallel: the window cannot separate them.
     if determinant <= 1e-12 * gram[g1, g1] * gram[g2, g2]:
         return 0.0, 0.0
     theta1 = (gram[g2, g2] * gram[g1, y] - gram[g1, g2] * gram[g2, y]) / determinant
@@ -213,11 +218,13 @@ def _friction_fit(gram: FloatArray, yy: float) -> tuple[float, float]:
 def _gain_over_rivals(gram: FloatArray) -> tuple[float, float, float]:
     """Residual energy of the rivals, the part of it that the jump explains, and the jump's sign."""
     y, g1 = gram.shape[0] - 1, _RIVALS
+    # After eliminating the rivals, the remaining entries are inner products of what they leave.
     left = gram.copy()
     for i in range(_RIVALS):
         _eliminate(left, i, 1e-9 * gram[i, i])
     remains = max(left[y, y], 0.0)
     jump = 0.0
+    # A jump that the rivals reproduce to rounding has no part of its own to test.
     if left[g1, g1] > 1e-9 * max(gram[g1, g1], 1e-30) and remains > 0.0:
         jump = left[g1, y] ** 2 / left[g1, g1]
     return remains, jump, 1.0 if left[g1, y] > 0.0 else -1.0

@@ -89,10 +89,12 @@ class Seen(NamedTuple):
 @njit()
 def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
     """The verdict after one more test."""
+    # A changed reading of the drive without a changed motion is a fault of that channel.
     if seen.moved_voltage and not seen.moved_acceleration:
         return OTHER
     if seen.voltage_swing > NEW_DRIVE and seen.moved_acceleration:
         return NEW_EXCITATION
+    # One test may agree by chance; once named, friction stays named until the episode ends.
     agrees = _friction(seen, evidence)
     state.counts.agreed = state.counts.agreed + 1 if agrees else 0
     if seen.before in (FRICTION, STICKING) or state.counts.agreed >= LOOKS:
@@ -104,6 +106,7 @@ def verdict(seen: Seen, evidence: Evidence, state: WatchState) -> float:
 @njit()
 def _friction(seen: Seen, evidence: Evidence) -> bool:
     """Whether this test finds dry friction."""
+    # Friction acts over many samples: a single large one is a spike of the sensor.
     if not seen.moved_acceleration or evidence.peak > SPIKE:
         return False
     if not (seen.moved_position or evidence.share > SURE_SHARE):
@@ -112,6 +115,7 @@ def _friction(seen: Seen, evidence: Evidence) -> bool:
         return True
     if 2 * seen.since >= seen.cycle and (_plain(evidence) or _follows(evidence)):
         return True
+    # A sudden fault makes the rig ring; weaker patterns count only after that has decayed.
     settled = seen.since >= RUNG_OFF * seen.cycle
     return settled and (_jumps(seen, evidence) or _thin(evidence))
 

@@ -82,6 +82,7 @@ def watch_block(  # noqa: PLR0917
     """Process the residual stage's columns from sample `first` on; fills `out`, (OUTPUTS, n)."""
     for k in range(code.size):
         seq = first + k
+        # A window across a gap would mix two motions, so everything collected is dropped.
         if code[k] == RESTART or code[k] == NEW_BOOT:
             restart(ref, code[k] == NEW_BOOT)
             forget(state, rules.window)
@@ -89,6 +90,7 @@ def watch_block(  # noqa: PLR0917
         if good and ref.counts.mode != ARMED:
             observe(ref, arming, seq, data[k])
             if ref.counts.mode == ARMED:
+                # Only now is the period known, and with it the length of whole-period windows.
                 forget(state, _window_length(rules.window, ref, state.window))
         elif good:
             _judge(data[k], seq, position_valid[k], rules, ref, state)
@@ -133,6 +135,7 @@ def _judge(  # noqa: PLR0917
     """Process one good sample."""
     place = place_in_period(ref, seq)
     _take(data, place, position_valid, ref, state)
+    # Sums are updated by every sample, the least squares are solved every `hop` samples.
     state.counts.hop += 1
     if state.counts.hop >= rules.hop:
         state.counts.hop = 0
@@ -184,6 +187,7 @@ def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
 
 @njit(inline="always")
 def _write(data: FloatArray, code: int, ref: Reference, state: WatchState, out: FloatArray) -> None:
+    # Estimates hold their last value between solutions; the residual is that of this sample.
     for i in range(out.size):
         out[i] = state.held[i]
     scale = ref.levels.scale

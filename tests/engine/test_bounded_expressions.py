@@ -5,7 +5,8 @@ import time
 import pytest
 import sympy
 
-from rigwatch.physics.engine.equations.expression import dimension_of, parse
+from rigwatch.physics.engine.equations.expression import parse
+from rigwatch.physics.engine.equations.expression_dimension import dimension_of
 from rigwatch.wire.errors import ModelError
 
 X = {"x": sympy.Symbol("x", real=True)}
@@ -26,12 +27,16 @@ BOMBS = {
 }
 
 
+MOST_SECONDS = 5.0
+"""Processor time, which does not depend on other work of the machine [s]."""
+
+
 @pytest.mark.parametrize("text", BOMBS.values(), ids=BOMBS)
 def test_a_bomb_is_refused_at_once(text: str) -> None:
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(ModelError) as refused:
         parse(text, X, "force of effect boom")
-    assert time.perf_counter() - began < 2.0
+    assert time.process_time() - began < MOST_SECONDS
     assert len(str(refused.value)) < 500
 
 

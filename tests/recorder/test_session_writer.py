@@ -27,7 +27,8 @@ from rigwatch.wire.messages import (
 )
 from rigwatch.wire.messages.protobuf import file_descriptor_set, type_name
 from rigwatch.wire.session import LARGEST_BLOCK, SessionWriter, open_session, run_info
-from rigwatch.wire.session.writer import SPILL, merge_pending, message_time
+from rigwatch.wire.session.merging import merge_pending
+from rigwatch.wire.session.writer import SPILL, message_time
 
 RUN = run_info("bench1", 256.0, t_ns=1)
 Write = Callable[[int, bytes], int]

@@ -14,6 +14,7 @@ from sim_plant.serve.pty_line import PtyLine
 from sim_plant.serve.serial_server import SerialServer
 from sim_plant.serve.source import Device, Pace
 from tests.daq.rig import ToySource, in_thread
+from tests.waiting import eventually
 
 
 def read_frames(port: Path, count: int) -> list[Frame]:
@@ -51,8 +52,7 @@ def test_the_schedule_is_absolute(tmp_path: Path) -> None:
     began = time.monotonic()
     with in_thread(server.run):
         frames = []
-        while not (tmp_path / "rig").is_symlink():
-            time.sleep(0.001)
+        eventually((tmp_path / "rig").is_symlink, "the line")
         frames = read_frames(tmp_path / "rig", 128)
     elapsed = time.monotonic() - began
     assert [f.seq for f in frames] == list(range(frames[0].seq, frames[0].seq + 128))

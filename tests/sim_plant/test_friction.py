@@ -60,22 +60,28 @@ def test_friction_only_takes_energy():
     assert np.all(truth["friction"] * truth["v"] >= 0.0)
 
 
-@pytest.mark.parametrize(
-    ("effect", "value", "level"),
-    [("coulomb_direction", 0.2, 0.6), ("binding", 50.0, None), ("stribeck", 0.4, None)],
-)
-def test_forms_of_friction_act_where_they_say(effect: str, value: float, level: float | None):
+def dry_friction(effect: str, value: float):
+    """Size of the friction [N], velocity [m/s] and position [m] with 0.4 N and one effect."""
     truth = settled(1.4, 8.0, {"coulomb": 0.4, effect: value}).truth
-    size, v = np.abs(truth["friction"]), truth["v"]
-    if effect == "coulomb_direction":
-        assert np.allclose(size[v > 0.02], level)
-        assert np.allclose(size[v < -0.02], 0.2)
-    elif effect == "binding":
-        fast = np.abs(v) > 0.05
-        assert np.allclose(size[fast], 0.4 + 50.0 * np.abs(truth["x"][fast]), atol=0.01)
-    else:
-        assert np.allclose(size[np.abs(v) > 0.15], 0.4, atol=1e-3)
-        assert size[(np.abs(v) < 0.05) & (v != 0)].max() > 0.5
+    return np.abs(truth["friction"]), truth["v"], truth["x"]
+
+
+def test_friction_by_direction_is_larger_outwards():
+    size, v, _ = dry_friction("coulomb_direction", 0.2)
+    assert np.allclose(size[v > 0.02], 0.6)
+    assert np.allclose(size[v < -0.02], 0.2)
+
+
+def test_binding_grows_with_the_distance_from_the_centre():
+    size, v, x = dry_friction("binding", 50.0)
+    fast = np.abs(v) > 0.05
+    assert np.allclose(size[fast], 0.4 + 50.0 * np.abs(x[fast]), atol=0.01)
+
+
+def test_stribeck_friction_fades_with_speed():
+    size, v, _ = dry_friction("stribeck", 0.4)
+    assert np.allclose(size[np.abs(v) > 0.15], 0.4, atol=1e-3)
+    assert size[(np.abs(v) < 0.05) & (v != 0)].max() > 0.5
 
 
 def test_stiction_holds_a_resting_load_until_it_is_overcome():

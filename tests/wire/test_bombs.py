@@ -17,7 +17,7 @@ from rigwatch.commands import main
 from rigwatch.wire.errors import ImportDataError, SessionError
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
 from rigwatch.wire.exchange.mat5 import MatError, read_mat5
-from rigwatch.wire.exchange.tables import read_table
+from rigwatch.wire.exchange.table_files import read_table
 from rigwatch.wire.session import open_session
 from rigwatch.wire.session.chunks import MAGIC
 from rigwatch.wire.typed_files import parse
@@ -29,13 +29,13 @@ MAT_HEAD = b"MATLAB 5.0".ljust(124) + b"\x00\x01IM"
 
 
 def peak_of(refused: type[Exception], call: object, *arguments: object) -> str:
-    """What the refusal says, after at most 5 s and 300 MB."""
+    """The refusal, after at most 10 s of processor time and 300 MB."""
     tracemalloc.start()
-    began = time.perf_counter()
+    began = time.process_time()
     try:
         with pytest.raises(refused) as error:
             call(*arguments)  # type: ignore[operator]
-        assert time.perf_counter() - began < 5.0
+        assert time.process_time() - began < 10.0
         assert tracemalloc.get_traced_memory()[1] < MEMORY
     finally:
         tracemalloc.stop()

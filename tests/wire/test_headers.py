@@ -8,7 +8,7 @@ import pytest
 from rigwatch.wire.errors import ImportDataError
 from rigwatch.wire.exchange.headers import read_header
 from rigwatch.wire.exchange.mapping import ImportMapping
-from rigwatch.wire.exchange.tables import read_table
+from rigwatch.wire.exchange.table_files import read_table
 from rigwatch.wire.units import unit_of
 
 

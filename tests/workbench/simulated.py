@@ -10,7 +10,8 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
-from rigwatch.workbench.study.study import Accepted, Span, Study, StudyFile
+from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study_file import Accepted, Span, StudyFile
 from sim_plant.oscillator import DAMPING, MASS, RATE, STIFFNESS, Hidden, oscillate, strength_for
 
 HORIZON = 256

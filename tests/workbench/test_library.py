@@ -11,7 +11,8 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.ranking.scoring import rank_all
-from rigwatch.workbench.study.study import Span, Study, StudyFile
+from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study_file import Span, StudyFile
 from sim_plant.specimens import HIDDEN, specimen
 from sim_plant.specimens.specimen import NOISE
 

@@ -5,7 +5,7 @@ from rigwatch.wire.exchange.exporting import export_session
 from rigwatch.wire.exchange.headers import Header, read_header
 from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option, parse_source
-from rigwatch.wire.exchange.tables import columns_of, read_table
+from rigwatch.wire.exchange.table_files import columns_of, read_table
 
 __all__ = [
     "AMBIGUOUS",

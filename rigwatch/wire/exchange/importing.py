@@ -12,7 +12,8 @@ from rigwatch.wire.exchange.column_units import conversion
 from rigwatch.wire.exchange.grid import Grid, fit_grid
 from rigwatch.wire.exchange.mapping import ImportMapping, Source, parse_source
 from rigwatch.wire.exchange.session_columns import is_native, native_blocks
-from rigwatch.wire.exchange.tables import Table, read_table
+from rigwatch.wire.exchange.table_files import read_table
+from rigwatch.wire.exchange.tables import Table
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, blocks
 from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.session import LARGEST_BLOCK, SessionWriter, run_info

@@ -5,6 +5,7 @@ describes.
 """
 
 from rigwatch.wire.session.edit import Written, first_time, iso_time, newest, recover, trim
+from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
 from rigwatch.wire.session.reader import (
     MERGED_SAMPLES,
     SUFFIX,
@@ -15,13 +16,7 @@ from rigwatch.wire.session.reader import (
 )
 from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.summary import ChannelSummary, DeviceSummary, Summary, summarise
-from rigwatch.wire.session.writer import (
-    LARGEST_BLOCK,
-    SessionWriter,
-    merge_pending,
-    message_time,
-    run_info,
-)
+from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
 
 __all__ = [
     "LARGEST_BLOCK",

@@ -11,10 +11,7 @@ Channel numbers are the positions in the table of topics, so that a file whose f
 damaged can still be read.
 """
 
-import errno
-import os
 import time
-from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -25,22 +22,20 @@ from rigwatch.version import __version__
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import (
     TOPICS,
-    AlarmCommand,
     EstimateBlock,
     Message,
     RunInfo,
     SampleBlock,
-    blocks,
 )
 from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.session.file_output import FileOutput
+from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
 
 PROFILE = "rigwatch"
 FORMAT = 1
 """Version of the content: readers refuse a higher one."""
 FORMAT_KEY = "rigwatch_format"
 SOFTWARE = f"rigwatch {__version__}"
-LARGEST_BLOCK = 4096
-"""Most samples per message, which bounds a reader's memory."""
 SPILL = 2 * LARGEST_BLOCK
 """Most waiting samples before an automatic flush."""
 _NEVER = 1 << 62
@@ -74,7 +69,7 @@ class SessionWriter:
         self.path = Path(path)
         self.pending: list[Message] = []
         self._waiting = 0
-        self._output = _Output(self.path, sync)
+        self._output = FileOutput(self.path, sync)
         self._mcap = Writer(self._output, _NEVER, CompressionType.ZSTD)  # type: ignore[arg-type]
         try:
             self._head(run)
@@ -157,118 +152,6 @@ class SessionWriter:
             self.close()
         else:
             self.abandon()
-
-
-def merge_pending(messages: Iterable[Message], largest: int = LARGEST_BLOCK) -> list[Message]:
-    """The messages, with consecutive blocks joined up to `largest` samples.
-
-    A joined block takes the position of its first part. Nothing is joined across an operator's
-    command, so that the command keeps its position between the samples.
-    """
-    slots: list[list[Message]] = []
-    runs: dict[tuple[type[Message], str], tuple[list[Message], int]] = {}
-    for message in messages:
-        if isinstance(message, SampleBlock | EstimateBlock):
-            if len(message):
-                _append_block(slots, runs, message, largest)
-            continue
-        if isinstance(message, AlarmCommand):
-            runs.clear()
-        slots.append([message])
-    return [joined for slot in slots for joined in _joined(slot)]
-
-
-def _append_block(
-    slots: list[list[Message]],
-    runs: dict[tuple[type[Message], str], tuple[list[Message], int]],
-    block: SampleBlock | EstimateBlock,
-    largest: int,
-) -> None:
-    key = (type(block), block.device)
-    slot, length = runs.get(key, ([], 0))
-    tail = slot[-1] if slot else None
-    fits = length + len(block) <= largest
-    if fits and isinstance(tail, SampleBlock | EstimateBlock) and blocks.continues(tail, block):
-        slot.append(block)
-        runs[key] = (slot, length + len(block))
-        return
-    slot = [block]
-    slots.append(slot)
-    runs[key] = (slot, len(block))
-
-
-def _joined(slot: list[Message]) -> list[Message]:
-    head = slot[0]
-    if isinstance(head, SampleBlock):
-        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var]
-    if isinstance(head, EstimateBlock):
-        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var]
-    return slot
-
-
-class _Output:
-    """The stream below the MCAP writer: bytes wait here until `commit` puts them on the disk."""
-
-    def __init__(self, path: Path, sync: bool) -> None:
-        self._path, self._sync = path, sync
-        self._bytes = bytearray()
-        self.committed = 0
-        try:
-            self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-        except FileExistsError:
-            raise SessionError(f"{path}: the file exists already and is not overwritten") from None
-        except OSError as error:
-            raise SessionError(f"{path}: cannot be written: {error.strerror}") from error
-        self.closed = False
-
-    @property
-    def waiting(self) -> int:
-        return len(self._bytes)
-
-    def write(self, data: bytes) -> int:
-        self._bytes += data
-        return len(data)
-
-    def tell(self) -> int:
-        return self.committed + len(self._bytes)
-
-    def flush(self) -> None:
-        """Nothing: the MCAP writer flushes more often than a chunk is whole."""
-
-    def commit(self) -> None:
-        try:
-            self._write_all()
-        except OSError as error:
-            self._roll_back()
-            raise SessionError(f"{self._path}: cannot be written: {_reason(error)}") from error
-
-    def _write_all(self) -> None:
-        view = memoryview(bytes(self._bytes))
-        done = 0
-        while done < len(view):
-            done += os.write(self._descriptor, view[done:])
-        if self._sync:
-            os.fsync(self._descriptor)
-        self.committed += done
-        self._bytes.clear()
-
-    def _roll_back(self) -> None:
-        """Take a half-written chunk away again, so that its messages are not in two segments."""
-        try:
-            os.ftruncate(self._descriptor, self.committed)
-            os.lseek(self._descriptor, self.committed, os.SEEK_SET)
-        except OSError:
-            pass
-
-    def close(self) -> None:
-        if not self.closed:
-            self.closed = True
-            os.close(self._descriptor)
-
-
-def _reason(error: OSError) -> str:
-    known = {errno.ENOSPC: "no space left on the disk", errno.EROFS: "the disk is read-only"}
-    return known.get(error.errno or 0, error.strerror or str(error))
 
 
 def run_info(

@@ -15,8 +15,9 @@ from rigwatch.workbench.data.proposals import (
     proposed_low_pass,
     proposed_split,
 )
+from rigwatch.workbench.data.recorded_columns import read_columns
 from rigwatch.workbench.data.signal_scales import port_sizes
-from rigwatch.workbench.data.signals import Data, MotionSensor, parameters_of, prepare, read_columns
+from rigwatch.workbench.data.signals import Data, MotionSensor, parameters_of, prepare
 
 __all__ = [
     "METHODS",

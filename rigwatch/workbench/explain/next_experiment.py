@@ -10,7 +10,7 @@ is the rms difference between the best effect and a rival that the new recording
 output is divided by its noise floor, so separations are in noise floors.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.units import unit_of
 from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.explain.excitation_shapes import shapes
 from rigwatch.workbench.fit import nodes
 from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Derived
@@ -29,7 +30,6 @@ from rigwatch.workbench.study import Derived
 DURATION = 20.0
 """Length of the simulated recordings [s]."""
 MOST_SAMPLES = 8000
-Shape = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -125,47 +125,10 @@ def _excitations(bench: Bench) -> Iterator[tuple[str, float, FloatArray]]:
     count = count // bench.data.horizon * bench.data.horizon or count
     time: FloatArray = np.arange(count, dtype=np.float64) * dt
     for share in (1.0, 0.3):
-        for name, shape in _shapes(time[-1], dt).items():
+        for name, shape in shapes(time[-1], dt).items():
             inputs = _inputs(bench, shape(time), share)
             if inputs is not None:
                 yield name, share, inputs
-
-
-def _shapes(length: float, dt: float) -> dict[str, Shape]:
-    """Excitations of amplitude 1."""
-    found: dict[str, Shape] = {}
-    for periods in (2, 8, 32):
-        rate = periods / length
-        if rate < 0.05 / dt:
-            found[f"sine of {rate:.2g} Hz"] = _sine(rate)
-            found[f"steps of {rate:.2g} Hz"] = _steps(rate)
-            found[f"triangle of {rate:.2g} Hz"] = _triangle(rate)
-    found["triangle of growing speed"] = lambda t: _triangle(1.0)(2 + 8 * (t / length) ** 2)
-    found["sines of many frequencies"] = _multisine(length, dt)
-    return found
-
-
-def _sine(rate: float) -> Shape:
-    return lambda t: np.asarray(np.sin(2 * np.pi * rate * t))
-
-
-def _steps(rate: float) -> Shape:
-    return lambda t: np.asarray(np.tanh(8 * np.sin(2 * np.pi * rate * t)))
-
-
-def _triangle(rate: float) -> Shape:
-    return lambda t: np.asarray(2 / np.pi * np.arcsin(np.sin(2 * np.pi * rate * t)))
-
-
-def _multisine(length: float, dt: float) -> Shape:
-    lines = np.arange(2, max(4, int(0.02 * length / dt)))
-    phases = -np.pi * lines * (lines - 1) / len(lines)
-
-    def shape(t: FloatArray) -> FloatArray:
-        waves = np.cos(2 * np.pi * np.outer(t, lines) / length + phases).sum(axis=1)
-        return np.asarray(waves / np.abs(waves).max())
-
-    return shape
 
 
 def _inputs(bench: Bench, shape: FloatArray, share: float) -> FloatArray | None:

@@ -1,9 +1,8 @@
 """Fits a study's model to its recordings: intervals, healthy parameters, holds, free run."""
 
 from rigwatch.workbench.fit.continued_error import continued_train_error
+from rigwatch.workbench.fit.fitted import Fitted, block_differences
 from rigwatch.workbench.fit.fitted_model import (
-    Fitted,
-    block_differences,
     eigenvalues,
     fit_base,
     fit_model,

@@ -15,7 +15,7 @@ from rigwatch.physics.engine.equations import Model, Output, compose
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import port_sizes
-from rigwatch.workbench.fit.fitted_model import Fitted
+from rigwatch.workbench.fit.fitted import Fitted
 
 MOTION_GAIN = 1.2
 """Ratio of the test motion to the healthy motion."""

@@ -7,7 +7,7 @@ different effects can be compared only if such states are continued, as on held-
 
 from rigwatch.physics.engine.fit import evaluate
 from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit.fitted_model import Fitted, overall
+from rigwatch.workbench.fit.fitted import Fitted, overall
 
 
 def continued_train_error(fitted: Fitted, data: Data) -> float:

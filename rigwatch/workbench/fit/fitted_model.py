@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import CompiledSystem, compile_system, even_substeps
+from rigwatch.physics.engine.compile import compile_system, even_substeps
 from rigwatch.physics.engine.equations import Placement, System, compose
 from rigwatch.physics.engine.fit import (
     Fit,
@@ -25,10 +25,11 @@ from rigwatch.physics.engine.search import (
     convergence,
     multi_start_fit,
 )
-from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
+from rigwatch.wire.arrays import ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, port_sizes, quiet_scale
 from rigwatch.workbench.fit.discontinuities import away_from_jumps
+from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.study import Study
 
 LONG = 2000
@@ -43,78 +44,6 @@ FAST, SLOWED = 1.0, 0.5
 """Eigenvalue times step above which a linearisation uses finer steps, and its value then."""
 LOOKED_AT = 20
 """Largest number of windows whose eigenvalues are computed."""
-BLOCKS = 40
-"""Number of blocks for statistics on a recording of a model without states."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """A fitted model with its held-out error.
-
-    Attributes:
-        placements: its effects.
-        train, held_out: the fit, and the same parameters on the held-out recordings.
-        substeps: integration steps per sample for non-stiff systems.
-        horizon: samples from one re-initialisation to the next.
-        calm: held-out samples away from discontinuities of an effect, shape (windows, length); None
-            if there are none.
-        convergence: how the fit ended; None if it started from another fit and was not checked.
-    """
-
-    placements: tuple[Placement, ...]
-    train: Fit
-    held_out: Fit
-    substeps: int
-    horizon: int
-    calm: BoolArray | None = None
-    convergence: Convergence | None = None
-
-    @property
-    def compiled(self) -> CompiledSystem:
-        """The compiled system."""
-        return self.train.compiled
-
-    def errors(self, fitted: Fit) -> float:
-        """Training and held-out error over all channels, see `overall`."""
-        return overall(fitted)
-
-    @property
-    def train_error(self) -> float:
-        """Overall error on the training recordings."""
-        return overall(self.train)
-
-    @property
-    def held_out_error(self) -> float:
-        """Overall error on the recordings held out."""
-        return overall(self.held_out)
-
-
-def overall(fitted: Fit) -> float:
-    """Error over all channels: in the channel's unit if there is only one, else in noise floors."""
-    if len(fitted.scale) == 1:
-        return float(fitted.rms[0])
-    return float(np.sqrt(np.mean((fitted.rms / fitted.scale) ** 2)))
-
-
-def block_errors(fitted: Fit) -> FloatArray:
-    """Mean squared error of each block (a window or part of one); NaN without valid samples."""
-    scale = fitted.scale if len(fitted.scale) > 1 else 1.0
-    squared = (fitted.residuals / scale) ** 2
-    means = [np.nanmean(p) if np.isfinite(p).any() else np.nan for p in blocks(squared)]
-    return np.array(means)
-
-
-def block_differences(one: Fit, other: Fit) -> FloatArray:
-    """Mean squared error of `one` minus that of `other`, for blocks valid in both."""
-    found = block_errors(one) - block_errors(other)
-    return np.asarray(found[np.isfinite(found)])
-
-
-def blocks(windowed: FloatArray) -> list[FloatArray]:
-    """Windows (windows, samples, …) as blocks; few long windows are divided."""
-    pieces = max(1, -(-BLOCKS // len(windowed)))
-    cut = [np.array_split(window, min(pieces, len(window))) for window in windowed]
-    return [piece for window in cut for piece in window]
 
 
 def placements_of(study: Study, recording: Recording) -> tuple[Placement, ...]:

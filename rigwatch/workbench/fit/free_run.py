@@ -8,7 +8,7 @@ import numpy as np
 
 from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.fit.fitted_model import Fitted
+from rigwatch.workbench.fit.fitted import Fitted
 
 
 def free_run(fitted: Fitted, recording: Recording) -> FloatArray:

@@ -17,7 +17,8 @@ from rigwatch.physics.engine.equations import Model, Parameter, compose
 from rigwatch.physics.engine.fit import evaluate
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit.fitted_model import Fitted, fit_model
+from rigwatch.workbench.fit.fitted import Fitted
+from rigwatch.workbench.fit.fitted_model import fit_model
 from rigwatch.workbench.fit.intervals import covariance
 from rigwatch.workbench.study import Kept, Study
 

@@ -24,7 +24,8 @@ from rigwatch.physics.engine.fit import Recording, evaluate
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, find_period
-from rigwatch.workbench.fit.fitted_model import Fitted, fit_model
+from rigwatch.workbench.fit.fitted import Fitted
+from rigwatch.workbench.fit.fitted_model import fit_model
 from rigwatch.workbench.study import Study
 
 MAX_DIFFERENCE = 0.2

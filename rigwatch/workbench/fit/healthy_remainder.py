@@ -17,7 +17,7 @@ from msgspec import structs
 from rigwatch.physics.engine.equations import Model, has_hidden_states
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, along_motion
-from rigwatch.workbench.fit.fitted_model import Fitted
+from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.fit.healthy_parameters import with_known
 from rigwatch.workbench.fit.intervals import covariance
 from rigwatch.workbench.fit.learned_terms import LEARNED

@@ -22,13 +22,8 @@ from rigwatch.physics.engine.equations import Hold, Model, Placement
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, parameters_of, quiet_scale
-from rigwatch.workbench.fit.fitted_model import (
-    Fitted,
-    block_differences,
-    block_errors,
-    fit_model,
-    placements_of,
-)
+from rigwatch.workbench.fit.fitted import Fitted, block_differences, block_errors
+from rigwatch.workbench.fit.fitted_model import fit_model, placements_of
 from rigwatch.workbench.study import Held, Study
 
 BEYOND_CHANCE = 3.0

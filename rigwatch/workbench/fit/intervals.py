@@ -21,7 +21,7 @@ from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.units import unit_of
-from rigwatch.workbench.fit.fitted_model import blocks
+from rigwatch.workbench.fit.fitted import blocks
 
 CONFIDENCE = 0.95
 ENOUGH = 12

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit import Fit, Recording, fit
-from rigwatch.workbench.fit.fitted_model import Fitted
+from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.fit.intervals import CONFIDENCE, Value, covariance, values
 
 STEPS = 6

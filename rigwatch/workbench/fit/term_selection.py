@@ -19,7 +19,7 @@ from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit.boundedness import BoundednessTest, Sizes
-from rigwatch.workbench.fit.fitted_model import Fitted
+from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.fit.learned_terms import with_friction, with_products
 from rigwatch.workbench.fit.whole_fit import fit_whole
 from rigwatch.workbench.study import Study

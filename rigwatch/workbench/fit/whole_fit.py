@@ -18,7 +18,7 @@ from rigwatch.physics.engine.fit import Fit, Recording, bounds, evaluate
 from rigwatch.physics.engine.search import Convergence, WholeRuns, multi_start_fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data, quiet_scale
-from rigwatch.workbench.fit.fitted_model import Fitted
+from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.study import Study
 
 SHARE = 0.3

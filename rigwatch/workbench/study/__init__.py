@@ -12,20 +12,8 @@ from rigwatch.workbench.study.edits import (
 )
 from rigwatch.workbench.study.folder import FILE, digest
 from rigwatch.workbench.study.ledger import append, check_data, commit, lines, model_hash, stands_on
-from rigwatch.workbench.study.study import (
-    GIVEN,
-    Accepted,
-    Derive,
-    Derived,
-    Held,
-    Kept,
-    Span,
-    Study,
-    StudyFile,
-    open_study,
-    study_of,
-    varied,
-)
+from rigwatch.workbench.study.study import GIVEN, Held, Kept, Study, open_study, study_of, varied
+from rigwatch.workbench.study.study_file import Accepted, Derive, Derived, Span, StudyFile
 
 __all__ = [
     "FILE",

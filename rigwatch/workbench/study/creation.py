@@ -7,7 +7,8 @@ from rigwatch.wire.errors import ConfigError, RigwatchError
 from rigwatch.wire.typed_files import load
 from rigwatch.workbench.study.folder import FILE, LEDGER
 from rigwatch.workbench.study.ledger import append
-from rigwatch.workbench.study.study import Study, StudyFile, open_study
+from rigwatch.workbench.study.study import Study, open_study
+from rigwatch.workbench.study.study_file import StudyFile
 
 
 def check_new(folder: Path) -> None:

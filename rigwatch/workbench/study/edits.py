@@ -9,7 +9,8 @@ from dataclasses import replace
 
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.study.own_files import unsaved
-from rigwatch.workbench.study.study import GIVEN, Accepted, Study, converted, study_of
+from rigwatch.workbench.study.study import GIVEN, Study, converted, study_of
+from rigwatch.workbench.study.study_file import Accepted
 
 _TABLE = "\n[[effects]]\n"
 CHOSEN = "  # chosen from the data, with the first effect"

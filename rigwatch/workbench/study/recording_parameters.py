@@ -14,7 +14,7 @@ from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.units import unit_of
 
 if TYPE_CHECKING:
-    from rigwatch.workbench.study.study import Span, StudyFile
+    from rigwatch.workbench.study.study_file import Span, StudyFile
 
 
 def known_in_si(model: Model, file: "StudyFile", path: Path) -> "StudyFile":

@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from msgspec import Meta, field, structs
+from msgspec import structs
 from numpy.typing import NDArray
 
 from rigwatch.physics.engine.equations import (
@@ -32,127 +32,15 @@ from rigwatch.physics.engine.equations import (
 )
 from rigwatch.physics.engine.search import Convergence
 from rigwatch.wire.errors import ConfigError, ModelError, nearest
-from rigwatch.wire.typed_files import Section, parse, read_text
+from rigwatch.wire.typed_files import parse, read_text
 from rigwatch.wire.units import Unit, unit_of
 from rigwatch.workbench.study.folder import FILE, LEDGER, settle
 from rigwatch.workbench.study.own_files import NOTHING_UNSAVED, Unsaved, content
 from rigwatch.workbench.study.recording_parameters import known_as_inputs, known_in_si
+from rigwatch.workbench.study.study_file import Accepted, StudyFile
 
 GIVEN = ("the study", "the model file")
 """Sources of holds that were given rather than chosen from data."""
-
-Lateness = Annotated[float, Meta(ge=0, le=1)]
-
-
-class Span(Section, frozen=True, kw_only=True):
-    """A recording, or a part of one."""
-
-    session: Annotated[str, Meta(description="session file, relative to the study's folder")]
-    start: Annotated[float, Meta(ge=0, description="start of the part in the session [s]")] = 0.0
-    end: Annotated[float, Meta(description="end of the part in the session [s]")] = float("inf")
-    parameters: Annotated[
-        dict[str, float],
-        Meta(description="model parameters known for this recording, in their units"),
-    ] = field(default_factory=dict)
-
-
-class Derived(Section, frozen=True, kw_only=True):
-    """A signal derived from a channel: low-passed and differentiated."""
-
-    channel: Annotated[str, Meta(description="source channel")]
-    order: Annotated[int, Meta(ge=0, le=2, description="number of differentiations")] = 0
-
-
-class Derive(Section, frozen=True, kw_only=True):
-    """Signals derived from channels."""
-
-    low_pass: Annotated[float, Meta(gt=0, description="zero-phase Butterworth of order 4 [Hz]")]
-    signals: Annotated[dict[str, Derived], Meta(description="the signals, by name")]
-
-
-class Thin(Section, frozen=True, kw_only=True):
-    """Decimation of residuals: low-pass, then every n-th sample."""
-
-    factor: Annotated[int, Meta(ge=1, description="decimation factor")] = 1
-    edge: Annotated[int, Meta(ge=0, description="samples dropped at both ends after it")] = 0
-
-
-class Accepted(Section, frozen=True, kw_only=True):
-    """An accepted effect."""
-
-    effect: Annotated[str, Meta(description="its name")]
-    port: Annotated[str, Meta(description="its port")]
-    parameters: Annotated[
-        dict[str, float], Meta(description="initial values of its fit, in the parameters' units")
-    ] = field(default_factory=dict)
-    model: Annotated[
-        dict[str, float],
-        Meta(description="initial values of the rest of the model, from its accepted fit"),
-    ] = field(default_factory=dict)
-    ahead: Annotated[
-        bool,
-        Meta(description="whether a signal passes it before the effects that are listed earlier"),
-    ] = False
-
-
-class StudyFile(Section, frozen=True, kw_only=True):
-    """The file `study.toml`."""
-
-    model: Annotated[str, Meta(description="name of a shipped model, or a model file")]
-    variants: Annotated[
-        tuple[str, ...], Meta(description="model variants in use, see `rigwatch study base`")
-    ] = ()
-    train: Annotated[tuple[Span, ...], Meta(min_length=1, description="training recordings")]
-    held_out: Annotated[
-        tuple[Span, ...], Meta(min_length=1, description="recordings that judge effects")
-    ]
-    healthy: Annotated[
-        tuple[Span, ...], Meta(description="recordings of the healthy rig, for the noise floor")
-    ] = ()
-    horizon: Annotated[
-        Annotated[float, Meta(gt=0)] | None,
-        Meta(
-            description="time between re-initialisations [s]; chosen from the data and the model's"
-            " time constants if not given"
-        ),
-    ] = None
-    prediction: Annotated[
-        Literal["auto", "measured motion", "free"],
-        Meta(
-            description="along the measured motion, or free runs over horizons; auto: along the"
-            " motion if channels show some of the model's states but not all"
-        ),
-    ] = "auto"
-    rate: Annotated[
-        Annotated[float, Meta(gt=0)] | None,
-        Meta(description="common sample rate of all recordings [Hz]; their own if not given"),
-    ] = None
-    substeps: Annotated[int, Meta(ge=1, description="integration steps per sample")] = 2
-    period: Annotated[float, Meta(ge=0, description="period of the excitation [s]; 0: find")] = 0.0
-    channels: Annotated[
-        dict[str, str], Meta(description="channel of a model's signal, if its name differs")
-    ] = field(default_factory=dict)
-    start: Annotated[
-        dict[str, float],
-        Meta(description="initial values of model parameters, in their units"),
-    ] = field(default_factory=dict)
-    hold: Annotated[
-        dict[str, Hold],
-        Meta(description="inputs between samples; chosen from the data if not given"),
-    ] = field(default_factory=dict)
-    late: Annotated[
-        dict[str, Lateness],
-        Meta(description="delay of held inputs, as a share of the sample period"),
-    ] = field(default_factory=dict)
-    derive: Derive | None = None
-    thin: Thin | None = None
-    effect_files: Annotated[
-        tuple[str, ...], Meta(description="own effects: TOML files, relative to the study's folder")
-    ] = ()
-    whole_library: Annotated[
-        bool, Meta(description="also rank the elective effects of the library")
-    ] = False
-    effects: Annotated[tuple[Accepted, ...], Meta(description="accepted effects, in order")] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.fit.continued_error import continued_train_error
 from rigwatch.workbench.steps.change import add, learn
 from rigwatch.workbench.steps.trial import try_effect
-from rigwatch.workbench.study.study import Accepted
+from rigwatch.workbench.study.study_file import Accepted
 from tests.workbench.dampers import effect
 from tests.workbench.machine import studied
 from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS

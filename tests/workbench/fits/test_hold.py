@@ -19,7 +19,8 @@ from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.fit.input_hold import with_hold, with_holds
 from rigwatch.workbench.report.text_report import fit_lines
 from rigwatch.workbench.study.edits import keep_holds
-from rigwatch.workbench.study.study import Accepted, Span, Study, StudyFile, open_study
+from rigwatch.workbench.study.study import Study, open_study
+from rigwatch.workbench.study.study_file import Accepted, Span, StudyFile
 from sim_plant.oscillator import RATE, Hidden, oscillate
 
 SAMPLES, HORIZON, NOISE = 2560, 256, 2e-3
@@ -144,15 +145,28 @@ def test_a_digital_filter_at_a_drive_needs_an_input_that_is_held():
     assert suits(effect, model.ports["drive"], structs.replace(model, hold="zero"))
 
 
-@pytest.mark.parametrize("name", ["digital_smoothing", "moving_average"])
-def test_a_digital_filter_is_exact_at_the_samples(name):
+def smoothed(clean):
+    found = np.zeros(len(clean))
+    for k in range(1, len(clean)):
+        found[k] = (0.4 * found[k - 1] + clean[k]) / 1.4
+    return found
+
+
+def averaged(clean):
+    return np.convolve(clean, np.ones(3) / 3)[: len(clean)]
+
+
+@pytest.mark.parametrize(
+    ("name", "strength", "expected", "first"),
+    [("digital_smoothing", 0.4, smoothed, 1), ("moving_average", 3.0, averaged, 3)],
+)
+def test_a_digital_filter_is_exact_at_the_samples(name, strength, expected, first):
     model = structs.replace(shipped_models()["mass-spring-damper"], hold="zero")
     placement = Placement(name, library()[name], "acceleration_sensor")
     compiled = compile_system(compose(model, [placement]))
     force = force_of(5)[:400, None]
     plain = compile_system(compose(model))
     values = {"m": 0.8, "c": 1.5, "k": 60.0}
-    strength = {"digital_smoothing": 0.4, "moving_average": 3.0}[name]
     more = {placement.prefix + placement.effect.strength: strength}
     clean = plain.simulate(
         force, 1 / RATE, np.zeros(1, np.int64), 400, initial=np.zeros((1, 2)),
@@ -163,14 +177,7 @@ def test_a_digital_filter_is_exact_at_the_samples(name):
         initial=np.zeros((1, len(compiled.system.states))),
         parameters=compiled.vector(values | more), substeps=4,
     )  # fmt: skip
-    if name == "moving_average":
-        expected = (clean[2:] + clean[1:-1] + clean[:-2]) / 3
-        assert run.outputs[0, 3:, 1] == pytest.approx(expected[1:], abs=1e-9)
-        return
-    expected = np.zeros(400)
-    for k in range(1, 400):
-        expected[k] = (strength * expected[k - 1] + clean[k]) / (1 + strength)
-    assert run.outputs[0, 1:, 1] == pytest.approx(expected[1:], abs=1e-9)
+    assert run.outputs[0, first:, 1] == pytest.approx(expected(clean)[first:], abs=1e-9)
 
 
 def test_effects_that_were_accepted_do_not_disturb_the_hold_of_the_healthy_recording():

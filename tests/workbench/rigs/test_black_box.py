@@ -7,7 +7,8 @@ import pytest
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.preparation import open_bench
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.study.study import Accepted, Study
+from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study_file import Accepted
 from tests.workbench.black_box import TEMPLATE, record
 from tests.workbench.black_box import study as made
 

@@ -14,7 +14,8 @@ from rigwatch.workbench.compare.preparation import Bench, bench_of, determined_b
 from rigwatch.workbench.data.noise_floor import from_residual
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
-from rigwatch.workbench.study.study import Span, Study, StudyFile
+from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study_file import Span, StudyFile
 from tests.workbench.conftest import measured
 
 RATE = 256

@@ -12,7 +12,8 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.fit.fitted_model import fit_base
 from rigwatch.workbench.fit.healthy_parameters import with_healthy_parameters
-from rigwatch.workbench.study.study import Span, Study, StudyFile
+from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study_file import Span, StudyFile
 from sim_plant.excitation import Multisine, drive
 from sim_plant.parameters import RigParameters
 from sim_plant.rig import Rig

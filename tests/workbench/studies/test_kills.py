@@ -12,7 +12,8 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.study.edits import append_effect, drop_effect
 from rigwatch.workbench.study.folder import FILE, LEDGER, NEW, digest
 from rigwatch.workbench.study.ledger import append, commit, lines
-from rigwatch.workbench.study.study import Accepted, Study, open_study
+from rigwatch.workbench.study.study import Study, open_study
+from rigwatch.workbench.study.study_file import Accepted
 from tests.workbench.fits.test_accepted_fit import UNITS, WAVES, waves
 from tests.workbench.machine import studied
 

@@ -12,7 +12,8 @@ from rigwatch.workbench.steps.change import learn_text, remodel
 from rigwatch.workbench.study.edits import append_effect, use_effect_file
 from rigwatch.workbench.study.folder import FILE, LEDGER
 from rigwatch.workbench.study.ledger import commit, lines
-from rigwatch.workbench.study.study import Accepted, Study, open_study
+from rigwatch.workbench.study.study import Study, open_study
+from rigwatch.workbench.study.study_file import Accepted
 from tests.workbench.fits.test_accepted_fit import UNITS, WAVES, waves
 from tests.workbench.machine import studied
 

@@ -8,7 +8,7 @@ import pytest
 from rigwatch.workbench.compare.preparation import Bench, open_bench
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.scoring import rank_only
-from rigwatch.workbench.study.study import Accepted
+from rigwatch.workbench.study.study_file import Accepted
 from tests.workbench.machine import studied
 
 DAMPER = """

@@ -71,8 +71,7 @@ def test_without_a_healthy_recording_little_is_claimed(best: float, method: str,
     found = unchecked(bench(16.0, method=method), naming(best))
 
     assert found.word == word
-    if word != "missing_effect":
-        assert "[[healthy]]" in found.text
+    assert ("[[healthy]]" in found.text) == (word != "missing_effect")
 
 
 def test_a_model_that_was_checked_keeps_its_verdict() -> None:

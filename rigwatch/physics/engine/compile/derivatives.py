@@ -65,9 +65,11 @@ def derivative(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
 
 
 def _by_rules(expression: sympy.Expr, by: sympy.Symbol) -> sympy.Expr:
+    # SymPy leaves the derivative of floor unevaluated; as a constant its derivative is zero.
     steps = {step: sympy.Dummy(real=True) for step in expression.atoms(sympy.floor)}
     back = {dummy: step for step, dummy in steps.items()}
     slope = sympy.diff(expression.xreplace(steps), by).xreplace(back)
+    # A jump's impulse has no value at a sample, and a step needs one at zero.
     if not slope.has(sympy.DiracDelta, sympy.Heaviside):
         return slope
     slope = slope.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))

@@ -55,9 +55,11 @@ def place(  # noqa: PLR0917 -- a kernel
     `hold` is 1 for a linear input, 0 for a zero-order hold, and -d for a zero-order hold delayed by
     a share d of a sample. `inside`: a step ending at a change uses the value before it.
     """
+    # The entry after the inputs is the time until held inputs change.
     us[u.shape[1]] = 0.0
     for j in range(u.shape[1]):
         us[j] = u[row, j]
+        # Before its delayed update an input still has the previous sample's value.
         if hold[j] < 0.0 and inside < -hold[j]:
             us[j] = u[max(row - 1, 0), j]
             us[u.shape[1]] = max(-hold[j] - at, 0.0) * dt
@@ -76,6 +78,8 @@ def advance(  # noqa: PLR0917 -- a kernel
     """One Runge-Kutta step between two fractions of a sample; updates z in place."""
     h, middle = dt * (end - start), 0.5 * (start + end)
     zp, dp, up, size = zs.ctypes.data, dz.ctypes.data, us.ctypes.data, z.size
+    # Inputs at both ends are chosen as inside the step: a jump at an end is not part of it.
+    # `acc` sums the weighted slopes, since z is needed unchanged by every stage.
     place(u, row, start, middle, hold, rows, dt, us)
     call(rates, (row + start) * dt, z.ctypes.data, up, pp, dp, dp)
     for i in range(size):
@@ -112,6 +116,7 @@ def across(  # noqa: PLR0917 -- a kernel
     z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
 ) -> None:  # fmt: skip
     """Integrate from one sample to the next, in steps that end where an input changes."""
+    # A step across the jump of a held input would reduce the method to first order.
     first = math.ceil(steps * late) if late < 1.0 else steps
     for step in range(first):
         start, end = late * step / first, late * (step + 1) / first
@@ -143,6 +148,7 @@ def restart(z: FloatArray, x0: FloatArray, w: int, m: int) -> None:
     # Loops, here and below: numba takes seconds to compile assignments of whole slices.
     for i in range(z.size):
         z[i] = 0.0
+    # Sensitivities follow the states, a row of m for each; its last n are by initial states.
     for i in range(n):
         z[i] = x0[w, i]
         z[n + i * m + m - n + i] = 1.0
@@ -165,6 +171,7 @@ def needed(  # noqa: PLR0917 -- a kernel
     for i in range(n):
         near[i] = z[i]
         end[i] = z[i] + dt * dx[i]
+    # Friction and play are stiffest near zero, which the step may cross between its ends.
     for i in crossing:
         middle, reach = 0.5 * (z[i] + end[i]), 0.5 * WIDE * abs(end[i] - z[i])
         near[i] = math.copysign(max(abs(middle) - reach, 0.0), middle)
@@ -217,6 +224,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
                     )  # fmt: skip
                     steps = int(min(float(finest), max(float(substeps), math.ceil(wanted_steps))))
                 across(rates, u, row, steps, late, hold, rows, dt, pp, z, zs, dz, acc, us)
+                # Sampled states change together with the held signals.
                 if updated and (row + 1) % rows == 0:
                     renew(update, u, row + 1, hold, rows, dt, pp, z, dz, us)
         for i in range(n):

@@ -133,6 +133,7 @@ class NativeKernel:
             self._crossing, self._columns, rows, u, dt, substeps, finest, hold,
         )  # fmt: skip
         numbers = x0.shape[1] * (1 + self._columns)
+        # Starting threads costs more than a small simulation.
         if starts.size * y.shape[1] * substeps * numbers < LARGE:
             kernel(starts, x0, p, y, dy, last)
             return
@@ -217,6 +218,8 @@ def _with_sensitivities(
     function, n, k = _function(system, name), len(system.states), len(found.values)
     if not k:
         return function
+    # All expressions go through one common-subexpression elimination: values and derivatives
+    # share most of their terms.
     flat = [*found.values, *(e for r in found.by_state for e in r)]
     flat += [e for r in found.by_parameter for e in r]
     values = _values(function, flat)
@@ -229,6 +232,7 @@ def _with_sensitivities(
         function.store("out", i, plain[i] or literal(0.0))
         row = function.row(explicit[i], m)
         for slope, of_state in zip(by_state[i], moved, strict=True):
+            # Most entries of a Jacobian are zero and cost nothing.
             if slope is not None:
                 row = function.add_scaled(row, slope, of_state, m)
         function.store_row(into, first + i * m, row, m)

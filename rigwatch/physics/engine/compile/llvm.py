@@ -90,6 +90,7 @@ class Function:
     def add_scaled(self, row: str, scale: str, other: str, width: int) -> str:
         """row + scale·other."""
         kind = f"<{width} x double>"
+        # LLVM's idiom for a scalar in all elements of a vector.
         one = self._inserted("poison", scale, 0, width)
         wide = self._do(
             f"shufflevector {kind} {one}, {kind} poison, <{width} x i32> zeroinitializer"
@@ -150,6 +151,7 @@ class Function:
         return total
 
     def _product(self, e: sympy.Mul) -> str:
+        # A single division for all factors below the line, as it is the slowest operation.
         above: list[sympy.Basic] = []
         below: list[sympy.Basic] = []
         for factor in e.args:
@@ -163,6 +165,7 @@ class Function:
             return self._op("fdiv", literal(1.0), self.value(sympy.Pow(base, -exponent)))
         if exponent == sympy.Rational(1, 2):
             return self._call("llvm.sqrt.f64", self.value(base))
+        # Squaring shares its factors with other powers of the base; `pow` is far slower.
         if exponent.is_Integer and exponent <= 16:
             half = self.value(sympy.Pow(base, exponent // 2))
             square = self._op("fmul", half, half)
@@ -177,6 +180,7 @@ class Function:
         return found
 
     def _choice(self, e: sympy.Piecewise) -> str:
+        # All branches are computed and one is selected: without jumps the code is vectorised.
         found = literal(float("nan"))
         for value, condition in reversed(e.args):
             if condition == sympy.true:
@@ -213,6 +217,7 @@ class Function:
         arguments = [self.value(argument) for argument in e.args]
         if name == "sign":
             zero, (x,) = literal(0.0), arguments
+            # Zero and NaN remain as they are.
             below = self._selected(self._compared("olt", x, zero), literal(-1.0), x)
             return self._selected(self._compared("ogt", x, zero), literal(1.0), below)
         known = {"Abs": "llvm.fabs.f64", "floor": "llvm.floor.f64"}

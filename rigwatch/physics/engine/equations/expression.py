@@ -7,13 +7,12 @@ selects. No other Python is accepted, so an equation file cannot execute code.
 import ast
 import difflib
 from collections.abc import Callable, Mapping
-from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
 import sympy
 
-from rigwatch.physics.engine.equations.dimension import NONE, Dimension, describe, times
+from rigwatch.physics.engine.equations.syntax_tree import is_caret, quoted, syntax_tree
 from rigwatch.wire.errors import ModelError
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
@@ -31,7 +30,6 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "tanh": sympy.tanh,
     "where": lambda condition, a, b: sympy.Piecewise((a, condition), (b, True)),
 }
-_SAME_UNIT = {"max", "min", "abs"}
 _OPERATORS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
@@ -47,10 +45,6 @@ _COMPARISONS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
 }
 
 
-LONGEST = 20_000
-"""Largest length of an expression in characters."""
-DEEPEST, DEEPEST_CALLS = 400, 24
-"""Largest nesting depth of operations and functions, which SymPy processes recursively."""
 LARGEST_EXPONENT = 64.0
 """Largest numeric exponent of a power."""
 MOST_BITS = 4096
@@ -75,11 +69,11 @@ def parse(text: str, names: Mapping[str, sympy.Expr], where: str) -> sympy.Expr:
 def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) -> sympy.Expr:
     """`parse` with a cache: SymPy takes milliseconds to simplify `where`, `min` and `max`."""
     try:
-        value = sympy.sympify(_Reader(dict(names), where).value(_tree(text, where)))
+        value = sympy.sympify(_Reader(dict(names), where).value(syntax_tree(text, where)))
     except RecursionError:
-        raise ModelError(f"{where}: found {_shown(text)}, which is too deep") from None
+        raise ModelError(f"{where}: found {quoted(text)}, which is too deep") from None
     if value.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
-        raise ModelError(f"{where}: found {_shown(text)}, which has no finite value")
+        raise ModelError(f"{where}: found {quoted(text)}, which has no finite value")
     return value
 
 
@@ -89,7 +83,7 @@ def check_size(text: str, where: str) -> None:
     Raises:
         ModelError: it is, or it does not parse.
     """
-    _tree(text, where)
+    syntax_tree(text, where)
 
 
 def names_in(text: str, where: str) -> frozenset[str]:
@@ -98,48 +92,11 @@ def names_in(text: str, where: str) -> frozenset[str]:
     Raises:
         ModelError: it does not parse.
     """
-    tree = _tree(text, where)
+    tree = syntax_tree(text, where)
     called = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
     return frozenset(
         node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in called
     )
-
-
-def _tree(text: str, where: str) -> ast.expr:
-    """Python's syntax tree of an expression, after checking its length and depth."""
-    if len(text) > LONGEST:
-        found = f"found {len(text)} characters"
-        raise ModelError(f"{where}: {found}, expected an expression of at most {LONGEST}")
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except SyntaxError as error:
-        raise ModelError(
-            f"{where}: found {_shown(text)}, which breaks off at character {error.offset}"
-        ) from None
-    except (RecursionError, MemoryError, ValueError):
-        raise ModelError(f"{where}: found {_shown(text)}, which cannot be read") from None
-    if _is_deep(tree):
-        expected = f"operations at most {DEEPEST} deep, functions {DEEPEST_CALLS}"
-        raise ModelError(f"{where}: found {_shown(text)}, expected {expected}")
-    return tree
-
-
-def _is_deep(tree: ast.AST) -> bool:
-    """Whether operations or functions are nested too deeply."""
-    level = [(tree, 0)]
-    for _ in range(DEEPEST):
-        if any(calls > DEEPEST_CALLS for _, calls in level):
-            return True
-        level = [
-            (child, calls + isinstance(node, ast.Call))
-            for node, calls in level
-            for child in ast.iter_child_nodes(node)
-        ]
-    return bool(level)
-
-
-def _shown(text: str) -> str:
-    return repr(text) if len(text) <= 200 else f"{text[:200]!r}…"
 
 
 class _Reader:
@@ -165,7 +122,7 @@ class _Reader:
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
                 function = self._named(name, FUNCTIONS, "function")
                 return self._called(name, function, [self.value(arg) for arg in args])
-        hint = ": write ** for a power" if _is_caret(node) else ""
+        hint = ": write ** for a power" if is_caret(node) else ""
         raise ModelError(
             f"{self._where}: found {ast.unparse(node)!r}, which is no arithmetic{hint}"
         )
@@ -197,90 +154,3 @@ def _excess(base: sympy.Expr, exponent: Any) -> str:
         return f"an exponent beyond {LARGEST_EXPONENT:g}"
     digits = max(base.p.bit_length(), base.q.bit_length()) if base.is_Rational else 0
     return "a number of too many digits" if digits * abs(exponent) > MOST_BITS else ""
-
-
-def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> Dimension | None:
-    """The dimension of the expression `text`; None for zero, which is valid in every unit.
-
-    Raises:
-        ModelError: it adds or compares different dimensions, or passes one to a function.
-    """
-    try:
-        return _Measurer(dimensions, where).dim(_tree(text, where))
-    except RecursionError:
-        raise ModelError(f"{where}: found {_shown(text)}, which is too deep") from None
-
-
-def _is_caret(node: ast.AST) -> bool:
-    return isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor)
-
-
-class _Measurer:
-    """Walks the syntax tree and computes dimensions."""
-
-    def __init__(self, dimensions: Mapping[str, Dimension], where: str) -> None:
-        self._dimensions, self._where = dimensions, where
-
-    def dim(self, node: ast.AST) -> Dimension | None:  # noqa: PLR0911 -- one a kind of node
-        match node:
-            case ast.Constant(value=number):
-                return None if number == 0 else NONE
-            case ast.Name(id=name):
-                return self._dimensions[name]
-            case ast.UnaryOp(operand=operand):
-                return self.dim(operand)
-            case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):
-                return self._same(node, self.dim(left), self.dim(right))
-            case ast.BinOp(left=left, op=ast.Mult(), right=right):
-                return self._scaled(self.dim(left), self.dim(right), 1)
-            case ast.BinOp(left=left, op=ast.Div(), right=right):
-                return self._scaled(self.dim(left), self.dim(right), -1)
-            case ast.BinOp(left=left, op=ast.Pow(), right=right):
-                return self._power(node, self.dim(left), right)
-            case ast.Compare(left=left, comparators=[right]):
-                self._same(node, self.dim(left), self.dim(right))
-                return NONE
-            case ast.Call(func=ast.Name(id=name), args=args):
-                return self._function(node, name, args)
-        return NONE
-
-    def _same(
-        self, node: ast.AST, one: Dimension | None, other: Dimension | None
-    ) -> Dimension | None:
-        if one is not None and other is not None and one != other:
-            raise ModelError(
-                f"{self._where}: found {ast.unparse(node)!r} with units"
-                f" {describe(one)} and {describe(other)}, expected one unit"
-            )
-        return other if one is None else one
-
-    def _scaled(
-        self, one: Dimension | None, other: Dimension | None, power: int
-    ) -> Dimension | None:
-        return None if one is None else times(one, other or NONE, power)
-
-    def _power(self, node: ast.AST, base: Dimension | None, exponent: ast.AST) -> Dimension | None:
-        if base is None or base == NONE:
-            return base
-        try:
-            return times(NONE, base, Fraction(str(ast.literal_eval(ast.unparse(exponent)))))
-        except ValueError:
-            raise ModelError(
-                f"{self._where}: found {ast.unparse(node)!r}, expected a number as exponent of"
-                f" a quantity in {describe(base)}"
-            ) from None
-
-    def _function(self, node: ast.AST, name: str, args: list[ast.expr]) -> Dimension | None:
-        dims = [self.dim(arg) for arg in args]
-        if name == "where":
-            return self._same(node, dims[1], dims[2])
-        if name in _SAME_UNIT:
-            return dims[0] if len(dims) == 1 else self._same(node, dims[0], dims[1])
-        if name == "sqrt":
-            return None if dims[0] is None else times(NONE, dims[0], Fraction(1, 2))
-        if name != "sign" and dims[0] not in (None, NONE):
-            raise ModelError(
-                f"{self._where}: found {ast.unparse(node)!r} of a quantity in"
-                f" {describe(dims[0] or NONE)}, expected a pure number"
-            )
-        return NONE

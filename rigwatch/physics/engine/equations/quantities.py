@@ -14,8 +14,9 @@ from graphlib import CycleError, TopologicalSorter
 
 from msgspec.structs import replace
 
-from rigwatch.physics.engine.equations.expression import LONGEST, check_size, names_in
+from rigwatch.physics.engine.equations.expression import check_size, names_in
 from rigwatch.physics.engine.equations.model import Model
+from rigwatch.physics.engine.equations.syntax_tree import LONGEST
 from rigwatch.wire.errors import ModelError
 
 

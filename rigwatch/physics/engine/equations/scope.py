@@ -13,7 +13,8 @@ from rigwatch.physics.engine.equations.dimension import (
     dimension,
     names_gram,
 )
-from rigwatch.physics.engine.equations.expression import dimension_of, parse
+from rigwatch.physics.engine.equations.expression import parse
+from rigwatch.physics.engine.equations.expression_dimension import dimension_of
 from rigwatch.wire.errors import ModelError
 
 

@@ -1,0 +1,94 @@
+"""The physical dimension of an expression, from its syntax tree."""
+
+import ast
+from collections.abc import Mapping
+from fractions import Fraction
+
+from rigwatch.physics.engine.equations.dimension import NONE, Dimension, describe, times
+from rigwatch.physics.engine.equations.syntax_tree import quoted, syntax_tree
+from rigwatch.wire.errors import ModelError
+
+_SAME_UNIT = {"max", "min", "abs"}
+
+
+def dimension_of(text: str, dimensions: Mapping[str, Dimension], where: str) -> Dimension | None:
+    """The dimension of the expression `text`; None for zero, which is valid in every unit.
+
+    Raises:
+        ModelError: it adds or compares different dimensions, or passes one to a function.
+    """
+    try:
+        return _Measurer(dimensions, where).dim(syntax_tree(text, where))
+    except RecursionError:
+        raise ModelError(f"{where}: found {quoted(text)}, which is too deep") from None
+
+
+class _Measurer:
+    """Walks the syntax tree and computes dimensions."""
+
+    def __init__(self, dimensions: Mapping[str, Dimension], where: str) -> None:
+        self._dimensions, self._where = dimensions, where
+
+    def dim(self, node: ast.AST) -> Dimension | None:  # noqa: PLR0911 -- one a kind of node
+        match node:
+            case ast.Constant(value=number):
+                return None if number == 0 else NONE
+            case ast.Name(id=name):
+                return self._dimensions[name]
+            case ast.UnaryOp(operand=operand):
+                return self.dim(operand)
+            case ast.BinOp(left=left, op=ast.Add() | ast.Sub(), right=right):
+                return self._same(node, self.dim(left), self.dim(right))
+            case ast.BinOp(left=left, op=ast.Mult(), right=right):
+                return self._scaled(self.dim(left), self.dim(right), 1)
+            case ast.BinOp(left=left, op=ast.Div(), right=right):
+                return self._scaled(self.dim(left), self.dim(right), -1)
+            case ast.BinOp(left=left, op=ast.Pow(), right=right):
+                return self._power(node, self.dim(left), right)
+            case ast.Compare(left=left, comparators=[right]):
+                self._same(node, self.dim(left), self.dim(right))
+                return NONE
+            case ast.Call(func=ast.Name(id=name), args=args):
+                return self._function(node, name, args)
+        return NONE
+
+    def _same(
+        self, node: ast.AST, one: Dimension | None, other: Dimension | None
+    ) -> Dimension | None:
+        if one is not None and other is not None and one != other:
+            raise ModelError(
+                f"{self._where}: found {ast.unparse(node)!r} with units"
+                f" {describe(one)} and {describe(other)}, expected one unit"
+            )
+        return other if one is None else one
+
+    def _scaled(
+        self, one: Dimension | None, other: Dimension | None, power: int
+    ) -> Dimension | None:
+        return None if one is None else times(one, other or NONE, power)
+
+    def _power(self, node: ast.AST, base: Dimension | None, exponent: ast.AST) -> Dimension | None:
+        if base is None or base == NONE:
+            return base
+        try:
+            return times(NONE, base, Fraction(str(ast.literal_eval(ast.unparse(exponent)))))
+        except ValueError:
+            raise ModelError(
+                f"{self._where}: found {ast.unparse(node)!r}, expected a number as exponent of"
+                f" a quantity in {describe(base)}"
+            ) from None
+
+    def _function(self, node: ast.AST, name: str, args: list[ast.expr]) -> Dimension | None:
+        dims = [self.dim(arg) for arg in args]
+        if name == "where":
+            return self._same(node, dims[1], dims[2])
+        if name in _SAME_UNIT:
+            return dims[0] if len(dims) == 1 else self._same(node, dims[0], dims[1])
+        if name == "sqrt":
+            return None if dims[0] is None else times(NONE, dims[0], Fraction(1, 2))
+        if name != "sign" and dims[0] not in (None, NONE):
+            raise ModelError(
+                f"{self._where}: found {ast.unparse(node)!r} of a quantity in"
+                f" {describe(dims[0] or NONE)}, expected a pure number"
+            )
+        return NONE

@@ -1,0 +1,53 @@
+"""Python's syntax tree of a user expression, with bounded length and depth."""
+
+import ast
+
+from rigwatch.wire.errors import ModelError
+
+LONGEST = 20_000
+"""Largest length of an expression in characters."""
+DEEPEST, DEEPEST_CALLS = 400, 24
+"""Largest nesting depth of operations and functions, which SymPy processes recursively."""
+
+
+def syntax_tree(text: str, where: str) -> ast.expr:
+    """Python's syntax tree of an expression, after checking its length and depth."""
+    if len(text) > LONGEST:
+        found = f"found {len(text)} characters"
+        raise ModelError(f"{where}: {found}, expected an expression of at most {LONGEST}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except SyntaxError as error:
+        raise ModelError(
+            f"{where}: found {quoted(text)}, which breaks off at character {error.offset}"
+        ) from None
+    except (RecursionError, MemoryError, ValueError):
+        raise ModelError(f"{where}: found {quoted(text)}, which cannot be read") from None
+    if _is_deep(tree):
+        expected = f"operations at most {DEEPEST} deep, functions {DEEPEST_CALLS}"
+        raise ModelError(f"{where}: found {quoted(text)}, expected {expected}")
+    return tree
+
+
+def _is_deep(tree: ast.AST) -> bool:
+    """Whether operations or functions are nested too deeply."""
+    level = [(tree, 0)]
+    for _ in range(DEEPEST):
+        if any(calls > DEEPEST_CALLS for _, calls in level):
+            return True
+        level = [
+            (child, calls + isinstance(node, ast.Call))
+            for node, calls in level
+            for child in ast.iter_child_nodes(node)
+        ]
+    return bool(level)
+
+
+def quoted(text: str) -> str:
+    """An expression in quotes, shortened if long."""
+    return repr(text) if len(text) <= 200 else f"{text[:200]!r}…"
+
+
+def is_caret(node: ast.AST) -> bool:
+    """Whether a node is `a ^ b`, often meant as a power."""
+    return isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor)

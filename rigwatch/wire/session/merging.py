@@ -1,0 +1,61 @@
+"""Joins consecutive blocks of pending messages, so that a chunk has few and long ones."""
+
+from collections.abc import Iterable
+
+from rigwatch.wire.messages import (
+    AlarmCommand,
+    EstimateBlock,
+    Message,
+    SampleBlock,
+    blocks,
+)
+
+LARGEST_BLOCK = 4096
+"""Most samples per message, which bounds a reader's memory."""
+
+
+def merge_pending(messages: Iterable[Message], largest: int = LARGEST_BLOCK) -> list[Message]:
+    """The messages, with consecutive blocks joined up to `largest` samples.
+
+    A joined block takes the position of its first part. Nothing is joined across an operator's
+    command, so that the command keeps its position between the samples.
+    """
+    slots: list[list[Message]] = []
+    runs: dict[tuple[type[Message], str], tuple[list[Message], int]] = {}
+    for message in messages:
+        if isinstance(message, SampleBlock | EstimateBlock):
+            if len(message):
+                _append_block(slots, runs, message, largest)
+            continue
+        if isinstance(message, AlarmCommand):
+            runs.clear()
+        slots.append([message])
+    return [joined for slot in slots for joined in _joined(slot)]
+
+
+def _append_block(
+    slots: list[list[Message]],
+    runs: dict[tuple[type[Message], str], tuple[list[Message], int]],
+    block: SampleBlock | EstimateBlock,
+    largest: int,
+) -> None:
+    key = (type(block), block.device)
+    slot, length = runs.get(key, ([], 0))
+    tail = slot[-1] if slot else None
+    fits = length + len(block) <= largest
+    if fits and isinstance(tail, SampleBlock | EstimateBlock) and blocks.continues(tail, block):
+        slot.append(block)
+        runs[key] = (slot, length + len(block))
+        return
+    slot = [block]
+    slots.append(slot)
+    runs[key] = (slot, len(block))
+
+
+def _joined(slot: list[Message]) -> list[Message]:
+    head = slot[0]
+    if isinstance(head, SampleBlock):
+        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var]
+    if isinstance(head, EstimateBlock):
+        return list(blocks.pieces(blocks.concatenate(slot), LARGEST_BLOCK))  # type: ignore[type-var]
+    return slot

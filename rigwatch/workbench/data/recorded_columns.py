@@ -1,0 +1,79 @@
+"""Columns of a recorded session, and signals derived from them."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from rigwatch.wire.errors import ModelError, nearest
+from rigwatch.wire.session import open_session
+from rigwatch.workbench.data.columns import Columns, bridged
+from rigwatch.workbench.data.signal_units import in_si
+from rigwatch.workbench.study import Derive, Span
+
+
+def read_columns(folder: Path, span: Span) -> Columns:
+    """The channels of a session, or of a part of it.
+
+    Raises:
+        SessionError: it cannot be read.
+        ModelError: it holds no samples there.
+    """
+    blocks = list(open_session(folder / span.session).samples())
+    boots = {(b.device, b.boot) for b in blocks}
+    if not blocks or len(boots) > 1:
+        raise ModelError(f"{span.session}: found {len(boots)} runs of a device, expected one")
+    first, last = blocks[0], blocks[-1]
+    count = last.seq + len(last) - first.seq
+    dt = (last.t_ns[-1] - first.t_ns[0]) * 1e-9 / max(count - 1, 1)
+    values = {c.name: np.full(count, np.nan) for c in first.channels}
+    for block in blocks:
+        at = block.seq - first.seq
+        for column in block.channels:
+            into = values.setdefault(column.name, np.full(count, np.nan))
+            into[at : at + len(block)] = column.usable()
+    begin, end = round(span.start / dt), min(count, round(min(span.end, 1e9) / dt))
+    if end - begin < 2:
+        raise ModelError(
+            f"{span.session}: found {count * dt:g} s, expected samples from {span.start:g} s"
+            f" to {span.end:g} s"
+        )
+    units = {column.name: column.unit for block in blocks for column in block.channels}
+    cut = {name: in_si(column[begin:end], units[name]) for name, column in values.items()}
+    return Columns(dt, cut, units)
+
+
+def with_derived(columns: Columns, derive: Derive | None) -> Columns:
+    """The channels and the signals derived from them.
+
+    Raises:
+        ModelError: a channel is missing, or the low-pass is above half the sample rate.
+    """
+    if derive is None:
+        return columns
+    rate = 1 / columns.dt
+    if derive.low_pass >= rate / 2:
+        raise ModelError(
+            f"derive: found low_pass {derive.low_pass:g} Hz, expected less than half of {rate:g} Hz"
+        )
+    sections = butter(4, derive.low_pass, fs=rate, output="sos")
+    found = dict(columns.values)
+    for name, signal in derive.signals.items():
+        if signal.channel not in columns.values:
+            raise ModelError(
+                f"derive: found channel {signal.channel!r}{nearest(signal.channel, columns.values)}"
+            )
+        raw = columns.values[signal.channel]
+        smooth = sosfiltfilt(sections, bridged(raw))
+        for _ in range(signal.order):
+            smooth = np.gradient(smooth, columns.dt)
+        found[name] = np.where(np.isfinite(raw), smooth, np.nan)
+    return Columns(columns.dt, found, {**columns.units, **_derived_units(columns, derive)})
+
+
+def _derived_units(columns: Columns, derive: Derive) -> dict[str, str]:
+    units = {name: columns.units.get(s.channel, "") for name, s in derive.signals.items()}
+    return {
+        name: f"({unit})/s^{derive.signals[name].order}" if unit else ""
+        for name, unit in units.items()
+    }
