@@ -1,6 +1,6 @@
 """Uncertainty contributions that no single recording shows: those of the healthy recording.
 
-Two contributions bias a fit equally along a whole recording. First, the parameters kept from the
+These contributions bias a fit equally along a whole recording. First, the parameters kept from the
 healthy recording, and those known to a stated deviation (for example a mass), are uncertain. With S
 their covariance, and J_θ and J_κ the derivatives of the residual by the fitted and the kept
 parameters,
@@ -8,8 +8,9 @@ parameters,
     Cov θ ← Cov θ + A·S·Aᵀ,   A = J_θ⁺·J_κ
 
 Second, model error mimics a little of every effect. The apparent strength of an effect on a healthy
-recording is used as a standard deviation of its strength. Both are independent contributions and
-add in quadrature (JCGM 100:2008 (GUM), 5.1).
+recording is used as a standard deviation of its strength. Third, along the measured motion the
+model's response to an effect is itself in error by a share of it. The contributions are independent
+and add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
 import dataclasses
@@ -24,6 +25,13 @@ from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, with_kept_free
 from rigwatch.workbench.ranking import score_all
 from rigwatch.workbench.study import Kept, Study
+
+RESPONSE_ERROR = 0.01
+"""Relative error of the response to an effect along the measured motion, as a standard deviation.
+
+Dead bands and saturations of drawn rigs, whose equations differ from the model's, are found within
+1.3 %, many times their random error.
+"""
 
 
 def added_variances(
@@ -44,7 +52,17 @@ def added_variances(
         name = placement.prefix + placement.effect.strength
         if name in found:
             found[name] += apparent_strength(healthy, bare, placement, fitted) ** 2
+        if data.along_motion:
+            _add_response_error(found, placement, fitted)
     return found
+
+
+def _add_response_error(found: dict[str, float], placement: Placement, fitted: Fitted) -> None:
+    values = fitted.train.values()
+    for name, parameter in placement.effect.parameters.items():
+        whole = placement.prefix + name
+        if whole in found and parameter.role in ("strength", "shape"):
+            found[whole] += (RESPONSE_ERROR * (values[whole] - parameter.neutral)) ** 2
 
 
 def _from_kept(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str, float]:

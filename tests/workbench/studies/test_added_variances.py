@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 
 from rigwatch.workbench.compare.preparation import open_bench
-from rigwatch.workbench.compare.uncertainty_budget import added_variances
+from rigwatch.workbench.compare.uncertainty_budget import RESPONSE_ERROR, added_variances
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.fit.intervals import values
+from rigwatch.workbench.steps.change import add
 from rigwatch.workbench.study.creation import create
+from rigwatch.workbench.study.study import open_study
 from tests.workbench.rigs.test_black_box import record
 from tests.workbench.simulated import multisine, opened
 
@@ -39,9 +41,13 @@ def test_what_is_named_has_an_interval_that_is_wider_than_its_recording_says(tmp
     assert found.ranking[0].effect == "viscous"
     low, high = found.ranking[0].parameters["d"].interval
     assert low < DRAG < high
-    accepted = open_bench(study.with_effects([]))
+    assert add(study, "viscous", "load").step == "add"
+    accepted = open_bench(open_study(study.folder))
+    assert "load_viscous_d" in accepted.base.compiled.system.free
     more = added_variances(accepted.study, accepted.data, accepted.bare, accepted.base)
     assert set(more) == set(accepted.base.compiled.system.free)
+    damping = accepted.base.train.values()["load_viscous_d"]
+    assert more["load_viscous_d"] > (RESPONSE_ERROR * damping) ** 2
     alone, whole = (values(accepted.base.train, extra) for extra in (None, more))
     for name, variance in more.items():
         assert variance > 0
