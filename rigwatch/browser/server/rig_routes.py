@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response, StreamingResponse
@@ -33,14 +34,21 @@ EVERY = 0.25
 
 
 def _link(request: Request) -> RigLink:
-    """The rig's link, opened on first use."""
-    rig = context_of(request).rig
+    return link_of(request.app)
+
+
+def link_of(app: Starlette) -> RigLink:
+    """The rig's link, opened on first use.
+
+    Raises:
+        RigwatchError: there is no rig, or its configuration cannot be read.
+    """
+    rig: Path | None = app.state.context.rig
     if rig is None:
         raise PlaceError("no rig: start `rigwatch workbench` with --rig CONFIG")
-    state = request.app.state
-    if not hasattr(state, "link"):
-        state.link = RigLink(rig)
-    found: RigLink = state.link
+    if not hasattr(app.state, "link"):
+        app.state.link = RigLink(rig)
+    found: RigLink = app.state.link
     return found
 
 
@@ -48,9 +56,12 @@ async def rig_page(request: Request) -> Response:
     """The page."""
     context = context_of(request)
     if context.rig is None:
-        return HTMLResponse(render("rig.html", place="rig", has_rig=False, rig=""), 404)
-    name = _link(request).config.rig.id
-    return HTMLResponse(render("rig.html", place="rig", has_rig=True, rig=name))
+        return HTMLResponse(render("rig.html", place="rig", has_rig=False, rig="", trouble=""), 404)
+    try:
+        name, trouble = _link(request).config.rig.id, ""
+    except RigwatchError as error:
+        name, trouble = context.rig.stem, str(error)
+    return HTMLResponse(render("rig.html", place="rig", has_rig=True, rig=name, trouble=trouble))
 
 
 async def rig_now(request: Request) -> Response:

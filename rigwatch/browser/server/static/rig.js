@@ -63,9 +63,9 @@ function make(kind, name, data) {
   $("live-charts").append(element("h3", `${words} `, {}, value), box);
   const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, font: "11px system-ui" };
   const plot = new uPlot({
-    width: box.clientWidth, height: 110, legend: { show: false }, cursor: { y: false },
+    width: box.clientWidth, height: 124, legend: { show: false }, cursor: { y: false },
     scales: { x: { time: false, range: () => [-seconds, 0] } },
-    axes: [{ ...axis, size: 20 }, { ...axis, size: 60 }],
+    axes: [{ ...axis, size: 30 }, { ...axis, size: 60 }],
     series: [{}, { label: plain(name), stroke: colour(kind === "samples" ? "measured" : "rest"), width: 1.3, points: { show: false } }],
   }, data, box);
   cursor(box, () => plot, (text) => { $("readout").textContent = text; say(text); }, { plain: true });
@@ -178,5 +178,5 @@ document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !keysOn() || event.target.closest("input, select, textarea")) return;
   if (event.key === "?") showHelp();
 });
-addEventListener("resize", () => { for (const { plot, box } of Object.values(charts)) plot.setSize({ width: box.clientWidth, height: 110 }); });
+addEventListener("resize", () => { for (const { plot, box } of Object.values(charts)) plot.setSize({ width: box.clientWidth, height: 124 }); });
 addEventListener("load", () => { open(); history(); });
