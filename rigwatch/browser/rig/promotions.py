@@ -4,6 +4,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from msgspec import structs
+
 from monitor.model import model_versions
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.steps import ModelHandover, hand_over, model_path, restore
@@ -48,10 +50,9 @@ def promotions(rig: Path, root: Path) -> list[Promotion]:
     now = model_versions.digest_of(path)
     last = max((k for k, one in enumerate(found) if one.sha256 == now), default=-1)
     return [
-        Promotion(one.t_ns, one.step, one.user, one.identity, one.why, _study(root, one.why), k == last,
-                  one.sha256)
-        for k, one in reversed(list(enumerate(found)))
-    ]  # fmt: skip
+        Promotion(**structs.asdict(one), study=_study(root, one.why), in_force=number == last)
+        for number, one in reversed(list(enumerate(found)))
+    ]
 
 
 def can_roll_back(rig: Path) -> bool:

@@ -9,7 +9,6 @@ Commands, pages and Python work on the same folder and ledger: a study changed e
 again. Fits are kept in memory until the study changes.
 """
 
-import getpass
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -43,7 +42,7 @@ from rigwatch.workbench.steps import (
     try_undo,
 )
 from rigwatch.workbench.study import Study as Opened
-from rigwatch.workbench.study import create, open_study, stands_on
+from rigwatch.workbench.study import append, create, open_study, stands_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -150,7 +149,7 @@ class Study:
 
     def accept_data(self) -> None:
         """Continue with recordings that have changed (`rigwatch study accept-data`)."""
-        ledger.append(self._opened(), "accept-data")
+        append(self._opened(), "accept-data")
 
     def promote(self, rig: Path | str, *, rollback: bool = False) -> str:
         """Pass the model to a rig's monitor, or restore its previous one (`study promote`).
@@ -161,7 +160,7 @@ class Study:
         Raises:
             ModelError: the monitor refuses, or the residual does not fall.
         """
-        done = hand_over(self._opened(), Path(rig), getpass.getuser(), rollback=rollback).granted
+        done = hand_over(self._opened(), Path(rig), rollback=rollback).granted
         if not done.done:
             raise ModelError(f"{rig}: {done.text}")
         return done.text
