@@ -6,10 +6,13 @@ model.undone-….toml       rolled-back versions, named by the start of their SH
 model.history.jsonl       who, whether proved, when, what and why: a line for each change
 """
 
+import contextlib
 import hashlib
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+
+import msgspec
 
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import replace_file
@@ -23,6 +26,52 @@ class Author:
     user: str
     why: str
     identity: Identity = NOT_PROVED
+
+
+class Version(msgspec.Struct, frozen=True):
+    """One line of the history.
+
+    Attributes:
+        t_ns: of the change [ns].
+        step: "promote" or "rollback".
+        user: who made it.
+        why: the reason, in words.
+        identity: whether the user is proved by a signature; empty in older lines.
+        sha256: of the model in force since.
+    """
+
+    t_ns: int
+    step: str
+    user: str
+    why: str
+    sha256: str
+    identity: str = ""
+
+
+def history(path: Path) -> list[Version]:
+    """All changes of the model at `path`, oldest first; an incomplete line is skipped.
+
+    Raises:
+        ConfigError: the history cannot be read.
+    """
+    file = _history(path)
+    try:
+        lines = file.read_bytes().splitlines() if file.exists() else []
+    except OSError as error:
+        raise ConfigError(file, "", error.strerror or str(error), "a readable file") from error
+    found = []
+    for line in lines:
+        with contextlib.suppress(msgspec.DecodeError):
+            found.append(msgspec.json.decode(line, type=Version))
+    return found
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 of the model in force, as its history records it; empty if it cannot be read."""
+    try:
+        return _sha256(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError):
+        return ""
 
 
 def install(path: Path, text: str, t_ns: int, author: Author) -> None:
@@ -86,8 +135,12 @@ def _version(path: Path, number: int) -> Path:
 
 def _note(path: Path, step: str, text: str, t_ns: int, author: Author) -> None:
     line = {"t_ns": t_ns, "step": step, **asdict(author), "sha256": _sha256(text)}
-    with path.with_name(f"{path.stem}.history.jsonl").open("a", encoding="utf-8") as file:
+    with _history(path).open("a", encoding="utf-8") as file:
         file.write(json.dumps(line, ensure_ascii=False) + "\n")
+
+
+def _history(path: Path) -> Path:
+    return path.with_name(f"{path.stem}.history.jsonl")
 
 
 def _sha256(text: str) -> str:

@@ -1,6 +1,7 @@
 """The application: routes behind the guard."""
 
 import asyncio
+import contextlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.resources import files
@@ -26,6 +27,7 @@ from rigwatch.browser.server.access import Access, Guard
 from rigwatch.browser.server.context import Context
 from rigwatch.browser.work import warm_up
 from rigwatch.page import STYLE
+from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.study import FILE
 
 STATIC = Path(str(files("rigwatch.browser.server").joinpath("static")))
@@ -64,6 +66,8 @@ async def _style(_: Request) -> Response:
 async def _lifespan(app: Starlette) -> AsyncIterator[None]:
     context: Context = app.state.context
     warm_up()
+    with contextlib.suppress(RigwatchError):  # the rig's page tells what is wrong
+        rig_routes.link_of(app)
     watching = asyncio.create_task(context.desks.watch(_state))
     try:
         yield

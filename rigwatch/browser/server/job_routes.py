@@ -21,13 +21,14 @@ ARGUMENTS: dict[str, dict[str, type]] = {
     "preview": {"effect": str, "port": str},
     "add": {"effect": str, "port": str, "anyway": bool},
     "undo": {},
+    "accept_data": {},
     "report": {},
     "rehearse": {},
     "promote": {},
     "rollback": {},
 }
 """Tasks that a page may start, with their arguments."""
-CHANGES = frozenset({"add", "undo"})
+CHANGES = frozenset({"add", "undo", "accept_data"})
 AT_THE_RIG = frozenset({"rehearse", "promote", "rollback"})
 HEARTBEAT = 15.0
 """Longest time without an event [s]."""

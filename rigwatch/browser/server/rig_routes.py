@@ -1,32 +1,54 @@
-"""Routes of the rig's page: live signals, alarms, a study from an alarm."""
+"""Routes of the rig's page: live signals, alarms, promotions, a study from an alarm."""
 
+import asyncio
 import time
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
 
+import msgspec
+from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, Response
+from starlette.responses import HTMLResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from rigwatch.browser.rig import RigLink, study_of_alarm
+from rigwatch.browser.rig import (
+    RigLink,
+    can_roll_back,
+    promotions,
+    roll_back,
+    study_of_alarm,
+)
 from rigwatch.browser.server.context import answer, body_of, context_of, told
 from rigwatch.browser.server.places import PlaceError
-from rigwatch.browser.views import render
+from rigwatch.browser.views import listed, render
+from rigwatch.browser.work import as_plain
 from rigwatch.wire.access import operator_name
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages import AlarmCommand
 
 ACTIONS = ("acknowledge", "reset")
+EVERY = 0.25
+"""Time between events [s]."""
 
 
 def _link(request: Request) -> RigLink:
-    """The rig's link, opened on first use."""
-    rig = context_of(request).rig
+    return link_of(request.app)
+
+
+def link_of(app: Starlette) -> RigLink:
+    """The rig's link, opened on first use.
+
+    Raises:
+        RigwatchError: there is no rig, or its configuration cannot be read.
+    """
+    rig: Path | None = app.state.context.rig
     if rig is None:
         raise PlaceError("no rig: start `rigwatch workbench` with --rig CONFIG")
-    state = request.app.state
-    if not hasattr(state, "link"):
-        state.link = RigLink(rig)
-    found: RigLink = state.link
+    if not hasattr(app.state, "link"):
+        app.state.link = RigLink(rig)
+    found: RigLink = app.state.link
     return found
 
 
@@ -34,14 +56,70 @@ async def rig_page(request: Request) -> Response:
     """The page."""
     context = context_of(request)
     if context.rig is None:
-        return HTMLResponse(render("rig.html", place="rig", has_rig=False, rig=""), 404)
-    name = _link(request).config.rig.id
-    return HTMLResponse(render("rig.html", place="rig", has_rig=True, rig=name))
+        return HTMLResponse(render("rig.html", place="rig", has_rig=False, rig="", trouble=""), 404)
+    try:
+        name, trouble = _link(request).config.rig.id, ""
+    except RigwatchError as error:
+        name, trouble = context.rig.stem, str(error)
+    return HTMLResponse(render("rig.html", place="rig", has_rig=True, rig=name, trouble=trouble))
 
 
 async def rig_now(request: Request) -> Response:
-    """Latest signals and alarms."""
-    return answer(await run_in_threadpool(_link(request).seen))
+    """Latest signals, alarms and states."""
+    link = _link(request)
+    _, signals = await run_in_threadpool(link.signals, 0)
+    return answer(signals | await run_in_threadpool(link.status))
+
+
+async def rig_events(request: Request) -> Response:
+    """Server-sent events: new signals a few times a second, alarms and states when they change."""
+    headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
+    events = _events(_link(request))
+    return StreamingResponse(events, media_type="text/event-stream", headers=headers)
+
+
+async def _events(link: RigLink) -> AsyncIterator[bytes]:
+    since, told = 0, b""
+    while True:
+        status = msgspec.json.encode(as_plain(link.status()))
+        if status != told:
+            told = status
+            yield b"event: status\ndata: " + status + b"\n\n"
+        newest, signals = link.signals(since)
+        if newest != since:
+            since = newest
+            yield b"event: signals\ndata: " + msgspec.json.encode(signals) + b"\n\n"
+        else:
+            yield b": still here\n\n"
+        await asyncio.sleep(EVERY)
+
+
+async def rig_history(request: Request) -> Response:
+    """Promotions of the rig's model, and the studies with effects that could be promoted."""
+    link, root = _link(request), context_of(request).places.root
+    return answer(await run_in_threadpool(_history, link.path, root))
+
+
+def _history(rig: Path, root: Path) -> dict[str, Any]:
+    studies = [
+        {
+            "name": one.name,
+            "effects": [f"{a.effect}@{a.port}" for a in one.state.whole.file.effects],
+        }
+        for one in listed(root)
+        if one.state is not None and one.state.whole.file.effects
+    ]
+    history = promotions(rig, root)
+    return {"history": history, "can_roll_back": can_roll_back(rig), "studies": studies}
+
+
+async def rig_rollback(request: Request) -> Response:
+    """Restore the previous model of the rig's monitor."""
+    link, root = _link(request), context_of(request).places.root
+    done = await run_in_threadpool(roll_back, link.path, root)
+    if not done.granted.done:
+        raise RigwatchError(done.granted.text)
+    return answer({"text": f"the previous model is {done.granted.text}"})
 
 
 async def rig_alarm(request: Request) -> Response:
@@ -71,6 +149,9 @@ async def rig_study(request: Request) -> Response:
 ROUTES = [
     Route("/rig", rig_page),
     Route("/api/rig", told(rig_now)),
+    Route("/api/rig/events", told(rig_events)),
+    Route("/api/rig/history", told(rig_history)),
+    Route("/api/rig/rollback", told(rig_rollback), methods=["POST"]),
     Route("/api/rig/alarm", told(rig_alarm), methods=["POST"]),
     Route("/api/rig/study", told(rig_study), methods=["POST"]),
 ]

@@ -44,9 +44,7 @@ async def study_page(request: Request) -> Response:
     }  # fmt: skip
     try:
         folder = await run_in_threadpool(context.places.checked, name)
-        state, parts = await run_in_threadpool(
-            _drawn, folder, name, _step(request), context.rig is not None
-        )
+        state, parts = await run_in_threadpool(_drawn, folder, name, _step(request), context.rig)
     except RigwatchError as error:
         return HTMLResponse(render("study.html", **(values | {"trouble": str(error)})), 404)
     shown = {name: Markup(html) for name, html in parts.items()}
@@ -58,9 +56,7 @@ async def study_parts(request: Request) -> Response:
     """The parts of a study's page and the data for its script."""
     context, name = context_of(request), request.path_params["name"]
     folder = await run_in_threadpool(context.places.checked, name)
-    state, parts = await run_in_threadpool(
-        _drawn, folder, name, _step(request), context.rig is not None
-    )
+    state, parts = await run_in_threadpool(_drawn, folder, name, _step(request), context.rig)
     return answer({"parts": parts, "state": state, "job": job_data(context.desk(request).job)})
 
 
@@ -85,10 +81,10 @@ async def study_file(request: Request) -> Response:
 
 
 def _drawn(
-    folder: Path, name: str, step: int | None, rig: bool
+    folder: Path, name: str, step: int | None, rig: Path | None
 ) -> tuple[dict[str, Any], dict[str, str]]:
     state = state_of(folder, name, step)
-    return state.plain(), parts_of(state, rig=rig)
+    return state.plain(), parts_of(state, rig)
 
 
 def _script(state: dict[str, Any]) -> Any:

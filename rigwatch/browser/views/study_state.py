@@ -7,9 +7,10 @@ from typing import Any
 import msgspec
 
 from rigwatch.browser.work import Results, results_of
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Comparison
 from rigwatch.workbench.explain import Explanation
-from rigwatch.workbench.study import Study, digest, lines, open_study
+from rigwatch.workbench.study import Study, check_data, digest, lines, open_study
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,7 @@ class State:
         explanation: of the displayed step, None if not computed.
         evidence: for each candidate, by label.
         ledger: its lines, oldest first.
+        changed: that recordings have changed since the last step, in words; empty if not.
     """
 
     study: Study
@@ -57,6 +59,7 @@ class State:
     explanation: Explanation | None
     evidence: dict[str, Any]
     ledger: list[dict[str, Any]]
+    changed: str = ""
 
     @property
     def comparison(self) -> Comparison | None:
@@ -89,6 +92,7 @@ class State:
             "channels": channels,
             "fitted": found is not None and self.results.has("signals"),
             "explained": self.explanation is not None,
+            "changed": self.changed,
         }
 
 
@@ -113,8 +117,16 @@ def state_of(folder: Path, name: str, step: int | None = None) -> State:
     return State(
         models[shown], name, whole, shown, steps, results,
         None if told is None else msgspec.convert(told, Explanation, strict=False),
-        results.read("evidence") or {}, list(lines(whole)),
+        results.read("evidence") or {}, list(lines(whole)), _changed(whole),
     )  # fmt: skip
+
+
+def _changed(study: Study) -> str:
+    try:
+        check_data(study)
+    except ModelError as error:
+        return str(error).removeprefix(f"{study.folder}: ")
+    return ""
 
 
 def _comparison(results: Results) -> Comparison | None:

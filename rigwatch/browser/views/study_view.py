@@ -1,8 +1,10 @@
 """The parts of a study's page, each a fragment of HTML that replaces the previous one."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+from rigwatch.browser.views.equivalents import adding, every_step
 from rigwatch.browser.views.motion_map import motion_map
 from rigwatch.browser.views.pages import render
 from rigwatch.browser.views.study_state import State
@@ -59,8 +61,8 @@ class Candidate:
         return str(self.told.get("reason", self.row.reason))
 
 
-def parts_of(state: State, *, rig: bool = False) -> dict[str, str]:
-    """All parts by name; `rig`: whether there is a rig to promote to."""
+def parts_of(state: State, rig: Path | None = None) -> dict[str, str]:
+    """All parts by name; `rig`: configuration of the rig to promote to."""
     values = {
         "s": state,
         "headline": headline(state),
@@ -69,9 +71,9 @@ def parts_of(state: State, *, rig: bool = False) -> dict[str, str]:
         "regions": regions(state),
         "views": VIEWS,
         "maps": motion_map(state),
-        "command": command,
+        "commands": every_step(state.whole, rig),
         "no_experiment": no_experiment(state),
-        "rig": rig,
+        "rig": rig is not None,
         "rehearsal": state.results.read("rehearsal") if rig else None,
     }
     return {name: render(f"{name}.html", **values) for name in PARTS}
@@ -168,17 +170,6 @@ def no_experiment(state: State) -> str:
     return "None of the excitations tried separates the rivals better than this recording."
 
 
-def command(state: State, step: str, effect: str = "", port: str = "") -> tuple[str, str]:
-    """The equivalent shell command and Python call."""
-    name = state.study.folder.name
-    if not effect:
-        return f"rigwatch {step} {name}", f'rigwatch.{step}("{name}")'
-    return (
-        f"rigwatch {step} {name} {effect} --port {port}",
-        f'rigwatch.{step}("{name}", "{effect}", port="{port}")',
-    )
-
-
 def candidate_html(state: State, label: str) -> str:
     """One candidate with the evidence for it; empty if the name is unknown."""
     every = [one for c in candidates(state) for one in (c, *c.alike)]
@@ -190,5 +181,5 @@ def candidate_html(state: State, label: str) -> str:
     return render(
         "detail.html", c=found, now=state.comparison, latest=state.latest,
         blocks=[g / most for g in gains], better=sum(g > 0 for g in gains),
-        command=command(state, "add", found.row.effect, found.row.port),
+        command=adding(state.whole, found.row.effect, found.row.port),
     )  # fmt: skip

@@ -25,7 +25,7 @@ from rigwatch.workbench.steps import (
     try_effect,
     try_undo,
 )
-from rigwatch.workbench.study import Study, open_study
+from rigwatch.workbench.study import Study, ledger, open_study
 
 Progress = Callable[[str], None]
 
@@ -105,6 +105,11 @@ class Worker:
     def undo(self) -> dict[str, Any]:
         """Remove the last effect; returns the outcome."""
         return self._done(try_undo(open_study(self.folder), self.progress, self.warm))
+
+    def accept_data(self) -> dict[str, Any]:
+        """Continue with recordings that have changed."""
+        ledger.append(open_study(self.folder), "accept-data")
+        return {"text": "continues with the recordings as they are now"}
 
     def report(self) -> None:
         """Write the study's report."""
@@ -226,6 +231,7 @@ TASKS: Mapping[str, Callable[..., Any]] = {
     "preview": Worker.preview,
     "add": Worker.add,
     "undo": Worker.undo,
+    "accept_data": Worker.accept_data,
     "report": Worker.report,
     "rehearse": Worker.rehearse,
     "promote": Worker.promote,

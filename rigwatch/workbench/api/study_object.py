@@ -14,7 +14,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rigwatch.wire.errors import ModelError
 from rigwatch.wire.exchange import ImportMapping
+from rigwatch.wire.typed_files import read_text
 from rigwatch.workbench.api.data_frames import NamedArrays, columns_from, records, write_csv
 from rigwatch.workbench.api.shown import Rows, Shown
 from rigwatch.workbench.compare import Comparison, Region, Warm, locate
@@ -30,6 +32,9 @@ from rigwatch.workbench.steps import (
     Change,
     Logs,
     Stage,
+    hand_over,
+    learn,
+    remodel,
     signals,
     stages,
     study_from_logs,
@@ -37,7 +42,7 @@ from rigwatch.workbench.steps import (
     try_undo,
 )
 from rigwatch.workbench.study import Study as Opened
-from rigwatch.workbench.study import create, open_study, stands_on
+from rigwatch.workbench.study import append, create, open_study, stands_on
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -132,6 +137,33 @@ class Study:
     def undo(self) -> Shown[Change]:
         """Remove the last effect (`rigwatch undo`)."""
         return Shown(try_undo(self._opened(), warm=self._warm).commit(), change_lines, _errors)
+
+    def learn(self, path: Path | str) -> list[str]:
+        """Copy an own effect file into the study (`rigwatch add --effect-file`); its effects."""
+        return learn(self._opened(), Path(path))[1]
+
+    def remodel(self, path: Path | str) -> None:
+        """Copy an own model file into the study and use it (`rigwatch study base --model-file`)."""
+        path = Path(path)
+        remodel(self._opened(), path.name, read_text(path))
+
+    def accept_data(self) -> None:
+        """Continue with recordings that have changed (`rigwatch study accept-data`)."""
+        append(self._opened(), "accept-data")
+
+    def promote(self, rig: Path | str, *, rollback: bool = False) -> str:
+        """Pass the model to a rig's monitor, or restore its previous one (`study promote`).
+
+        Returns:
+            The monitor's answer.
+
+        Raises:
+            ModelError: the monitor refuses, or the residual does not fall.
+        """
+        done = hand_over(self._opened(), Path(rig), rollback=rollback).granted
+        if not done.done:
+            raise ModelError(f"{rig}: {done.text}")
+        return done.text
 
     def signals(self, *, held_out: bool = True) -> NamedArrays:
         """Time [s], and for each output its measured and modelled values and the residual."""

@@ -11,6 +11,7 @@ from rigwatch.workbench.steps.model_handover import (
     hand_over,
     model_path,
     rehearse,
+    restore,
 )
 from rigwatch.workbench.steps.model_steps import Signals, Stage, signals, stages
 from rigwatch.workbench.steps.promotion import promotion
@@ -38,6 +39,7 @@ __all__ = [
     "rehearse",
     "remodel",
     "replay",
+    "restore",
     "signals",
     "stages",
     "study_from_logs",

@@ -99,6 +99,20 @@ def hand_over(
     return ModelHandover(granted, live, found)
 
 
+def restore(
+    rig: Path, user: str = "", say: Callable[[str], None] = lambda _: None
+) -> ModelHandover:
+    """Restore the previous model of a rig's monitor, whatever the present one is from.
+
+    Raises:
+        ConfigError: the rig's configuration cannot be read, or there is no previous model.
+    """
+    user = operator_name(load_rig(rig).bus, user)
+    wish = ModelRequest("rollback", "", user, "rolled back from the rig's page")
+    granted, live = _send(rig, model_path(rig), wish, say)
+    return ModelHandover(granted, live, None)
+
+
 def model_path(rig: Path) -> Path:
     """Path of the model file that a rig's monitor uses."""
     return Path(monitor_section(load_rig(rig), rig).model)

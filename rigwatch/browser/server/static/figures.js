@@ -30,6 +30,40 @@ function document_of(svg) {
   return new XMLSerializer().serializeToString(copy);
 }
 
+const NS = "http://www.w3.org/2000/svg";
+function shape(tag, attributes, words = "") {
+  const made = document.createElementNS(NS, tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  made.textContent = words;
+  return made;
+}
+
+/** A table as a picture: a bar for each value, or a point with its interval. */
+function drawn(table, title) {
+  const rows = [...table.tBodies[0].rows].map((row) => ({
+    name: row.cells[0].textContent.trim().replace(/\s+/g, " ").slice(0, 44), at: row.querySelector("[data-bar], [data-low]"),
+  })).filter((row) => row.at);
+  const soft = getComputedStyle(document.documentElement).getPropertyValue("--soft");
+  const held = getComputedStyle(document.documentElement).getPropertyValue("--held");
+  const top = Math.max(...rows.map(({ at }) => Math.abs(Number(at.dataset.bar ?? 0))), 1e-300);
+  const height = 34 + 22 * rows.length;
+  const svg = shape("svg", { xmlns: NS, viewBox: `0 0 640 ${height}`, width: 640, height, "font-family": "sans-serif", "font-size": 12 });
+  svg.append(shape("rect", { width: 640, height, fill: getComputedStyle(document.body).backgroundColor }));
+  svg.append(shape("text", { x: 10, y: 18, fill: soft, "font-size": 14 }, title));
+  rows.forEach(({ name, at }, k) => {
+    const y = 44 + 22 * k;
+    svg.append(shape("text", { x: 270, y, fill: soft, "text-anchor": "end" }, name));
+    const { bar, low, high, value } = at.dataset;
+    if (bar !== undefined) svg.append(shape("rect", { x: 280, y: y - 11, width: (260 * Math.abs(Number(bar))) / top, height: 12, fill: held }));
+    else {
+      const scale = (end) => 410 + 260 * Math.min(Math.max((Number(end) - Number(value)) / Math.abs(Number(value)), -0.5), 0.5);
+      svg.append(shape("path", { d: `M${scale(low)} ${y - 5}H${scale(high)}`, stroke: held, "stroke-width": 3 }), shape("circle", { cx: 410, cy: y - 5, r: 3.5, fill: held }));
+    }
+    svg.append(shape("text", { x: 630, y, fill: soft, "text-anchor": "end" }, at.textContent.trim()));
+  });
+  return new XMLSerializer().serializeToString(svg);
+}
+
 const quoted = (words) => (/[",\n]/.test(words) ? `"${words.replaceAll('"', '""')}"` : words);
 
 /** A table's visible words as CSV; a cell's `data-value` has the number in full. */
@@ -44,7 +78,7 @@ export function exportable(root = document) {
     const bar = document.createElement("p");
     bar.className = "export";
     for (const [words, act] of [
-      ["SVG", () => save(`${name}.svg`, "image/svg+xml", document_of(one.querySelector("svg")))],
+      ["SVG", () => save(`${name}.svg`, "image/svg+xml", one.classList.contains("listed") ? drawn(one.querySelector("table"), name.replaceAll("-", " ")) : document_of(one.querySelector("svg")))],
       ["CSV", () => save(`${name}.csv`, "text/csv", csv(one.querySelector("table")))],
     ]) {
       const button = document.createElement("button");

@@ -1,82 +1,182 @@
-// The rig as it is now: signals a few times a second, alarms, an alarm as a study.
+// The rig as it is now: signals, alarms and states as the server tells them; an alarm as a study.
 import { get, post } from "./api.js";
-import { $, attempt, say } from "./common.js";
+import { $, attempt, keysOn, remark, say, showHelp } from "./common.js";
+import { cursor, label } from "./cursor.js";
 
-const EVERY = 400;
 const charts = {};
+const kept = { samples: { times: [], lines: {} }, estimates: { times: [], lines: {} } };
+let seconds = 20;
+let units = {};
 let shown = "";
+let paused = false;
+let status = null;
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const plain = (words) => words.replaceAll("_", " ");
 
-function element(tag, text, attributes = {}) {
+function element(tag, text, attributes = {}, ...children) {
   const made = document.createElement(tag);
   if (text) made.textContent = text;
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  made.append(...children);
   return made;
 }
 
-function draw(kind, name, times, values, unit) {
-  const last = times[times.length - 1] ?? 0;
-  const data = [times.map((at) => at - last), values];
-  const id = `${kind}-${name}`;
-  if (!charts[id]) {
-    const box = element("div", "", { class: "live", role: "img", "aria-label": `${name} over the last seconds` });
-    $("live-charts").append(element("h3", `${name.replaceAll("_", " ")} [${unit}]`), box);
-    const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, font: "11px system-ui" };
-    charts[id] = new uPlot({
-      width: box.clientWidth, height: 110, legend: { show: false }, cursor: { show: false },
-      scales: { x: { time: false, range: [-20, 0] } },
-      axes: [{ ...axis, size: 20 }, { ...axis, size: 60 }],
-      series: [{}, { stroke: colour(kind === "samples" ? "measured" : "rest"), width: 1.3, points: { show: false } }],
-    }, data, box);
-  } else charts[id].setData(data);
-}
-
-function button(words, act) {
-  const made = element("button", words, { type: "button" });
-  made.addEventListener("click", () => attempt(act));
+function button(words, act, attributes = {}) {
+  const made = element("button", words, { type: "button", ...attributes });
+  made.addEventListener("click", async () => { made.disabled = true; await attempt(act); made.disabled = false; });
   return made;
 }
+
+/** New samples behind those that are here, as long as they are of one span. */
+function take(kind, { times, lines }) {
+  if (!times.length) return;
+  const own = kept[kind];
+  const names = Object.keys(lines);
+  const same = names.length === Object.keys(own.lines).length && names.every((name) => name in own.lines);
+  if (!same || times[0] <= (own.times.at(-1) ?? -Infinity)) { own.times = []; own.lines = Object.fromEntries(names.map((name) => [name, []])); }
+  own.times.push(...times);
+  for (const name of names) own.lines[name].push(...lines[name]);
+  const old = own.times.findIndex((at) => at >= own.times.at(-1) - seconds);
+  own.times.splice(0, old);
+  for (const name of names) own.lines[name].splice(0, old);
+}
+
+function draw() {
+  for (const [kind, { times, lines }] of Object.entries(kept)) {
+    const last = times.at(-1) ?? 0;
+    const since = times.map((at) => at - last);
+    for (const [name, values] of Object.entries(lines)) {
+      const chart = charts[name] ?? make(kind, name, [since, values]);
+      chart.plot.setData([since, values]);
+      chart.value.textContent = `${label(values.at(-1))} ${units[name] ?? ""}`;
+      numbers(name, values);
+    }
+  }
+  document.body.dataset.frames = String(Number(document.body.dataset.frames ?? 0) + 1);
+}
+
+function make(kind, name, data) {
+  if (!Object.keys(charts).length) { $("live-charts").replaceChildren(); }
+  const words = `${plain(name)} [${units[name] ?? ""}]`;
+  const value = element("b", "", { class: "value" });
+  const box = element("div", "", { class: "live", role: "img", tabindex: "0", "aria-label": `${words} over the last seconds; arrow keys read its points` });
+  $("live-charts").append(element("h3", `${words} `, {}, value), box);
+  const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, font: "11px system-ui" };
+  const plot = new uPlot({
+    width: box.clientWidth, height: 124, legend: { show: false }, cursor: { y: false },
+    scales: { x: { time: false, range: () => [-seconds, 0] } },
+    axes: [{ ...axis, size: 30 }, { ...axis, size: 60 }],
+    series: [{}, { label: plain(name), stroke: colour(kind === "samples" ? "measured" : "rest"), width: 1.3, points: { show: false } }],
+  }, data, box);
+  cursor(box, () => plot, (text) => { $("readout").textContent = text; say(text); }, { plain: true });
+  box.addEventListener("keydown", (event) => { if (event.key.startsWith("Arrow")) pause(true); });
+  charts[name] = { plot, value, box };
+  return charts[name];
+}
+
+function numbers(name, values) {
+  const body = $("numbers").tBodies[0];
+  const id = `number-${name}`;
+  const row = $(id) ?? body.appendChild(element("tr", "", { id }, element("th", plain(name), { scope: "row" }), ...[0, 1, 2].map(() => element("td", "", { class: "num" })), element("td", units[name] ?? "")));
+  const real = values.filter((value) => value !== null);
+  [values.at(-1), Math.min(...real), Math.max(...real)].forEach((value, k) => { row.cells[k + 1].textContent = real.length ? label(value) : "–"; });
+}
+
+function pause(on) {
+  paused = on;
+  $("pause").setAttribute("aria-pressed", on);
+  $("pause").textContent = on ? "Go on" : "Pause";
+  if (!on) draw();
+}
+
+function since(t_ns) { return new Date(t_ns / 1e6).toLocaleString([], { dateStyle: "short", timeStyle: "medium" }); }
 
 function alarms(found) {
-  const now = JSON.stringify(found.map((one) => [one.name, one.state, one.cause]));
+  const now = JSON.stringify(found);
   if (now === shown) return;
   shown = now;
+  const focused = document.activeElement?.dataset?.act ? `[data-alarm="${document.activeElement.closest("article")?.dataset.alarm}"] [data-act="${document.activeElement.dataset.act}"]` : "";
   const items = found.map((one) => {
     const item = element("article", "", { class: `alarm ${one.state}`, "data-alarm": one.name, "data-state": one.state });
-    const name = one.name.replaceAll("_", " ");
-    item.append(element("h3", name), element("p", `${one.severity}, ${one.state.replaceAll("_", " ")}`, { class: "note" }));
-    item.append(element("p", one.cause), element("p", one.guidance, { class: "note" }));
+    item.append(element("h3", plain(one.name)), element("p", `${one.severity}, ${plain(one.state)}, since ${since(one.t_ns)}${one.first_out ? ", the first" : ""}${one.user ? `, by ${one.user}` : ""}`, { class: "note" }));
+    const [what, probable] = one.cause.split("; probably missing: ");
+    item.append(element("p", what));
+    if (probable) item.append(element("p", `probably missing: ${probable}`, { class: "probable" }));
+    item.append(element("p", one.guidance, { class: "note" }));
     const acts = element("p", "", { class: "acts" });
-    if (one.state === "unacknowledged" || one.state === "cleared_unacknowledged") acts.append(button("Acknowledge", () => post("/api/rig/alarm", { name: one.name, action: "acknowledge" })));
-    if (one.state !== "normal") acts.append(button("Reset", () => post("/api/rig/alarm", { name: one.name, action: "reset" })));
+    const tell = (action) => async () => { await post("/api/rig/alarm", { name: one.name, action }); remark(`${plain(one.name)}: ${action} sent`, true); };
+    if (one.state === "unacknowledged" || one.state === "cleared_unacknowledged") acts.append(button("Acknowledge", tell("acknowledge"), { "data-act": "acknowledge" }));
+    if (one.state !== "normal") acts.append(button("Reset", tell("reset"), { "data-act": "reset" }));
     if (one.seq >= 0) {
-      const open = button("Open as a study", async () => {
+      acts.append(button("Open as a study", async () => {
         const made = await post("/api/rig/study", { name: one.name });
         location.href = `/study/${made.study}`;
-      });
-      open.className = "primary";
-      acts.append(open);
+      }, { class: "primary", "data-act": "study" }));
     }
     item.append(acts);
     return item;
   });
   $("alarms").replaceChildren(...(items.length ? items : [element("p", "No alarms received.", { class: "note" })]));
-  const standing = found.filter((one) => one.state !== "normal").map((one) => one.name.replaceAll("_", " "));
+  if (focused) document.querySelector(focused)?.focus();
+  const standing = found.filter((one) => one.state !== "normal").map((one) => plain(one.name));
   say(standing.length ? `alarms: ${standing.join(", ")}` : "no standing alarms");
 }
 
-async function look() {
-  if (!document.hidden) {
-    try {
-      const found = await get("/api/rig");
-      const words = found.trouble || "live";
-      if ($("link").textContent !== words) $("link").textContent = words;
-      for (const [kind, { times, lines }] of Object.entries(found.signals)) {
-        for (const [name, values] of Object.entries(lines)) draw(kind, name, times, values, found.units[name]);
-      }
-      alarms(found.alarms);
-    } catch (error) { $("link").textContent = error.message; }
-  }
-  setTimeout(look, EVERY);
+function states() {
+  const { trouble, armed, why, processes } = status;
+  const words = trouble ? "absent" : armed && !why ? "watching" : armed ? `watching, but ${why}` : `not armed: ${why}`;
+  if ($("link").textContent !== words) $("link").textContent = words;
+  $("link").dataset.armed = trouble ? "absent" : armed ? "yes" : "no";
+  $("absent").hidden = !trouble;
+  $("absent-why").textContent = trouble;
+  $("processes").tBodies[0].replaceChildren(...processes.map((one) => element("tr", "", {}, element("th", one.name, { scope: "row" }), element("td", one.state), element("td", one.text))));
 }
-addEventListener("load", look);
+
+async function history() {
+  const found = await attempt(() => get("/api/rig/history"));
+  if (!found) return;
+  const rows = found.history.map((one) => {
+    const study = one.study ? element("a", one.study, { href: `/study/${one.study}` }) : element("span", "–");
+    const step = `${one.step === "promote" ? "promoted" : "rolled back"}${one.in_force ? ", in force" : ""}`;
+    return element("tr", "", { "data-step": one.step, "data-in-force": one.in_force ? "yes" : "" }, element("th", since(one.t_ns), { scope: "row" }), element("td", step), element("td", one.identity ? `${one.user} (${plain(one.identity)})` : one.user), element("td", "", {}, study), element("td", one.why));
+  });
+  const head = element("tr", "", {}, ...["when", "what", "who", "study", "why"].map((words) => element("th", words, { scope: "col" })));
+  const table = element("table", "", { id: "promotions" }, element("caption", "History of promotions, newest first", { class: "visually-hidden" }), element("thead", "", {}, head), element("tbody", "", {}, ...rows));
+  const parts = rows.length ? [element("div", "", { class: "scroll", tabindex: "0", role: "region", "aria-label": "History of promotions" }, table)] : [element("p", "The commissioned model; nothing has been promoted yet.", { class: "note" })];
+  if (found.can_roll_back) parts.push(element("p", "", { class: "acts" }, button("Roll back", rollback, { id: "rollback" }), element("span", "restores the previous model between two samples", { class: "note" })));
+  if (found.studies.length) {
+    const links = found.studies.map((one) => element("li", "", {}, element("a", one.name, { href: `/study/${one.name}` }), ` ${one.effects.join(", ")}`));
+    parts.push(element("h3", "To promote"), element("p", "A study's page rehearses its model on the rig's last minutes, and then lets it go live.", { class: "note" }), element("ul", "", { class: "note" }, ...links));
+  }
+  $("history").replaceChildren(...parts);
+}
+
+async function rollback() {
+  const done = await post("/api/rig/rollback");
+  remark(done.text, true);
+  await history();
+}
+
+let source = null;
+function open() {
+  if (source || document.hidden) return;
+  source = new EventSource("/api/rig/events");
+  source.addEventListener("signals", (event) => {
+    const found = JSON.parse(event.data);
+    ({ units, seconds } = found);
+    for (const kind of Object.keys(kept)) take(kind, found.signals[kind]);
+    if (!paused) draw();
+  });
+  source.addEventListener("status", (event) => { status = JSON.parse(event.data); states(); alarms(status.alarms); });
+  source.addEventListener("error", () => { $("link").textContent = "the server does not answer; trying again"; });
+}
+function close() { source?.close(); source = null; }
+document.addEventListener("visibilitychange", () => { if (document.hidden) close(); else { open(); history(); } });
+addEventListener("pagehide", close);
+$("pause").addEventListener("click", () => pause(!paused));
+document.addEventListener("keydown", (event) => {
+  if (event.ctrlKey || event.metaKey || event.altKey || !keysOn() || event.target.closest("input, select, textarea")) return;
+  if (event.key === "?") showHelp();
+});
+addEventListener("resize", () => { for (const { plot, box } of Object.values(charts)) plot.setSize({ width: box.clientWidth, height: 124 }); });
+addEventListener("load", () => { open(); history(); });

@@ -2,6 +2,9 @@
 import { get, post, listen } from "./api.js";
 import { $, attempt, keysOn, remark, say, showHelp } from "./common.js";
 import { Charts } from "./charts.js";
+import { cursor } from "./cursor.js";
+import { exportable } from "./figures.js";
+import { numbers } from "./numbers.js";
 
 const name = document.querySelector("[data-study]").dataset.study;
 const path = name.split("/").map(encodeURIComponent).join("/");
@@ -105,8 +108,13 @@ async function refresh(step = sought) {
   else if (chosen) choose(chosen);
   if (place !== null && state.key !== before.key) leavePlace();
   channels();
-  if (!state.fitted) ask("show", state.latest ? {} : { step: state.step });
-  else draw();
+  show();
+}
+
+/** What is fitted is drawn; what is not is fitted, unless the data are not those of the last step. */
+function show() {
+  if (state.fitted) draw();
+  else if (!state.changed) ask("show", state.latest ? {} : { step: state.step });
 }
 
 const drawn = new Map();
@@ -120,6 +128,7 @@ function replace(part, html) {
   part.innerHTML = html;
   [part, ...part.querySelectorAll(".scroll")].forEach((box, k) => { box.scrollTop = tops[k] ?? 0; });
   if (focused) part.querySelector(focused)?.focus({ preventScroll: true });
+  exportable(part);
 }
 
 function selector(element) {
@@ -132,7 +141,7 @@ function selector(element) {
 async function ask(task, args = {}) {
   const found = await attempt(() => post(`/api/begin/${path}`, { task, arguments: args, study: state.study }));
   if (found) { asked = found.number; heardJob(found); }
-  else if (task === "add" || task === "undo") refresh();
+  else if (["add", "undo", "accept_data"].includes(task)) refresh();
 }
 
 const OVER = { done: "", refused: "refused", failed: "failed", cancelled: "cancelled" };
@@ -149,14 +158,15 @@ function heardJob(now, tell = true) {
 
 function showJob() {
   const box = $("job");
-  box.hidden = !(job.active || job.state === "failed");
+  box.hidden = !(job.active || (["failed", "refused", "cancelled"].includes(job.state) && job.task !== "show"));
+  $("dismiss").hidden = job.active;
   const steps = /(\d+) of (?:at most )?(\d+)/.exec(job.text);
   const bar = $("job-progress");
   if (steps && job.active) { bar.max = Number(steps[2]); bar.value = Number(steps[1]); } else bar.removeAttribute("value");
   bar.hidden = !job.active;
   $("cancel").hidden = !job.active;
   $("job-text").textContent = job.text || job.task;
-  box.classList.toggle("failed", job.state === "failed");
+  box.classList.toggle("failed", job.state === "failed" || job.state === "refused");
   box.dataset.state = job.state;
   clock();
   if (job.active) say(job.text || job.task);
@@ -223,6 +233,8 @@ const acts = {
   explain: () => ask("explain"),
   undo: () => ask("undo"),
   preview: () => { if (candidate()) ask("preview", candidate()); else move(1); },
+  anyway: () => { if (candidate()) ask("add", { ...candidate(), anyway: true }); },
+  accept_data: () => ask("accept_data"),
   add: () => { if (candidate()) ask("add", candidate()); else remark("select a candidate first (j, k)"); },
   cancel: () => attempt(() => post(`/api/cancel/${path}`)),
   report: async () => { wanted = "report"; await ask("report"); },
@@ -288,6 +300,8 @@ document.addEventListener("click", (event) => {
   if (at("[role=tab]")) return tab(at("[role=tab]").id.slice(4));
   for (const id of ["explain", "undo", "cancel"]) if (at(`#${id}`)) return acts[id]();
   if (at("#export-report")) return acts.report();
+  if (at("#numbers")) { at("details").open = false; return numbers(charts); }
+  if (at("#dismiss")) { $("job").hidden = true; return undefined; }
   if (at("#zoom-in")) return charts.zoom(0.5);
   if (at("#zoom-out")) return charts.zoom(2);
   if (at("#zoom-all")) return charts.look(null);
@@ -325,7 +339,7 @@ const KEYS = {
 };
 
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey || $("help").open) return;
+  if (event.ctrlKey || event.metaKey || event.altKey || $("help").open || $("table").open) return;
   const target = event.target;
   const within = (what) => target.closest?.(what);
   if (event.key !== "Escape" && (!keysOn() || within("input, select, textarea"))) return;
@@ -372,7 +386,8 @@ function begin() {
   if (state.channels.some((one) => one.name === address.get("channel"))) $("channel").value = address.get("channel");
   const span = [Number(address.get("from")), Number(address.get("to"))];
   if (address.has("from") && span[1] > span[0]) charts.span = span;
-  if (state.fitted) draw();
-  else ask("show", state.latest ? {} : { step: state.step });
+  show();
+  exportable();
+  for (const chart of ["signals", "residual"]) cursor($(chart), () => charts.plots[chart], (words) => { $("readout").textContent = words; say(words); });
 }
 addEventListener("load", begin);

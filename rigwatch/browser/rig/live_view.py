@@ -1,0 +1,170 @@
+"""What the rig's page shows: latest signals, alarms with their probable causes, states."""
+
+import math
+from collections import deque
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.messages import (
+    Alarm,
+    EstimateBlock,
+    Health,
+    SampleBlock,
+    columns_of,
+)
+
+SECONDS = 20.0
+"""Time span shown [s]."""
+SHOWN_RATE = 64.0
+"""Sample rate of the signals shown [Hz]."""
+SHOWN_ESTIMATES = ("residual", "theta1", "theta2")
+SILENT = 3.0
+"""Time without a message after which a process is called silent [s]."""
+
+Lines = tuple[FloatArray, dict[str, FloatArray]]
+"""Times of some samples [s], and values by name."""
+
+
+class LiveView:
+    """Buffers of the page; not thread-safe.
+
+    Args:
+        sample_rate: of the rig [Hz].
+    """
+
+    def __init__(self, sample_rate: float) -> None:
+        self._every = max(1, round(sample_rate / SHOWN_RATE))
+        self._parts: dict[str, deque[tuple[int, Lines]]] = {
+            "samples": deque(),
+            "estimates": deque(),
+        }
+        self._count = 0
+        self._units: dict[str, str] = {}
+        self._alarms: dict[str, Alarm] = {}
+        self._health: dict[str, tuple[Health, float]] = {}
+        self._figures: dict[str, float] = {}
+        self._heard: dict[str, float] = {}
+
+    def standing(self, alarms: list[Alarm]) -> None:
+        """Take the list of standing alarms, whose causes name what is probably missing."""
+        for alarm in alarms:
+            known = self._alarms.get(alarm.name)
+            if known is None or known.t_ns <= alarm.t_ns:
+                self._alarms[alarm.name] = alarm
+
+    def alarm(self, name: str) -> Alarm | None:
+        """An alarm by name."""
+        return self._alarms.get(name)
+
+    def take(self, message: object, now: float) -> None:
+        """Take a message that arrived at `now`, a monotonic time [s]."""
+        if isinstance(message, SampleBlock | EstimateBlock):
+            self._keep(message, now)
+        elif isinstance(message, Alarm):
+            self._alarms[message.name] = message
+        elif isinstance(message, Health):
+            self._health[message.source] = message, now
+
+    def _keep(self, block: SampleBlock | EstimateBlock, now: float) -> None:
+        kind = "samples" if isinstance(block, SampleBlock) else "estimates"
+        self._heard[kind] = now
+        columns = columns_of(block)
+        if kind == "estimates" and len(block):
+            named = {column.name: column for column in columns}
+            flags = [name for name in ("armed", "observable") if name in named]
+            self._figures = {name: float(named[name].values[-1]) for name in flags}
+        shown = [c for c in columns if kind == "samples" or c.name in SHOWN_ESTIMATES]
+        self._units |= {column.name: column.unit for column in shown}
+        taken = slice(-block.seq % self._every, None, self._every)
+        times = np.asarray(block.t_ns[taken] / 1e9)
+        if not len(times):
+            return
+        self._count += 1
+        parts = self._parts[kind]
+        values = {c.name: np.asarray(c.values[taken], float) for c in shown}
+        parts.append((self._count, (times, values)))
+        while parts and times[-1] - parts[0][1][0][-1] > SECONDS:
+            parts.popleft()
+
+    def signals(self, since: int) -> tuple[int, dict[str, Any]]:
+        """The newest part's number, and the signals of all parts after the part `since`."""
+        found = {
+            kind: _joined([lines for number, lines in parts if number > since])
+            for kind, parts in self._parts.items()
+        }
+        return self._count, {"signals": found, "units": dict(self._units), "seconds": SECONDS}
+
+    def alarms(self) -> list[dict[str, Any]]:
+        """All alarms, standing ones first."""
+        found = [_plain(alarm) for alarm in self._alarms.values()]
+        return sorted(found, key=lambda a: (a["state"] == "normal", -a["t_ns"]))
+
+    def states(self, now: float, learns: float) -> dict[str, Any]:
+        """Whether the monitor watches, why not, and what the processes say.
+
+        Args:
+            now: monotonic time [s].
+            learns: time that the monitor needs after a start [s].
+        """
+        processes = [
+            {
+                "name": source.partition("/")[0],
+                "state": "silent" if now - at > SILENT else health.state,
+                "text": health.text if now - at <= SILENT else "says nothing",
+            }
+            for source, (health, at) in sorted(self._health.items())
+        ]
+        return {"armed": self._armed(now), "why": self._why(now, learns), "processes": processes}
+
+    def hears(self, now: float) -> bool:
+        """Whether samples arrive."""
+        return now - self._heard.get("samples", -math.inf) < SILENT
+
+    def _armed(self, now: float) -> bool:
+        recent = now - self._heard.get("estimates", -math.inf) < SILENT
+        return recent and bool(self._figures.get("armed", 0.0))
+
+    def _why(self, now: float, learns: float) -> str:
+        """Why the monitor does not watch; empty if it does."""
+        if not self.hears(now):
+            return "no samples arrive: the rig or its acquisition is stopped"
+        told = [h.text for source, (h, _) in self._health.items() if source.startswith("monitor")]
+        if any(told):
+            return "; ".join(filter(None, told))
+        if now - self._heard.get("estimates", -math.inf) >= SILENT:
+            return "no monitor runs: start `rigwatch monitor` or `rigwatch up`"
+        if self._armed(now):
+            return (
+                ""
+                if self._figures.get("observable", 1.0)
+                else "the rig hardly moves: friction cannot be observed"
+            )
+        return (
+            "it learns the healthy reference of this run, which takes about"
+            f" {learns:.0f} s of steady drive after a start or a gap"
+        )
+
+
+def _joined(parts: list[Lines]) -> dict[str, Any]:
+    names = parts[-1][1] if parts else {}
+    same = [(times, columns) for times, columns in parts if columns.keys() == names.keys()]
+    times = np.concatenate([t for t, _ in same]) if same else np.zeros(0)
+    lines = {name: np.concatenate([columns[name] for _, columns in same]) for name in names}
+    return {
+        "times": [round(at, 4) for at in times.tolist()],
+        "lines": {name: _finite(values) for name, values in lines.items()},
+    }
+
+
+def _finite(values: FloatArray) -> list[float | None]:
+    return [float(f"{v:.6g}") if math.isfinite(v) else None for v in values.tolist()]
+
+
+def _plain(alarm: Alarm) -> dict[str, Any]:
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in asdict(alarm).items()
+    }
