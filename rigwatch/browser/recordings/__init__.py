@@ -2,7 +2,12 @@
 
 from rigwatch.browser.recordings.looking import Look, look_at
 from rigwatch.browser.recordings.new_study import make_study, template_data, template_names
-from rigwatch.browser.recordings.recorded import channels_of, recordings_in, write_channels
+from rigwatch.browser.recordings.recorded import (
+    channels_of,
+    check_session,
+    recordings_in,
+    write_channels,
+)
 from rigwatch.browser.recordings.stories import Story, begin_story, stories
 
 __all__ = [
@@ -10,6 +15,7 @@ __all__ = [
     "Story",
     "begin_story",
     "channels_of",
+    "check_session",
     "look_at",
     "make_study",
     "recordings_in",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rigwatch.browser.signals import write_trace
-from rigwatch.browser.work import RESULTS, Results
+from rigwatch.browser.work import RESULTS, Results, apart
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.session import SUFFIX, open_session
 
@@ -38,9 +38,18 @@ def channels_of(root: Path, path: Path) -> tuple[Results, dict[str, Any]]:
     key = f"{path}:{stat.st_ino}:{stat.st_size}:{stat.st_mtime_ns}"
     kept = Results(root / RESULTS / hashlib.sha256(key.encode()).hexdigest()[:32])
     if not kept.has("recording.json"):
-        kept.write("recording", write_channels(kept, path))
+        kept.write("recording", apart(write_channels, kept, path))
     found: dict[str, Any] = kept.read("recording")
     return kept, found
+
+
+def check_session(path: Path) -> None:
+    """Check the content of a session.
+
+    Raises:
+        RigwatchError: it cannot be read.
+    """
+    open_session(path).check_content()
 
 
 def write_channels(kept: Results, path: Path) -> dict[str, Any]:

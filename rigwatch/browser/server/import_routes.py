@@ -14,6 +14,7 @@ from starlette.routing import Route
 from rigwatch.browser.recordings import (
     begin_story,
     channels_of,
+    check_session,
     look_at,
     make_study,
     recordings_in,
@@ -32,9 +33,10 @@ from rigwatch.browser.server.places import RECORDINGS, UPLOADS, PlaceError
 from rigwatch.browser.server.signal_routes import packed, span_of
 from rigwatch.browser.signals import open_trace
 from rigwatch.browser.views import render
+from rigwatch.browser.work import apart
 from rigwatch.wire.errors import ImportDataError, RigwatchError
 from rigwatch.wire.exchange import ImportMapping, import_file
-from rigwatch.wire.session import SUFFIX, open_session
+from rigwatch.wire.session import SUFFIX
 
 
 async def new_page(request: Request) -> Response:
@@ -71,9 +73,9 @@ async def bring(request: Request) -> Response:
 async def _looked(path: Path) -> Any:
     """Content of an uploaded file; None for a session, which needs no mapping."""
     if path.suffix == SUFFIX:
-        await run_in_threadpool(lambda: open_session(path).check_content())
+        await run_in_threadpool(apart, check_session, path)
         return None
-    return await run_in_threadpool(look_at, path)
+    return await run_in_threadpool(apart, look_at, path)
 
 
 async def _written(request: Request, path: Path, most: int) -> bool:
@@ -108,7 +110,7 @@ async def take_in(request: Request) -> Response:
         return answer({"recording": context.places.relative(target), "remarks": []})
     mapping = _mapping(wanted.get("mapping"))
     try:
-        made = await run_in_threadpool(import_file, source, target, mapping)
+        made = await run_in_threadpool(apart, import_file, source, target, mapping)
     except RigwatchError as error:
         target.unlink(missing_ok=True)
         raise ImportDataError(str(error).replace(str(source), source.name[13:])) from None

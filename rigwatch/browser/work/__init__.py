@@ -1,5 +1,6 @@
 """Long tasks on studies: one process per study, results on disk, cancelling at any time."""
 
+from rigwatch.browser.work.apart import ApartError, apart
 from rigwatch.browser.work.desk import Desk, Desks, Job, warm_up
 from rigwatch.browser.work.directions import Directions
 from rigwatch.browser.work.results import FOLDER as RESULTS
@@ -7,11 +8,13 @@ from rigwatch.browser.work.results import Results, as_plain, results_of, signal_
 
 __all__ = [
     "RESULTS",
+    "ApartError",
     "Desk",
     "Desks",
     "Directions",
     "Job",
     "Results",
+    "apart",
     "as_plain",
     "results_of",
     "signal_key",

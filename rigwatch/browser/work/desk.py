@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
+from multiprocessing.forkserver import ensure_running
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
@@ -242,3 +243,4 @@ class Desks:
 def warm_up() -> None:
     """Start the process from which the others are forked, with the engine loaded."""
     multiprocessing.set_forkserver_preload(["rigwatch.browser.work.worker"])
+    ensure_running()

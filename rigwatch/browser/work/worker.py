@@ -12,7 +12,7 @@ from rigwatch.wire.errors import RigwatchError
 
 def work(pipe: Connection, folder: str) -> None:
     """Execute tasks from the pipe, one after another, until it is closed."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     worker = Worker(Path(folder), lambda text: pipe.send(("progress", text)))
     while True:
         try:
@@ -31,7 +31,7 @@ def _outcome(worker: Worker, task: str, arguments: dict[str, object]) -> tuple[s
         return "failed", f"{task}: {type(error).__name__}: {error}"
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
     """Let this process end when its server is killed."""
     parent = parent_process()
     if parent is not None:
