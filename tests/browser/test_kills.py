@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.workbench.study.ledger import append
 from tests.browser.kills import Kills
 from tests.workbench.fits.test_accepted_fit import UNITS, WAVES, waves
 from tests.workbench.machine import studied
@@ -14,7 +13,7 @@ pytestmark = pytest.mark.xdist_group("browser")
 
 
 def test_kills_of_server_and_worker_lose_nothing(tmp_path: Path) -> None:
-    append(studied(tmp_path, WAVES, [waves(0)], [waves(1)], UNITS), "new")
+    studied(tmp_path, WAVES, [waves(0)], [waves(1)], UNITS)
     kills = Kills(tmp_path, "study", random.Random(7))
     kills.run(2)
     assert kills.wrong == []
