@@ -208,7 +208,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "the {channel} channel delivers no number",
         "Check the sensor, its supply and its calibration. The "
         "channel is kept out of every estimate.",
-        _SENSOR,
+        _AT_ONCE,
     ),
     AlarmKind(
         "sensor_saturated",

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from monitor.alarms import AlarmRecord, read_journal
+from monitor.model import RigModel, model_text
 from monitor.process.startup_grace import SETTLING
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.messages import (
@@ -35,7 +36,7 @@ from rigwatch.wire.messages import (
 )
 from sim_plant.serve import Device, LineFaults, PtyLine, SerialServer
 from tests.bus.rig import TestRig, kill
-from tests.monitor_process.model import write_model
+from tests.monitor_process.model import MODEL
 from tests.waiting import PATIENCE, eventually
 
 RATE = 256.0
@@ -175,6 +176,7 @@ class Field:
         keys: further keys of a channel, by channel.
         extra: further sections.
         lease: of the bus [s].
+        model: of the monitor.
     """
 
     def __init__(
@@ -185,7 +187,7 @@ class Field:
         keys: dict[str, str] | None = None,
         extra: str = "",
         lease: float = 10.0,
-        monitor: str = "",
+        model: RigModel = MODEL,
     ) -> None:
         self.folder, self.journal = folder, folder / "alarms.jsonl"
         self.rig = TestRig(folder, lease=lease)
@@ -197,10 +199,10 @@ class Field:
         )
         text = self.rig.path.read_text()
         head = text[: text.index("[[channels]]")]
-        model = write_model(folder)
+        (folder / "model.toml").write_text(model_text(model))
         self.rig.path.write_text(
             f"{head}{channels}[daq.device]\n{device}\n"
-            f'[monitor]\nmodel = "{model}"\njournal = "{self.journal}"\n{monitor}\n{extra}'
+            f'[monitor]\nmodel = "{folder}/model.toml"\njournal = "{self.journal}"\n{extra}'
         )
         self.processes: dict[str, Popen[bytes]] = {}
         self.heard = Heard()
