@@ -263,7 +263,7 @@ class MonitorProcess:
             "queue_length": float(len(self.reader)),
             "rejected": float(self.reader.rejected),
             "dropped": float(self.reader.dropped),
-        }
+        } | {f"rejected_of_{who}": float(n) for who, n in self.reader.rejected_by.items()}
         self.bus.publish(
             HEALTH, self._health.message(seen.t_ns, state, text, self.reader.counters, extra)
         )

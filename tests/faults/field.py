@@ -224,14 +224,16 @@ class Field:
         thread.start()
         self._threads.append(thread)
 
-    def start(self, *commands: str) -> None:
+    def start(self, *commands: str, path: Path | None = None) -> None:
         """Start processes of the rig by command, and wait until each is on the bus."""
         if "router" not in self.processes:
             self.processes["router"] = self.rig.router()
             self.bus = self.rig.bus("observer")
             self.beside(self._listen)
         for command in commands:
-            self.processes[command] = self.rig.start("-m", "rigwatch", command, str(self.rig.path))
+            self.processes[command] = self.rig.start(
+                "-m", "rigwatch", command, str(path or self.rig.path)
+            )
         for command in commands:
             name = {"record": "recorder"}.get(command, command)
             eventually(lambda n=name: f"alive/{n}" in self.bus.tokens("alive/*"), f"{name} runs")  # type: ignore[misc]
