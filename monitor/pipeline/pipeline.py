@@ -117,7 +117,7 @@ class Monitor:
         )
         result = self._result(block, admitted, out)
         reset = self._residual.reset[admitted.padding :]
-        resets = above(kinds.MONITOR_RESET, reset, reset * 1.0, 0.0)
+        resets = above(kinds.MONITOR_RESET, reset, reset.astype(np.float64), 0.0)
         return replace(result, conditions=(*result.conditions, resets, *clipping))
 
     def _result(self, block: SampleBlock, admitted: Admitted, out: FloatArray) -> Result:
