@@ -49,7 +49,8 @@ class Supervisor:
     @property
     def link(self) -> Link:
         """The connection as the watch needs it."""
-        return Link(self.connected, self.text, self.reconnects)
+        trouble = str(getattr(self.adapter, "trouble", ""))
+        return Link(self.connected, self.text, self.reconnects, trouble)
 
     def start(self) -> None:
         """Open the device for the first time; `read` waits for an absent one.

@@ -11,7 +11,7 @@
 """
 
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +41,7 @@ class Link:
     connected: bool
     text: str = ""
     reconnects: int = 0
+    trouble: str = ""
 
 
 class Watch:
@@ -72,6 +73,8 @@ class Watch:
         self._rates = {"rate_hz": 0.0, "rate_mean_hz": 0.0, "rate_worst_hz": 0.0}
         self._before: dict[str, float] = {}
         self._garbage_text = ""
+        self._polls_failed = 0.0
+        self._failure_told_ns = -_SECOND
         self._drift_severity: Severity = "info"
         self._outside: dict[str, int] = {}
 
@@ -99,7 +102,7 @@ class Watch:
         self, now_ns: int, unix_ns: int, link: Link, counters: Mapping[str, float]
     ) -> list[Message]:
         """Events for what changed; health once a second and when the state changes."""
-        messages: list[Message] = []
+        messages: list[Message] = [*self._failed_polls(unix_ns, link, counters)]
         second_over = self._second_ns is None or now_ns - self._second_ns >= _SECOND
         if second_over:
             messages += self._second(now_ns, unix_ns, counters)
@@ -141,6 +144,16 @@ class Watch:
         severity, code = _STATE_EVENTS.get(state, ("info", state))
         said = text or f"{state}, was {was}"
         return [Event(self._source, unix_ns, severity, code, said)]
+
+    def _failed_polls(
+        self, unix_ns: int, link: Link, counters: Mapping[str, float]
+    ) -> Iterator[Message]:
+        """An event for the first failed poll of a second, as soon as it has failed."""
+        failed, before = counters.get("failed_polls", 0.0), self._polls_failed
+        self._polls_failed = failed
+        if failed > before and unix_ns - self._failure_told_ns >= _SECOND:
+            self._failure_told_ns = unix_ns
+            yield Event(self._source, unix_ns, "warning", "poll_failed", link.trouble)
 
     def _second(self, now_ns: int, unix_ns: int, counters: Mapping[str, float]) -> list[Message]:
         self._update_rates(now_ns)

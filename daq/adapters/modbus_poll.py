@@ -51,6 +51,9 @@ class ModbusAdapter:
         order: which 16-bit half of a 32-bit value comes first.
         clock: monotonic time [ns].
         sleep: waits for a number of seconds.
+
+    Attributes:
+        trouble: why the last failed poll failed.
     """
 
     clock_rate = 1.0
@@ -77,6 +80,7 @@ class ModbusAdapter:
         self._failed = 0
         self._backwards = 0
         self._counts = Counter({"polls": 0, "failed_polls": 0})
+        self.trouble = ""
 
     def open(self) -> None:
         """Connect, and check identification, word order and channels.
@@ -123,6 +127,7 @@ class ModbusAdapter:
 
     def _count_failure(self, error: ModbusError) -> None:
         self._counts["failed_polls"] += 1
+        self.trouble = str(error)
         self._failed += 1
         if self._failed >= _FAILURES:
             raise DeviceError(f"{self._failed} polls in a row failed, the last: {error}") from error

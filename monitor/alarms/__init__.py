@@ -8,7 +8,7 @@ from monitor.alarms.journal import AlarmJournal, last_records, read_journal
 from monitor.alarms.kinds import ALARM_KINDS, AlarmKind, check_settings, settings_of
 from monitor.alarms.manager import AlarmManager, Announcement
 from monitor.alarms.operator import LONGEST_NAME, LONGEST_TEXT, bounded
-from monitor.alarms.quality import quality_conditions
+from monitor.alarms.quality import SensorFlags
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.state import Occasion
 
@@ -22,10 +22,10 @@ __all__ = [
     "AlarmRecord",
     "Announcement",
     "Occasion",
+    "SensorFlags",
     "bounded",
     "check_settings",
     "last_records",
-    "quality_conditions",
     "read_journal",
     "settings_of",
 ]

@@ -140,6 +140,14 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         _PASSING,
     ),
     AlarmKind(
+        "clock_wrong",
+        "error",
+        "the device's clock is off by more than half a per cent; frequencies and rates are wrong",
+        "Do not trust frequencies, velocities and accelerations. Check the device's oscillator and "
+        "rig.sample_rate.",
+        _AT_ONCE,
+    ),
+    AlarmKind(
         "disk",
         "error",
         "the disk is full or nearly so; recording or journal may stop",
@@ -200,7 +208,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "the {channel} channel delivers no number",
         "Check the sensor, its supply and its calibration. The "
         "channel is kept out of every estimate.",
-        _SENSOR,
+        _AT_ONCE,
     ),
     AlarmKind(
         "sensor_saturated",
@@ -208,7 +216,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "the {channel} signal stands at its rail or outside the sensor's range",
         "Lower the excitation or choose another range. Saturated "
         "samples are kept out of the estimates.",
-        _SENSOR,
+        _AT_ONCE,
     ),
     AlarmKind(
         "sensor_clipped",
@@ -243,9 +251,9 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "sensor_spike",
         "warning",
-        "the {channel} signal changes faster than the sensor can",
+        "three times within a second the {channel} signal has changed faster than the sensor can",
         "Look for a loose contact or electrical disturbance near the sensor's cable.",
-        _SENSOR,
+        _AT_ONCE,
     ),
     AlarmKind(
         "sensor_invalid",

@@ -33,7 +33,7 @@ from rigwatch.physics.engine.equations import (
     shipped_models,
     spelt_out,
 )
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 
 SETTLING = 8.0
@@ -117,12 +117,16 @@ def _fixed(effect: Effect) -> Effect:
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Columns of the prediction, each of shape (n,) or (n, hidden states)."""
+    """Columns of the prediction, each of shape (n,) or (n, hidden states).
+
+    `reset` marks samples at which the states diverged and were started anew.
+    """
 
     output: FloatArray
     dry: FloatArray
     viscous: FloatArray
     hidden: FloatArray
+    reset: BoolArray
 
 
 class AlongMotion:
@@ -151,7 +155,8 @@ class AlongMotion:
     def update(self, rows: FloatArray, state: Codes) -> Predicted:
         """Predict the next rows of inputs and motion, shape (n, inputs); 0 without a kernel."""
         n = len(rows)
-        out = Predicted(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros((n, self.hidden)))
+        hidden, reset = np.zeros((n, self.hidden)), np.zeros(n, np.bool_)
+        out = Predicted(np.zeros(n), np.zeros(n), np.zeros(n), hidden, reset)
         for begin, end in _stretches(state):
             if state[begin] == FIRST:
                 self._begin(rows[begin])
@@ -182,6 +187,7 @@ class AlongMotion:
         out.dry[at] = outputs[1, :, 0] - outputs[0, :, 0]
         out.viscous[at] = outputs[2, :, 0] - outputs[0, :, 0]
         if not good:
+            out.reset[first + done - 1] = True
             self._begin(rows[done - 1])
         return done
 

@@ -50,7 +50,9 @@ class ObserverMonitor:
         plant, remainder = model.plant, model.remainder
         assert isinstance(plant, EquationsPlant)
         assert remainder is not None
-        self._admission = Admission(model.channels, model.channels, model.decision.longest_hold)
+        self._admission = Admission(
+            model.channels, model.channels, model.decision.longest_hold, model.sample_rate
+        )
         self._signals = ObserverSignals(plant, remainder, model.sample_rate)
         self._range = RangeSeen(model, self._signals.layout.speed)
         assert model.motion_range is not None
@@ -182,6 +184,7 @@ class ObserverMonitor:
             above(kinds.NOT_ARMED, ~started | (mode == d.ARMING), waited, 0.0),
             above(kinds.NOT_JUDGED, started & (mode == d.BEYOND), far[at:], 1.0),
             above(kinds.GAP, lost != 0.0, lost, 0.0),
+            above(kinds.MONITOR_RESET, seen.predicted.reset[at:], lost * 0.0, 0.0),
             above(kinds.SENSOR_INVALID, run > longest, run.astype(np.float64), longest),
         )
 

@@ -69,7 +69,9 @@ class Monitor:
     def __init__(self, model: RigModel) -> None:
         inertia = isinstance(model.plant, InertiaPlant)
         needed = model.channels if inertia else (model.channels[0], model.channels[2])
-        self._admission = Admission(model.channels, needed, model.decision.longest_hold)
+        self._admission = Admission(
+            model.channels, needed, model.decision.longest_hold, model.sample_rate
+        )
         self._residual = InertiaResidual(model) if inertia else TransferResidual(model)
         self._follow(model)
 
@@ -114,7 +116,9 @@ class Monitor:
             out,
         )
         result = self._result(block, admitted, out)
-        return replace(result, conditions=(*result.conditions, *clipping))
+        reset = self._residual.reset[admitted.padding :]
+        resets = above(kinds.MONITOR_RESET, reset, reset.astype(np.float64), 0.0)
+        return replace(result, conditions=(*result.conditions, resets, *clipping))
 
     def _result(self, block: SampleBlock, admitted: Admitted, out: FloatArray) -> Result:
         kept = out[:, admitted.padding :]

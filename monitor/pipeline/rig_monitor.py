@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from monitor.alarms import AlarmManager, Announcement, quality_conditions, settings_of
+from monitor.alarms import AlarmManager, Announcement, SensorFlags, settings_of
 from monitor.detectors import Detector
 from monitor.model import EquationsPlant, RigModel
 from monitor.pipeline.observer_pipeline import ObserverMonitor
@@ -64,6 +64,7 @@ class RigMonitor:
         self._friction = friction
         self._pipeline = scheme_of(model)
         self._detectors = tuple(detectors)
+        self._sensors = SensorFlags(model.sample_rate)
         checked = any(settings_of(name, settings or {}).enabled for name in WIRING)
         self._wiring = WiringCheck(model) if checked else None
 
@@ -89,7 +90,7 @@ class RigMonitor:
         found = [detector.update(fresh) for detector in self._detectors]
         columns = at.columns + tuple(column for columns, _ in found for column in columns)
         more = tuple(condition for _, conditions in found for condition in conditions)
-        quality = tuple(quality_conditions(fresh))
+        quality = tuple(self._sensors.update(fresh))
         own = result.conditions
         if not self._friction:
             own = tuple(c for c in own if c.name.partition(".")[0] in OF_SAMPLES)
@@ -123,7 +124,10 @@ class RigMonitor:
         result = self._pipeline.update(block)
         for detector in self._detectors:
             detector.update(block)
-        if result is not None and self._wiring is not None:
+        if result is None:
+            return
+        self._sensors.update(_fresh(block, result.estimates))
+        if self._wiring is not None:
             self._wiring.update(_fresh(block, result.estimates))
 
 

@@ -12,8 +12,8 @@ from rigwatch.wire.messages import Health
 
 LOSS_SHOWN_NS = 1_000_000_000
 """Time for which a loss alarm holds after the last gap [ns]."""
-DRIFT_PPM = 500.0
-"""Clock deviation of a device above which an alarm is raised [ppm]."""
+DRIFT_PPM, WRONG_PPM = 500.0, 5000.0
+"""Clock deviations of a device above which a warning and an error are raised [ppm]."""
 UNJUDGED_S = 1.0
 """Time without an estimate, while samples arrive, after which an alarm is raised [s]."""
 ALMOST_FULL = 0.02
@@ -31,6 +31,7 @@ class Seen:
         monotonic_ns: monotonic time [ns].
         silent_s: time since the last sample [s].
         daq_trouble: why no samples arrive, as reported by daq or because it is gone; otherwise "".
+        flowed: whether samples have flowed; before that daq may just be starting.
         contested: whether a second source sends samples.
         device: the device's name.
         position: (boot, seq) of the last sample.
@@ -40,6 +41,7 @@ class Seen:
     monotonic_ns: int
     silent_s: float
     daq_trouble: str
+    flowed: bool
     contested: bool
     device: str
     position: tuple[int, int]
@@ -68,7 +70,8 @@ class LinkWatch:
         silent_ms, limit_ms = seen.silent_s * 1e3, self._stale_after * 1e3
         stale = seen.silent_s > self._stale_after
         yield "stale", _occasion(seen, silent_ms, limit_ms), stale
-        yield "link", _occasion(seen, text=seen.daq_trouble), stale and bool(seen.daq_trouble)
+        gone = bool(seen.daq_trouble) and (stale or seen.flowed)
+        yield "link", _occasion(seen, text=seen.daq_trouble), gone
         yield "duplicate_source", _occasion(seen), seen.contested
         losing = seen.monotonic_ns - self._lost_at_ns < LOSS_SHOWN_NS
         yield "loss", _occasion(seen, float(self._lost), 0.0, "samples lost so far"), losing
@@ -98,6 +101,8 @@ def device_reports(
     drift = abs(daq.counters.get("drift_ppm", 0.0)) if daq else 0.0
     at = _occasion(seen, drift, DRIFT_PPM, f"off by {drift:.0f} ppm")
     yield "clock_drift", at, drift > DRIFT_PPM
+    at = _occasion(seen, drift, WRONG_PPM, f"off by {drift:.0f} ppm")
+    yield "clock_wrong", at, drift > WRONG_PPM
     yield "estimates_missing", _occasion(seen, text=why), unjudged_s > UNJUDGED_S
 
 

@@ -20,6 +20,7 @@ from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_rep
 from monitor.process.model_requests import ModelDesk, Place
 from monitor.process.operator_desk import OperatorDesk
 from monitor.process.startup_grace import Patience
+from monitor.signals import MONITOR_RESET
 from rigwatch.wire.bus import Bus, CommandCheck, connect, serve_alarm_list
 from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
 from rigwatch.wire.errors import ConfigError
@@ -76,7 +77,8 @@ class MonitorProcess:
         self._journal = AlarmJournal(section.journal) if section.journal else None
         self._cursor = Cursor(f"{section.journal}.position") if section.journal else None
         self._done = self._cursor.read() if self._cursor else None
-        self._links = LinkWatch(config.daq.stale_after)
+        self._stale_after = config.daq.stale_after
+        self._links = LinkWatch(self._stale_after)
         self._health = HealthBook("monitor")
         self._device = config.daq.name
         self._patience = Patience(time.monotonic())
@@ -113,6 +115,11 @@ class MonitorProcess:
             self._done = None
             if self._cursor:
                 self._cursor.set_aside()
+
+    def turn_s(self) -> float:
+        """Longest wait for samples: less than a turn if silence becomes an alarm sooner [s]."""
+        left = self._stale_after - self.reader.silent_for()
+        return min(left, TURN) if left > 0.0 else TURN
 
     def look_around(self) -> None:
         """Store the position, execute commands, check the link, publish the health."""
@@ -156,7 +163,13 @@ class MonitorProcess:
         for said in announcements:
             if isinstance(said, Alarm):
                 self._explainer.hear(said)
+                self._tell_reset(said)
             self.bus.publish(ALARMS if isinstance(said, Alarm) else EVENTS, said)
+
+    def _tell_reset(self, alarm: Alarm) -> None:
+        if alarm.name == MONITOR_RESET and alarm.state == "unacknowledged":
+            text = f"filters were reset at sample {alarm.seq} of boot {alarm.boot}"
+            self.bus.publish(EVENTS, Event("monitor", alarm.t_ns, "error", "MONITOR RESET", text))
 
     def close(self) -> None:
         """Close all resources."""
@@ -232,6 +245,7 @@ class MonitorProcess:
             time.monotonic_ns(),
             silent,
             self._daq_trouble if self._daq_alive else "the daq process is not there",
+            self.reader.heard,
             self.reader.contested,
             self._device,
             self.reader.position or (0, -1),
@@ -251,6 +265,7 @@ class MonitorProcess:
             "rejected": float(self.reader.rejected),
             "dropped": float(self.reader.dropped),
             **self._operators.counters,
+            **{f"rejected_of_{who}": float(n) for who, n in self.reader.rejected_by.items()},
         }
         self.bus.publish(
             HEALTH, self._health.message(seen.t_ns, state, text, self.reader.counters, extra)
@@ -291,7 +306,7 @@ def watch(process: MonitorProcess, stop: threading.Event) -> None:
     prepare_for_real_time()
     heartbeat.ready()
     while not stop.is_set():
-        for item in process.reader.read(TURN):
+        for item in process.reader.read(process.turn_s()):
             process.take(item)
         process.look_around()
         heartbeat.advance(process.reader.counters.delivered)

@@ -3,7 +3,8 @@
 A short run of missing or invalid samples is bridged: the last good value is held for the filters,
 and the sample is excluded from the estimates. After a longer run nothing is fed until a good sample
 arrives, which restarts every filter. Missing samples are inserted as held ones, so that sample
-counts and periods stay aligned.
+counts and periods stay aligned. Numbers that follow one another do not show a device that has
+paused, or whose clock has jumped: its clock does, and restarts the filters as well.
 """
 
 from dataclasses import dataclass
@@ -15,9 +16,16 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import NON_FINITE, SATURATED, SPIKE, STALE, Column, SampleBlock, valid
 
+LARGEST = 1e9
+"""Magnitude in SI units that no signal of a rig has; a larger reading is none."""
 GOOD, HELD, DEAD, RESTART, NEW_BOOT = 0, 1, 2, 3, 4
 """Codes: good; held; nothing to feed; good after a dead stretch; good and the first of a new boot.
 """
+
+JUMP = 2.5
+"""Deviation of a device's clock from its sample numbers that is a jump [periods]."""
+PROVEN = 16
+"""Steps of one period after which a device's clock is trusted."""
 
 Codes = NDArray[np.int64]
 
@@ -54,11 +62,18 @@ class Admission:
         channels: names of the channels in the order of the columns.
         needed: which of them the residual needs; the others may be invalid.
         longest_hold: longest run of samples that is bridged.
+        sample_rate: of the device [Hz]; None leaves its clock unchecked.
     """
 
     def __init__(
-        self, channels: tuple[str, ...], needed: tuple[str, ...], longest_hold: int
+        self,
+        channels: tuple[str, ...],
+        needed: tuple[str, ...],
+        longest_hold: int,
+        sample_rate: float | None = None,
     ) -> None:
+        self._period_us = 1e6 / sample_rate if sample_rate else 0.0
+        self._even, self._us = 0, 0
         self._channels, self._hold = channels, longest_hold
         self._needed = np.array([name in needed for name in channels])
         self._last = np.zeros(len(channels))
@@ -82,10 +97,12 @@ class Admission:
         if missing > self._hold or new_boot:
             self._run[0] = self._hold + max(missing, 1)
         values, good = self._columns(block, seen, padding)
+        broken = np.zeros(len(values), np.bool_)
+        broken[padding:] = self._clock_breaks(block.device_us[seen:], missing, new_boot)
         code = np.empty(len(values), np.int64)
         run = np.empty(len(values), np.int64)
         needed_good = np.asarray(good[:, self._needed].all(axis=1))
-        _classify(values, good, needed_good, self._last, self._run, self._hold, code, run)
+        _classify(values, good, needed_good, broken, self._last, self._run, self._hold, code, run)
         self._fresh = self._fresh or new_boot
         self._mark_new_boot(code)
         missing = -1 if new_boot and self._boot is not None else missing
@@ -95,6 +112,23 @@ class Admission:
         seq = np.arange(first, first + len(values), dtype=np.int64)
         valid_position = position_valid.astype(np.uint8)
         return Admitted(values, code, valid_position, seq, padding, missing, run, good)
+
+    def _clock_breaks(self, device_us: Codes, missing: int, new_boot: bool) -> NDArray[np.bool_]:
+        """Where the device's clock does not follow the sample numbers, as it did before."""
+        steps = np.diff(device_us, prepend=self._us)
+        expected = np.full(len(steps), self._period_us)
+        expected[0] *= missing + 1
+        even = np.abs(steps - expected) <= JUMP * self._period_us
+        even[0] &= not new_boot
+        self._us = int(device_us[-1])
+        broken = np.zeros(len(steps), np.bool_)
+        if not self._period_us or even.all():
+            self._even += len(steps)
+            return broken
+        for k, follows in enumerate(even):
+            broken[k] = not follows and self._even >= PROVEN and not (k == 0 and new_boot)
+            self._even = self._even + 1 if follows else 0
+        return broken
 
     def _mark_new_boot(self, code: Codes) -> None:
         """The first good sample of a boot restarts more than the filters."""
@@ -118,8 +152,8 @@ class Admission:
 
 
 def usable(column: Column, stuck_counts: bool) -> NDArray[np.bool_]:
-    """Finite and of good quality; a constant position may be stiction, so it counts as good."""
-    finite = np.isfinite(column.values)
+    """Finite, possible and of good quality; a constant position may be stiction: it counts."""
+    finite = np.abs(column.values) <= LARGEST  # also false for NaN
     if column.quality.size == 0:
         return finite
     if stuck_counts:
@@ -132,6 +166,7 @@ def _classify(  # noqa: PLR0917
     values: FloatArray,
     good: NDArray[np.bool_],
     needed_good: NDArray[np.bool_],
+    broken: NDArray[np.bool_],
     last: FloatArray,
     run: Codes,
     longest_hold: int,
@@ -140,6 +175,8 @@ def _classify(  # noqa: PLR0917
 ) -> None:
     """Fill in held values and write the codes; updates `last` and `run`."""
     for k in range(code.size):
+        if broken[k]:
+            run[0] = longest_hold + 1
         was = run[0]
         run[0] = 0 if needed_good[k] else was + 1
         if needed_good[k]:

@@ -22,6 +22,7 @@ ILL_CONDITIONED = "ill_conditioned"
 NOT_ARMED = "not_armed"
 NOT_JUDGED = "not_judged"
 GAP = "gap"
+MONITOR_RESET = "monitor_reset"
 SENSOR_INVALID = "sensor_invalid"
 SENSOR_CLIPPED = "sensor_clipped"
 """One per channel, as `sensor_clipped.position`; its value is the evidence S of `flat_top.py`."""
@@ -101,6 +102,13 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
         "1",
         "samples are missing before this one",
         False,
+    ),
+    ConditionKind(
+        MONITOR_RESET,
+        "1 where the filters were reset",
+        "1",
+        "a filter left its limits or lost its numbers and was reset",
+        True,
     ),
     ConditionKind(
         SENSOR_INVALID,

@@ -67,6 +67,7 @@ class InertiaResidual:
         self._mass, self._offset = model.plant.mass, model.plant.offset
         self._ring = np.zeros((2, self._kernels.shape[1]))
         self._place = np.zeros(2, np.int64)
+        self.reset = np.zeros(0, np.bool_)
 
     def adopt(self, plant: InertiaPlant) -> None:
         """Continue with another mass and offset; the smoothed signals stay."""
@@ -75,8 +76,11 @@ class InertiaResidual:
     def update(self, signals: FloatArray, code: Codes) -> FloatArray:
         """The next samples, shape (n, 2) of force and position, to the stage's columns, shape (n,
         7).
+
+        The kernel is finite, so nothing lasts and nothing has to be reset.
         """
         out = np.zeros((code.size, 7))
+        self.reset = np.zeros(code.size, np.bool_)
         _advance(
             signals, code, self._kernels, self._ring, self._place, self._mass, self._offset, out
         )

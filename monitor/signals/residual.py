@@ -7,6 +7,10 @@
 
 Ĝ begins with q⁻¹, so one sample of advance costs nothing; a longer one delays the measured signals
 instead.
+
+A recursive filter keeps a number that is not finite for ever, and an unstable one grows without
+limit. Each sample's results are therefore checked: beyond `LARGEST` every filter is reset, the
+sample counts as dead, and the next good one restarts the estimates.
 """
 
 from typing import NamedTuple
@@ -14,10 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 from monitor.model import RigModel, TransferPlant
-from monitor.signals.admission import DEAD, NEW_BOOT, RESTART, Codes
+from monitor.signals.admission import DEAD, GOOD, LARGEST, NEW_BOOT, RESTART, Codes
 from rigwatch.physics.transfer import TransferFunction, filter_sample, velocity_filter
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
+from rigwatch.wire.messages import ByteArray
 
 COLUMNS = ("voltage", "position", "acceleration", "modelled", "velocity", "g1", "g2")
 """Columns of the stage's output."""
@@ -38,6 +43,7 @@ class _Filters(NamedTuple):
     sign_state: FloatArray
     speed_state: FloatArray
     late: FloatArray
+    was_reset: ByteArray
 
 
 def modelled_acceleration(plant: TransferPlant, sample_rate: float) -> tuple[TransferFunction, int]:
@@ -69,13 +75,19 @@ class TransferResidual:
             np.zeros(max(friction[0].size - 1, 1)),
             np.zeros(max(friction[0].size - 1, 1)),
             np.zeros((delay + 1, 3)),
+            np.zeros(1, np.uint8),
         )
         self.delay = delay
+        self.reset = np.zeros(0, np.bool_)
 
     def update(self, signals: FloatArray, code: Codes) -> FloatArray:
-        """The next samples, shape (n, 3) of V, x, a, to the stage's columns, shape (n, 7)."""
+        """The next samples, shape (n, 3) of V, x, a, to the stage's columns, shape (n, 7).
+
+        `code` is changed where the filters are reset, which `reset`, shape (n,), marks.
+        """
         out = np.zeros((code.size, len(COLUMNS)))
-        _advance(signals, code, self._filters, out)
+        self.reset = np.zeros(code.size, np.bool_)
+        _advance(signals, code, self._filters, out, self.reset)
         return out
 
 
@@ -85,15 +97,33 @@ def _with_state(function: TransferFunction) -> tuple[FloatArray, FloatArray, Flo
 
 
 @kernel()
-def _advance(signals: FloatArray, code: Codes, f: _Filters, out: FloatArray) -> None:
+def _clear(f: _Filters) -> None:
+    f.plant_state[:] = 0.0
+    f.velocity_state[:] = 0.0
+    f.sign_state[:] = 0.0
+    f.speed_state[:] = 0.0
+    f.late[:] = 0.0
+
+
+@kernel()
+def _within_limits(row: FloatArray) -> bool:
+    for value in row:  # noqa: SIM110 (no generators in a compiled kernel)
+        if not abs(value) <= LARGEST:  # also false for NaN
+            return False
+    return True
+
+
+@kernel()
+def _advance(
+    signals: FloatArray, code: Codes, f: _Filters, out: FloatArray, reset: BoolArray
+) -> None:
     longest = f.late.shape[0]
     for k in range(code.size):
+        if f.was_reset[0] and code[k] == GOOD:
+            code[k] = RESTART
         if code[k] == RESTART or code[k] == NEW_BOOT:
-            f.plant_state[:] = 0.0
-            f.velocity_state[:] = 0.0
-            f.sign_state[:] = 0.0
-            f.speed_state[:] = 0.0
-            f.late[:] = 0.0
+            f.was_reset[0] = 0
+            _clear(f)
         if code[k] == DEAD:
             continue
         for i in range(longest - 1, 0, -1):
@@ -109,3 +139,9 @@ def _advance(signals: FloatArray, code: Codes, f: _Filters, out: FloatArray) -> 
         out[k, 4] = speed
         out[k, 5] = filter_sample(f.friction_b, f.friction_a, f.sign_state, sign)
         out[k, 6] = filter_sample(f.friction_b, f.friction_a, f.speed_state, speed)
+        if not _within_limits(out[k]):
+            _clear(f)
+            out[k] = 0.0
+            code[k] = DEAD
+            f.was_reset[0] = 1
+            reset[k] = True

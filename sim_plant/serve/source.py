@@ -86,10 +86,10 @@ class Device:
         self._seq += n
         return Sent(self.boot, seq % _U32, np.rint(clock).astype(np.int64) % _U32, samples.codes)
 
-    def restart(self, *, keep_boot: bool = False) -> None:
-        """Count from 0 again, with a new boot as a real device draws it unless `keep_boot`."""
+    def restart(self, *, keep_boot: bool = False, first_seq: int = 0) -> None:
+        """Count anew from `first_seq`, with a new boot as a real device unless `keep_boot`."""
         self.boot = self.boot if keep_boot else secrets.randbits(32)
-        self._seq, self._clock = 0, 0.0
+        self._seq, self._clock = first_seq, 0.0
 
     def jump_clock(self, seconds: float) -> None:
         """Step the device's clock."""

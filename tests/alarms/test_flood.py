@@ -105,7 +105,7 @@ def test_a_flood_that_ends_within_a_block_ends_before_what_follows_in_it():
             )
         said.append(steps(heard))
     assert said[0] == said[1]
-    assert said[0][-1] == ("sensor_spike.voltage", "unacknowledged", ends + 12)
+    assert said[0][-1] == ("sensor_spike.voltage", "unacknowledged", ends + 10)
 
 
 def flap(alarms: AlarmManager, name: str, count: int, apart: int = 256, begin: int = 0):

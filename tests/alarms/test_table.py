@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from monitor.alarms import ALARM_KINDS, AlarmManager, check_settings, quality_conditions
+from monitor.alarms import ALARM_KINDS, AlarmManager, SensorFlags, check_settings
 from monitor.alarms.kinds import kind_of, settings_of
 from monitor.signals.conditions import CONDITION_KINDS
 from rigwatch.wire.errors import ConfigError
@@ -72,7 +72,7 @@ def test_quality_flags_become_an_alarm_of_their_channel():
     )
     t_ns = np.arange(n, dtype=np.int64)
     block = SampleBlock("rig", 7, 0, t_ns, t_ns, channels)
-    (alarm,) = AlarmManager().update("rig", 7, 0, t_ns, quality_conditions(block))
-    assert (alarm.name, alarm.seq, alarm.onset_seq) == ("sensor_saturated.position", 12, 10)
+    (alarm,) = AlarmManager().update("rig", 7, 0, t_ns, SensorFlags(256.0).update(block))
+    assert (alarm.name, alarm.seq, alarm.onset_seq) == ("sensor_saturated.position", 10, 10)
     assert "position" in alarm.cause
-    assert alarm.value == pytest.approx(channels[1].values[12])
+    assert alarm.value == pytest.approx(channels[1].values[10])

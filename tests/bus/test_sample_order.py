@@ -431,3 +431,22 @@ def test_a_loss_of_unknown_length_does_not_count_as_samples() -> None:
     answered = order.on_reply(ask, RingReply(7, -1, ()))
     assert [item.last < item.first for item in answered if isinstance(item, Loss)] == [True]
     assert order.counters.lost == 0
+
+
+@pytest.mark.parametrize("gone_first", [7, 8])
+def test_a_rival_whose_token_returns_first_after_a_router_has_no_control(gone_first: int) -> None:
+    bench = Bench()
+    since = {7: 1, 8: 2}
+    for boot in (7, 8):
+        bench.order.on_token(boot, since[boot], True)
+    bench.send(block(0, 10, boot=7))
+    bench.send(block(0, 1, boot=8))
+    for boot in (gone_first, 15 - gone_first):
+        bench.take(bench.order.on_token(boot, since[boot], False))
+    for boot in (8, 7):
+        bench.take(bench.order.on_token(boot, since[boot], True))
+    for seq in range(10, 60, 10):
+        bench.send(block(seq, 10, boot=7))
+        bench.reply_all()
+    assert bench.order.position == (7, 59)
+    bench.ledger.assert_complete(7, 0, 59)

@@ -279,8 +279,12 @@ def test_a_model_of_another_rig_is_refused(tmp_path: Path, old: str, new: str, t
         suitable_model(load_rig(path), path)
 
 
-def seen(t_s: float, monotonic_s: float, silent: float = 0.0, trouble: str = "") -> Seen:
-    return Seen(int(t_s * 1e9), int(monotonic_s * 1e9), silent, trouble, False, "rig", (7, 9))
+def seen(
+    t_s: float, monotonic_s: float, silent: float = 0.0, trouble: str = "", flowed: bool = False
+) -> Seen:
+    return Seen(
+        int(t_s * 1e9), int(monotonic_s * 1e9), silent, trouble, flowed, False, "rig", (7, 9)
+    )
 
 
 def holding(watch: LinkWatch, at: Seen) -> set[str]:
@@ -292,6 +296,8 @@ def test_each_alarm_of_the_link_holds_as_long_as_its_reason() -> None:
     assert holding(watch, seen(0, 0)) == set()
     assert holding(watch, seen(1, 1, silent=0.2)) == {"stale"}
     assert holding(watch, seen(1, 1, silent=0.2, trouble="cable")) == {"stale", "link"}
+    assert holding(watch, seen(1, 1, trouble="not opened yet")) == set()
+    assert holding(watch, seen(1, 1, trouble="cable", flowed=True)) == {"link"}
     watch.lost(3, int(2e9))
     assert holding(watch, seen(2.5, 2.5)) == {"loss"}
     assert holding(watch, seen(4, 4)) == set()
@@ -327,6 +333,7 @@ def test_the_recorders_troubles_are_alarms_and_clear(bench: Bench) -> None:
         ("line_noise", "garbage", {}),
         ("slow_device", "slow", {}),
         ("clock_drift", "running", {"drift_ppm": -600.0}),
+        ("clock_wrong", "running", {"drift_ppm": 6000.0}),
     ],
 )
 def test_what_daq_says_of_its_device_is_an_alarm_and_clears(

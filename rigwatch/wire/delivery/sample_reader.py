@@ -9,6 +9,7 @@ All logic is in `sample_order.py`; a block in order passes straight through, in 
 
 import contextlib
 import time
+from collections import Counter
 from queue import Empty, SimpleQueue
 
 from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus, RingQuestions
@@ -43,6 +44,9 @@ SILENCE = 1.0
 CONTESTED = 1.0
 """Time for which samples sent under another process's boot count as a conflict [s]."""
 
+MOST_REJECTED = 8
+"""Senders whose invalid payloads are counted separately: identities cost a stranger nothing."""
+
 Item = SampleBlock | Gap | Event
 _Incoming = (
     tuple[bytes, str] | tuple[int, int, str | None] | tuple[Ask, RingReply[SampleBlock] | None]
@@ -65,6 +69,7 @@ class SampleReader:
     Attributes:
         heard: whether a sample block was ever received.
         rejected: payloads that were not sample blocks.
+        rejected_by: the same by sender, for the first `MOST_REJECTED` of them.
         dropped: payloads left to the ring because the inbox was full.
     """
 
@@ -77,6 +82,7 @@ class SampleReader:
     ) -> None:
         self.heard = False
         self.rejected = 0
+        self.rejected_by: Counter[str] = Counter()
         self.dropped = 0
         self._bus = bus
         self._order: SampleOrder[SampleBlock] = SampleOrder(resume_after, history)
@@ -154,11 +160,16 @@ class SampleReader:
 
     def _receive(self, payload: bytes, sender: str, _mark: bytes) -> None:
         if len(payload) > MAX_PAYLOAD:
-            self.rejected += 1
+            self._reject(sender)
         elif self._inbox.qsize() >= self._capacity:
             self.dropped += 1
         else:
             self._inbox.put((payload, sender))
+
+    def _reject(self, sender: str) -> None:
+        self.rejected += 1
+        if sender in self.rejected_by or len(self.rejected_by) < MOST_REJECTED:
+            self.rejected_by[sender] += 1
 
     def _token(self, key: str, alive: bool) -> None:
         with contextlib.suppress(ValueError):
@@ -186,7 +197,7 @@ class SampleReader:
         try:
             block = decode(SampleBlock, payload)
         except MessageError:
-            self.rejected += 1
+            self._reject(sender)
             return
         if not self._owners.admits(block.boot, sender):
             self._refuse(block)

@@ -166,6 +166,8 @@ class SampleOrder(Generic[S]):
         """Process the appearance or end of a source's liveliness token."""
         if alive:
             self.sources.appeared(boot, since_ns)
+            if self.sources.returns(boot):
+                self._change_control((boot, 0))
         else:
             self._vanished(boot, since_ns)
         return self._outcomes()

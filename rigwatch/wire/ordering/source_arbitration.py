@@ -47,6 +47,9 @@ class Sources:
     def __init__(self) -> None:
         self.current: int | None = None
         self._alive: dict[int, int] = {}
+        self._since: dict[int, int] = {}
+        self._in_control_since: dict[int, int] = {}
+        self._interrupted: set[int] = set()
         self._had_token: set[int] = set()
         self._silent = False
         self._latest_ns = -(2**62)
@@ -66,8 +69,25 @@ class Sources:
 
     def appeared(self, boot: int, since_ns: int) -> None:
         """The boot's token has appeared, declared at `since_ns`."""
-        self._alive[boot] = since_ns
+        if boot not in self._alive and self._since.get(boot) == since_ns:
+            self._interrupted.add(boot)
+        self._alive[boot] = self._since[boot] = since_ns
         self._had_token.add(boot)
+        if boot == self.current:
+            self._in_control_since[boot] = since_ns
+
+    def returns(self, boot: int) -> bool:
+        """Whether the boot was in control, and its token was gone only with the router.
+
+        All tokens vanish with a router and reappear in any order: a rival that reappears first must
+        not keep control.
+        """
+        if boot == self.current or boot not in self._interrupted:
+            return False
+        was_in_control = self._in_control_since.get(boot) == self._since[boot]
+        both = self.current in self._interrupted or self.current not in self._alive
+        now = self._alive.get(self.current or 0, 2**63)
+        return was_in_control and both and self._since[boot] < now
 
     def vanished(self, boot: int, since_ns: int) -> tuple[int, int] | None:
         """The boot's token has vanished; returns its skipped samples if it never had control."""
@@ -96,6 +116,8 @@ class Sources:
     def take_control(self, boot: int) -> None:
         """Give control to `boot`."""
         self.current = boot
+        if boot in self._alive:
+            self._in_control_since[boot] = self._alive[boot]
         self._silent = False
         self._rivals.pop(boot, None)
 

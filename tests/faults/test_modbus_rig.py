@@ -1,0 +1,239 @@
+"""Faults of a Modbus device on one running rig: a real server, a proxy before it, daq, monitor."""
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from rigwatch.wire.bus import connect
+from rigwatch.wire.device import HEADER_LENGTH
+from rigwatch.wire.host import free_port
+from rigwatch.wire.messages import EVENTS, HEALTH, SAMPLES, SampleBlock
+from rigwatch.wire.messages import quality_flags as quality
+from rigwatch.wire.rig_config import load_rig
+from sim_plant.serve import Device, ModbusServer, RegisterBank
+from tests.bus.rig import answers, kill, stopped
+from tests.daq.test_modbus_faults import late, short
+from tests.faults.field import AMPLITUDE, GAINS, RATE, Field, WaveSource, least_of
+from tests.waiting import eventually
+
+pytestmark = [pytest.mark.xdist_group("faults-modbus"), pytest.mark.long]
+TIMEOUT, POLLS = 0.1, 32.0
+FIRST_SLOT = 9 + 2 * (4 + 1)
+"""Place in a reply of slots of the high byte of the first sample's position."""
+Edit = Callable[["Replies", bytes], bytes]
+
+
+class Replies:
+    """Disturbs the next `left` replies of a server with `edit`, and remembers when it began."""
+
+    def __init__(self) -> None:
+        self.left, self.held, self.t_ns = 0, b"", 0
+        self.edit: Edit = lambda replies, data: data
+
+    def disturb(self, edit: Edit, replies: int) -> None:
+        self.edit, self.t_ns, self.left = edit, 0, replies
+
+    def trace(self, sending: bool, data: bytes) -> bytes:
+        if not sending or (self.left == 0 and not self.held):
+            return data
+        self.t_ns = self.t_ns or time.time_ns()
+        self.left = max(self.left - 1, 0)
+        return self.edit(self, data)
+
+
+def nothing(replies: Replies, data: bytes) -> bytes:
+    return b""
+
+
+def of_another_question(replies: Replies, data: bytes) -> bytes:
+    return bytes([data[0] ^ 0x40]) + data[1:]
+
+
+def twice(replies: Replies, data: bytes) -> bytes:
+    return data + data
+
+
+def flipped(replies: Replies, data: bytes) -> bytes:
+    """One high bit of a position; the header is left alone."""
+    if data[8] == 2 * HEADER_LENGTH:
+        replies.left += 1
+        return data
+    return data[:FIRST_SLOT] + bytes([data[FIRST_SLOT] ^ 0x40]) + data[FIRST_SLOT + 1 :]
+
+
+class ModbusRig(Field):
+    """The rig; its device's clock runs fast by 0.6 % from the start."""
+
+    def begin(self, port: int) -> None:
+        source = WaveSource()
+        self.device = Device(source)
+        self.device.drift_ppm = 6000.0
+        source.device = self.device
+        self.replies = Replies()
+        self.server = ModbusServer(self.device, RegisterBank(3), trace=self.replies.trace)
+        self.beside(lambda stop: self.server.run_tcp("127.0.0.1", port, stop))
+        eventually(lambda: answers(port), "the server listens")
+        self.server_port = port
+        self.open_proxy()
+        self.start("daq", "monitor")
+        self.samples: list[SampleBlock] = []
+        heard = self.bus.subscribe_lossy(SAMPLES)
+        self.beside(lambda stop: self._collect(heard, stop))
+        self.settle(self.device)
+
+    def open_proxy(self) -> None:
+        ports = str(self.port), str(self.server_port)
+        self.proxy = self.rig.start("-m", "tests.bus.rig", *ports)
+        eventually(lambda: answers(self.port), "the proxy listens")
+
+    def _collect(self, heard, stop) -> None:  # type: ignore[no-untyped-def]
+        while not stop.wait(0.01):
+            self.samples += heard.drain()
+
+    def every_sample_is_right(self, first: int) -> None:
+        """From `first` on each came once, or was reported, with the value of its number."""
+        self.judged(self.device.boot, self.device.next_seq)
+        found = {
+            b.seq + i: v
+            for b in list(self.samples)
+            for i, v in enumerate(b.channel("position").values)
+        }
+        told = {n for g in self.gaps if g.reporter == "daq/rig" for n in range(g.first, g.last + 1)}
+        numbers = np.array(sorted(n for n in found if n >= first))
+        missing = set(range(first, int(numbers[-1]))) - set(numbers.tolist())
+        assert missing <= told
+        wave = np.rint(AMPLITUDE * np.sin(2 * np.pi * 8.0 * numbers / RATE)) * GAINS["position"]
+        np.testing.assert_allclose([found[n] for n in numbers], wave, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModbusRig]:
+    port = free_port()
+    section = f'adapter = "modbus-tcp"\nhost = "127.0.0.1"\nport = {port}\ntimeout = {TIMEOUT}'
+    keys = {"position": "spike_above = 0.004"}
+    with ModbusRig(tmp_path_factory.mktemp("modbus"), section, keys=keys) as made:
+        made.port = port  # type: ignore[attr-defined]
+        made.begin(free_port())
+        yield made
+
+
+def noticed(rig: ModbusRig, edit: Edit, replies: int, text: str) -> None:
+    """Replies are disturbed: an event after one poll and its timeout, and no wrong sample."""
+
+    def disturb() -> float:
+        time.sleep(1.1)  # an event a second
+        rig.replies.disturb(edit, replies)
+        eventually(lambda: rig.replies.t_ns > 0, "a reply is disturbed")
+        event = rig.event("poll_failed", rig.replies.t_ns)
+        assert text in event.text
+        return (event.t_ns - rig.replies.t_ns) * 1e-9
+
+    first, before = rig.device.next_seq, rig.health("daq").counters["failed_polls"]
+    least_of(disturb, TIMEOUT + 1.0 / POLLS, lambda: None)
+    assert rig.health("daq").counters["failed_polls"] > before
+    rig.every_sample_is_right(first)
+
+
+def test_19_a_reply_that_does_not_come(rig: ModbusRig) -> None:
+    noticed(rig, nothing, 1, "no valid answer in time")
+
+
+def test_22_a_short_reply(rig: ModbusRig) -> None:
+    noticed(rig, short, 1, "a reply of")
+
+
+def test_25_late_foreign_and_doubled_replies(rig: ModbusRig) -> None:
+    noticed(rig, of_another_question, 1, "no valid answer in time")
+    noticed(rig, late, 1, "no valid answer in time")
+    first, failed = rig.device.next_seq, rig.health("daq").counters["failed_polls"]
+    rig.replies.disturb(twice, 3)
+    eventually(lambda: rig.replies.left == 0, "replies come twice")
+    rig.judged(rig.device.boot, rig.device.next_seq + 64)
+    assert rig.health("daq").counters["failed_polls"] <= failed + 1
+    rig.every_sample_is_right(first)
+
+
+def refused(rig: ModbusRig, code: int, words: str) -> float:
+    """The server refuses with a code: the alarm names it. Time to the event [s]."""
+    began = time.time_ns()
+    rig.server.exception = code
+    event, alarm = rig.event("link_lost", began), rig.raised("link", after_ns=began)
+    rig.server.exception = 0
+    assert words in alarm.cause
+    assert f"exception code {code}, " in alarm.cause
+    rig.cleared("link")
+    return (event.t_ns - began) * 1e-9
+
+
+def test_20_exception_codes(rig: ModbusRig) -> None:
+    first = rig.device.next_seq
+    refused(rig, 6, "3 polls in a row failed, the last")
+    least_of(lambda: refused(rig, 2, "illegal address"), 2.0 / POLLS, lambda: None)
+    rig.every_sample_is_right(first)
+
+
+def test_21_another_word_order(rig: ModbusRig) -> None:
+    text = rig.rig.path.read_text().replace('id = "bench"', 'id = "other"')
+    path = rig.folder / "other.toml"
+    path.write_text(text.replace("timeout = 0.1", 'timeout = 0.1\nword_order = "little"'))
+    bus = connect(load_rig(path), "observer")
+    events, health, samples = (bus.subscribe(topic) for topic in (EVENTS, HEALTH, SAMPLES))
+    daq = rig.rig.start("-m", "rigwatch", "daq", str(path))
+    told: list[str] = []
+
+    def said() -> bool:
+        told.extend(one.text for one in [*events.drain(), *health.drain()])
+        return any("set word_order = 'big'" in text for text in told)
+
+    eventually(said, "the right word order is named")
+    assert samples.drain() == []
+    kill(daq)
+    bus.close()
+
+
+def test_23_a_bit_that_flips(rig: ModbusRig) -> None:
+    since, first = len(rig.samples), rig.device.next_seq
+    rig.replies.disturb(flipped, 1)
+    eventually(lambda: rig.replies.left == 0 and rig.replies.t_ns > 0, "a bit flips")
+    rig.judged(rig.device.boot, rig.device.next_seq + 256)
+    flags = np.concatenate([b.channel("position").quality for b in rig.samples[since:]])
+    assert np.count_nonzero(flags & (quality.SPIKE | quality.SATURATED)) == 1, "that sample"
+    assert not [one for one in rig.journalled("departure") if one.alarm.seq >= first]
+
+
+@pytest.mark.parametrize("frozen_s", [0.5, 3.5], ids=["within the ring", "longer than the ring"])
+def test_24_a_server_that_hangs(rig: ModbusRig, frozen_s: float) -> None:
+    first, since = rig.device.next_seq, len(rig.gaps)
+    with stopped(rig.proxy):
+        began = time.time_ns()
+        alarm = rig.raised("link", after_ns=began)
+        time.sleep(frozen_s)
+    back = time.time_ns()
+    event = rig.event("running", back)
+    assert (event.t_ns - back) * 1e-9 <= 1.5
+    assert (alarm.t_ns - began) * 1e-9 <= 3 * (TIMEOUT + 1 / POLLS) + 0.1
+    rig.cleared("link")
+    rig.every_sample_is_right(first)
+    lost = [g for g in rig.gaps[since:] if g.reporter == "daq/rig"]
+    assert bool(lost) == (frozen_s > 2.0), "what the device still has is fetched"
+
+
+def test_24_a_server_that_starts_again(rig: ModbusRig) -> None:
+    first, began = rig.device.next_seq, time.time_ns()
+    kill(rig.proxy)
+    rig.event("link_lost", began)
+    time.sleep(1.0)
+    rig.open_proxy()
+    back = time.time_ns()
+    assert (rig.event("running", back - 10**8).t_ns - back) * 1e-9 <= 1.5
+    rig.every_sample_is_right(first)
+
+
+def test_09_a_clock_that_runs_fast(rig: ModbusRig) -> None:
+    began = rig.samples[0].t_ns[0]
+    for name in ("clock_drift", "clock_wrong"):
+        alarm = rig.raised(name)
+        assert (alarm.t_ns - began) * 1e-9 <= 60.0
+    assert rig.health("daq").counters["drift_ppm"] == pytest.approx(6000.0, rel=0.1)

@@ -1,0 +1,292 @@
+"""Faults of a serial device and its sensors, on one running rig: daq and monitor as processes."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from rigwatch.wire.messages import SAMPLES
+from tests.bus.rig import ROOT
+from tests.faults.field import PERIOD_NS, RATE, Field, SerialDevice, least_of, serial_field
+from tests.waiting import PATIENCE, eventually
+
+pytestmark = [pytest.mark.xdist_group("faults-serial"), pytest.mark.long]
+POSITION, ACCELERATION = 1, 2
+
+
+@pytest.fixture(scope="module")
+def field(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Field, SerialDevice]]:
+    keys = {"position": "spike_above = 0.004"}
+    with serial_field(tmp_path_factory.mktemp("serial"), keys=keys) as made:
+        yield made
+
+
+@pytest.fixture
+def rig(field: tuple[Field, SerialDevice]) -> Field:
+    return field[0]
+
+
+@pytest.fixture
+def device(field: tuple[Field, SerialDevice]) -> SerialDevice:
+    return field[1]
+
+
+def counted(rig: Field, name: str) -> float:
+    """A counter of daq, from a health message that is sent after now."""
+    return rig.health_after("daq", time.time_ns()).counters.get(name, 0.0)
+
+
+def lost(rig: Field, since: int) -> list[tuple[int, int]]:
+    """First and last of the gaps that daq has reported after the first `since`."""
+    return [(g.first, g.last) for g in rig.gaps[since:] if g.reporter == "daq/rig"]
+
+
+def estimated(rig: Field, boot: int, first: int, last: int, column: str = "") -> np.ndarray:
+    """Numbers of the samples with estimates, or a column of them, once all have come."""
+    rig.judged(boot, last)
+    blocks = [b for b in rig.estimates() if b.boot == boot]
+    seqs = np.concatenate([np.arange(b.seq, b.seq + len(b)) for b in blocks])
+    values = np.concatenate([b.column(column).values for b in blocks]) if column else seqs
+    return values[(seqs >= first) & (seqs <= last)]
+
+
+def test_05_frames_with_wrong_checksums(rig: Field, device: SerialDevice) -> None:
+    before, since = counted(rig, "crc_errors"), len(rig.gaps)
+    device.faults.start("flip", 5)
+    gap = rig.gap(since)
+    alarm = rig.raised("gap", after_seq=gap.first)
+    assert 5 <= gap.last - gap.first + 1 <= 6
+    assert alarm.seq == gap.last + 1, "told with the next good frame"
+    assert counted(rig, "crc_errors") > before
+
+
+@pytest.mark.parametrize("kind", ["drop", "insert"])
+def test_06_dropped_and_inserted_bytes(rig: Field, device: SerialDevice, kind: str) -> None:
+    boot, since, first = device.device.boot, len(rig.gaps), device.device.next_seq
+    device.faults.start(kind, 1)
+    rig.judged(boot, first + 64)
+    eventually(lambda: len(lost(rig, since)) > 0 or kind == "insert", "the gap")
+    assert sum(last - first + 1 for first, last in lost(rig, since)) <= 2
+
+
+def test_07_frames_that_come_twice(rig: Field, device: SerialDevice) -> None:
+    before, first, boot = counted(rig, "duplicates"), device.device.next_seq, device.device.boot
+    device.faults.start("duplicate", 5)
+    assert counted(rig, "duplicates") == before + 5
+    numbers = estimated(rig, boot, first, first + 64)
+    assert numbers.tolist() == list(range(first, first + 65))
+
+
+def test_08_a_device_that_starts_anew_and_a_counter_that_wraps(
+    rig: Field, device: SerialDevice
+) -> None:
+    was, since, top = device.device.boot, len(rig.gaps), 2**32
+    device.source.inject(lambda codes: device.device.restart(first_seq=top - 64), 1).sent()
+    event = rig.event("boot_changed", device.line.plugged_ns)
+    boot = device.device.boot
+    assert f"boot {boot:08x} follows {was:08x}" in event.text
+    gap = rig.gap(since)
+    assert (gap.boot, gap.last) == (was, gap.first - 1), "of unknown length"
+    numbers = estimated(rig, boot, top - 64, top + 64)
+    assert numbers.tolist() == list(range(numbers[0], top + 65))
+    assert numbers[0] <= top - 62
+    assert len(lost(rig, since)) == 1
+    (first,) = [b for b in rig.estimates() if b.boot == boot][:1]
+    assert abs(event.t_ns - int(first.t_ns[0])) <= PERIOD_NS * len(first), "with the same frame"
+
+
+def test_10_a_clock_that_jumps(rig: Field, device: SerialDevice) -> None:
+    ready(rig, device)
+    boot = device.device.boot
+    jump = device.source.inject(lambda codes: device.device.jump_clock(0.5), 1).sent()
+    event = rig.event("clock_jump", time.time_ns() - 10**9)
+    assert "jumped by +0.5" in event.text
+    rig.judged(boot, jump + 64)
+    blocks = [b for b in rig.estimates() if b.boot == boot]
+    t_ns = {b.seq + i: int(t) for b in blocks for i, t in enumerate(b.t_ns)}
+    assert abs(event.t_ns - t_ns[jump]) <= 3 * PERIOD_NS, "within the frame"
+    steps = np.diff([t_ns[seq] for seq in range(jump - 32, jump + 64)])
+    assert steps.min() > 0
+    assert steps.max() < 0.25e9, "the stamps follow the host's clock"
+    armed = estimated(rig, boot, jump - 1, jump, "armed")
+    assert armed.tolist() == [1.0, 0.0], "the filters start anew"
+
+
+def test_35_a_gap_in_the_samples(rig: Field, device: SerialDevice) -> None:
+    boot, since = device.device.boot, len(rig.gaps)
+    ready(rig, device)
+    device.faults.start("lose", 2)
+    short = rig.gap(since)
+    assert short.last - short.first == 1
+    armed = estimated(rig, boot, short.last + 1, short.last + 32, "armed")
+    assert armed.all(), "predicted through"
+    rig.cleared("gap")
+    since = len(rig.gaps)
+    device.faults.start("lose", 60)
+    long = rig.gap(since)
+    alarm = rig.raised("gap", after_seq=long.first)
+    assert alarm.seq == long.last + 1
+    armed = estimated(rig, boot, long.last + 1, long.last + 32, "armed")
+    assert not armed.any(), "the window starts anew"
+
+
+def ready(rig: Field, device: SerialDevice) -> None:
+    """The monitor has its reference again."""
+    boot = device.device.boot
+
+    def armed() -> bool:
+        last = rig.estimates()[-1]
+        return last.boot == boot and last.column("armed").values[-1] == 1.0
+
+    eventually(armed, "armed")
+
+
+def test_13_a_signal_at_its_rail(rig: Field, device: SerialDevice) -> None:
+    ready(rig, device)
+
+    def rail(codes: np.ndarray) -> None:
+        codes[:, ACCELERATION] = 32767
+
+    first = device.source.inject(rail, 8).sent()
+    alarm = rig.raised("sensor_saturated.acceleration", after_seq=first)
+    assert alarm.seq - first < 0.012 * RATE
+    theta = estimated(rig, device.device.boot, first, first + 64, "theta1")
+    assert np.isfinite(theta).all()
+
+
+def test_17_spikes(rig: Field, device: SerialDevice) -> None:
+    before = counted(rig, "flagged_spike")
+
+    def spike(codes: np.ndarray) -> None:
+        codes[:, POSITION] += 9000
+
+    def quiet(codes: np.ndarray) -> None:
+        """Nothing."""
+
+    device.source.inject(spike, 1).sent()
+    assert counted(rig, "flagged_spike") == before + 1
+    assert rig.journalled("sensor_spike.position") == []
+    for _ in range(3):
+        last = device.source.inject(spike, 1).sent()
+        device.source.inject(quiet, 40).sent()
+        time.sleep(0.15)
+    assert rig.raised("sensor_spike.position").seq == last, "with the third within a second"
+
+
+def test_11_a_stuck_sensor(rig: Field, device: SerialDevice) -> None:
+    def stuck(codes: np.ndarray) -> None:
+        codes[:, ACCELERATION] = 1234
+
+    first = device.source.inject(stuck, 140).sent()
+    alarm = rig.raised("sensor_stuck.acceleration", after_seq=first)
+    assert alarm.seq - first < 0.4 * RATE
+
+
+def test_15_a_gain_that_changes(rig: Field, device: SerialDevice) -> None:
+    time.sleep(0.7)
+    ready(rig, device)
+
+    def gain(codes: np.ndarray) -> None:
+        codes[:, ACCELERATION] *= 1.5
+
+    first = device.source.inject(gain, 256).sent()
+    alarm = rig.raised("departure", after_seq=first)
+    assert alarm.seq - first <= RATE
+
+
+def test_42_a_slow_reader(rig: Field, device: SerialDevice) -> None:
+    slow = rig.bus.subscribe_lossy(SAMPLES, capacity=16)
+    since, first, boot = len(rig.gaps), device.device.next_seq, device.device.boot
+    rig.judged(boot, first + 256)
+    assert slow.dropped > 256 - 64
+    assert lost(rig, since) == []
+    slow.close()
+
+
+def test_03_a_silent_device(rig: Field, device: SerialDevice) -> None:
+    def silence() -> float:
+        device.silent = True
+        began = time.time_ns()
+        alarm = rig.raised("stale", after_ns=began)
+        device.silent = False
+        rig.cleared("stale")
+        return (alarm.t_ns - began) * 1e-9
+
+    least_of(silence, 0.1, lambda: rig.renew_monitor(device.device))
+
+
+def test_16_a_slow_device(rig: Field, device: SerialDevice) -> None:
+    def slow() -> float:
+        began = time.time_ns()
+        device.slow_down(2.0)
+        alarm = rig.raised("slow_device", after_ns=began)
+        device.slow_down(1.0)
+        rig.cleared("slow_device")
+        return (alarm.t_ns - began) * 1e-9
+
+    least_of(slow, 0.5, lambda: rig.renew_monitor(device.device))
+
+
+def test_04_garbage_on_the_line(rig: Field, device: SerialDevice) -> None:
+    before = counted(rig, "skipped_bytes")
+
+    def garbage() -> float:
+        began, first = time.time_ns(), device.device.next_seq
+        device.faults.start("garbage")
+        alarm = rig.raised("line_noise", after_ns=began)
+        newest = rig.estimates()[-1]
+        assert newest.seq + len(newest) <= first + 4, "no sample of garbage is accepted"
+        device.faults.stop("garbage")
+        rig.cleared("line_noise")
+        return (alarm.t_ns - began) * 1e-9
+
+    least_of(garbage, 1.0, lambda: rig.renew_monitor(device.device))
+    assert counted(rig, "skipped_bytes") > before
+
+
+def test_01_an_unplugged_device(rig: Field, device: SerialDevice) -> None:
+    def unplug() -> float:
+        since, began = len(rig.gaps), time.time_ns()
+        device.faults.start("unplug", 400)
+        alarm = rig.raised("link", after_ns=began)
+        assert "the line was closed" in alarm.cause
+        rig.cleared("link")
+        gap = rig.gap(since)
+        assert 380 <= gap.last - gap.first + 1 <= 700
+        back = next(b for b in rig.estimates() if b.seq + len(b) > gap.last + 1)
+        assert back.seq <= gap.last + 1, "the gap ends where samples go on"
+        assert back.t_ns[0] - device.line.plugged_ns < 1.1e9, "reopened within a second"
+        return (alarm.t_ns - device.line.unplugged_ns) * 1e-9
+
+    least_of(unplug, 0.1, lambda: rig.renew_monitor(device.device))
+
+
+def test_02_a_device_plugged_in_under_another_name(rig: Field, device: SerialDevice) -> None:
+    began = time.time_ns()
+    device.faults.start("unplug", 200, device.line.link.with_name("line-b"))
+    device.source.inject(lambda codes: None, 100).sent()
+    device.device.restart()
+    event = rig.event("boot_changed", began)
+    assert f"boot {device.device.boot:08x}" in event.text
+    rig.judged(device.device.boot, device.device.next_seq)
+    first = next(b for b in rig.estimates() if b.boot == device.device.boot)
+    assert first.t_ns[0] - device.line.plugged_ns < 2e9
+    assert device.line.link.name == "line-b"
+
+
+def test_18_a_second_daq_on_the_same_port(rig: Field, device: SerialDevice) -> None:
+    second = subprocess.run(
+        [sys.executable, "-m", "rigwatch", "daq", str(rig.rig.path)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert second.returncode == 2
+    assert second.stderr.count("\n") == 1
+    assert "in use by another process" in second.stderr
+    rig.judged(device.device.boot, device.device.next_seq)
