@@ -278,9 +278,11 @@ class Problem:
         of its length.
 
         Args:
-            parameters: all parameters, shape (n_p,). steps: most simulations. least_reduction:
-            smallest predicted relative reduction of a window's squared error for a step. rows:
-            windows to settle, all if None.
+            parameters: all parameters, shape (n_p,).
+            steps: most simulations.
+            least_reduction: smallest predicted relative reduction of a window's squared error for
+                a step.
+            rows: windows to settle, all if None.
         """
         self._follow_inputs(parameters)
         rows = np.arange(len(self.initial)) if rows is None else rows
