@@ -1,1 +1,1 @@
-"""What rigwatch reaches, measured on this machine beside published figures: `make bench`."""
+"""Figures of rigwatch, measured on this machine and compared with published ones: `make bench`."""

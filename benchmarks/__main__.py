@@ -1,7 +1,7 @@
 """`python -m benchmarks [NAME...]`: runs the benchmarks and prints one table.
 
-A benchmark is a module in a room of this folder with `def run(quick: bool) -> list[Row]`; nothing
-else has to be registered. `--page` keeps the results and writes them to docs/benchmarks.md.
+A benchmark is a module in a room of this folder with `def run(quick: bool) -> list[Row]`; no
+registration is needed. `--page` stores the results and writes them to docs/benchmarks.md.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from tools.benchmark_table import Row, as_markdown, as_text, rows_of
 
 
 def modules() -> dict[str, str]:
-    """All benchmarks there are, by name: the modules of the rooms that have a function `run`."""
+    """All benchmarks by name: the modules of the rooms with a function `run`."""
     sources = sorted(Path(benchmarks.__path__[0]).glob("*/*.py"), key=lambda path: path.stem)
     return {
         path.stem: f"benchmarks.{path.parent.name}.{path.stem}"
@@ -30,7 +30,7 @@ def modules() -> dict[str, str]:
 
 
 def machine() -> dict[str, str]:
-    """What the figures were measured on."""
+    """The machine of the measurement."""
     return {
         "processor": _processor(),
         "cores": str(len(os.sched_getaffinity(0))),
@@ -50,7 +50,7 @@ def _processor() -> str:
 
 
 def measure(name: str, quick: bool) -> list[Row]:
-    """A benchmark's rows; what it takes is said."""
+    """A benchmark's rows; prints its duration."""
     started = time.perf_counter()
     print(f"{name} ...", end=" ", file=sys.stderr, flush=True)
     rows = rows_of(name, lambda: importlib.import_module(modules()[name]).run(quick))
@@ -59,7 +59,7 @@ def measure(name: str, quick: bool) -> list[Row]:
 
 
 def main() -> int:
-    """0 when every row that has a bar reaches it, else 1."""
+    """0 if every row with a bar reaches it, otherwise 1."""
     parser = _parser()
     arguments = parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do

@@ -1,1 +1,1 @@
-"""The workbench on plants that hide something."""
+"""The workbench on plants with hidden effects."""

@@ -1,6 +1,6 @@
-"""Outcomes of chains, step by step, and the rows that they make: good chains, wrong verdicts, ends.
+"""Outcomes of chains, step by step, and their rows: good chains, wrong verdicts, ends.
 
-How often a verdict is wrong is calibrated on the other machines than the one that it is judged on.
+The probability of a wrong verdict is calibrated on all machines except the one judged.
 """
 
 from collections import Counter
@@ -19,7 +19,7 @@ from rigwatch.workbench.explain.verdict_calibration import (
 from tools.benchmark_table import Row
 
 CONFIDENT = 0.05
-"""Probability of being wrong up to which a verdict counts as given with confidence."""
+"""Largest probability of being wrong at which a verdict counts as confident."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Case:
 
     Attributes:
         machine: its name.
-        hidden: names of what is hidden.
-        noise: of the sensors, over the rms of what they read.
+        hidden: names of the hidden effects.
+        noise: of the sensors, relative to the rms of their signals.
         seed: of excitation and noise.
     """
 
@@ -41,14 +41,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Step:
-    """One question and its answer.
+    """One step: a verdict and its classification.
 
     Attributes:
         judged: right, undecided, unknown, astray or wrong; "ended" or "more" once all are found.
         word: the verdict.
         named: labels that are named, the best first.
-        added: what the user added.
-        evidence: what the verdict rests on.
+        added: the effect that the user added.
+        evidence: the evidence of the verdict.
         seconds: of one explanation.
     """
 
@@ -69,13 +69,13 @@ class Outcome:
 
     @property
     def good(self) -> bool:
-        """Whether each step was right or honestly undecided until all was found."""
+        """Whether each step was right or undecided until all effects were found."""
         on_the_way = [step for step in self.steps if step.judged not in ("ended", "more")]
         return self.complete and all(s.judged in ("right", "undecided") for s in on_the_way)
 
     @property
     def complete(self) -> bool:
-        """Whether all that is hidden was found."""
+        """Whether all hidden effects were found."""
         return self.steps[-1].judged in ("ended", "more")
 
 
@@ -116,7 +116,7 @@ def _parts(outcomes: Sequence[Outcome]) -> str:
 
 
 def _left_out(outcomes: Sequence[Outcome]) -> list[Row]:
-    """Wrong verdicts as the other machines promise them and as they came."""
+    """Wrong verdicts: predicted by the other machines, and observed."""
     rows = []
     for machine in dict.fromkeys(o.case.machine for o in outcomes):
         told = _named_steps([o for o in outcomes if o.case.machine != machine])
@@ -127,7 +127,7 @@ def _left_out(outcomes: Sequence[Outcome]) -> list[Row]:
 
 
 def _shipped(outcomes: Sequence[Outcome]) -> list[Row]:
-    """Wrong verdicts as the calibration of first steps promises them and as they came."""
+    """Wrong verdicts: predicted by the calibration of first steps, and observed."""
     steps = {
         "first steps": [o.steps[0] for o in outcomes],
         "later steps": [step for o in outcomes for step in o.steps[1:]],
@@ -140,7 +140,7 @@ def _shipped(outcomes: Sequence[Outcome]) -> list[Row]:
 
 
 def _promised(what: str, steps: Sequence[Step], doubts: Sequence[float]) -> Row:
-    """Wrong verdicts found, against those that were promised."""
+    """Observed and predicted numbers of wrong verdicts."""
     found, most = sum(map(_is_wrong, steps)), most_by_chance(doubts)
     sure = [s for s, doubted in zip(steps, doubts, strict=True) if doubted <= CONFIDENT]
     return Row(
@@ -152,7 +152,7 @@ def _promised(what: str, steps: Sequence[Step], doubts: Sequence[float]) -> Row:
 
 
 def most_by_chance(doubts: Sequence[float], level: float = 0.95) -> int:
-    """Wrong verdicts that are not exceeded with this probability, each wrong with its own."""
+    """Number of wrong verdicts not exceeded with this probability; each has its own probability."""
     of_count = np.ones(1)
     for doubted in doubts:
         of_count = np.convolve(of_count, [1 - doubted, doubted])

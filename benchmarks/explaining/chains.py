@@ -1,15 +1,15 @@
 """Chains: several effects hidden at once in five kinds of machine, found step by step.
 
-What a user does is played: the log becomes a study, the workbench is asked, what it names is added,
-it is asked again, until it says that nothing is missing. Where it cannot tell rivals apart and the
-truth is among them, the user's next experiment tells, so the truth is added. Each step is judged as
-`sim_plant/machines/answers.py` says.
+A user's work is simulated: the log is imported as a study and explained, the effect named is added,
+and this is repeated until nothing is missing. If rivals are named and a hidden effect is among
+them, the hidden effect is added, as the user's next experiment would decide. Steps are classified
+as in `sim_plant/machines/answers.py`.
 
     python -m benchmarks chains --quick
     python -m benchmarks.explaining.chains --results chains.jsonl --machine motor --minutes 10
 
-Machines are `sim_plant.machines`, which share no equations with the models. How often a verdict is
-wrong is calibrated on the other machines than the one that it is judged on.
+Machines are `sim_plant.machines`, which share no equations with the models. The probability of
+a wrong verdict is calibrated on all machines except the one judged.
 """
 
 import sys
@@ -37,19 +37,19 @@ CHAINS = {
     "damper": "slider+hardening joint+orifice+preload",
     "tanks": "leak+dead_band saturation+late_pump+inlet",
 }
-"""What is hidden in each machine at once."""
+"""Effects hidden in each machine at the same time."""
 SHARE = 0.1
-"""Share by which each changes the outputs alone, but for these."""
+"""Share of the outputs' rms that each effect changes alone, with exceptions."""
 SHARES = {
     "pendulum": {"late_drive": 0.2},
     "tanks": {"leak": 0.3, "dead_band": 0.5, "saturation": 0.3, "late_pump": 0.3, "inlet": 0.3},
 }
 NOISES = (0.002, 0.005, 0.02)
-"""Standard deviation of the sensors' noise over the rms of what they read."""
+"""Standard deviation of the sensors' noise, relative to the rms of their signals."""
 SEEDS, FIRST = 5, 101
-"""Seeds, and the first of them: the rules of verdicts were chosen on others below it."""
+"""Number of seeds, and the first: the rules of verdicts were chosen on seeds below it."""
 MORE = 2
-"""Steps beyond the hidden effects after which a chain is broken off."""
+"""Number of steps beyond the hidden effects after which a chain is stopped."""
 
 
 def cases(*, quick: bool, first: int = FIRST) -> Iterator[Case]:
@@ -62,7 +62,7 @@ def cases(*, quick: bool, first: int = FIRST) -> Iterator[Case]:
 
 
 def shares(case: Case) -> dict[str, float]:
-    """What share each hidden effect of a case changes the outputs by."""
+    """Share of the outputs' rms that each hidden effect of a case changes."""
     own = SHARES.get(case.machine, {})
     return {name: own.get(name, SHARE) for name in case.hidden}
 
@@ -82,7 +82,7 @@ def solve(case: Case) -> Outcome:
 
 
 def _asked(study: Study, machine: str, left: list[str]) -> tuple[Step, Ranked | None]:
-    """One step, and what the user adds; what is found is no longer left."""
+    """One step, and the effect that the user adds; effects found are removed from `left`."""
     begin = time.perf_counter()
     rows, verdict = ranking(open_bench(study))
     seconds = time.perf_counter() - begin
@@ -98,19 +98,19 @@ def _asked(study: Study, machine: str, left: list[str]) -> tuple[Step, Ranked | 
 
 
 def _chosen(rows: Sequence[Ranked], verdict: Verdict, right: Sequence[str]) -> Ranked | None:
-    """What the user adds: what is named, or of rivals the one that the next experiment confirms."""
+    """The effect that the user adds: the one named or, of rivals, the hidden one."""
     true = (row for row in rows if row.label in right and row.fitted is not None)
     confirmed = next(true, None) if verdict.word == "undetermined" else None
     return confirmed or verdict.best
 
 
 def run(quick: bool) -> list[Row]:
-    """Chains found again, and what was said with confidence and was wrong."""
+    """Rows of chains found completely, and of wrong verdicts given with confidence."""
     return chain_rows([solve(case) for case in cases(quick=quick)])
 
 
 def main() -> int:
-    """Run cases into a file, one line each; print the table of what it holds."""
+    """Run cases into a file, one line each; print their table."""
     parser = asked(__doc__)
     parser.add_argument("--machine", action="append", help="this machine alone, may be repeated")
     parser.add_argument("--noise", type=float, action="append", help="this noise alone")

@@ -1,10 +1,10 @@
-"""How long explaining takes: scoring, a whole explanation, and an expression never seen before.
+"""Time of an explanation: scoring, a whole explanation, and a new expression.
 
 The recording is 20 s at 256 Hz of three channels (force, position, acceleration) from the
 oscillator of `hidden_effects`, with Coulomb friction hidden at 5 % of the outputs' rms. A whole
-explanation and a new expression run in processes of their own, with empty caches and with those
-that an explanation leaves. These hold the loops around the equations; equations are never kept, so
-that an expression is new to every process.
+explanation and a new expression run in separate processes, with empty caches and with those that
+an explanation leaves. The caches contain the loops around the equations but not the equations, so
+an expression is new to every process.
 
     python -m benchmarks explain_speed
 """
@@ -55,7 +55,7 @@ parameters.vs = { unit = "{v}", role = "constant", value = 1e-3, scale = "v" }
 
 
 def recordings() -> Data:
-    """What is to be explained."""
+    """The study to be explained."""
     hidden = (Hidden("coulomb", strength_for("coulomb", excitation(SEED), 0.05)),)
     held_out, healthy = noisy(hidden, SEED + 1000), noisy((), SEED + 2000)
     return Data(noisy(hidden, SEED), held_out, healthy, HORIZON, ())
@@ -67,7 +67,7 @@ def opened(data: Data) -> Bench:
 
 
 def scoring(data: Data, repeats: int) -> Row:
-    """Directions, projection and p-values of 30 candidates, all of them met before."""
+    """Directions, projection and p-values of 30 candidates, all of them known to the process."""
     bench = opened(data)
     base, found = bench.base, candidates(bench.study, data.train)[:CANDIDATES]
     taken: dict[str, list[float]] = {"scores": [], "p-values": []}
@@ -94,7 +94,7 @@ def explaining(data: Data) -> str:
 
 
 def comparing(data: Data) -> str:
-    """A new expression read, compiled, scored, fitted beside the base model and judged."""
+    """A new expression read, compiled, scored, fitted with the base model and judged."""
     bench = opened(data)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "own.toml"
@@ -135,7 +135,7 @@ def _in_processes(file: Path, repeats: int) -> Iterator[Row]:
 
 
 def _step(step: str, what: str, file: Path, caches: str, repeats: int) -> Row:
-    """Median of a step's time, each time in a process of its own."""
+    """Median of a step's time, each in a separate process."""
     folders = {"NUMBA_CACHE_DIR": f"{caches}/numba"}
     found = []
     for _ in range(repeats):

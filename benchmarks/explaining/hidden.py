@@ -1,6 +1,4 @@
-"""What the benchmarks of hidden effects share: results kept as they come, shares, who was taken for
-whom.
-"""
+"""Common parts of the benchmarks of hidden effects: stored results, shares, confusion matrix."""
 
 import argparse
 import time
@@ -16,11 +14,11 @@ from tools.benchmark_table import Row
 
 
 class Judged(Protocol):
-    """An outcome, which knows its case."""
+    """An outcome with its case."""
 
     @property
     def case(self) -> Any:
-        """What was tried."""
+        """The case."""
         ...
 
 
@@ -28,7 +26,7 @@ Outcome = TypeVar("Outcome", bound=Judged)
 
 
 def asked(description: str | None) -> argparse.ArgumentParser:
-    """The command line of a benchmark whose results are kept as they come."""
+    """The command line of a benchmark that stores its results one by one."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--results", type=Path, required=True, help="file of JSON lines")
     parser.add_argument("--effect", action="append", help="this effect alone, may be repeated")
@@ -39,7 +37,7 @@ def asked(description: str | None) -> argparse.ArgumentParser:
 
 
 def wanted(case: Any, chosen: argparse.Namespace) -> bool:
-    """Whether the command line asks for a case with these hidden effects, share and seed."""
+    """Whether the command line selects a case with these hidden effects, share and seed."""
     return (
         (not chosen.effect or ("+".join(case.hidden) or "healthy") in chosen.effect)
         and (not chosen.share or case.share in chosen.share or not case.hidden)
@@ -56,7 +54,7 @@ def collected(
     said: Callable[[Outcome], str],
     minutes: float,
 ) -> list[Outcome]:
-    """What the file of JSON lines holds, with the cases that it lacked solved and written to it."""
+    """All outcomes of a file of JSON lines; missing cases are run and appended."""
     found: list[Outcome] = []
     if path.exists():
         lines = path.read_text("utf-8").splitlines()
@@ -79,7 +77,7 @@ def collected(
 
 
 def share_row(what: str, hits: Sequence[bool], bar: float | None, note: str) -> Row:
-    """A row that says how many of all hit, against the bar where there is one."""
+    """A row that says how many of all hit, against the bar if there is one."""
     passed = None if not hits or bar is None else sum(hits) >= bar * len(hits)
     share = f" = {sum(hits) / len(hits):.1%}" if hits else ""
     said = "" if bar is None else f"≥ {100 * bar:g}%"
@@ -92,7 +90,7 @@ def counted(names: Iterable[str]) -> str:
 
 
 def confusion(pairs: Iterable[tuple[tuple[str, ...], str]]) -> str:
-    """The confusion matrix as lines: what was hidden, and what it was called how often."""
+    """The confusion matrix as lines: hidden effects, and how often each name was given."""
     table: dict[str, Counter[str]] = {}
     for hidden, called in pairs:
         table.setdefault("+".join(hidden) or "healthy", Counter())[called] += 1

@@ -3,15 +3,15 @@
 The plant is `sim_plant.oscillator`, which shares no equations with the engine. Each case hides one
 effect, or two, or none, at a strength that changes an output by a given share of its rms; the
 model is fitted to one recording of 20 s, judged on another, and a healthy recording with another
-excitation gives the noise floor. Two hidden effects are asked for in two steps: what is named first
-is added, and the workbench asked again.
+excitation gives the noise floor. Two hidden effects are found in two steps: the effect named first
+is added, and the study is explained again.
 
     python -m benchmarks hidden_effects --quick
     python -m benchmarks.explaining.hidden_effects --results msd.jsonl --seed 10 --share 0.05
     python -m benchmarks.explaining.hidden_effects --results msd.jsonl --calibrate
 
-Results go to the file as they come, and cases that it holds are not run again. The verdicts of
-seeds below `JUDGED` make the calibration of the workbench, the others judge it.
+Results are appended to the file one by one; cases already in it are not repeated. The verdicts of
+seeds below `JUDGED` make the calibration of the workbench, the others test it.
 """
 
 import sys
@@ -48,7 +48,7 @@ from tools.benchmark_table import Row, as_text
 
 SAMPLES = 5120
 NOISE = 2e-3
-"""Standard deviation of the sensors' noise over the rms of what they read."""
+"""Standard deviation of the sensors' noise, relative to the rms of their signals."""
 RIGHT: dict[str, tuple[str, ...]] = {
     "coulomb": ("coulomb@load",),
     "stribeck": ("stribeck@load",),
@@ -78,16 +78,16 @@ RIGHT: dict[str, tuple[str, ...]] = {
     "position_average": ("moving_average@position_sensor",),
     "drive_average": ("moving_average@drive",),
 }
-"""What the library calls each hidden effect; several where they are one on any recording."""
+"""Library names of each hidden effect; several if no recording can distinguish them."""
 ANALOG = tuple(name for name in RIGHT if name not in DIGITAL)
-"""Hidden effects that any plant may have; the others are those of a computer."""
+"""Hidden effects that any plant may have; the others are digital filters."""
 EXACT = {
     "coulomb": "Fc", "dahl": "Fc", "quadratic_drag": "b", "cubic_stiffness": "k3",
     "quadratic_stiffness": "k2", "hard_stop": "k", "backlash": "k", "viscous_by_direction": "dd",
     "dead_band": "b", "position_drift": "r", "end_binding": "", "saturation": "",
 }  # fmt: skip
-"""Effects that leave mass, damper and spring their meaning once they are in the model, and what
-their own strength is called where the library means the same by it."""
+"""Effects with which mass, damper and spring keep their meaning, and the name of their own strength
+if the library defines it in the same way."""
 PAIRS = (
     ("coulomb", "cubic_stiffness"),
     ("quadratic_drag", "constant_force"),
@@ -99,9 +99,9 @@ SEEDS = 20
 HEALTHY = 400
 JUDGED = 20
 HEALTHY_JUDGED = 5000
-"""Seeds below make the calibration of verdicts, the others judge it."""
+"""Seeds below make the calibration of verdicts, the others test it."""
 STRONG = float(np.hypot(1.0, 2.0))
-"""Error over the floor where what is hidden, and not absorbed by the fit, is twice the floor."""
+"""Error over the floor if the hidden effect, less what the fit absorbs, is twice the floor."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Case:
         hidden: names; none for a healthy plant.
         share: of an output's rms that they change.
         seed: of excitation and noise.
-        held: whether the force stays from sample to sample, which the workbench is not told.
+        held: whether the force is held between samples; unknown to the workbench.
     """
 
     hidden: tuple[str, ...]
@@ -122,22 +122,22 @@ class Case:
 
     @property
     def judges(self) -> bool:
-        """Whether it judges the calibration of verdicts, rather than makes it."""
+        """Whether it tests the calibration of verdicts instead of contributing to it."""
         return self.seed >= (JUDGED if self.hidden else HEALTHY_JUDGED)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the workbench made of it.
+    """The workbench's result.
 
     Attributes:
-        case: what was hidden.
+        case: the case.
         word: the verdict.
-        first: labels that are named, the best first, with all that it cannot be told from.
+        first: labels that are named, the best first, with all indistinguishable from it.
         second: labels of a second effect: of the same verdict, or of the next step.
         before, after: held-out error over the floor without and with the best effect.
-        evidence: what the verdict rests on.
-        covered: intervals that hold the true parameter, of how many.
+        evidence: the evidence of the verdict.
+        covered: intervals that contain the true parameter, and their number.
         seconds: of one explanation.
     """
 
@@ -153,12 +153,12 @@ class Outcome:
 
     @property
     def called(self) -> str:
-        """What is named first, or the verdict."""
+        """The name given first, or the verdict."""
         return self.first[0] if self.word in ("missing_effect", "undetermined") else self.word
 
     @property
     def right(self) -> bool:
-        """Whether what is hidden is named, first or in the class of the first.
+        """Whether the hidden effect is named, first or in the class of the first.
 
         A verdict of `unknown_effect` names nothing, whatever the best effect was.
         """
@@ -174,7 +174,7 @@ class Outcome:
 
     @property
     def wrong(self) -> bool:
-        """Whether the verdict says what is not so."""
+        """Whether the verdict is wrong."""
         known = [name for name in self.case.hidden if name in RIGHT]
         match self.word:
             case "nothing_missing":
@@ -228,7 +228,7 @@ def simulated(case: Case) -> Data:
 
 
 def _named_next(best: Ranked, data: Data) -> tuple[str, ...]:
-    """What is named once the best has been added."""
+    """Labels named after the best has been added."""
     _, _, verdict = explained(study((accepted_from(best),)), data)
     return (*verdict.members, *verdict.rivals)
 
@@ -241,7 +241,7 @@ def explained(of: Study, data: Data) -> tuple[Bench, list[Ranked], Verdict]:
 
 
 def _covered(bench: Bench, case: Case, rows: Sequence[Ranked]) -> tuple[int, int]:
-    """Intervals that hold the truth, of how many, where the model is right."""
+    """Intervals that contain the truth, and their number, if the model is right."""
     true = {"m": MASS, "c": DAMPING, "k": STIFFNESS}
     fitted = None if case.hidden else bench.base
     if len(case.hidden) == 1 and case.hidden[0] in EXACT:
@@ -264,7 +264,7 @@ def _covered(bench: Bench, case: Case, rows: Sequence[Ranked]) -> tuple[int, int
 
 
 def cases(quick: bool) -> Iterator[Case]:
-    """What is tried, the strengths that count most first."""
+    """The cases, most important strengths first."""
     seeds = range(10, 11 if quick else 10 + SEEDS)
     for share in (0.05,) if quick else (0.05, 0.01, 0.02, 0.1, 0.005):
         for seed in seeds:
@@ -324,14 +324,14 @@ def rows_of(outcomes: Sequence[Outcome]) -> list[Row]:
 
 
 def _mistaken(outcomes: Sequence[Outcome]) -> str:
-    """What was called by which wrong name, the most frequent first."""
+    """Wrong names by hidden effect, the most frequent first."""
     return counted(
         f"{'+'.join(o.case.hidden) or 'healthy'} as {o.called}" for o in outcomes if o.wrong
     )
 
 
 def _calibration_row(outcomes: Sequence[Outcome]) -> Row:
-    """Wrong verdicts as promised and as they came, on seeds that did not make the calibration."""
+    """Predicted and observed wrong verdicts, on held-out seeds."""
     promised = sum(calibration.probability_wrong(o.word, o.evidence) for o in outcomes)
     spread = sum(
         d * (1 - d) for o in outcomes for d in [calibration.probability_wrong(o.word, o.evidence)]
@@ -344,7 +344,7 @@ def _calibration_row(outcomes: Sequence[Outcome]) -> Row:
 
 
 def calibrated(outcomes: Sequence[Outcome]) -> str:
-    """The text of the workbench's calibration file, from the seeds that make it."""
+    """The text of the workbench's calibration file, from the calibration seeds."""
     cells: dict[tuple[str, int, int], list[bool]] = {}
     for outcome in outcomes:
         if not outcome.case.judges:
@@ -361,7 +361,7 @@ def calibrated(outcomes: Sequence[Outcome]) -> str:
 
 
 def main() -> int:
-    """Run cases into a file, one line each; print the table of what it holds."""
+    """Run cases into a file, one line each; print their table."""
     parser = asked(__doc__)
     parser.add_argument("--calibrate", action="store_true", help="write the calibration file")
     chosen = parser.parse_args()

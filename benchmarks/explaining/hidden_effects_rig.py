@@ -1,18 +1,18 @@
 """Hidden effects on the simulated pneumatic rig: does the workbench name what is missing?
 
-The plant is `sim_plant.rig`: its own code, another integrator and finer steps than the models that
-are held against it, and sensors with their noise, steps, ranges and a piezo's high-pass. The flow
-law of the analytic model was chosen with the plant's in view and comes close to it, so that what is
-found here says little about how well it would follow a real valve.
+The plant is `sim_plant.rig`: its own code, another integrator and finer steps than the models
+compared with it, and sensors with their noise, steps, ranges and a piezo's high-pass. The flow
+law of the analytic model was chosen with the plant's in view and is close to it, so these
+figures are weak evidence for a real valve.
 
 Each case hides one effect, or two, or none, at a strength that changes an output by a given share
-of its rms. The analytic model keeps what a healthy recording told about the rig and is fitted to
-20 s; the fourth-order black box is held against a healthy recording of the same excitation.
+of its rms. The analytic model keeps the parameters of a healthy recording and is fitted to 20 s;
+the fourth-order black box is compared with a healthy recording of the same excitation.
 
     python -m benchmarks hidden_effects_rig --quick
     python -m benchmarks.explaining.hidden_effects_rig --results rig.jsonl --share 0.05 --seed 1
 
-Results go to the file as they come, and cases that it holds are not run again.
+Results are appended to the file one by one; cases already in it are not repeated.
 """
 
 import sys
@@ -60,7 +60,7 @@ HEALTHY = 40
 """Healthy cases of each model."""
 PAIRS = (("coulomb", "spring"), ("viscous", "acceleration_lag"), ("cubic_spring", "actuator_delay"))
 STRONG = float(np.hypot(1.0, 2.0))
-"""Held-out error over the floor where what is hidden is twice the floor."""
+"""Held-out error over the floor if the hidden effect is twice the floor."""
 QUICK = ("spring", "acceleration_lag")
 
 
@@ -73,7 +73,7 @@ class Case:
         hidden: effects; none for a healthy rig.
         share: of an output's rms that they change.
         seed: of excitation and noise.
-        repeat: tells cases with other noise alone.
+        repeat: number of cases that differ only in noise.
     """
 
     model: str
@@ -85,14 +85,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the workbench made of it.
+    """The workbench's result.
 
     Attributes:
-        case: what was hidden.
+        case: the case.
         word: the verdict.
         first: labels that are named, the best first.
         second: of a second effect.
-        rivals: labels that the recording cannot tell from the first.
+        rivals: labels that the recording cannot distinguish from the first.
         before, after: held-out error over the floor without and with the best effect.
         caused: change of each output over its floor.
         seconds: of one explanation.
@@ -110,17 +110,17 @@ class Outcome:
 
     @property
     def called(self) -> str:
-        """What is named first, or the verdict."""
+        """The name given first, or the verdict."""
         return self.first[0] if self.first and self.word != "unknown_effect" else self.word
 
     @property
     def named(self) -> tuple[str, ...]:
-        """All that the recording cannot tell from the best, itself first."""
+        """The best and all that the recording cannot distinguish from it."""
         return (*self.first, *self.rivals)
 
     @property
     def right(self) -> bool:
-        """Whether what is hidden is named, first or in the class of the first.
+        """Whether the hidden effect is named, first or in the class of the first.
 
         A verdict of `unknown_effect` names nothing, whatever the best effect was.
         """
@@ -130,7 +130,7 @@ class Outcome:
 
     @property
     def sure(self) -> bool:
-        """The same where no effect of other physics is in the class."""
+        """The same, with no effect of other physics in the class."""
         return self.right and not self.rivals
 
     @property
@@ -141,7 +141,7 @@ class Outcome:
 
 
 def right_for(model: str, name: str) -> tuple[str, ...]:
-    """What the library calls a hidden effect at the ports of a model."""
+    """Library names of a hidden effect at the ports of a model."""
     if model == "black box":
         return BLACK_BOX.get(name, RIGHT.get(name, ()))
     return RIGHT.get(name, ())
@@ -149,7 +149,7 @@ def right_for(model: str, name: str) -> tuple[str, ...]:
 
 @cache
 def study_of(model: str, seed: int) -> tuple[Study, Recording]:
-    """The study with what the healthy recording told, and that recording."""
+    """The study with the parameters of the healthy recording, and that recording."""
     span = (Span(session="simulated"),)
     name = MODELS[model]
     file = StudyFile(model=name, train=span, held_out=span, period=PERIOD / RIG.sample_rate)
@@ -182,7 +182,7 @@ def solve(case: Case) -> Outcome:
 
 def simulated(case: Case, effects: Mapping[str, float], healthy: Recording) -> Data:
     """The recordings of a case: fitted to, held out, healthy."""
-    # A linear box knows the rig under one excitation; the analytic model must do under another.
+    # A linear black box is valid for one excitation; the analytic model must be for another.
     other = case.seed if case.model == "black box" else case.seed + 1000
     number = 100 * case.seed + 10 + zlib.crc32(repr(case).encode()) % 50
     return Data(
@@ -200,14 +200,14 @@ def explained(study: Study, data: Data) -> tuple[Bench, Verdict]:
 
 
 def _named_next(study: Study, data: Data, best: Ranked) -> tuple[str, ...]:
-    """What is named once the best has been added."""
+    """Labels named after the best has been added."""
     file = structs.replace(study.file, effects=(accepted_from(best),))
     _, verdict = explained(replace(study, file=file), data)
     return (*verdict.members, *verdict.rivals)
 
 
 def cases(quick: bool) -> Iterator[Case]:
-    """What is tried, the strengths that count most first."""
+    """The cases, most important strengths first."""
     for seed in range(1, 2 if quick else SEEDS + 1):
         for share in (0.05,) if quick else (0.05, 0.02, 0.1, 0.01, 0.005):
             for model in MODELS:
@@ -280,12 +280,12 @@ def _rows(model: str, every: Sequence[Outcome]) -> list[Row]:
 
 
 def _mistaken(outcomes: Iterable[Outcome]) -> str:
-    """What was called by which wrong name, the most frequent first."""
+    """Wrong names by hidden effect, the most frequent first."""
     return counted(f"{o.case.hidden[0]} as {o.called}" for o in outcomes if not o.right)
 
 
 def main() -> int:
-    """Run cases into a file, one line each; print the table of what it holds."""
+    """Run cases into a file, one line each; print their table."""
     parser = asked(__doc__)
     parser.add_argument("--model", choices=list(MODELS), help="one model, default both")
     chosen = parser.parse_args()

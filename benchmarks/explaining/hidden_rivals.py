@@ -1,10 +1,10 @@
-"""What pysindy and SysIdentPy make of the hidden effects, beside the workbench, in one run.
+"""Hidden effects with pysindy, SysIdentPy and the workbench, in one run.
 
-The recordings are those of `benchmarks/explaining/hidden_effects`. A tool is right where the effect
-that it names is the hidden one, or, for the workbench, where the hidden one is in the class that it
-names first. Both rivals fit a list of terms; effects that no term of theirs can express (play,
-delays, anything with memory, sensors) are theirs to miss, so that their share is also
-given of the effects that they can express.
+The recordings are those of `benchmarks/explaining/hidden_effects`. A tool is right if it names the
+hidden effect or, for the workbench, if the hidden effect is in the class named first. Both rivals
+fit a list of terms; effects that no term of theirs can express (play, delays, anything with memory,
+sensors) cannot be found by them, so their share among the effects that they can express is also
+given.
 
     python -m benchmarks hidden_rivals --quick
 """
@@ -28,7 +28,7 @@ POLYNOMIAL = ("constant_force", "quadratic_stiffness", "cubic_stiffness")
 
 
 def workbench_names(data: Data) -> str:
-    """Labels of what is named first and its class, or the verdict."""
+    """Labels of the effect named first and its class, or the verdict."""
     _, _, verdict = explained(study(), data)
     named = verdict.word in ("missing_effect", "undetermined")
     return " ".join((*verdict.members, *verdict.rivals)) if named else verdict.word
@@ -42,12 +42,12 @@ TOOLS: dict[str, tuple[Callable[[Data], str], Sequence[str]]] = {
     ),
     "SysIdentPy": (lambda data: sysidentpy_names(data.train, data.held_out), POLYNOMIAL),
 }
-"""How each tool names what is missing, and the hidden effects that it can express."""
+"""Each tool's function, and the hidden effects that it can express."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What one tool said of one case."""
+    """One tool's result for one case."""
 
     tool: str
     case: Case
@@ -56,7 +56,7 @@ class Answer:
 
     @property
     def hidden(self) -> str:
-        """What was hidden."""
+        """The hidden effect."""
         return self.case.hidden[0] if self.case.hidden else "healthy"
 
     @property
@@ -70,7 +70,7 @@ class Answer:
 
 
 def cases(quick: bool) -> list[Case]:
-    """What is tried."""
+    """The cases."""
     seeds = range(30, 31 if quick else 33)
     names = ("coulomb", "cubic_stiffness", "acceleration_lag") if quick else tuple(RIGHT)
     shares = (0.05,) if quick else (0.05, 0.01)
@@ -80,7 +80,7 @@ def cases(quick: bool) -> list[Case]:
 
 
 def answers(case: Case) -> list[Answer]:
-    """What each tool says of one case."""
+    """Each tool's result for one case."""
     data, found = simulated(case), []
     for tool, (names, _) in TOOLS.items():
         begin = time.perf_counter()

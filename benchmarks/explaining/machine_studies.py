@@ -10,7 +10,7 @@ from rigwatch.workbench.study import Study, open_study
 from sim_plant.machines import MACHINES, log, strength_for
 
 UNITS = {"N": "N", "m": "m", "m_s2": "m/s^2", "V": "V", "rad_s": "rad/s", "rad": "rad", "s": "s"}
-"""Units by what ends the names of columns."""
+"""Units by the endings of column names."""
 STUDIES = {
     "oscillator": 'model = "mass-spring-damper"\nhorizon = 1.0\n',
     "motor": 'model = "motor"\nhorizon = 0.3\nstart = { R = 2.0, K = 0.06 }\n',
@@ -19,21 +19,21 @@ STUDIES = {
     'signals.velocity = { channel = "displacement", order = 1 }\n',
     "tanks": 'model = "tanks"\nhorizon = 150.0\nstart = { A1 = 0.0028, A2 = 0.0032 }\n',
 }
-"""What the study of each machine says beside its recordings."""
+"""Settings of each machine's study, without its recordings."""
 WITH_HEALTHY = ("oscillator",)
-"""Machines of which a recording with nothing wrong can be had."""
+"""Machines with a healthy recording."""
 
 
 def machine_study(
     folder: Path, machine: str, shares: Mapping[str, float], noise: float, seed: int
 ) -> Study:
-    """The study of a machine that hides effects.
+    """The study of a machine with hidden effects.
 
     Args:
-        folder: where its files go.
+        folder: for its files.
         machine: its name.
-        shares: of the outputs' rms that each hidden effect changes alone.
-        noise: of the sensors, over the rms of what they read.
+        shares: share of the outputs' rms that each hidden effect changes alone.
+        noise: of the sensors, relative to the rms of their signals.
         seed: of the recordings.
     """
     plant, text = MACHINES[machine], STUDIES[machine]

@@ -25,7 +25,7 @@ from sim_plant.specimens.exact_mass import RATE, Mass, excitation, moved
 from tools.benchmark_table import Row
 
 NOISE = 2e-3
-"""Standard deviation of the noise over the rms of what a sensor reads."""
+"""Standard deviation of the noise, relative to the rms of a sensor's signal."""
 HORIZONS = (64, 128, 256, 512, 1024)
 REACHED = 1.1
 DECADES = 3.0
@@ -50,7 +50,7 @@ def position_alone(model: Model) -> Model:
 
 
 def solved(seed: int, *, alone: bool) -> tuple[bool, bool, float]:
-    """Whether a fit reaches the floor, whether it says that it converged, and its time [s]."""
+    """Whether a fit reaches the floor, whether it is reported as converged, and its time [s]."""
     generator = np.random.default_rng(seed)
     hold: Hold = "zero" if seed % 2 else "linear"
     plant, force = drawn_plant(generator), excitation(generator)

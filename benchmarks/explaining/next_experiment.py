@@ -1,7 +1,7 @@
 """Proposed experiments, run: does a recording that could not decide give one that does?
 
-`sim_plant.oscillator` hides an effect while one sine drives it, which leaves rivals. What the
-workbench proposes is then run on the same plant, and explained anew.
+`sim_plant.oscillator` hides an effect while one sine drives it, which leaves rivals. The
+proposed experiment is then run on the same plant, and explained.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from tests.workbench.simulated import HORIZON, recorded, size_of, study
 from tools.benchmark_table import Row
 
 NOISE = 0.02
-"""Standard deviation of the sensors' noise over the rms of what they read under the sine."""
+"""Standard deviation of the sensors' noise, relative to the rms of their signals under the sine."""
 TRIED = (
     "coulomb", "stribeck", "dahl", "quadratic_drag", "cubic_stiffness", "quadratic_stiffness",
     "hard_stop", "backlash", "bouc_wen", "viscous_by_direction", "dead_band", "saturation",
@@ -33,11 +33,11 @@ class Decided:
     """One case.
 
     Attributes:
-        hidden: what is hidden, and the sine's frequency [Hz].
-        rivals: what the first recording could not tell from the best.
-        proposal: what was proposed, empty where nothing was.
+        hidden: the hidden effect, and the sine's frequency [Hz].
+        rivals: effects that the first recording could not distinguish from the best.
+        proposal: the proposed excitation, empty if there was none.
         after: verdict of the second recording.
-        right: whether it names what is hidden.
+        right: whether it names the hidden effect.
     """
 
     hidden: str
@@ -48,7 +48,7 @@ class Decided:
 
 
 def decide(name: str, frequency: float, share: float, seed: int = 3) -> Decided | None:
-    """Explain, propose, run, explain; None where the first recording leaves no rivals."""
+    """Explain, propose, run, explain; None if the first recording leaves no rivals."""
     time = np.arange(SAMPLES) / RATE
     force = 4 * np.sin(2 * np.pi * frequency * time)
     noise = NOISE * size_of(force)

@@ -1,7 +1,7 @@
-"""Recordings of the simulated rig with something hidden in it, at a strength that is asked for.
+"""Recordings of the simulated rig with hidden effects of given strengths.
 
-An effect is as strong as it changes the outputs: by a share of their rms in the channel where it
-shows most, measured on sensors without noise or steps.
+The strength is measured by the change of the outputs: by a share of their rms in the channel where
+it shows most, measured on sensors without noise or steps.
 """
 
 from collections.abc import Mapping
@@ -21,9 +21,9 @@ RIG = RigParameters()
 CLEAN = replace(
     RIG, lvdt_noise=0.0, lvdt_resolution=0.0, accelerometer_noise=0.0, voltage_noise=0.0
 )
-"""The same rig with sensors that neither hiss nor step."""
+"""The same rig with sensors without noise and quantization."""
 SAMPLES, WARM = 5120, 1024
-"""What is recorded, and what runs before it; 20 s and 4 s."""
+"""Number of recorded samples and of samples before; 20 s and 4 s."""
 PERIOD = 1024
 
 
@@ -32,10 +32,10 @@ class Hidden:
     """An effect of the simulated rig.
 
     Attributes:
-        name: as `sim_plant.effects` calls it.
-        right: what the library calls it; several where they are one on any recording.
-        base: value that a strength of 0 gives.
-        way: how a strength s > 0 sets it: base + s, base - s, or base/(1 + s).
+        name: in `sim_plant.effects`.
+        right: library names; several if no recording can distinguish them.
+        base: value at strength 0.
+        way: value at a strength s > 0: base + s, base - s, or base/(1 + s).
     """
 
     name: str
@@ -44,7 +44,7 @@ class Hidden:
     way: str = "more"
 
     def value(self, strength: float) -> float:
-        """What the plant's effect is set to."""
+        """The value of the plant's effect."""
         if self.way == "limit":
             return self.base / (1.0 + strength)
         return self.base + (strength if self.way == "more" else -strength)
@@ -91,7 +91,7 @@ _OUTSIDE = (
 )
 EVERY: dict[str, Hidden] = {h.name: h for h in (*_LISTED, *_SWALLOWED, *_OUTSIDE)}
 RIGHT: dict[str, tuple[str, ...]] = {h.name: h.right for h in _LISTED}
-"""What the library calls each hidden effect.
+"""Library names of each hidden effect.
 
 A gain of one motion sensor is a gain of the other and of the valve together; a constant force is
 balanced by pressure, as an offset of the valve is.
@@ -100,7 +100,7 @@ BLACK_BOX: dict[str, tuple[str, ...]] = {
     "leak_1": ("leakage@between", "orifice@between"),
     "leak_2": ("leakage@between", "orifice@between"),
 }
-"""What differs for the black box, which has no chambers."""
+"""Differences for the black box, which has no chambers."""
 ABSORBED = tuple(h.name for h in _SWALLOWED)
 """Effects that parameters of the model are: the zero of its valve is fitted to each recording."""
 UNKNOWN = tuple(h.name for h in _OUTSIDE)
@@ -116,7 +116,7 @@ def recorded(
         effects: of the plant, by name.
         excitation: seed of the multisine's phases; lines from 0.5 to 12 Hz, 2.5 V at most.
         noise: seed of the sensors.
-        rig: what the rig is made of.
+        rig: parameters of the rig.
     """
     plant = Rig(rig, noise)
     for name, value in effects.items():
@@ -136,7 +136,7 @@ def healthy_outputs(excitation: int) -> NDArray[np.float64]:
 
 
 def caused(effects: Mapping[str, float], excitation: int) -> NDArray[np.float64]:
-    """Rms of what effects change in the two outputs, in their units."""
+    """Rms change of the two outputs by effects, in their units."""
     moved = recorded(effects, excitation, 0, CLEAN).outputs - healthy_outputs(excitation)
     return np.asarray(np.sqrt(np.mean(moved**2, axis=0)))
 

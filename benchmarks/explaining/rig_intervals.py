@@ -1,7 +1,7 @@
-"""Stated 95 % intervals on the simulated rig: how often do they hold the hidden effect's strength?
+"""Stated 95 % intervals on the simulated rig: how often do they contain the effect's strength?
 
-Effects whose strength the plant and the library count alike, at four strengths, each fitted with
-the analytic model to 20 s of a rig that a healthy recording has told about.
+Effects whose strength plant and library define alike, at four strengths, each fitted with the
+analytic model to 20 s, with parameters from a healthy recording.
 
     python -m benchmarks rig_intervals
 """
@@ -38,7 +38,7 @@ SEEDS = 5
 
 
 def cases(quick: bool) -> Iterator[Case]:
-    """What is fitted."""
+    """The case that is fitted."""
     for seed in range(1, 2 if quick else SEEDS + 1):
         for share in (0.05,) if quick else SHARES:
             for name in STRENGTHS:
@@ -46,7 +46,7 @@ def cases(quick: bool) -> Iterator[Case]:
 
 
 def covers(case: Case) -> bool:
-    """Whether the interval of the hidden effect's strength holds what it was set to."""
+    """Whether the interval of the hidden effect's strength contains its true value."""
     name = case.hidden[0]
     study, healthy = study_of(case.model, case.seed)
     true = settings(name, case.share, case.seed)

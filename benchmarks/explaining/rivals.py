@@ -1,15 +1,15 @@
-"""What pysindy and SysIdentPy name on the recordings of the hidden effects.
+"""pysindy and SysIdentPy on the recordings of the hidden effects.
 
 pysindy gets the states that the rig has: position and velocity from one smoothing filter, and the
-measured acceleration as the derivative to be explained. Its library holds every effect that a sum
-of fixed terms can express, beside four terms of no effect. Sequentially thresholded least squares
-(S. L. Brunton, J. L. Proctor, J. N. Kutz, PNAS 113(15), 2016) picks the terms, the recording held
-out picks the threshold, and the largest term beyond the linear model is what it names.
+measured acceleration as the derivative to be explained. Its library has every effect that a sum
+of fixed terms can express, and four other terms. Sequentially thresholded least squares
+(S. L. Brunton, J. L. Proctor, J. N. Kutz, PNAS 113(15), 2016) selects the terms, the held-out
+recording selects the threshold, and the largest term beyond the linear model is named.
 
 SysIdentPy gets a polynomial NARX model of position from force (S. A. Billings, Nonlinear System
 Identification, 2013) at 64 Hz, terms by forward regression, their number by Akaike's criterion. A
-lagged cube of position is a cubic stiffness and so on; a term that is no effect of the list is
-"unknown".
+lagged cube of position counts as cubic stiffness and so on; a term of no effect in the list counts
+as "unknown".
 """
 
 import warnings
@@ -31,13 +31,13 @@ NOTHING = "nothing_missing"
 UNKNOWN = "unknown"
 
 SMOOTHED = 21
-"""Samples that a cubic is laid through to smooth and differentiate position."""
+"""Samples of the cubic that smooths and differentiates the position."""
 THRESHOLDS = np.geomspace(1e-3, 0.3, 24)
 """Share of the acceleration's rms below which a term is dropped."""
 AS_GOOD = 1.001
 """Held-out error over the smallest one up to which the model of fewer terms is taken."""
 STUCK = 1e-3
-"""Speed at which dry friction turns round, over the speed's rms: as in our own library."""
+"""Speed below which dry friction is proportional to speed, over its rms: as in the library."""
 LINEAR = ("x", "v", "force")
 TERMS: dict[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] = {
     "constant_force": lambda x, _v, _sign: np.ones_like(x),
@@ -55,7 +55,7 @@ TERMS: dict[str, Callable[[FloatArray, FloatArray, FloatArray], FloatArray]] = {
 """Terms beyond the linear model, by the effect that they are."""
 
 THINNED = 4
-"""Samples for one that SysIdentPy sees: at 256 Hz neighbours differ by little more than noise."""
+"""Decimation for SysIdentPy: at 256 Hz neighbouring samples differ by little more than noise."""
 LAGS = 2
 MOST_TERMS = 20
 
@@ -65,7 +65,7 @@ def pysindy_names(train: Recording, held_out: Recording) -> str:
 
     Args:
         train: one input, force [N]; outputs position [m] and acceleration [m/s^2].
-        held_out: the same; picks the threshold.
+        held_out: the same; selects the threshold.
     """
     with _one_thread():
         columns, wanted = _library(train), _inner(train.outputs[:, 1])
@@ -102,7 +102,7 @@ def _inner(signal: FloatArray) -> FloatArray:
 
 
 def _largest(contributions: Mapping[str, float]) -> str:
-    """Name of the largest contribution beyond the linear model that is there at all."""
+    """Name of the largest nonzero contribution beyond the linear model."""
     extra = {n: size for n, size in contributions.items() if size > 0 and n not in LINEAR}
     return max(extra, key=lambda n: extra[n]).partition(":")[0] if extra else NOTHING
 

@@ -4,9 +4,9 @@
     python -m benchmarks.family.along_calibration FOLDER --results F --calibrate
     python -m benchmarks.family.along_calibration FOLDER --results F --members judged --seed 5
 
-Counts come from the members that thresholds may be chosen on; promises are judged on members whose
-equations differ. A verdict is wrong if it names what is not hidden, calls a fault nothing, or calls
-a fault of the library unknown; a model that cannot judge names nothing and is not counted.
+Counts come from the calibration members; predictions are tested on members with other equations. A
+verdict is wrong if it names an effect that is not hidden, or reports a fault as nothing missing or
+a fault of the library as unknown; a model that is not adequate names nothing and is not counted.
 """
 
 import argparse
@@ -41,9 +41,9 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A verdict: its word, what was hidden, whether it is right, and the strength found.
+    """A verdict: its word, the hidden effect, whether it is right, and the strength found.
 
-    `strength` holds the name, the truth, the value and its interval.
+    `strength` contains the name, the truth, the value and its interval.
     """
 
     case: Case
@@ -54,7 +54,7 @@ class Outcome:
 
     @property
     def wrong(self) -> bool:
-        """Whether the verdict says what is not so."""
+        """Whether the verdict is wrong."""
         if self.word == "unknown_effect":
             return self.what != "pressure"
         return not self.right
@@ -66,7 +66,7 @@ class Outcome:
 
 
 def main() -> int:
-    """Run cases into a file, one line each; print the table of what it holds."""
+    """Run cases into a file, one line each; print their table."""
     chosen = _parser().parse_args()
     tried = () if chosen.calibrate else _cases(chosen)
     found = collected(
@@ -86,7 +86,7 @@ def main() -> int:
 
 
 def calibrated(outcomes: Sequence[Outcome]) -> str:
-    """The text of the calibration file, from the rigs that make it."""
+    """The text of the calibration file, from the calibration rigs."""
     cells: dict[tuple[bool, str], list[bool]] = {}
     for outcome in outcomes:
         if not outcome.judges:

@@ -3,9 +3,9 @@
     python -m benchmarks.family.rig_family FOLDER --members calibration --part watch
     python -m benchmarks.family.rig_family FOLDER --members iso spool --write-only
 
-Members go to FOLDER/NAME in the layout of the rig that is not ours, what the commands make of them
-to FOLDER/NAME/work. Thresholds and calibrations may be chosen on the calibration members only; the
-two groups are printed apart.
+Members go to FOLDER/NAME in the layout of a foreign rig, results of the commands to
+FOLDER/NAME/work. Thresholds and calibrations may be chosen on the calibration members only; the
+two groups are printed separately.
 """
 
 import argparse
@@ -22,7 +22,7 @@ PARTS = ("watch", "explain")
 
 
 def main() -> int:
-    """Writes members that are not there and, if asked for, prints what was right; returns 0."""
+    """Writes missing members and, unless disabled, prints the results; returns 0."""
     arguments = _parser().parse_args()
     parts = tuple(arguments.part or PARTS)
     totals: dict[str, Tally] = {}
@@ -42,7 +42,7 @@ def main() -> int:
 
 
 def _scores(rig: RigFolder, parts: tuple[str, ...], models: list[str]) -> list[tuple[str, Tally]]:
-    """Plays the parts, prints them recording by recording, returns what was right."""
+    """Plays the parts, prints them recording by recording, returns the counts of right results."""
     scores = []
     if "watch" in parts:
         watch = watched(rig)
@@ -60,7 +60,7 @@ def _scores(rig: RigFolder, parts: tuple[str, ...], models: list[str]) -> list[t
 
 
 def _flavours(wished: list[str]) -> list[str]:
-    """Flavours of the groups and flavours named; all of them where none is."""
+    """Flavours of the groups and flavours named; all if none is named."""
     wished = wished or list(GROUPS)
     return [name for name, kind in FLAVOURS.items() if name in wished or kind.group in wished]
 

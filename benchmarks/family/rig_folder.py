@@ -1,4 +1,4 @@
-"""A folder of recordings in the layout of the rig that is not ours, played through the commands."""
+"""A folder of recordings in the layout of a foreign rig, played through the commands."""
 
 import json
 import subprocess
@@ -16,7 +16,7 @@ CHANNELS = (
 
 @dataclass
 class Tally:
-    """How many of how many, by name."""
+    """Right results and totals, by name."""
 
     right: dict[str, int] = field(default_factory=dict)
     of: dict[str, int] = field(default_factory=dict)
@@ -38,18 +38,18 @@ class Tally:
 
 @dataclass(frozen=True)
 class RigFolder:
-    """Recordings and their truth, and a folder for what the commands make of them.
+    """Recordings and their truth, and a folder for the results of the commands.
 
     Attributes:
         recordings: has `truth.json` and a folder of CSV files for each part.
-        work: sessions, models and studies go there.
+        work: folder of sessions, models and studies.
     """
 
     recordings: Path
     work: Path
 
     def truth(self, part: str) -> dict[str, dict[str, Any]]:
-        """What was done in each recording of `part`."""
+        """The truth of each recording of `part`."""
         told = json.loads((self.recordings / "truth.json").read_text(encoding="utf-8"))
         return dict(told.get(part, {}))
 
@@ -67,13 +67,13 @@ class RigFolder:
 
 
 def command(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    """Runs `rigwatch` with these words."""
+    """Runs `rigwatch` with these arguments."""
     line = [sys.executable, "-m", "rigwatch", *map(str, words)]
     return subprocess.run(line, capture_output=True, text=True, check=False)
 
 
 def answer(*words: str | Path) -> tuple[dict[str, Any], str]:
-    """What a command prints with --json, and what it says where it fails."""
+    """A command's JSON output, and its message if it fails."""
     run = command(*words, "--json")
     try:
         return dict(json.loads(run.stdout)), ""

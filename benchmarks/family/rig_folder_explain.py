@@ -19,7 +19,7 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
     "accel_gain": ("gain",),
     "accel_late": ("lag@acc", "delay@acc", "filter@acc", "average@acc", "smooth", "digital"),
 }
-"""Parts of names that are right for what was hidden."""
+"""Parts of names that are right for a hidden effect."""
 STRENGTHS = {"dry": "Fc", "deadband": "b", "saturation": "us", "cubic": "k3", "spring": "k"}
 """The library's symbol for the strength of a hidden effect."""
 CLOSE = 0.15
@@ -40,10 +40,10 @@ start = 8.0
 
 @dataclass
 class Explained:
-    """What the workbench said about a folder.
+    """The workbench's results for a folder.
 
     Attributes:
-        tally: right; strength close and strength in its interval, of what was named.
+        tally: right; strength close and strength in its interval, of effects named.
         wrong: verdicts "missing_effect" that name the wrong one.
         lines: one for each recording.
     """
@@ -67,7 +67,7 @@ def explained(rig: RigFolder, model: str) -> Explained:
 
 
 def explanation(rig: RigFolder, name: str, model: str) -> tuple[dict[str, Any], str]:
-    """What `rigwatch explain` says of a recording; a failure in words if it says nothing."""
+    """The result of `rigwatch explain` for a recording, or its failure in words."""
     rig.session("explain", "healthy")
     rig.session("explain", name)
     folder = rig.work / "explain"
@@ -81,13 +81,13 @@ def explanation(rig: RigFolder, name: str, model: str) -> tuple[dict[str, Any], 
 
 
 def named(said: dict[str, Any]) -> tuple[dict[str, Any], str]:
-    """The first of the ranking, and the names of it, its class and of what acts beside it."""
+    """The first of the ranking, and the names of its class and of a second effect."""
     top = said["ranking"][0] if said["ranking"] else {"effect": "", "port": "", "class": []}
     return top, " ".join([f"{top['effect']}@{top['port']}", *top["class"], *said["also"]])
 
 
 def is_right(what: str, verdict: str, names: str) -> bool:
-    """Whether a verdict fits what was hidden; `names` are of the first, its class and more."""
+    """Whether a verdict fits the hidden effect; `names` are of the first, its class and more."""
     match what:
         case "none":
             return verdict == "nothing_missing"
@@ -122,7 +122,7 @@ def _judge(
 
 
 def _strength(found: Explained, told: dict[str, Any], top: dict[str, Any]) -> str:
-    """Counts whether the strength is close to the truth and in its interval, and says it."""
+    """Counts whether the strength is close to the truth and in its interval, and reports it."""
     strength = strength_of(told, top)
     if strength is None:
         return ""
@@ -135,7 +135,7 @@ def _strength(found: Explained, told: dict[str, Any], top: dict[str, Any]) -> st
 def strength_of(
     told: dict[str, Any], top: dict[str, Any]
 ) -> tuple[str, float, float, float, float] | None:
-    """What was hidden, its strength, the strength that was found, and its interval."""
+    """The hidden effect, its strength, the strength found, and its interval."""
     for key, true in told.get("hidden", {}).items():
         for symbol, figure in top.get("parameters", {}).items():
             if symbol.rpartition(".")[2] == STRENGTHS.get(key):

@@ -1,7 +1,7 @@
 """The monitor on a folder of recordings: quiet on healthy ones, friction named, faults noticed.
 
 Commissioning gets the chirp and the recordings `healthy_*` and `friction_*` with the generator
-locked. Excitations that are hard (`hard_*`) are counted apart.
+locked. Hard excitations (`hard_*`) are counted separately.
 """
 
 import statistics
@@ -13,18 +13,18 @@ from benchmarks.family.rig_folder import RigFolder, Tally, answer, command
 FRICTION = ("dry_friction", "stiction")
 ALARM = ("departure", "other_fault", *FRICTION)
 EARLY_S = 0.02
-"""An alarm that much before a fault still counts as caused by it: sampling and rounding."""
+"""Largest time of an alarm before its fault that sampling and rounding can cause."""
 RATE = 256.0
 
 
 @dataclass
 class Watched:
-    """What the monitor said about a folder.
+    """The monitor's results for a folder.
 
     Attributes:
         tally: quiet, noticed, named, other faults; `hard ...` for the hard excitations.
-        to_alarm, to_name: latencies after friction begins [ms], hard ones left out.
-        miscalled: other faults that were called friction.
+        to_alarm, to_name: latencies after friction begins [ms], without hard ones.
+        miscalled: other faults named friction.
         lines: one for each recording.
     """
 

@@ -49,7 +49,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of it."""
+    """Its outcome."""
 
     case: Case
     noticed: bool
@@ -108,7 +108,7 @@ def _thesis_case() -> Iterator[Row]:
 
 
 def _mixed(structure: Structure, record: Record) -> Iterator[Row]:
-    """What goes wrong when the data before the damage are used too."""
+    """The error if data before the damage are used as well."""
     for words, weighting in (("whole record", "uniform"), ("late data weighted", "exponential:-1")):
         try:
             found = identify("quasilinearization", structure, record, weighting=weighting)

@@ -1,4 +1,4 @@
-"""Identification of structures beside the published tables of W. B. Dunbar's 1999 thesis.
+"""Identification of structures compared with the published tables of W. B. Dunbar's 1999 thesis.
 
 Records of the rows "best method" are made by `sim_plant`, with other equations and finer steps.
 Those of the rows "as published" have the thesis's own integrator and step
@@ -84,7 +84,7 @@ def _as_published(published: Published) -> Row:
 
 
 def _beside_first(found: Identification, published: Published) -> tuple[str, bool]:
-    """How near the first iteration comes to the printed one, and whether that is near enough."""
+    """Difference of the first iteration from the published one, and whether it is small enough."""
     if not published.iterations:
         return "", True
     first = np.array(published.iterations[0])

@@ -1,1 +1,1 @@
-"""The workbench in a browser: how fast it shows and answers, and that nothing is lost."""
+"""The workbench in a browser: speed of display and replies, and safety against kills."""

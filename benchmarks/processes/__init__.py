@@ -1,1 +1,1 @@
-"""Real processes on a real bus: latency, and samples that are lost."""
+"""Real processes on a real bus: latency, and lost samples."""

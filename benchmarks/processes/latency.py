@@ -1,11 +1,11 @@
-"""From the last byte of a frame on the serial line to its estimate in another process.
+"""Latency from the last byte of a frame on the serial line to its estimate in another process.
 
     device ─pty─▶ daq ─▶ router ─▶ monitor ─▶ router ─▶ subscriber
 
-The device notes the time before it writes a frame, the subscriber the time after it has decoded the
-estimate, both on the clock that all processes of the machine share. Beside them runs a bare loop
-that sleeps for one sample period: how late it wakes is the machine's own jitter, which no
-software on it can undercut.
+The device records the time before it writes a frame, the subscriber the time after it has decoded
+the estimate, both on the clock shared by all processes of the machine. A bare loop that sleeps for
+one sample period runs in parallel: its lateness is the machine's jitter, a lower limit for any
+software.
 """
 
 import signal
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 PERIOD_MS = 1000.0 / 256.0
 WARM_UP = 2.0
-"""Start of the run that is not counted: processes come up and settle [s]."""
+"""Start-up time that is not counted [s]."""
 
 
 def run(quick: bool) -> list[Row]:
@@ -88,13 +88,13 @@ def matched(
     """Latencies [ms] of the samples sent, from times by number; jitter [ms]; how many are missing.
 
     Args:
-        sent: shape (n,), when frame k was written [ns].
-        got: shape (m, 2), number of a sample and when its estimate was there [ns].
+        sent: shape (n,), time at which frame k was written [ns].
+        got: shape (m, 2), number of a sample and arrival time of its estimate [ns].
         late: shape (k,), lateness of the bare loop [ns].
     """
     received = np.full(len(sent), -1, np.int64)
     known = got[got[:, 0] < len(sent)]
-    # Written backwards, so that of an estimate that came twice the first counts.
+    # Written backwards, so that the first of two equal estimates counts.
     received[known[::-1, 0]] = known[::-1, 1]
     counted = np.arange(int(WARM_UP * 256), len(sent))
     there = counted[received[counted] >= 0]
@@ -103,7 +103,7 @@ def matched(
 
 
 def device(config: Path, out: Path, stop: threading.Event) -> None:
-    """The simulated rig on its serial line, noting when each frame is written."""
+    """The simulated rig on its serial line, recording the time of each frame."""
     from rigwatch.wire.rig_config import load_rig
     from sim_plant.scenario import ScenarioRun, load_scenario
     from sim_plant.serve.pty_line import PtyLine
@@ -111,7 +111,7 @@ def device(config: Path, out: Path, stop: threading.Event) -> None:
     from sim_plant.serve.source import Device
 
     class NotingLine(PtyLine):
-        """A line that remembers when it was written to."""
+        """A line that records the times of writing."""
 
         times: list[int]
 
@@ -142,7 +142,7 @@ def _serve(server: "SerialServer", stop: threading.Event) -> None:
 
 
 def subscriber(config: Path, out: Path, stop: threading.Event) -> None:
-    """Notes when each sample's estimate is there."""
+    """Records the arrival time of each sample's estimate."""
     from rigwatch.wire.bus.connection import connect
     from rigwatch.wire.messages.topics import ESTIMATES
     from rigwatch.wire.rig_config import load_rig
@@ -160,7 +160,7 @@ def subscriber(config: Path, out: Path, stop: threading.Event) -> None:
 
 
 def jitter(_config: Path, out: Path, stop: threading.Event) -> None:
-    """How late a loop wakes that does nothing but sleep for one sample period."""
+    """Lateness of a loop that only sleeps for one sample period."""
     late: list[int] = []
     period = 1.0 / 256.0
     while not stop.is_set():

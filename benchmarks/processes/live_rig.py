@@ -27,7 +27,7 @@ class LiveRig:
     """Processes of one rig, all ended on leaving.
 
     Args:
-        folder: where configuration, model and recordings go.
+        folder: for configuration, model and recordings.
         needs_model: commission the simulated rig first, as the demonstration does.
     """
 
@@ -66,7 +66,7 @@ class LiveRig:
             raise TimeoutError(f"not all of {', '.join(names)} came up")
 
     def close(self) -> None:
-        """End all processes, in good order where they let themselves be ended."""
+        """End all processes, by a signal first and by a kill if necessary."""
         for process in reversed(self._running):
             process.send_signal(signal.SIGTERM)
         deadline = time.monotonic() + 5.0
@@ -78,7 +78,7 @@ class LiveRig:
 
 
 def _set_apart(path: Path) -> None:
-    """A port and a name of its own, so that no other rig on this machine is met on the bus."""
+    """A free port and a unique name, to avoid other rigs on this machine."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -88,7 +88,7 @@ def _set_apart(path: Path) -> None:
 
 @contextlib.contextmanager
 def live_rig(*, needs_model: bool = True) -> Iterator[LiveRig]:
-    """A rig in a folder of its own, gone afterwards."""
+    """A rig in a temporary folder."""
     with tempfile.TemporaryDirectory(prefix="rigwatch-bench-") as folder:
         rig = LiveRig(Path(folder), needs_model=needs_model)
         try:

@@ -1,11 +1,11 @@
-"""No sample disappears unreported, whoever is killed.
+"""Kills of processes: every sample is delivered or reported as lost.
 
     plant ─pty─▶ daq ─▶ router ─▶ two readers, each with a ledger on disk
                                 └▶ recorder ─▶ session
 
-Readers and recorder are killed (SIGKILL) in turn and started again, the router twice. Then every
-sample up to the newest that anybody has must stand in each ledger and in the recording, as
-delivered or as reported lost. The last moments before the end of the run are not counted.
+Readers and recorder are killed (SIGKILL) in turn and restarted, the router twice. Every sample up
+to the newest one received anywhere must then be in each ledger and in the recording, delivered or
+reported as lost. The last moments of the run are not counted.
 """
 
 import itertools
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 READERS = ("reader-1", "reader-2")
 END_OF_RUN = 512
-"""Samples that one ledger may end before another, since processes are ended one by one."""
+"""Allowed difference between the ends of two ledgers, as processes are ended one by one."""
 Spans = dict[int, list[tuple[int, int, bool]]]
 """By boot: first and last number of each stretch, and whether it was reported lost."""
 
@@ -44,7 +44,7 @@ def run(quick: bool) -> list[Row]:
 
 
 def end(spans: list[tuple[int, int, bool]]) -> int:
-    """The newest number that the stretches hold."""
+    """The newest number in the stretches."""
     return max(last for _, last, _ in spans)
 
 
@@ -70,7 +70,7 @@ def row(name: str, spans: Spans, newest: dict[int, int], kills: dict[str, int]) 
 
 
 def faults(spans: list[tuple[int, int, bool]]) -> tuple[int, int]:
-    """Numbers between the first and the last that stand nowhere, and numbers that stand twice."""
+    """Numbers between the first and the last that are missing, and numbers present twice."""
     missing = twice = 0
     following = min(first for first, _, _ in spans)
     for first, last, _ in sorted(spans):
@@ -115,7 +115,7 @@ def start(rig: LiveRig, name: str) -> "subprocess.Popen[bytes]":
 
 
 def read_ledger(path: Path) -> Spans:
-    """What a reader wrote down, across all its lives."""
+    """The ledger of a reader, across its restarts."""
     spans: Spans = {}
     for line in path.read_text(encoding="utf-8").splitlines(keepends=True):
         if line.endswith("\n"):
@@ -126,7 +126,7 @@ def read_ledger(path: Path) -> Spans:
 
 
 def read_recording(rig: LiveRig) -> Spans:
-    """What the recorder kept, and what it reported lost."""
+    """The samples recorded, and those reported lost."""
     from rigwatch.wire.messages.message_types import Gap, SampleBlock
     from rigwatch.wire.session.reader import open_session
 
@@ -143,7 +143,7 @@ def read_recording(rig: LiveRig) -> Spans:
 
 
 def reader(config: str, name: str, log: str) -> None:
-    """A reader that writes down what it gets, and continues there after it was killed."""
+    """A reader that writes a ledger and continues it after a kill."""
     from rigwatch.wire.bus.connection import connect
     from rigwatch.wire.delivery.sample_reader import SampleReader
     from rigwatch.wire.messages.message_types import Event
@@ -158,7 +158,7 @@ def reader(config: str, name: str, log: str) -> None:
 
 
 def _position(file: int) -> tuple[int, int] | None:
-    """The last sample written down in full; what a kill tore off is cut off."""
+    """The last complete entry; an incomplete one is removed."""
     text = os.pread(file, os.fstat(file).st_size, 0)
     whole = text[: text.rfind(b"\n") + 1]
     os.ftruncate(file, len(whole))

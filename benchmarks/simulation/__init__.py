@@ -1,1 +1,1 @@
-"""The engine's simulation with sensitivities beside other people's."""
+"""The engine's simulation with sensitivities compared with other simulators."""

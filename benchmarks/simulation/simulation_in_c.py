@@ -1,4 +1,4 @@
-"""The same simulation in C: SymPy's own C printer, `cc -O3 -march=native`, sizes known to it."""
+"""The same simulation in C: SymPy's C printer, `cc -O3 -march=native`, constant sizes."""
 
 import ctypes
 import shutil
@@ -70,7 +70,7 @@ void simulate(const double *u, double dt, long substeps, double hold, const long
 
 
 def in_c(task: Task) -> Simulator | None:
-    """The simulator; None where there is no compiler."""
+    """The simulator; None without a compiler."""
     compiler = shutil.which("cc")
     if compiler is None:
         return None

@@ -1,4 +1,4 @@
-"""The same simulation by CasADi, by JAX and by SciPy's LSODA, each in its own best form.
+"""The same simulation by CasADi, by JAX and by SciPy's LSODA, each in its fastest form.
 
 CasADi: one sample's Runge-Kutta steps as a function of states and sensitivities, accumulated over
 the samples and mapped over the windows, in its virtual machine and as C. JAX: `jit` of `vmap` of
@@ -42,14 +42,14 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
 
 
 def in_casadi_compiled(task: Task) -> Simulator | None:
-    """As C that CasADi prints and the system's compiler translates; None where there is none."""
+    """As C that CasADi prints and the system's compiler translates; None without a compiler."""
     compiler = shutil.which("cc")
     if compiler is None:
         return None
     flags = {"flags": ["-O3", "-march=native"], "cleanup": False}
     options = {"compiler": compiler, "linker": compiler, **flags}
     jit = {"jit": True, "jit_cleanup": False, "compiler": "shell", "jit_options": options}
-    # CasADi writes its files where it stands, and needs them until the code is loaded.
+    # CasADi writes its files to the working folder, and needs them until the code is loaded.
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         return in_casadi(task, jit)
 
@@ -185,7 +185,7 @@ def in_jax(task: Task) -> Simulator:
 
     def simulate() -> Result:
         y, slopes = every(*arguments)
-        # Arrays of NumPy are there only once they have been computed.
+        # Converting to NumPy waits until the arrays have been computed.
         return np.asarray(y), np.asarray(slopes)
 
     return simulate
@@ -199,7 +199,7 @@ def _in_jax(task: Task, expressions: Sequence[sympy.Expr]) -> Callable[..., Any]
 
 
 def in_scipy(task: Task) -> Simulator:
-    """LSODA at a relative tolerance of 1e-8 that picks its own steps."""
+    """LSODA at a relative tolerance of 1e-8 with adaptive steps."""
     rates = sympy.lambdify(task.names(), task.rates(), modules="math", cse=True)
     reads = numpy_function([s.name for s in task.names()], task.reads())
     free = task.free()

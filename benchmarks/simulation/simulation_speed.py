@@ -1,9 +1,9 @@
-"""Simulation with exact sensitivities: our kernel, the same in C, CasADi, JAX and SciPy.
+"""Simulation with exact sensitivities: rigwatch, the same in C, CasADi, JAX and SciPy.
 
-The problem is one for all: 20 windows of 256 samples (20 s at 256 Hz), each from its own initial
+All solve the same problem: 20 windows of 256 samples (20 s at 256 Hz), each from its own initial
 state, four classical Runge-Kutta steps a sample with inputs on straight lines between samples, and
-the derivatives of all outputs by all free parameters and initial states. SciPy's LSODA picks its
-own steps and gets the derivatives from differences, as it has none.
+the derivatives of all outputs by all free parameters and initial states. SciPy's LSODA
+uses adaptive steps and finite differences, as it has no derivatives.
 
     python -m benchmarks simulation_speed
 """
@@ -32,11 +32,11 @@ from tools.benchmark_table import Row
 
 LENGTH = 256
 BAR = 1.5
-"""Our time over that of C."""
+"""Time of rigwatch over that of C."""
 EQUAL = 1e-9
 """Largest difference of outputs and sensitivities, over the largest of their channel."""
 EQUAL_ADAPTIVE = 1e-4
-"""The same for outputs alone, where steps are the solver's own."""
+"""The same for outputs alone, with adaptive steps."""
 
 
 def oscillator(windows: int) -> Task:
@@ -61,7 +61,7 @@ def pneumatic(windows: int) -> Task:
 
 
 def _task(name: str, system: System, values: dict[str, float], size: float, windows: int) -> Task:
-    """20 s of excitation from 0.25 to 8 Hz; windows start from where a run from rest passes."""
+    """20 s of excitation from 0.25 to 8 Hz; windows start from states of a run from rest."""
     compiled, rng = compile_system(system), np.random.default_rng(1)
     n, dt = LENGTH * 20, 1 / 256
     lines = np.arange(0.25, 8, 0.25)
@@ -78,7 +78,7 @@ def _task(name: str, system: System, values: dict[str, float], size: float, wind
 
 
 def ours(task: Task) -> Simulator:
-    """The engine's own."""
+    """The simulation of rigwatch."""
     compiled = compile_system(task.system)
 
     def simulate() -> Result:
@@ -92,7 +92,7 @@ def ours(task: Task) -> Simulator:
 
 
 def timed(simulators: dict[str, Simulator], repeats: int) -> dict[str, float]:
-    """Median seconds of each, turn by turn so that a busy moment hits all of them."""
+    """Median seconds of each, in turns, so that other load affects all of them."""
     taken: dict[str, list[float]] = {name: [] for name in simulators}
     for _ in range(repeats):
         for name, simulate in simulators.items():
@@ -142,7 +142,7 @@ def _rows(task: Task, repeats: int) -> Iterator[Row]:
     for name in list(fast)[1:]:
         apart = difference(fast[name](), expected)
         yield _rival(task, name, seconds, f"ready in {ready[name]:.2f} s", apart, EQUAL)
-    # LSODA takes seconds: one window stands for all.
+    # LSODA takes seconds, so only one window is timed.
     few = replace(task, starts=task.starts[1:2], initial=task.initial[1:2])
     slow = in_scipy(few)
     begin = time.perf_counter()

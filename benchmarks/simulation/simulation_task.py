@@ -1,4 +1,4 @@
-"""What every simulator of `simulation_speed` is given, and what it hands back."""
+"""Input and output of every simulator of `simulation_speed`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class Task:
 
     @property
     def hold(self) -> float:
-        """1 where inputs are straight lines between samples, 0 where they are steps."""
+        """1 for inputs that are linear between samples, 0 for held ones."""
         return 1.0 if self.system.model.hold != "zero" else 0.0
 
     def names(self) -> list[sympy.Symbol]:
@@ -71,6 +71,6 @@ class Task:
         return [e.subs(probes) for e in expressions]
 
     def free(self) -> list[int]:
-        """Places of the free parameters among all."""
+        """Indices of the free parameters among all."""
         names = list(self.system.parameters)
         return [names.index(name) for name in self.system.free]

@@ -1,1 +1,1 @@
-"""The monitor on simulated rigs: alarms that are due, alarms that are false, and speed."""
+"""The monitor on simulated rigs: correct alarms, false alarms, and speed."""

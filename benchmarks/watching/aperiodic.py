@@ -1,7 +1,7 @@
-"""Drives that never repeat: false alarms in friction-free running, and how soon friction shows.
+"""Aperiodic drives: false alarms in friction-free running, and the delay of detecting friction.
 
-There is no healthy period to compare with, so the residual itself is judged. Of the fault it is
-said that it is there, not what it is: no name counts as right here, any name as wrong.
+There is no healthy period to compare with, so the residual itself is judged. A fault is detected
+but not named: no name counts as right here, any name as wrong.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ _NAMES = (DRY_FRICTION, STICTION, OTHER_FAULT, EXCITATION_CHANGED)
 
 @dataclass(frozen=True)
 class Noticed:
-    """When friction of one level was noticed, over all seeds [s]; None where it was not."""
+    """Delay until friction of one level was detected, over all seeds [s]; None if it was not."""
 
     delays: list[float | None]
     named: int

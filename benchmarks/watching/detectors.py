@@ -1,7 +1,7 @@
-"""What the detectors of docs/theory.md 3 see on the simulated rig, beside the friction scheme.
+"""The detectors of docs/theory.md 3 on the simulated rig, compared with the friction scheme.
 
 All four run in one monitor on the same samples with the same persistence, calibrated from one model
-file. A delay counts from the sample at which the fault comes to the one that raises the alarm.
+file. A delay is counted from the onset of the fault to the sample that raises the alarm.
 """
 
 from collections.abc import Iterator

@@ -1,8 +1,8 @@
-"""The seven experiments of Table 5.2 on the simulated rig: when each is detected, and as what.
+"""The seven experiments of Table 5.2 on the simulated rig: detection time and verdict of each.
 
-Until the velocity reverses, dry friction F·sgn v is a constant force, and no residual can tell the
-two apart. So no method can name it before the next reversal after the onset: that bound is computed
-from the true motion and stands beside the time at which friction was named.
+Until the velocity reverses, dry friction F·sgn v is a constant force, and no residual can
+distinguish the two. No method can therefore name it before the first reversal after the onset: this
+bound is computed from the true motion and given with the time at which friction was named.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ SEEDS = 20
 
 @dataclass(frozen=True)
 class Outcome:
-    """One run: delays after the fault's onset [s], None where it did not come."""
+    """One run: delays after the fault's onset [s], None if there was none."""
 
     early: int
     detected: float | None

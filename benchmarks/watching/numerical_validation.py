@@ -30,14 +30,14 @@ JOINT = 4.0
 TOP_SPEED = 0.1
 """Of the faulty plant, about."""
 SETTLED = FAULT_TIME + WINDOW * STEP
-"""From here on the window holds nothing but faulty data [s]."""
+"""Time from which the window contains only faulty data [s]."""
 FILTER_SEEDS = range(900, 920)
 VELOCITY_SHARE = 0.2
 """Share of the measured velocity in the one whose sign is taken; the rest is the integrated
 acceleration. Less of it lets the trapezoids' errors at the jumps last longer, more lets noise in.
 """
 JUDGED = range(1000, 1100)
-"""Seeds of noise; none of them had a part in choosing anything here."""
+"""Seeds of noise; none of them was used to choose anything here."""
 PUBLISHED = {
     1: "signature (0, 10), tracks within 1.6 s",
     2: "signature (1, 0.2), tracks within 1.5 s",
@@ -140,7 +140,7 @@ def _rows(case: int, seeds: range) -> list[Row]:
     tracks = [track(validation(case, seed), friction) for seed in seeds]
     signature = np.array([friction.coulomb, friction.gamma])
     settled = np.array([t.theta[t.time >= SETTLED].mean(axis=0) for t in tracks])
-    # What a signature below 1 is held against: for θ2, the Coulomb friction at the top speed.
+    # Reference of a signature below 1: for θ2, the Coulomb friction at the top speed.
     near_zero = np.array([1.0, 1.0 / TOP_SPEED])
     error = np.abs(settled - signature) / np.where(signature < 1.0, near_zero, signature)
     late = [_delay(t, t.limits.left(t.theta) > 0.0) for t in tracks]

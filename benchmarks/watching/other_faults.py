@@ -1,5 +1,5 @@
-"""Other faults: each is alarmed and none is called dry friction. The confusion matrix over every
-effect the rig declares.
+"""Other faults: each raises an alarm and none is named dry friction. The confusion matrix over
+all effects of the rig.
 """
 
 from collections import Counter
@@ -22,7 +22,7 @@ _LIMITS = ("saturation", "rate_limit")
 
 @dataclass(frozen=True)
 class Case:
-    """One fault under one excitation, and what the monitor made of it.
+    """One fault under one excitation, and the monitor's result.
 
     `alarmed` is a departure or a clipped channel; the verdict names the departure.
     """

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from monitor.clipping.flat_top import NEVER, forget_flat_tops, judge_flat_tops, new_flat_tops
+from monitor.clipping.flat_top import NEVER, judge_flat_tops, new_flat_tops, reset_flat_tops
 from monitor.decision import rules_for
 from monitor.model import RigModel
 from monitor.signals import SENSOR_CLIPPED, Admitted, Condition
@@ -31,7 +31,7 @@ class Clipping:
         if not self._names:
             return ()
         if admitted.missing < 0:
-            forget_flat_tops(self._state)
+            reset_flat_tops(self._state)
         elif admitted.missing:
             self._state.last[:] = np.nan
         score = np.zeros(admitted.signals.shape)

@@ -65,12 +65,12 @@ def new_flat_tops(channels: int) -> FlatTops:
         np.zeros((channels, 2), np.int64),
         np.zeros((channels, 2), np.int64),
     )
-    forget_flat_tops(state)
+    reset_flat_tops(state)
     return state
 
 
 @kernel()
-def forget_flat_tops(state: FlatTops) -> None:
+def reset_flat_tops(state: FlatTops) -> None:
     """Reset to the initial state; the counts stay."""
     state.score[:, :] = 0.0
     state.extreme[:, :, :] = -np.inf
@@ -102,7 +102,7 @@ def judge_flat_tops(  # noqa: PLR0917
             if good[k, c]:
                 for end in range(2):
                     side = values[k, c] if end == 0 else -values[k, c]
-                    _try(side, c, end, chance[c], limit, state)
+                    _trial(side, c, end, chance[c], limit, state)
                 state.last[c] = values[k, c]
             else:
                 state.last[c] = np.nan
@@ -115,7 +115,7 @@ def judge_flat_tops(  # noqa: PLR0917
 
 
 @njit()
-def _try(  # noqa: PLR0917
+def _trial(  # noqa: PLR0917
     side: float, c: int, end: int, chance: float, limit: float, state: FlatTops
 ) -> None:
     """One reading of one channel, for one end of the range: `side` is x or -x."""

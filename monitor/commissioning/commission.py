@@ -140,10 +140,10 @@ def _with_shift(plant: TransferPlant, healthy: Sequence[Recording], rate: float)
     """
     leading = int(np.argmax(np.array(plant.b) != 0.0))
     candidates = [TransferPlant(b=plant.b, a=plant.a, shift=shift) for shift in range(leading + 1)]
-    return max(candidates, key=lambda plant: sum(_likeness(plant, r, rate) for r in healthy))
+    return max(candidates, key=lambda plant: sum(_correlation(plant, r, rate) for r in healthy))
 
 
-def _likeness(plant: TransferPlant, healthy: Recording, rate: float) -> float:
+def _correlation(plant: TransferPlant, healthy: Recording, rate: float) -> float:
     """Correlation of modelled and measured acceleration, without a recording's first quarter."""
     signals = _signals(healthy, plant, rate)[:, healthy.channel("voltage").size // 4 :]
     return float(np.corrcoef(signals[2], signals[3])[0, 1])

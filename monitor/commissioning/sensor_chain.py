@@ -58,11 +58,11 @@ def fit_sensor(
         rate: sample rate [Hz].
     """
     names = sorted(sensor_parameters(model))
-    seen = _behind_the_balance(model, frozenset(names))
-    if not names or seen is None:
+    behind = _behind_the_balance(model, frozenset(names))
+    if not names or behind is None:
         return {}
-    compiled = compile_system(compose(seen))
-    start = np.array([state.start for state in seen.states.values()])[None, :]
+    compiled = compile_system(compose(behind))
+    start = np.array([state.start for state in behind.states.values()])[None, :]
     filters = high_pass(CORNER, rate)
 
     def left(logs: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ from numba import njit
 
 from monitor.decision.departure import moved, position_limit, voltage_limit
 from monitor.decision.estimates import spread_of_change
-from monitor.decision.isolation import HISTORY, swing_of_voltage_change, weigh
+from monitor.decision.isolation import HISTORY, evidence_of, swing_of_voltage_change
 from monitor.decision.isolation_verdict import Seen, verdict
 from monitor.decision.kernel_state import (  # fmt: skip
     DEVIATION,
@@ -30,7 +30,7 @@ from monitor.decision.kernel_state import (  # fmt: skip
     V,
     WatchState,
     X,
-    forget,
+    clear,
 )
 from monitor.reference import (
     APERIODIC,
@@ -81,7 +81,7 @@ def follow(  # noqa: PLR0917
         counts.excited = counts.excited + 1 if excited else 0
         if counts.excited >= LOOKS_AT_NEW_EXCITATION:
             restart(ref, True)
-            forget(state, rules.window)
+            clear(state, rules.window)
 
 
 @njit(inline="always")
@@ -114,7 +114,7 @@ def _look(seq: int, rules: Rules, ref: Reference, state: WatchState) -> None:
         held[VERDICT] = NEW_EXCITATION if louder else NO_VERDICT
         return
     cycle = max(SHORTEST_CYCLE, min(ref.counts.cycle, LONGEST_CYCLE))
-    evidence = weigh(state.history, ref, seq, min(since, HISTORY), min(since, 2 * cycle))
+    evidence = evidence_of(state.history, ref, seq, min(since, HISTORY), min(since, 2 * cycle))
     held[EXPLAINED], held[SHARE] = evidence.explained, evidence.share
     held[RHO], held[REST] = evidence.rho, evidence.rest
     held[TOGETHER] = evidence.together

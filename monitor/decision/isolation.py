@@ -82,7 +82,7 @@ def new_history(b: FloatArray, a: FloatArray) -> History:
 
 
 @njit(inline="always")
-def remember(  # noqa: PLR0917
+def store_sample(  # noqa: PLR0917
     history: History, y: float, g1: float, g2: float, speed: float, rest: float, volts: float
 ) -> None:
     """Store one sample."""
@@ -94,7 +94,7 @@ def remember(  # noqa: PLR0917
 
 
 @njit()
-def weigh(history: History, ref: Reference, seq: int, since: int, count: int) -> Evidence:
+def evidence_of(history: History, ref: Reference, seq: int, since: int, count: int) -> Evidence:
     """Evidence of the newest `count` samples.
 
     Args:

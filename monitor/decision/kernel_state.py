@@ -103,7 +103,7 @@ def new_watch_state(
 
 
 @njit()
-def forget(state: WatchState, window: int) -> None:
+def clear(state: WatchState, window: int) -> None:
     """Reset to the initial state; the least squares then spans `window` samples."""
     restart_window(state.window, window)
     restart_energies(state.energies)

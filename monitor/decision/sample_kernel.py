@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from monitor.decision.departure import departed
 from monitor.decision.episode import follow
 from monitor.decision.estimates import estimate
-from monitor.decision.isolation import HISTORY, remember
+from monitor.decision.isolation import HISTORY, store_sample
 from monitor.decision.kernel_state import (  # fmt: skip
     ARMED_FLAG,
     CHANGE,
@@ -34,7 +34,7 @@ from monitor.decision.kernel_state import (  # fmt: skip
     WatchState,
     X,
     Y,
-    forget,
+    clear,
 )
 from monitor.estimation import FILL, Window, add, push
 from monitor.reference import (
@@ -85,13 +85,13 @@ def watch_block(  # noqa: PLR0917
         # A window across a gap would mix two motions, so everything collected is dropped.
         if code[k] == RESTART or code[k] == NEW_BOOT:
             restart(ref, code[k] == NEW_BOOT)
-            forget(state, rules.window)
+            clear(state, rules.window)
         good = code[k] == GOOD or code[k] == RESTART or code[k] == NEW_BOOT
         if good and ref.counts.mode != ARMED:
             observe(ref, arming, seq, data[k])
             if ref.counts.mode == ARMED:
                 # Only now is the period known, and with it the length of whole-period windows.
-                forget(state, _window_length(rules.window, ref, state.window))
+                clear(state, _window_length(rules.window, ref, state.window))
         elif good:
             _judge(data[k], seq, position_valid[k], rules, ref, state)
         elif code[k] == HELD and ref.counts.mode == ARMED:
@@ -118,7 +118,7 @@ def _skip(state: WatchState) -> None:
     """Process a sample that does not count, so that windows keep their length in time."""
     push(state.window, np.zeros(3))
     add(state.energies, np.zeros(5))
-    remember(state.history, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    store_sample(state.history, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if state.counts.episode > 0:
         state.counts.episode += 1
 
@@ -161,7 +161,7 @@ def _take(
     row[0], row[1], row[2] = data[G1], data[G2], y
     push(state.window, row)
     rest = _at_rest(data, ref, state)
-    remember(state.history, y, data[G1], data[G2], data[VELOCITY], rest, signals[V])
+    store_sample(state.history, y, data[G1], data[G2], data[VELOCITY], rest, signals[V])
     state.held[CHANGE] = y
 
 

@@ -12,14 +12,14 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
 
-def forgetting(corner: float, sample_rate: float) -> float:
+def decay_factor(corner: float, sample_rate: float) -> float:
     """β of a corner [Hz]."""
     return float(1.0 / (1.0 + 2.0 * np.pi * corner / sample_rate))
 
 
 def high_passed(values: FloatArray, corner: float, sample_rate: float) -> FloatArray:
     """Filter a whole signal from rest, shape (n,)."""
-    beta = forgetting(corner, sample_rate)
+    beta = decay_factor(corner, sample_rate)
     return TransferFunction.of([beta, -beta], [1.0, -beta]).simulate(values - values[0])
 
 
@@ -28,7 +28,7 @@ def leaky(function: TransferFunction, corner: float, sample_rate: float) -> Tran
 
     Above the corner nothing changes; an integrator becomes a leaky one.
     """
-    beta = forgetting(corner, sample_rate)
+    beta = decay_factor(corner, sample_rate)
     poles = function.poles
     slow = np.abs(poles) > beta
     poles[slow] *= beta / np.abs(poles[slow])

@@ -32,7 +32,7 @@ from monitor.detectors.adaptive_threshold import (
     threshold_sample,
 )
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
-from monitor.detectors.high_pass import forgetting
+from monitor.detectors.high_pass import decay_factor
 from monitor.signals import DEAD, HELD, NEW_BOOT, RESTART
 from rigwatch.physics.transfer import TransferFunction, filter_sample
 from rigwatch.wire.arrays import FloatArray
@@ -97,7 +97,7 @@ def small_signal(  # noqa: PLR0917 -- a compiled kernel takes no keywords
 
 
 @kernel()
-def _forget_start(forget: float, state: ParityState, residual: float) -> float:
+def _remove_initial_state(forget: float, state: ParityState, residual: float) -> float:
     """The residual without the effect of the model's initial state."""
     if forget == 1.0:
         return residual
@@ -151,7 +151,7 @@ def parity_block(  # noqa: PLR0917 -- a compiled kernel takes no keywords
         if moving_average:
             r = filter_sample(a, one, state.output, y) - filter_sample(b, one, state.input, u)
         else:
-            r = _forget_start(point[0], state, y - filter_sample(b, a, state.input, u))
+            r = _remove_initial_state(point[0], state, y - filter_sample(b, a, state.input, u))
         bound = threshold_sample(threshold, state.threshold, u)
         state.counts[0] += 1
         state.counts[1] = 0 if code[k] == HELD else state.counts[1] + 1
@@ -192,7 +192,7 @@ class ParityDetector(SampleDetector):
         super().__init__(name, (channels.input, channels.output))
         self._moving_average, self._function = moving_average, function.padded()
         self._threshold = threshold.coefficients(sample_rate)
-        forget = forgetting(point.corner, sample_rate)
+        forget = decay_factor(point.corner, sample_rate)
         self._point = np.array([forget, point.u0, point.y0, float(point.settle)])
         self._state = _new_state(self._function[0].size - 1)
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor.detectors.detector import Channels, Judgement, SampleDetector, Series
-from monitor.detectors.high_pass import forgetting, high_pass_sample, leaky
+from monitor.detectors.high_pass import decay_factor, high_pass_sample, leaky
 from monitor.detectors.innovation_test import NisWindow, clear_nis, new_nis_window, push_nis
 from monitor.detectors.kalman import augmented_matrices, generalised_update, kalman_update
 from monitor.detectors.small_matrices import (
@@ -260,7 +260,7 @@ class UnknownInputDetector(SampleDetector):
             "unknown_input", (*names, channels.acceleration) if with_acceleration else names
         )
         self._noise = noise
-        self._traits = (noise.settle, forgetting(noise.corner, sample_rate))
+        self._traits = (noise.settle, decay_factor(noise.corner, sample_rate))
         if noise.corner > 0.0:
             function = leaky(function, noise.corner, sample_rate)
         self._model = filter_model(

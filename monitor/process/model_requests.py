@@ -20,7 +20,7 @@ from rigwatch.wire.messages import Identity, ModelChange
 class _Waiting:
     """A request whose sender waits for the answer."""
 
-    wish: ModelRequest
+    request: ModelRequest
     identity: Identity
     withdrawn: bool = False
     answered: threading.Event = field(default_factory=threading.Event)
@@ -60,7 +60,7 @@ class ModelDesk:
             if one.withdrawn:
                 continue
             try:
-                found.append(self._grant(one.wish, one.identity, place))
+                found.append(self._apply(one.request, one.identity, place))
                 text = f"in force from sample {place.seq} of boot {place.boot} on"
                 one.answer = ModelReply(True, text, place.boot, place.seq)
             except RigwatchError as error:
@@ -89,35 +89,35 @@ class ModelDesk:
         one.withdrawn = not one.answered.wait(0.8 * PATIENCE)
         return [msgspec.json.encode(one.answer)]
 
-    def _grant(self, wish: ModelRequest, identity: Identity, place: Place) -> ModelChange:
+    def _apply(self, request: ModelRequest, identity: Identity, place: Place) -> ModelChange:
         """Apply one request; the file is written first, so the model survives a restart."""
         previous = self._rig.model
-        model = self._wanted(wish)
+        model = self._requested_model(request)
         check_can_follow(previous, model)
-        author = versions.Author(wish.user, wish.text, identity)
-        if wish.action == "rollback":
+        author = versions.Author(request.user, request.text, identity)
+        if request.action == "rollback":
             versions.roll_back(self._path, place.t_ns, author)
         else:
-            versions.install(self._path, wish.model, place.t_ns, author)
+            versions.install(self._path, request.model, place.t_ns, author)
         self._rig.adopt(model)
         return ModelChange(
             place.device,
             place.boot,
             place.seq,
             place.t_ns,
-            wish.user,
-            wish.text or wish.action,
+            request.user,
+            request.text or request.action,
             model_text(model),
             model_text(previous),
             identity,
         )
 
-    def _wanted(self, wish: ModelRequest) -> RigModel:
-        if wish.action == "rollback":
+    def _requested_model(self, request: ModelRequest) -> RigModel:
+        if request.action == "rollback":
             return parse_model(versions.version_before(self._path), str(self._path))
-        return parse_model(wish.model, "the new model")
+        return parse_model(request.model, "the new model")
 
 
-def _bounded(wish: ModelRequest) -> ModelRequest:
+def _bounded(request: ModelRequest) -> ModelRequest:
     """The request with user and reason limited in length for the version records."""
-    return replace(wish, user=wish.user[:LONGEST_NAME], text=wish.text[:LONGEST_TEXT])
+    return replace(request, user=request.user[:LONGEST_NAME], text=request.text[:LONGEST_TEXT])

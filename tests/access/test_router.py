@@ -60,7 +60,7 @@ def test_a_revocation_and_a_new_certificate_are_in_force_without_a_restart(
     assert "bob" in heard_from(senders, monitor)
 
 
-def test_refused_connections_and_denied_messages_are_counted_and_told(
+def test_refused_connections_and_denied_messages_are_counted_and_reported(
     rig: SecuredRig, tmp_path: Path
 ) -> None:
     observer = rig.bus("recorder")

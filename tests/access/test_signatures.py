@@ -129,12 +129,12 @@ def test_alarm_and_model_commands_are_signed_for_all_receivers(keys: Path) -> No
     ]
     ann = operator_bus(network, keys, "ann")
     command = signed(ann, AlarmCommand("*", "acknowledge", "ann", 5))
-    wish = signed(ann, ModelRequest("rollback", "", "ann", "worse"))
+    change = signed(ann, ModelRequest("rollback", "", "ann", "worse"))
     for check in checks:
         assert check.judge(command).identity == "proved"
-        assert check.judge(wish).identity == "proved"
-        assert "signed by ann, expected bob" in check.judge(replace(wish, user="bob")).refusal
-        assert check.judge(replace(command, proof=wish.proof)).refusal
+        assert check.judge(change).identity == "proved"
+        assert "signed by ann, expected bob" in check.judge(replace(change, user="bob")).refusal
+        assert check.judge(replace(command, proof=change.proof)).refusal
         assert check.refused == 2
     unsecured = CommandCheck(network.bus("bench", "monitor"), "")
     assert unsecured.judge(AlarmCommand("*", "reset", "ann", 1)).identity == "not proved"

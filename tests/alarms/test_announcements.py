@@ -196,7 +196,7 @@ def test_a_run_continues_with_the_next_sample_of_the_same_boot_only(boot, seq):
     ]
 
 
-def test_a_block_without_samples_says_nothing():
+def test_a_block_without_samples_reports_nothing():
     assert AlarmManager().update("rig", 7, 0, np.zeros(0, np.int64), []) == []
 
 
@@ -345,7 +345,7 @@ def test_the_shelf_is_over_before_a_command_of_that_time_is_obeyed():
     assert [state for _, state, _ in steps(said)] == ["unacknowledged", "acknowledged"]
 
 
-def test_a_command_to_every_channel_says_nothing_of_those_it_does_not_change():
+def test_a_command_to_every_channel_reports_nothing_of_those_it_does_not_change():
     alarms = AlarmManager()
     for seq, channel in enumerate("ab"):
         alarms.report(f"sensor_stuck.{channel}", at(seq), active=True)
@@ -432,7 +432,7 @@ def test_a_reset_of_the_flood_acknowledges_nothing():
     }
 
 
-def test_the_end_of_a_flood_is_told_with_its_instant_and_its_alarms():
+def test_the_end_of_a_flood_is_reported_with_its_instant_and_its_alarms():
     alarms = flooded()
     alarms.take_changes()
     ends = 10 * 256 + 10 * MINUTE
@@ -450,7 +450,7 @@ def test_the_end_of_a_flood_is_told_with_its_instant_and_its_alarms():
     assert steps(said) == [("sensor_stuck.ch12", "cleared_unacknowledged", ends + 100)]
 
 
-def test_after_a_flood_the_next_one_is_told_again():
+def test_after_a_flood_the_next_one_is_reported_again():
     alarms = flooded()
     ends = 10 * 256 + 10 * MINUTE
     alarms.report("gap", at(ends), active=False)
@@ -465,7 +465,7 @@ def test_after_a_flood_the_next_one_is_told_again():
 # ---- series -----------------------------------------------------------------------------------
 
 
-def test_the_end_of_a_series_is_told_with_its_instant():
+def test_the_end_of_a_series_is_reported_with_its_instant():
     alarms = AlarmManager()
     for i in range(6):
         alarms.report("link", at(256 * i), active=True)

@@ -124,7 +124,7 @@ def test_the_operators_name_time_and_text_are_kept():
         ("link", "shelve", "ann", "critical"),
     ],
 )
-def test_commands_that_cannot_be_obeyed_say_why(name, action, user, why):
+def test_commands_that_cannot_be_obeyed_give_the_reason(name, action, user, why):
     alarms = AlarmManager()
     run(alarms, [condition("departure", spell(20, (0, 20)))])
     alarms.report("link", Occasion("rig", t_ns=order("", "reset", at=30).t_ns), active=True)

@@ -81,7 +81,9 @@ def test_a_command_runs_on_the_cluster(cluster, tmp_path, capsys):
     assert (tmp_path / "dask.jsonl").read_bytes() == (tmp_path / "here.jsonl").read_bytes()
 
 
-def test_at_last_a_scheduler_that_goes_away_is_said_and_results_are_kept(cluster, files, tmp_path):
+def test_at_last_a_scheduler_that_goes_away_is_reported_and_results_are_kept(
+    cluster, files, tmp_path
+):
     target = tmp_path / "out.jsonl"
     seen: list[object] = []
 

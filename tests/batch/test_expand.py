@@ -24,7 +24,7 @@ def test_each_unit_is_there_once_in_order_of_names(tmp_path):
     assert expand(given) == [str(tmp_path / name) for name in names]
 
 
-def test_what_is_not_there_is_said(tmp_path):
+def test_what_is_not_there_is_reported(tmp_path):
     with pytest.raises(BatchError, match="no such file or folder"):
         expand([tmp_path / "none.mcap"])
     with pytest.raises(BatchError, match="found nothing to work on"):

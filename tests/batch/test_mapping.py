@@ -171,7 +171,7 @@ def test_a_setting_that_is_a_file_counts_with_its_content(tmp_path):
         ("dask://127.0.0.1:1", "no scheduler of this version answers"),
     ],
 )
-def test_an_executor_that_is_not_there_is_said_plainly(where, said, monkeypatch):
+def test_an_executor_that_is_not_there_is_reported_plainly(where, said, monkeypatch):
     monkeypatch.setattr("rigwatch.batch.executors.CONNECT_S", 0.5)
     with pytest.raises(BatchError, match=said), executor_on(where):
         pass

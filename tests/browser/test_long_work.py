@@ -60,7 +60,7 @@ async def done(desk: Desk, task: str, **arguments: object) -> str:
     return desk.job.state
 
 
-def test_progress_is_heard_and_a_second_task_is_refused_meanwhile(desk: Desk) -> None:
+def test_progress_is_received_and_a_second_task_is_refused_meanwhile(desk: Desk) -> None:
     async def story() -> None:
         queue = desk.listen()
         desk.ask("explain", {})
@@ -107,7 +107,7 @@ def test_cancel_ends_it_and_leaves_the_files(desk: Desk) -> None:
     asyncio.run(story())
 
 
-def test_a_process_that_is_killed_is_told_and_replaced(desk: Desk) -> None:
+def test_a_process_that_is_killed_is_reported_and_replaced(desk: Desk) -> None:
     async def story() -> None:
         assert await done(desk, "show") == "done"
         before = files(desk.folder)
@@ -124,7 +124,7 @@ def test_a_process_that_is_killed_is_told_and_replaced(desk: Desk) -> None:
     asyncio.run(story())
 
 
-def test_the_engines_sentence_is_told(desk: Desk) -> None:
+def test_the_engines_sentence_is_reported(desk: Desk) -> None:
     async def story() -> None:
         assert await done(desk, "add", effect="strebeck", port="load") == "failed"
         assert desk.job is not None

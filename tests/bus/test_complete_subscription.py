@@ -47,7 +47,7 @@ def test_what_is_lost_on_the_way_is_fetched_once_and_in_order():
     assert heard(listener, 61) == list(range(62))
 
 
-def test_the_last_word_before_a_silence_is_heard_too():
+def test_the_last_word_before_a_silence_is_received_too():
     network = MemoryNetwork()
     monitor, listener = network.bus("r", "monitor"), network.bus("r", "listener").subscribe(ALARMS)
     say(monitor, range(2))
@@ -57,7 +57,7 @@ def test_the_last_word_before_a_silence_is_heard_too():
     assert heard(listener, 3) == [0, 1, 2, 3]
 
 
-def test_one_who_joins_late_hears_what_is_said_from_then_on():
+def test_a_late_listener_gets_messages_from_then_on():
     network = MemoryNetwork()
     monitor = network.bus("r", "monitor")
     say(monitor, range(5))
@@ -68,7 +68,7 @@ def test_one_who_joins_late_hears_what_is_said_from_then_on():
     assert heard(listener, 5) == [5]
 
 
-def test_a_process_started_again_is_heard_from_its_first_word_on_and_the_break_is_told():
+def test_messages_of_a_restarted_process_arrive_from_the_first_on_and_the_break_is_reported():
     network = MemoryNetwork()
     gaps = network.bus("r", "observer").subscribe(GAPS)
     listener = network.bus("r", "listener").subscribe(ALARMS)

@@ -45,7 +45,7 @@ def restarted(end: int) -> Bench:
 # ---- whom it follows ------------------------------------------------------------------------
 
 
-def test_joining_is_told_with_boot_and_number() -> None:
+def test_joining_is_reported_with_boot_and_number() -> None:
     bench = Bench()
     bench.send(block(500))
     assert bench.remarks == [Remark("info", "JOINED", "joined boot 7 at seq 500")]
@@ -98,7 +98,7 @@ def test_a_source_without_a_token_takes_over_once_the_other_is_silent() -> None:
     assert bench.codes() == ["JOINED", "SOURCE RESTARTED"]
 
 
-def test_a_source_that_comes_back_before_its_end_was_told_continues_where_it_was() -> None:
+def test_a_source_that_comes_back_before_its_end_was_reported_continues_where_it_was() -> None:
     bench = restarted(end=4)
     bench.keep(block(5, 3))
     tokens(bench, 7)
@@ -113,7 +113,7 @@ def test_a_source_that_comes_back_before_its_end_was_told_continues_where_it_was
     assert bench.order.counters.duplicates == 0
 
 
-def test_a_source_that_comes_back_after_its_end_was_told_is_not_read_again() -> None:
+def test_a_source_that_comes_back_after_its_end_was_reported_is_not_read_again() -> None:
     bench = restarted(end=4)
     bench.reply_all()
     gone(bench, 8)
@@ -188,7 +188,7 @@ def test_the_largest_number_that_is_believed() -> None:
     assert bench.order.counters.foreign == 5
 
 
-def test_an_empty_block_says_nothing() -> None:
+def test_an_empty_block_reports_nothing() -> None:
     bench = Bench()
     assert bench.order.on_block(block(3, 0)) == []
     assert bench.order.position is None
@@ -403,7 +403,7 @@ def test_a_straggler_behind_a_hole_at_the_end_of_a_boot_is_not_dropped() -> None
 # ---- what is not believed -------------------------------------------------------------------
 
 
-def test_forged_samples_are_dropped_counted_and_told_each_time() -> None:
+def test_forged_samples_are_dropped_counted_and_reported_each_time() -> None:
     bench = Bench(SampleOrder(capacity=10))
     bench.send(block(0, 5))
     for seq in (50, 60):

@@ -106,7 +106,7 @@ def test_one_without_a_certificate_of_this_authority_is_not_let_in(
         connect(load_rig(tmp_path / "plain.toml"), "monitor", 0.5)
 
 
-def test_a_revoked_certificate_says_nothing(secured: RigConfig, tmp_path: Path) -> None:
+def test_a_revoked_certificate_cannot_send(secured: RigConfig, tmp_path: Path) -> None:
     text = (tmp_path / "rig.toml").read_text()
     (tmp_path / "ann.toml").write_text(
         text.replace("[bus.security]", '[bus.security]\noperator = "ann"')
@@ -133,7 +133,7 @@ def test_beyond_loopback_a_router_asks_for_keys(tmp_path: Path, keys: Path) -> N
         open_router(plain)
 
 
-def test_missing_keys_are_told_in_one_line(tmp_path: Path) -> None:
+def test_missing_keys_are_reported_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(KeysError, match=r"router\.pem|authority\.pem"):
         open_router(config_with(tmp_path, tmp_path / "nowhere"))
 

@@ -43,7 +43,7 @@ def test_messages_survive_the_wire() -> None:
     assert (again.boot, again.seq, again.device) == (7, 0, "rig")
 
 
-def test_a_step_of_the_host_clock_is_said_and_time_goes_on() -> None:
+def test_a_step_of_the_host_clock_is_reported_and_time_goes_on() -> None:
     acquiring, offset = acquisition(host_offset_ns=100 * SECOND)
     (before,) = acquiring.update(raw_of(0, 1))
     offset[0] = 70 * SECOND
@@ -56,7 +56,7 @@ def test_a_step_of_the_host_clock_is_said_and_time_goes_on() -> None:
 
 
 @pytest.mark.parametrize(("ppm", "severity"), [(1000.0, "warning"), (-6000.0, "error")])
-def test_drift_is_said_once_with_its_severity(ppm: float, severity: str) -> None:
+def test_drift_is_reported_once_with_its_severity(ppm: float, severity: str) -> None:
     acquiring, _ = acquisition()
     events: list[Event] = []
     for second in range(30):

@@ -73,12 +73,12 @@ def test_no_usage_report_is_kept_or_sent(web: Viewer, homes: Path) -> None:
     assert not homes.exists()
 
 
-def test_a_taken_port_is_told(web: Viewer) -> None:
+def test_a_taken_port_is_reported(web: Viewer) -> None:
     with pytest.raises(ViewerError, match=f"port {web.port} is taken"):
         Viewer("web", port=web.port)
 
 
-def test_a_viewer_that_cannot_start_says_why() -> None:
+def test_a_viewer_that_cannot_start_gives_the_reason() -> None:
     viewer = Viewer("headless")
     viewer._process.kill()
     with pytest.raises(ViewerError, match="the viewer did not start"):

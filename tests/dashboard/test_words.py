@@ -83,7 +83,7 @@ def test_what_to_do_comes_before_why() -> None:
     assert text.index("Stop soon") < text.index("The cause of dry_friction")
 
 
-def test_what_is_probably_missing_is_said_until_the_alarm_comes_anew() -> None:
+def test_what_is_probably_missing_is_reported_until_the_alarm_comes_anew() -> None:
     facts = moving(alarm("dry_friction"))
     text = "dry_friction: probably missing: coulomb@load"
     facts.book.hear(Event("monitor", 0, "error", PROBABLY_MISSING, text))
@@ -99,7 +99,7 @@ def test_estimates_stand_beside_thresholds_and_signature() -> None:
     assert "| Coulomb θ1 | 0.93 | -0.1 … 0.1 | 1 |" in text
 
 
-def test_silence_is_told_and_ends() -> None:
+def test_silence_is_reported_and_ends() -> None:
     facts = moving()
     now = RIG.start_ns + SECOND
     facts.tell_time(now)

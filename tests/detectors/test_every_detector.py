@@ -68,7 +68,7 @@ def test_the_configuration_offers_exactly_these(kind):
     assert kind.name in get_args(get_args(hint)[0])
 
 
-def test_an_unknown_name_is_told_with_the_known_ones():
+def test_an_unknown_name_is_reported_with_the_known_ones():
     with pytest.raises(ModelError, match="parity-arma"):
         detector_kind("parity")
 

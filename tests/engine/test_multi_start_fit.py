@@ -137,7 +137,7 @@ def lagged():
         size=SAMPLES))[:, None]), np.array([noise])  # fmt: skip
 
 
-def test_a_hidden_state_is_reached_by_growing_horizons_and_what_is_open_is_said():
+def test_a_hidden_state_is_reached_by_growing_horizons_and_what_is_open_is_reported():
     recording, noise = lagged()
     compiled = compile_system(compose(parse(HIDDEN_STATE, Model, "filtered")))
     start = np.array([3000.0, 1e-2, 1e-2])

@@ -167,7 +167,7 @@ def test_numbers_of_a_model_are_si_and_keep_the_unit_to_show() -> None:
     assert (s.start, s.low, s.unit) == (1e-3, -2e-3, "m")
 
 
-def test_a_unit_that_is_unknown_is_told_with_file_line_and_key() -> None:
+def test_a_unit_that_is_unknown_is_reported_with_file_line_and_key() -> None:
     with pytest.raises(ConfigError, match=r"spring.toml:9: parameters.k.unit: .*did you mean 'kN'"):
         parse(SPRING.replace("kN/mm", "kNN/mm"), Model, "spring.toml")
     with pytest.raises(ConfigError, match=r"parameters.gap.unit: found the unknown unit 'mmm'"):

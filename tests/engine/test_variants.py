@@ -49,7 +49,7 @@ def test_what_a_variant_takes_away_is_gone() -> None:
     assert "r" in RIG.states
 
 
-def test_a_slip_in_a_variant_is_told_with_its_name() -> None:
+def test_a_slip_in_a_variant_is_reported_with_its_name() -> None:
     slip = Variant(physics="None.", parameters={"n": Parameter(value=1.0, unit="Pa", fixed=True)})
     model: Model = replace(RIG, variants={"slip": slip})
     with pytest.raises(ModelError, match=r"variants\.slip: .*"):

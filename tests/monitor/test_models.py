@@ -49,20 +49,20 @@ def test_commissioning_finds_the_rig() -> None:
         ("a = [1.0, -", "a = [1.0, -9", "stable"),
     ],
 )
-def test_a_wrong_model_file_is_told(tmp_path: Path, old: str, new: str, says: str) -> None:
+def test_a_wrong_model_file_is_reported(tmp_path: Path, old: str, new: str, says: str) -> None:
     path = saved(model(), tmp_path)
     path.write_text(path.read_text().replace(old, new, 1), encoding="utf-8")
     with pytest.raises(ConfigError, match=says):
         load_model(path)
 
 
-def test_a_missing_recording_is_told() -> None:
+def test_a_missing_recording_is_reported() -> None:
     healthy = recording_of("healthy", "healthy", RATE, run(SINE, 8.0))
     with pytest.raises(ModelError, match="no chirp recording"):
         commission([healthy])
 
 
-def test_a_friction_recording_without_friction_is_told() -> None:
+def test_a_friction_recording_without_friction_is_reported() -> None:
     parts = [
         recording_of("chirp", "chirp", RATE, run(SINE, 40.0)),
         recording_of("healthy", "healthy", RATE, run(SINE, 10.0)),

@@ -53,7 +53,7 @@ def test_accelerometer_fault_is_not_called_friction() -> None:
     assert not names & {"dry_friction", "stiction"}
 
 
-def test_position_that_jumps_is_said_and_not_called_friction() -> None:
+def test_position_that_jumps_is_reported_and_not_called_friction() -> None:
     channels = run(SINE, 10.0, seed=5)
     channels["position"][round(6.0 * RATE) :] += 2e-3
 
@@ -90,7 +90,7 @@ def test_gap_restarts_and_says_that_it_is_not_armed() -> None:
     assert not any(flags[name].any() for name in FAULTS)
 
 
-def test_motion_beyond_the_range_is_said_and_not_judged() -> None:
+def test_motion_beyond_the_range_is_reported_and_not_judged() -> None:
     channels = run(SINE, 8.0, seed=8)
     grown = np.interp(np.arange(round(8.0 * RATE)) / RATE, [5.0, 6.0], [1.0, 8.0])
     for name in channels:

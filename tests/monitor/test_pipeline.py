@@ -169,7 +169,9 @@ def test_friction_from_the_start_shows_where_the_model_knows_the_excitation() ->
     assert active(result, kinds.DEPARTURE)[-1] == 1
 
 
-def test_friction_from_the_start_that_the_model_cannot_know_is_learnt_and_that_is_said() -> None:
+def test_friction_from_the_start_that_the_model_cannot_know_is_learnt_and_that_is_reported() -> (
+    None
+):
     result = watched(run(OTHER_SINE, 6.0, friction(0.0), seed=26))
     assert not active(result, kinds.DEPARTURE).any()
     learnt = next(c for c in result.conditions if c.name == kinds.REFERENCE_LEARNT)
@@ -179,7 +181,7 @@ def test_friction_from_the_start_that_the_model_cannot_know_is_learnt_and_that_i
     assert learnt.value[armed][0] == pytest.approx(1.0, abs=0.2)
 
 
-def test_nothing_is_said_of_learning_where_the_model_knows_the_excitation() -> None:
+def test_nothing_is_reported_of_learning_where_the_model_knows_the_excitation() -> None:
     assert not active(watched(HEALTHY), kinds.REFERENCE_LEARNT).any()
 
 

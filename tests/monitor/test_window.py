@@ -53,7 +53,7 @@ def test_energies_are_those_of_the_last_samples(length: int, count: int, recent:
     assert recent_energy(kept, 0, recent) == pytest.approx(squares[-recent:, 0].sum())
 
 
-def test_a_singular_window_is_told_and_gives_no_number() -> None:
+def test_a_singular_window_is_reported_and_gives_no_number() -> None:
     theta1, theta2, condition = solve_two(np.array([1.0, 2.0, 3.0, 4.0, 6.0, 9.0]))
     assert (theta1, theta2) == (0.0, 0.0)
     assert condition == np.inf

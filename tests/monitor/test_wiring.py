@@ -70,7 +70,7 @@ def in_millimetres(c: Channels) -> None:
         (in_millimetres, "wiring_scale"),
     ],
 )
-def test_wrong_wiring_is_told_and_nothing_is_judged_after_it(
+def test_wrong_wiring_is_reported_and_nothing_is_judged_after_it(
     scheme: str, tamper: Callable[[Channels], None], alarm: str
 ) -> None:
     channels = run(SINE, 12.0, friction(8.0))

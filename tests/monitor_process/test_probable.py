@@ -128,7 +128,7 @@ def test_an_inertia_is_ranked_beyond_its_healthy_friction() -> None:
     assert rows[0].explained > 0.9
 
 
-def test_a_file_of_effects_that_does_not_fit_is_told_in_the_answer(tmp_path: Path) -> None:
+def test_a_file_of_effects_that_does_not_fit_is_reported_in_the_answer(tmp_path: Path) -> None:
     wrong = tmp_path / "mine.toml"
     wrong.write_text("[effects.mine]\n")
     found = evidence("coulomb", 0.3)

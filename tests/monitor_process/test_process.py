@@ -230,7 +230,7 @@ def test_lost_samples_are_an_alarm(bench: Bench) -> None:
     assert ("loss", "unacknowledged") in bench.alarm_states()
 
 
-def test_samples_without_a_channel_are_said_to_be_unsuitable(bench: Bench) -> None:
+def test_samples_without_a_channel_are_reported_as_unsuitable(bench: Bench) -> None:
     whole = wave(0, 4, 7, 0)
     part = SampleBlock("rig", 7, 0, whole.device_us, whole.t_ns, whole.channels[:2])
     bench.send(part)
@@ -260,7 +260,7 @@ def test_health_counts_samples_losses_and_latency(bench: Bench) -> None:
     )
 
 
-def test_without_a_monitor_the_list_says_so() -> None:
+def test_without_a_monitor_the_list_reports_it() -> None:
     with pytest.raises(BusError, match="no monitor of rig bench answers"):
         ask_alarm_list(MemoryNetwork().bus("bench", "asker"))
 
@@ -356,7 +356,7 @@ def test_samples_without_estimates_are_an_alarm(bench: Bench) -> None:
     assert ("estimates_missing", "unacknowledged") in bench.alarm_states()
 
 
-def test_the_return_of_a_router_is_told_to_those_who_only_listen(bench: Bench) -> None:
+def test_the_return_of_a_router_is_reported_to_those_who_only_listen(bench: Bench) -> None:
     bench.network.up = False
     bench.turn()
     bench.network.up = True

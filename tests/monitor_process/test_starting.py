@@ -8,21 +8,21 @@ NOW = 1000.0
 
 
 @pytest.mark.parametrize(("after", "alarmed"), [(4.0, False), (19.0, False), (20.5, True)])
-def test_a_daq_that_never_appears_is_told_late(after: float, alarmed: bool) -> None:
+def test_a_daq_that_never_appears_is_reported_late(after: float, alarmed: bool) -> None:
     patience = Patience(NOW)
     counted = patience.counted(NOW + after, after, daq_alive=False, heard=False)
     assert counted == (after if alarmed else 0.0)
 
 
 @pytest.mark.parametrize(("after", "alarmed"), [(19.0, False), (20.5, True)])
-def test_a_daq_without_samples_is_told_late(after: float, alarmed: bool) -> None:
+def test_a_daq_without_samples_is_reported_late(after: float, alarmed: bool) -> None:
     patience, appears = Patience(NOW), NOW + 9.0
     assert patience.counted(appears, 9.0, daq_alive=True, heard=False) == 0.0
     counted = patience.counted(appears + after, 9.0 + after, daq_alive=True, heard=False)
     assert counted == (9.0 + after if alarmed else 0.0)
 
 
-def test_a_daq_that_goes_again_before_its_first_sample_is_told() -> None:
+def test_a_daq_that_goes_again_before_its_first_sample_is_reported() -> None:
     patience = Patience(NOW)
     patience.counted(NOW + 1.0, 1.0, daq_alive=True, heard=False)
     assert patience.counted(NOW + 22.0, 22.0, daq_alive=False, heard=False) == 22.0

@@ -26,10 +26,10 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     made.monitor.close()
 
 
-def asked(bench: Bench, wish: ModelRequest) -> ModelReply:
-    """The answer to a wish, while the monitor's loop turns."""
+def asked(bench: Bench, request: ModelRequest) -> ModelReply:
+    """The reply to a model request while the monitor's loop runs."""
     answers: list[ModelReply] = []
-    asker = threading.Thread(target=lambda: answers.append(ask_for_model(bench.observer, wish)))
+    asker = threading.Thread(target=lambda: answers.append(ask_for_model(bench.observer, request)))
     asker.start()
 
     def answered() -> bool:
@@ -43,9 +43,9 @@ def asked(bench: Bench, wish: ModelRequest) -> ModelReply:
 
 @pytest.mark.parametrize("model", [f"sample_rate = {'9' * 5000}", "a = " + "[" * 50_000])
 def test_a_model_that_is_a_bomb_is_refused_and_watching_goes_on(bench: Bench, model: str) -> None:
-    granted = asked(bench, ModelRequest("promote", model, "eve", "x" * 100_000))
-    assert not granted.done
-    assert len(granted.text) < 400
+    reply = asked(bench, ModelRequest("promote", model, "eve", "x" * 100_000))
+    assert not reply.done
+    assert len(reply.text) < 400
     bench.send(wave(0, 64, 7, time.time_ns()))
     bench.turn_until(63)
 

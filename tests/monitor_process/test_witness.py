@@ -66,7 +66,9 @@ def test_people_are_notified_once_and_again_until_somebody_has_seen_it() -> None
     assert len(notices.hear(fault(), 700.0)) == 1
 
 
-def test_a_hung_monitor_is_told_of_by_the_witness_and_the_command_is_run(tmp_path: Path) -> None:
+def test_a_hung_monitor_is_reported_by_the_witness_and_the_command_is_run(
+    tmp_path: Path,
+) -> None:
     told = tmp_path / "told"
     line = "sys.argv[1] + ' ' + sys.stdin.read() + chr(10)"
     code = f"import sys; open({str(told)!r}, 'a').write({line})"

@@ -331,7 +331,7 @@ def test_a_kernel_that_takes_few_bytes_at_a_time_gets_them_all(
         (OSError("without a number"), "without a number"),
     ],
 )
-def test_the_reason_of_a_failing_disk_is_told(
+def test_the_reason_of_a_failing_disk_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: OSError, reason: str
 ) -> None:
     path = tmp_path / "a.mcap"

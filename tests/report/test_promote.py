@@ -81,10 +81,12 @@ class Bench:
             self.monitor.take(item)
         self.monitor.look_around()
 
-    def ask(self, wish: ModelRequest) -> ModelReply:
+    def ask(self, change: ModelRequest) -> ModelReply:
         """Ask from a thread of its own, as an operator does, while the loop turns."""
         answers: list[ModelReply] = []
-        asking = threading.Thread(target=lambda: answers.append(ask_for_model(self.observer, wish)))
+        asking = threading.Thread(
+            target=lambda: answers.append(ask_for_model(self.observer, change))
+        )
         asking.start()
         while asking.is_alive():
             self.turn()
@@ -98,7 +100,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     made.monitor.close()
 
 
-def wish_of(study: Study) -> ModelRequest:
+def change_of(study: Study) -> ModelRequest:
     return ModelRequest("promote", promotion(study, MODEL).text, "ann", "friction is known")
 
 
@@ -125,9 +127,9 @@ def test_the_residual_of_a_running_monitor_falls_and_rises_again(
 ) -> None:
     samples = block(3)
     bench.send(cut(samples, 0, 2000))
-    granted = bench.ask(wish_of(study))
-    assert granted.done, granted.text
-    assert granted.seq == 2000
+    reply = bench.ask(change_of(study))
+    assert reply.done, reply.text
+    assert reply.seq == 2000
     bench.send(cut(samples, 2000, 4000))
     assert load_model(bench.model).promoted is not None
     assert bench.ask(ModelRequest("rollback", "", "ann", "")).done
@@ -150,7 +152,7 @@ def test_a_replay_gives_the_same_to_the_last_bit(
 ) -> None:
     samples = block(3, 3000)
     bench.send(cut(samples, 0, 1501))
-    assert bench.ask(wish_of(study)).done
+    assert bench.ask(change_of(study)).done
     bench.send(cut(samples, 1501, 3000))
     live = concatenate(bench.estimates.drain())
     path = tmp_path / "session.mcap"
@@ -165,7 +167,7 @@ def test_a_replay_gives_the_same_to_the_last_bit(
 
 
 @pytest.mark.parametrize(
-    ("wish", "words"),
+    ("change", "words"),
     [
         (ModelRequest("rollback", "", "ann", ""), "no version before"),
         (ModelRequest("promote", "mass = 1", "ann", ""), "the new model"),
@@ -176,11 +178,11 @@ def test_a_replay_gives_the_same_to_the_last_bit(
     ],
 )
 def test_what_does_not_suit_is_refused_and_nothing_changes(
-    bench: Bench, wish: ModelRequest, words: str
+    bench: Bench, change: ModelRequest, words: str
 ) -> None:
-    granted = bench.ask(wish)
-    assert not granted.done
-    assert words in granted.text
+    reply = bench.ask(change)
+    assert not reply.done
+    assert words in reply.text
     assert load_model(bench.model) == MODEL == bench.monitor.rig.model
     assert not bench.changes.drain()
 

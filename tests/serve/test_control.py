@@ -88,7 +88,7 @@ def test_a_second_plant_of_the_same_rig_is_refused(tmp_path: Path) -> None:
         pass
 
 
-def test_no_plant_is_said_plainly(tmp_path: Path) -> None:
+def test_no_plant_is_reported_plainly(tmp_path: Path) -> None:
     with pytest.raises(DeviceError, match="no simulated rig answers"):
         ask(tmp_path / "nobody", "effects")
 

@@ -82,7 +82,7 @@ def test_recorded_file_is_played_once(tmp_path: Path):
 
 
 @pytest.mark.parametrize("text", ["", "a\n", "1,2\n3,4\n", "nan\n"])
-def test_bad_recorded_file_is_told(tmp_path: Path, text: str):
+def test_bad_recorded_file_is_reported(tmp_path: Path, text: str):
     file = tmp_path / "volts.csv"
     file.write_text(text)
     with pytest.raises(ConfigError, match=r"volts\.csv"):
@@ -94,6 +94,6 @@ def test_recorded_needs_one_source():
         drive(Recorded(), RATE)
 
 
-def test_missing_recorded_file_is_told(tmp_path: Path):
+def test_missing_recorded_file_is_reported(tmp_path: Path):
     with pytest.raises(ConfigError, match=r"no\.csv"):
         drive(Recorded(file=str(tmp_path / "no.csv")), RATE)

@@ -33,7 +33,7 @@ def session(table: Path) -> Path:
     return path
 
 
-def test_the_result_is_told_as_json_alone(
+def test_the_result_is_reported_as_json_alone(
     table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     page = tmp_path / "damage.html"

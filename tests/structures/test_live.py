@@ -103,7 +103,7 @@ def _booted(part: SampleBlock, boot: int) -> SampleBlock:
     return SampleBlock(part.device, boot, part.seq, part.device_us, part.t_ns, part.channels)
 
 
-def test_what_cannot_be_watched_is_told(damaged: Record) -> None:
+def test_what_cannot_be_watched_is_reported(damaged: Record) -> None:
     few = Record(0.01, {name: damaged.columns[name] for name in ("x1", "x2")})
     with pytest.raises(ModelError, match="samples without the channel 'x3'"):
         watched(cuts(few, 100))

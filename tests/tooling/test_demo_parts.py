@@ -103,7 +103,7 @@ def test_acts_follow_the_scenario_through_its_cycles() -> None:
     assert rest[len(scenario.events) - 2].seq == first.seq + round(scenario.cycle_s * RATE)
 
 
-def test_an_alarm_is_told_with_its_cause_and_its_delay_after_what_was_done() -> None:
+def test_an_alarm_is_reported_with_its_cause_and_its_delay_after_what_was_done() -> None:
     said: list[str] = []
     narrator = Narrator(load_scenario(find_config("scenarios/demo.toml")), said.append)
     narrator.samples(100)

@@ -107,7 +107,7 @@ def test_endpoints_are_taken_apart(endpoint: str, address: tuple[str, int] | Non
     assert endpoint_address(endpoint) == address
 
 
-def test_free_and_taken_ports_are_told_apart(taken_port: int) -> None:
+def test_free_and_taken_ports_are_distinguished(taken_port: int) -> None:
     assert not is_free("127.0.0.1", taken_port)
     assert is_free("127.0.0.1", free_port())
     assert len(set(free_ports(200))) == 200

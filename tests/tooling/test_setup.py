@@ -96,14 +96,16 @@ def run_tool(name: str, *words: str, path: Path) -> "subprocess.CompletedProcess
     )
 
 
-def test_without_a_python_that_fits_one_is_told_which_do(bare_path: Path, tmp_path: Path) -> None:
+def test_without_a_suitable_python_the_suitable_ones_are_named(
+    bare_path: Path, tmp_path: Path
+) -> None:
     done = run_tool("setup.sh", str(tmp_path / "venv"), "requirements/lock.txt", path=bare_path)
     assert done.returncode == 1
     assert "found Python 3.9.2, expected Python 3.11, 3.12, 3.13 or 3.14" in done.stderr
     assert not (tmp_path / "venv").exists()
 
 
-def test_missing_debian_packages_are_told_with_the_one_command_that_installs_them(
+def test_missing_debian_packages_are_reported_with_the_one_command_that_installs_them(
     bare_path: Path,
 ) -> None:
     script(bare_path / "dpkg-query", "echo unknown ok not-installed")

@@ -43,7 +43,7 @@ def test_a_folder_of_that_name_is_no_file(empty: Path) -> None:
     assert find_file("emps", "studies").parent.name == "studies"
 
 
-def test_near_names_are_told(empty: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_near_names_are_reported(empty: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(ConfigError, match="epms: found no such file, expected a file or one of"):
         find_file("epms", "studies")
     with pytest.raises(SystemExit):

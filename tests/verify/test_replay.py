@@ -113,7 +113,7 @@ def test_a_block_keeps_its_samples_where_nothing_falls_in() -> None:
 
 
 @pytest.mark.parametrize("model", ["", "a = " + "[" * 50_000, "no toml"])
-def test_a_forged_change_of_the_model_is_told_and_left_out(tmp_path: Path, model: str) -> None:
+def test_a_forged_change_of_the_model_is_reported_and_left_out(tmp_path: Path, model: str) -> None:
     genuine = open_session(FRICTION)
     path = tmp_path / "forged.mcap"
     with SessionWriter(path, genuine.info) as writer:

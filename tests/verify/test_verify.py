@@ -122,7 +122,7 @@ def change_model(folder: Path) -> None:
     model.write_text("\n".join(lines))
 
 
-def test_a_change_is_told_with_field_sample_old_and_new(
+def test_a_change_is_reported_with_field_sample_old_and_new(
     copied: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     change_model(copied)

@@ -95,7 +95,7 @@ def test_names_for_matlab_are_valid_and_different() -> None:
     assert all(name.isidentifier() and len(name) <= 31 for name in names.values())
 
 
-def test_what_cannot_be_exported_is_said(tmp_path: Path, session: Session) -> None:
+def test_what_cannot_be_exported_is_reported(tmp_path: Path, session: Session) -> None:
     with pytest.raises(SessionError, match=r"unknown format '\.xls', expected one of \.csv"):
         export_session(session, tmp_path / "a.xls")
     (tmp_path / "a.csv").write_text("mine")

@@ -344,7 +344,7 @@ def test_json_of_columns_or_of_rows_is_read(tmp_path: Path, text: str) -> None:
         ('{"t": [0, 1], "qm": [1, null]}', "run.json, row 2, column qm: found 'nan'"),
     ],
 )
-def test_json_that_is_no_table_is_told(tmp_path: Path, text: str, message: str) -> None:
+def test_json_that_is_no_table_is_reported(tmp_path: Path, text: str, message: str) -> None:
     source = tmp_path / "run.json"
     source.write_text(text)
     with pytest.raises(ImportDataError, match=message):

@@ -188,7 +188,7 @@ def test_the_same_counters_are_the_same_bytes_in_whatever_order_they_were_counte
     assert len(data) == 1
 
 
-def test_what_is_wrong_with_the_bytes_is_told(started):
+def test_what_is_wrong_with_the_bytes_is_reported(started):
     odd = started.encode(replace(EXAMPLES[AlarmCommand], action="ignore"))
     with pytest.raises(MessageError) as told:
         started.decode(AlarmCommand, odd)

@@ -172,7 +172,7 @@ def encoded(path: Path) -> list[bytes]:
     ]
 
 
-def test_recover_without_the_head_says_so(session: Path, tmp_path: Path) -> None:
+def test_recover_without_the_head_reports_it(session: Path, tmp_path: Path) -> None:
     content = bytearray(session.read_bytes())
     content[150] ^= 0xFF
     broken = tmp_path / "broken.mcap"

@@ -43,7 +43,7 @@ def test_a_model_that_ships_can_work(name: str) -> None:
     assert model_report(shipped_models()[name], given).fine
 
 
-def test_what_no_output_shows_and_nothing_uses_is_told() -> None:
+def test_what_no_output_shows_and_nothing_uses_is_reported() -> None:
     found = model_report(parse(UNSEEN, Model, "unseen"), {})
 
     assert not found.fine

@@ -140,7 +140,7 @@ class Worker:
     def _handed(self, rig: str, *, rollback: bool) -> dict[str, Any]:
         study = open_study(self.folder)
         done = hand_over(study, Path(rig), rollback=rollback, say=self.progress)
-        return {"step": "done" if done.granted.done else "refused", "text": done.granted.text}
+        return {"step": "done" if done.reply.done else "refused", "text": done.reply.text}
 
     def _done(self, trial: Trial) -> dict[str, Any]:
         self.progress("writing study and ledger")

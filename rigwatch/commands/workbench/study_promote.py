@@ -32,14 +32,14 @@ def run(arguments: argparse.Namespace) -> int:
 
     study = open_study(arguments.study)
     done = hand_over(study, arguments.rig, arguments.user, rollback=arguments.rollback, say=say)
-    found, granted = done.found, done.granted
+    found, reply = done.found, done.reply
     if arguments.json:
         residual = {"before": found.before, "after": found.after} if found else None
         learnt = found.learnt if found else None
-        print_json({"granted": granted, "live": done.live, "residual": residual, "learnt": learnt})
+        print_json({"granted": reply, "live": done.live, "residual": residual, "learnt": learnt})
     else:
         if found:
             fall = f"{found.before:.4g} → {found.after:.4g} m/s^2"
             print(f"the monitor's residual on the recordings held out: {fall}")
-        print(f"{model_path(arguments.rig)}: {granted.text}")
-    return 0 if granted.done else 1
+        print(f"{model_path(arguments.rig)}: {reply.text}")
+    return 0 if reply.done else 1

@@ -122,8 +122,8 @@ def examine(
     progress(f"undamaged structure from the first {undamaged:g} s")
     base = reference(structure, record, undamaged, known=chosen.known, model=model)
     judge = Judge(base.sigma, base.samples, chosen.rate, chosen.limit)
-    work = _Work(base, judge, chosen, progress)
-    work.through()
+    work = _Search(base, judge, chosen, progress)
+    work.run()
     return Examination(base, chosen, tuple(work.watches), tuple(work.damages))
 
 
@@ -138,7 +138,7 @@ def _check(settings: Settings) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Now:
+class _Estimate:
     """The structure as estimated from a sample on."""
 
     parameters: FloatArray
@@ -149,7 +149,7 @@ class _Now:
 
 
 @dataclass(eq=False)
-class _Work:
+class _Search:
     base: Reference
     judge: Judge
     settings: Settings
@@ -157,49 +157,54 @@ class _Work:
     watches: list[Watch] = field(default_factory=list)
     damages: list[Damage] = field(default_factory=list)
 
-    def through(self) -> None:
+    def run(self) -> None:
         """Monitor, identify, monitor again, to the record's end."""
         base = self.base
-        now = _Now(base.parameters, base.model.start(), 0, base.spread, base.figures)
+        estimate = _Estimate(base.parameters, base.model.start(), 0, base.spread, base.figures)
         while len(self.damages) < MOST:
-            watch = self._watched(now)
+            watch = self._watched(estimate)
             self.watches.append(watch)
             if watch.alarm is None or len(base.model) - watch.alarm.sample < SHORTEST:
                 return
-            now = self._identified(now, watch, watch.alarm)
+            estimate = self._identified(estimate, watch, watch.alarm)
             if not self.damages[-1].explained:
                 # With a model known to be wrong, every sample would be an alarm.
                 return
 
-    def _watched(self, now: _Now) -> Watch:
+    def _watched(self, estimate: _Estimate) -> Watch:
         model = self.base.model
         return self.judge.watch(
-            model, now.parameters, now.state, now.first, len(model), spread=now.spread
+            model,
+            estimate.parameters,
+            estimate.state,
+            estimate.first,
+            len(model),
+            spread=estimate.spread,
         )
 
-    def _identified(self, now: _Now, watch: Watch, alarm: Alarm) -> _Now:
+    def _identified(self, estimate: _Estimate, watch: Watch, alarm: Alarm) -> _Estimate:
         model, dt = self.base.model, self.base.model.dt
         self.progress(f"residual beyond its threshold at {alarm.sample * dt:g} s")
-        path = np.concatenate([np.tile(now.state, (now.first, 1)), watch.states])
-        begin = self._begin(now, path, watch, alarm)
-        ranking, explained = self._located(now, path, begin)
+        path = np.concatenate([np.tile(estimate.state, (estimate.first, 1)), watch.states])
+        begin = self._begin(estimate, path, watch, alarm)
+        ranking, explained = self._located(estimate, path, begin)
         best = ranking.best
         places = [f"{c.name}: {c.before:g} -> {c.after:g}" for c in ranking.changed]
         self.progress(f"most likely {' and '.join(places)}")
-        when = instant(model, self._changed(now, best.refit), watch, alarm, self.base.sigma)
-        refit = self._refitted(now, path, ranking, when.sample)
+        when = instant(model, self._changed(estimate, best.refit), watch, alarm, self.base.sigma)
+        refit = self._refitted(estimate, path, ranking, when.sample)
         figures = _figures(refit)
-        before = {n: now.figures.get(n, self._taken(now, n)) for n in figures}
+        before = {n: estimate.figures.get(n, self._taken(estimate, n)) for n in figures}
         self.damages.append(
             Damage(alarm.sample * dt, when, ranking, figures, before, explained, ranking.last * dt)
         )
         follow = max(ranking.first, min(when.sample, ranking.last - SHORTEST))
-        return _Now(
-            self._changed(now, refit), refit.state, follow, self._spread(refit),
-            {**now.figures, **figures},
+        return _Estimate(
+            self._changed(estimate, refit), refit.state, follow, self._spread(refit),
+            {**estimate.figures, **figures},
         )  # fmt: skip
 
-    def _begin(self, now: _Now, path: FloatArray, watch: Watch, alarm: Alarm) -> int:
+    def _begin(self, estimate: _Estimate, path: FloatArray, watch: Watch, alarm: Alarm) -> int:
         """First sample of the data to identify from.
 
         If the alarm is late the change is small, and the onset is only known to be earlier.
@@ -209,22 +214,22 @@ class _Work:
         end = len(self.base.model)
         if alarm.sample - alarm.onset <= LATE * (end - alarm.sample):
             return alarm.sample
-        earliest = min(alarm.onset, max(now.first, self.base.samples))
+        earliest = min(alarm.onset, max(estimate.first, self.base.samples))
         before = np.linspace(earliest, alarm.onset, STARTS)
         within = np.linspace(alarm.onset, alarm.sample, STARTS)
         starts = np.unique(np.concatenate([before, within]).astype(int)).tolist()
         squares = np.nansum((watch.residual / self.base.sigma) ** 2, axis=1)
         gains = [
             float(squares[first - watch.first :].sum())
-            - unexplained(self._stretch(now, first, end), path)
+            - unexplained(self._stretch(estimate, first, end), path)
             for first in starts
         ]
         return int(starts[int(np.argmax(gains))])
 
-    def _stretch(self, now: _Now, first: int, last: int) -> Stretch:
-        return Stretch(self.base.model, now.parameters, first, last, self.base.sigma)
+    def _stretch(self, estimate: _Estimate, first: int, last: int) -> Stretch:
+        return Stretch(self.base.model, estimate.parameters, first, last, self.base.sigma)
 
-    def _located(self, now: _Now, path: FloatArray, begin: int) -> tuple[Ranking, bool]:
+    def _located(self, estimate: _Estimate, path: FloatArray, begin: int) -> tuple[Ranking, bool]:
         """Rank with more and more data while a change explains them, otherwise with less.
 
         Two simultaneous changes are considered only if a single one does not suffice.
@@ -236,10 +241,10 @@ class _Work:
         while True:
             # A remainder that is too short is joined to the data before it.
             last = end if begin + 1.5 * length > end else begin + length
-            ranking, holds = self._ranked(now, path, begin, last)
+            ranking, holds = self._ranked(estimate, path, begin, last)
             if not holds:
                 if kept is not None:
-                    return self._extended(now, path, kept), True
+                    return self._extended(estimate, path, kept), True
                 if length // 2 < max(SHORTEST, shortest):
                     return ranking, False
                 length //= 2
@@ -249,60 +254,64 @@ class _Work:
                 return ranking, True
             length *= 2
 
-    def _ranked(self, now: _Now, path: FloatArray, begin: int, last: int) -> tuple[Ranking, bool]:
+    def _ranked(
+        self, estimate: _Estimate, path: FloatArray, begin: int, last: int
+    ) -> tuple[Ranking, bool]:
         """One change, or else two simultaneous ones; and whether they explain the data."""
-        stretch = self._stretch(now, begin, last)
+        stretch = self._stretch(estimate, begin, last)
         single = locate(stretch, path)
-        if self._holds(now, single):
+        if self._holds(estimate, single):
             return single, True
         pair = locate_pair(stretch, path, single)
-        return (pair, True) if pair.second and self._holds(now, pair) else (single, False)
+        return (pair, True) if pair.second and self._holds(estimate, pair) else (single, False)
 
-    def _extended(self, now: _Now, path: FloatArray, kept: Ranking) -> Ranking:
+    def _extended(self, estimate: _Estimate, path: FloatArray, kept: Ranking) -> Ranking:
         """The ranking from all data until the next damage, if it holds there."""
         refit, end = kept.best.refit, len(self.base.model)
         if refit is None:
             return kept
-        parameters, spread = self._changed(now, refit), self._spread(refit)
+        parameters, spread = self._changed(estimate, refit), self._spread(refit)
         watch = self.judge.watch(
             self.base.model, parameters, refit.state, kept.first, end, spread=spread
         )
         if watch.alarm is None or watch.alarm.onset <= kept.last:
             return kept
-        ranking, holds = self._ranked(now, path, kept.first, watch.alarm.onset)
+        ranking, holds = self._ranked(estimate, path, kept.first, watch.alarm.onset)
         return ranking if holds else kept
 
-    def _holds(self, now: _Now, ranking: Ranking) -> bool:
+    def _holds(self, estimate: _Estimate, ranking: Ranking) -> bool:
         """Whether the change is significant and leaves only noise."""
         refit = ranking.best.refit
         chance = max(candidate.p_value for candidate in ranking.changed)
         if refit is None or not np.isfinite(refit.chi2) or chance > CLEAR:
             return False
-        parameters = self._changed(now, refit)
+        parameters = self._changed(estimate, refit)
         watch = self.judge.watch(
             self.base.model, parameters, refit.state, ranking.first, ranking.last
         )
         return watch.alarm is None
 
-    def _refitted(self, now: _Now, path: FloatArray, ranking: Ranking, onset: int) -> Refit:
+    def _refitted(
+        self, estimate: _Estimate, path: FloatArray, ranking: Ranking, onset: int
+    ) -> Refit:
         """The changed coefficient and those marked in the file, from the instant on."""
         best, known = ranking.best, self.base.model.candidates
         first = max(ranking.first, min(onset, ranking.last - SHORTEST))
-        marked = {n: f.value for n, f in now.figures.items() if n in known}
+        marked = {n: f.value for n, f in estimate.figures.items() if n in known}
         state = path[first] if best.refit is None or first != ranking.first else best.refit.state
-        stretch = self._stretch(now, first, ranking.last)
+        stretch = self._stretch(estimate, first, ranking.last)
         return stretch.refit({**marked, **{c.name: c.after for c in ranking.changed}}, state)
 
-    def _changed(self, now: _Now, refit: Refit | None) -> FloatArray:
-        parameters = now.parameters.copy()
+    def _changed(self, estimate: _Estimate, refit: Refit | None) -> FloatArray:
+        parameters = estimate.parameters.copy()
         names = list(self.base.model.problem.sweeper.compiled.system.parameters)
         for name, value in (refit.values if refit else {}).items():
             parameters[names.index(name)] = value
         return parameters
 
-    def _taken(self, now: _Now, name: str) -> Figure:
+    def _taken(self, estimate: _Estimate, name: str) -> Figure:
         names = list(self.base.model.problem.sweeper.compiled.system.parameters)
-        return Figure(float(now.parameters[names.index(name)]), float("nan"), float("nan"))
+        return Figure(float(estimate.parameters[names.index(name)]), float("nan"), float("nan"))
 
     def _spread(self, refit: Refit) -> FloatArray:
         """The refit's covariance, expanded to all coefficients and states."""

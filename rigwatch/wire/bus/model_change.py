@@ -49,14 +49,14 @@ class ModelReply:
     seq: int = 0
 
 
-def ask_for_model(bus: Bus, wish: ModelRequest, timeout: float = PATIENCE) -> ModelReply:
+def ask_for_model(bus: Bus, request: ModelRequest, timeout: float = PATIENCE) -> ModelReply:
     """Sign and send the request, and wait for the reply.
 
     Raises:
         BusError: no monitor answers.
         KeysError: the operator's key cannot be read.
     """
-    question = msgspec.json.encode(signed(bus, wish))
+    question = msgspec.json.encode(signed(bus, request))
     for reply in bus.query(KEY, question, timeout):
         try:
             return msgspec.json.decode(reply, type=ModelReply)

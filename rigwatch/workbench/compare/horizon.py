@@ -40,15 +40,15 @@ def with_horizon(study: Study) -> Study:
     given = study.file.horizon is not None or not study.model.states
     if given or study.model.rough or predicts_along_motion(study):
         return study
-    data = prepare(_with(study, ""))
+    data = prepare(_with_source(study, ""))
     shortest = (
         min(length for r in (data.train, data.held_out) for length in r.parts) * data.train.dt
     )
     longest, least = shortest / WINDOWS, FEWEST * data.train.dt
-    begin = float(np.clip(_memory(data.train), least, max(longest, least)))
-    study = _with(study, "how fast the outputs change", begin)
+    begin = float(np.clip(_from_correlation(data.train), least, max(longest, least)))
+    study = _with_source(study, "how fast the outputs change", begin)
     try:
-        fitted = _once(study)
+        fitted = _fitted_once(study)
     except ModelError:
         return study
     slowest = _slowest(eigenvalues(fitted, data.train), shortest)
@@ -57,7 +57,7 @@ def with_horizon(study: Study) -> Study:
     constant, name = slowest
     chosen = float(np.clip(constant, least, max(longest, least)))
     bound = ", limited to a tenth of the shortest recording" if chosen < constant else ""
-    return _with(study, f"{name}{bound}", chosen)
+    return _with_source(study, f"{name}{bound}", chosen)
 
 
 def with_horizon_of(study: Study, other: Study) -> Study:
@@ -68,13 +68,13 @@ def with_horizon_of(study: Study, other: Study) -> Study:
     return replace(study, file=file, horizon_from=other.horizon_from)
 
 
-def _with(study: Study, source: str, horizon: float | None = None) -> Study:
+def _with_source(study: Study, source: str, horizon: float | None = None) -> Study:
     rounded = None if horizon is None else float(f"{horizon:.2g}")
     file = structs.replace(study.file, horizon=rounded)
     return replace(study, file=file, horizon_from=source)
 
 
-def _once(study: Study) -> Fitted:
+def _fitted_once(study: Study) -> Fitted:
     """The model fitted to the training recordings."""
     data = prepare(study)
     scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
@@ -87,29 +87,31 @@ def _slowest(found: ComplexArray, longest: float) -> tuple[float, str] | None:
     Modes slower than the recording, for example integrators, are ignored.
     """
     rate = np.sort_complex(found.ravel())
-    seen = rate[np.abs(rate) * longest > 1]
-    if not len(seen):
+    resolved = rate[np.abs(rate) * longest > 1]
+    if not len(resolved):
         return None
-    turning = np.abs(seen.imag) > np.abs(seen.real)
-    asked = np.where(turning, 2 * np.pi * PERIODS / np.abs(seen), SPANS / np.abs(seen))
+    oscillating = np.abs(resolved.imag) > np.abs(resolved.real)
+    horizons = np.where(
+        oscillating, 2 * np.pi * PERIODS / np.abs(resolved), SPANS / np.abs(resolved)
+    )
     # Modes of all windows: the slowest that is not an outlier.
-    wanted = float(np.quantile(asked, 1 - 0.5 / found.shape[1]))
-    at = int(np.argmin(np.abs(asked - wanted)))
-    if turning[at]:
-        return wanted, f"the model's period of {wanted / PERIODS:.2g} s"
-    return wanted, f"the model's time constant of {wanted / SPANS:.2g} s"
+    slowest = float(np.quantile(horizons, 1 - 0.5 / found.shape[1]))
+    at = int(np.argmin(np.abs(horizons - slowest)))
+    if oscillating[at]:
+        return slowest, f"the model's period of {slowest / PERIODS:.2g} s"
+    return slowest, f"the model's time constant of {slowest / SPANS:.2g} s"
 
 
-def _memory(recording: Recording) -> float:
+def _from_correlation(recording: Recording) -> float:
     """Three times the correlation time of the slowest output [s]."""
-    spans = [_like_itself(filled(column)) for column in recording.outputs.T]
+    spans = [_correlation_time(filled(column)) for column in recording.outputs.T]
     return SPANS * max(spans) * recording.dt
 
 
-def _like_itself(signal: FloatArray) -> int:
+def _correlation_time(signal: FloatArray) -> int:
     """Samples until the autocorrelation has fallen to 1/e."""
     left = signal - signal.mean()
     spectrum = np.abs(np.fft.rfft(left, 2 * len(left))) ** 2
-    together = np.fft.irfft(spectrum)[: len(left)]
-    below = np.nonzero(together < UNCORRELATED * max(float(together[0]), 1e-300))[0]
+    correlation = np.fft.irfft(spectrum)[: len(left)]
+    below = np.nonzero(correlation < UNCORRELATED * max(float(correlation[0]), 1e-300))[0]
     return int(below[0]) if len(below) else len(left)

@@ -88,7 +88,7 @@ def _fitted(
     """The base model refitted on the corrected motion, and the strength of the fault."""
     base = bench.base
     for step in range(STEPS):
-        data = _undone(bench.data, sensor, direction, strength)
+        data = _corrected_data(bench.data, sensor, direction, strength)
         found = fit_model(
             bench.study, data, base.placements, base.train.values(), base.train.scale, base=base
         )
@@ -102,7 +102,7 @@ def _step(
 ) -> tuple[float, float]:
     """A Gauss-Newton step of the strength, jointly with the free parameters; share explained."""
     change = CHANGE * _unit(data.train, sensor, direction)
-    moved = undone(data.train, sensor, direction, change)
+    moved = corrected(data.train, sensor, direction, change)
     there = evaluate(at.train, moved, at.horizon, at.substeps, at.train.initial)
     error = at.train.error.ravel()
     column = (there.error.ravel() - error) / change
@@ -126,12 +126,16 @@ def _times(recording: Recording, samples: int) -> FloatArray:
     return np.asarray(np.arange(samples) * recording.dt, np.float64)
 
 
-def _undone(data: Data, sensor: MotionSensor, direction: Direction, strength: float) -> Data:
-    train, held_out = (undone(r, sensor, direction, strength) for r in (data.train, data.held_out))
+def _corrected_data(
+    data: Data, sensor: MotionSensor, direction: Direction, strength: float
+) -> Data:
+    train, held_out = (
+        corrected(r, sensor, direction, strength) for r in (data.train, data.held_out)
+    )
     return replace(data, train=train, held_out=held_out)
 
 
-def undone(
+def corrected(
     recording: Recording, sensor: MotionSensor, direction: Direction, strength: float
 ) -> Recording:
     """The recording with the sensor's fault removed from the motion."""
@@ -161,7 +165,7 @@ def with_motion_sensor(bench: Bench, found: Verdict) -> Verdict:
     best = min(rows, key=lambda row: row.held_out_error)
     assert best.fitted is not None
     named = found.best if found.word != "unknown_effect" else None
-    if bench.floor.reached(best.fitted.held_out) and (named is None or _ahead(best, named)):
+    if bench.floor.reached(best.fitted.held_out) and (named is None or _is_better(best, named)):
         return _named(bench, best, rows)
     if found.best is None or found.best.gain is None or best.gain is None:
         return found
@@ -173,7 +177,7 @@ def with_motion_sensor(bench: Bench, found: Verdict) -> Verdict:
 
 def _named(bench: Bench, best: Ranked, rows: list[Ranked]) -> Verdict:
     """The verdict that names a sensor fault."""
-    alike = [row.label for row in rows if row is not best and not _ahead(best, row)]
+    alike = [row.label for row in rows if row is not best and not _is_better(best, row)]
     name, value = next(iter(best.start.items()))
     assert best.fitted is not None
     text = (
@@ -185,7 +189,7 @@ def _named(bench: Bench, best: Ranked, rows: list[Ranked]) -> Verdict:
     return Verdict(word, best, (best.label,), tuple(alike), text, evidence=Evidence(left))
 
 
-def _ahead(one: Ranked, other: Ranked) -> bool:
+def _is_better(one: Ranked, other: Ranked) -> bool:
     """Whether one has the lower held-out error by more than chance."""
     assert one.fitted is not None
     assert other.fitted is not None

@@ -87,7 +87,7 @@ def excitation(bench: Bench, experiment: Experiment) -> FloatArray:
 def _worded(
     bench: Bench, name: str, share: float, separation: dict[str, float], now: dict[str, float]
 ) -> Experiment:
-    signal = _driven(bench)
+    signal = _varied_input(bench)
     driven = bench.study.model.inputs[signal]
     amplitude = share * _amplitude(bench, signal)
     rival, size = min(separation.items(), key=lambda item: item[1])
@@ -104,7 +104,7 @@ def _in_words(amplitude: float, driven: Input) -> str:
     return f"{amplitude / float(unit_of(shown).factor):.3g} {shown}"
 
 
-def _driven(bench: Bench) -> str:
+def _varied_input(bench: Bench) -> str:
     """The input that is varied; in an inverse model the one whose derivatives are the others."""
     derive = bench.study.file.derive
     if derive is not None:
@@ -134,7 +134,7 @@ def _excitations(bench: Bench) -> Iterator[tuple[str, float, FloatArray]]:
 def _inputs(bench: Bench, shape: FloatArray, share: float) -> FloatArray | None:
     """All inputs for a shape of the driven input; None if a derivative exceeds its past range."""
     recording, names = bench.data.train, list(bench.study.model.inputs)
-    driven = _driven(bench)
+    driven = _varied_input(bench)
     middle = recording.inputs.mean(axis=0)
     inputs = np.tile(middle, (len(shape), 1))
     at = names.index(driven)

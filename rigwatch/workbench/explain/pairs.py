@@ -67,7 +67,7 @@ def two_effects(
         progress: called with the pair about to be fitted.
     """
     fits = _fitted(bench, likely_pairs(bench, rows), progress)
-    good = _enough(bench, fits)
+    good = _explaining(bench, fits)
     if not good:
         return verdict
     best, together = min(good, key=lambda found: found[1].held_out_error)
@@ -75,7 +75,7 @@ def two_effects(
     second = _verdict_with(bench, rows, fits, best.one, best.other)
     if first is None or second is None:
         return verdict
-    found = _both(bench, first, second, together)
+    found = _both_named(bench, first, second, together)
     return dataclasses.replace(found, best=_row(rows, found.best))
 
 
@@ -111,12 +111,12 @@ def _pair(one: Ranked, other: Ranked) -> Pair | None:
 
 def _same(pair: Pair, other: Pair) -> bool:
     """Whether two pairs are equivalent and the other has no more parameters."""
-    straight = _double(pair.one, other.one) and _double(pair.other, other.other)
-    crossed = _double(pair.one, other.other) and _double(pair.other, other.one)
+    straight = _parallel(pair.one, other.one) and _parallel(pair.other, other.other)
+    crossed = _parallel(pair.one, other.other) and _parallel(pair.other, other.one)
     return (straight or crossed) and other.free <= pair.free
 
 
-def _double(row: Ranked, other: Ranked) -> bool:
+def _parallel(row: Ranked, other: Ranked) -> bool:
     return row is other or row.cosines[other.label] > ALIKE
 
 
@@ -137,7 +137,7 @@ def _fitted(bench: Bench, pairs: Sequence[Pair], progress: Progress) -> list[tup
     return found
 
 
-def _enough(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pair, Fitted]]:
+def _explaining(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pair, Fitted]]:
     """Pairs whose residual is small enough for them to be named.
 
     The residual must be at the noise floor, since two wrong effects together explain much. A rough
@@ -184,7 +184,7 @@ def _row(rows: Sequence[Ranked], found: Ranked | None) -> Ranked | None:
     return next((row for row in rows if found is not None and row.label == found.label), None)
 
 
-def _both(bench: Bench, first: Verdict, second: Verdict, together: Fitted) -> Verdict:
+def _both_named(bench: Bench, first: Verdict, second: Verdict, together: Fitted) -> Verdict:
     """The verdict that names both effects."""
     named = (*second.members, *second.rivals)
     assert first.best is not None

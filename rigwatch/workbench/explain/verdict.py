@@ -100,7 +100,7 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
     trusted = floor.reached(best.fitted.held_out)
     members, rivals = _undistinguished(best, rows, trusted=trusted)
     if not trusted and floor.method == "healthy motion":
-        rivals = (*rivals, *_elsewhere(best, rows, (*members, *rivals)))
+        rivals = (*rivals, *_at_other_ports(best, rows, (*members, *rivals)))
     evidence = Evidence(
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
@@ -130,7 +130,7 @@ def _word(
 def _margin(best: Ranked, rows: Sequence[Ranked], confused: tuple[str, ...]) -> float:
     """Standard deviations by which the best beats every effect outside its class and rivals."""
     others = [row for row in rows if row.fitted is not None and row.label not in confused]
-    return min((_ahead(best, row) for row in others), default=CLEAR)
+    return min((_lead(best, row) for row in others), default=CLEAR)
 
 
 def _undistinguished(
@@ -152,16 +152,18 @@ def _undistinguished(
         cosine = best.cosines.get(row.label, 0.0)
         if _same_shift(best, row):
             members.append(row.label)
-        elif cosine > SAME or _kin(best, row):
-            if _one_with(best, row, cosine, trusted=trusted):
+        elif cosine > SAME or _same_family(best, row):
+            if _in_class(best, row, cosine, trusted=trusted):
                 members.append(row.label)
         elif _rivals(best, row, cosine, trusted=trusted):
             rivals.append(row.label)
-    rivals += _looking_like(rows, rivals, {*members, *rivals})
+    rivals += _parallel_to_rivals(rows, rivals, {*members, *rivals})
     return tuple(members), tuple(rivals)
 
 
-def _looking_like(rows: Sequence[Ranked], rivals: Sequence[str], known: set[str]) -> list[str]:
+def _parallel_to_rivals(
+    rows: Sequence[Ranked], rivals: Sequence[str], known: set[str]
+) -> list[str]:
     """Labels of effects not fitted because they are parallel to a rival that was."""
     return [
         row.label
@@ -172,19 +174,19 @@ def _looking_like(rows: Sequence[Ranked], rivals: Sequence[str], known: set[str]
     ]
 
 
-def _one_with(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
+def _in_class(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
     """Whether a parallel effect, or one of the same family, belongs to the best's class."""
     if _equal(best, row, cosine):
         # At another port it does not refine the best, however many parameters its shape has.
-        return _earns(best, row) or (cosine > SAME and row.port != best.port)
+        return _is_simple_enough(best, row) or (cosine > SAME and row.port != best.port)
     near = row.held_out_error < MUCH_WORSE * best.held_out_error
-    return not trusted and row.accepted and cosine > ALIKE and near and _earns(best, row)
+    return not trusted and row.accepted and cosine > ALIKE and near and _is_simple_enough(best, row)
 
 
 def _same_shift(best: Ranked, row: Ranked) -> bool:
     """Whether both shift the machine's only input or only output in time, with the same result.
 
-    A machine that does not change in time answers a late input with the same motion, later.
+    A time-invariant machine responds to a delayed input with the same motion, delayed.
     """
     shifts = best.placement.effect.time_shift and row.placement.effect.time_shift
     if not shifts or best.fitted is None or row.port == best.port:
@@ -199,7 +201,7 @@ def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
         return False
     if row.free > best.free:
         no_worse = row.held_out_error <= best.held_out_error * (1 + NO_DIFFERENCE)
-        better = cosine > SIMILAR and _ahead(row, best) > PERHAPS
+        better = cosine > SIMILAR and _lead(row, best) > PERHAPS
         # At another port it does not refine the best, however many parameters its shape has.
         not_worse = row.port != best.port and _equal(best, row, cosine)
         return trusted and ((cosine > ALIKE and (no_worse or not_worse)) or better)
@@ -208,7 +210,9 @@ def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:
     return cosine > SIMILAR and _equal(best, row, cosine)
 
 
-def _elsewhere(best: Ranked, rows: Sequence[Ranked], known: tuple[str, ...]) -> tuple[str, ...]:
+def _at_other_ports(
+    best: Ranked, rows: Sequence[Ranked], known: tuple[str, ...]
+) -> tuple[str, ...]:
     """Labels of similar effects at another kind of port, if the residual is above the noise floor.
 
     For example, a sensor delay that no effect describes fits nearly as well as a drive delay.
@@ -225,12 +229,12 @@ def _elsewhere(best: Ranked, rows: Sequence[Ranked], known: tuple[str, ...]) -> 
     )
 
 
-def _kin(best: Ranked, row: Ranked) -> bool:
+def _same_family(best: Ranked, row: Ranked) -> bool:
     family = best.placement.effect.family
     return bool(family) and row.placement.effect.family == family
 
 
-def _earns(best: Ranked, row: Ranked) -> bool:
+def _is_simple_enough(best: Ranked, row: Ranked) -> bool:
     """Whether it needs no more parameters than the best and refines no effect of its class."""
     known = {best.effect, *(name.split("@")[0] for name in best.alike)}
     return row.free <= best.free and row.placement.effect.refines not in known
@@ -290,10 +294,10 @@ def _equal(one: Ranked, other: Ranked, cosine: float) -> bool:
     if not other.accepted:
         return False
     same = abs(other.held_out_error / one.held_out_error - 1) < NO_DIFFERENCE
-    return bool(same or abs(_ahead(one, other)) < EQUAL)
+    return bool(same or abs(_lead(one, other)) < EQUAL)
 
 
-def _ahead(one: Ranked, other: Ranked) -> float:
+def _lead(one: Ranked, other: Ranked) -> float:
     """Paired held-out difference in standard deviations; positive if `one` is better."""
     assert one.fitted is not None
     assert other.fitted is not None

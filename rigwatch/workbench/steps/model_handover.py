@@ -37,12 +37,12 @@ class ModelHandover:
     """Outcome of a model change.
 
     Attributes:
-        granted: the monitor's answer.
+        reply: the monitor's answer.
         live: whether a monitor is running.
         found: the promoted model; None for a rollback.
     """
 
-    granted: ModelReply
+    reply: ModelReply
     live: bool
     found: Promotion | None
 
@@ -88,15 +88,15 @@ def hand_over(
     path, user = model_path(rig), operator_name(load_rig(rig).bus, user)
     name, found = study.folder.resolve().name, None
     if rollback:
-        wish = ModelRequest("rollback", "", user, f"rolled back from study {name}")
+        request = ModelRequest("rollback", "", user, f"rolled back from study {name}")
     else:
         found = promotion(study, load_model(path))
         effects = ", ".join(a.effect for a in study.file.effects)
-        wish = ModelRequest("promote", found.text, user, f"study {name}: {effects}")
-    granted, live = _send(rig, path, wish, say)
-    if granted.done:
-        ledger.append(study, wish.action, rig=str(rig), live=live, text=granted.text)
-    return ModelHandover(granted, live, found)
+        request = ModelRequest("promote", found.text, user, f"study {name}: {effects}")
+    reply, live = _send(rig, path, request, say)
+    if reply.done:
+        ledger.append(study, request.action, rig=str(rig), live=live, text=reply.text)
+    return ModelHandover(reply, live, found)
 
 
 def restore(
@@ -138,26 +138,26 @@ def _run(model: RigModel, blocks: Sequence[SampleBlock]) -> tuple[float, tuple[s
 
 
 def _send(
-    rig: Path, path: Path, wish: ModelRequest, say: Callable[[str], None]
+    rig: Path, path: Path, request: ModelRequest, say: Callable[[str], None]
 ) -> tuple[ModelReply, bool]:
     """The monitor's answer and True; if none runs, the file is changed, and False."""
     config = load_rig(rig)
     try:
         bus = connect(config, unique_process("promote"), LINK_TIMEOUT)
         try:
-            return ask_for_model(bus, wish), True
+            return ask_for_model(bus, request), True
         finally:
             bus.close()
     except BusError as error:
         say(f"{error}; the model file is changed for the monitor's next start")
-        return _in_file(config, path, wish), False
+        return _in_file(config, path, request), False
 
 
-def _in_file(config: RigConfig, path: Path, wish: ModelRequest) -> ModelReply:
-    identity = proved_here(config.bus, config.rig.id, wish)
-    now, author = time.time_ns(), model_versions.Author(wish.user, wish.text, identity)
-    if wish.action == "rollback":
+def _in_file(config: RigConfig, path: Path, request: ModelRequest) -> ModelReply:
+    identity = proved_here(config.bus, config.rig.id, request)
+    now, author = time.time_ns(), model_versions.Author(request.user, request.text, identity)
+    if request.action == "rollback":
         model_versions.roll_back(path, now, author)
     else:
-        model_versions.install(path, wish.model, now, author)
+        model_versions.install(path, request.model, now, author)
     return ModelReply(True, "in force from the monitor's next start on")

@@ -180,12 +180,12 @@ def _scatter(columns: FloatArray, known: PromotedSection, sample_rate: float) ->
     friction = known.coulomb * columns[:, G1] + known.viscous * columns[:, G2]
     residual = columns[:, ACCELERATION] - columns[:, MODELLED] - friction
     change = (residual[period:] - residual[:-period]) / np.sqrt(2)
-    felt = [_felt(change, columns[period:, g], period) for g in (G1, G2)]
+    felt = [_equivalent_noise(change, columns[period:, g], period) for g in (G1, G2)]
     margin = 1 + 2 / np.sqrt(len(change) / period)
     return float(margin * max(np.std(change), *felt))
 
 
-def _felt(change: FloatArray, regressor: FloatArray, window: int) -> float:
+def _equivalent_noise(change: FloatArray, regressor: FloatArray, window: int) -> float:
     """Rms of white noise with the same influence on an estimate over a window."""
     along = np.convolve(change * regressor, np.ones(window), "valid")
     size = np.convolve(regressor**2, np.ones(window), "valid")

@@ -66,7 +66,7 @@ def test_it_is_chosen_and_nothing_is_missing(held, hold, healthy):
     assert ranking(bench)[1].word == "nothing_missing"
 
 
-def test_what_is_held_and_late_by_a_part_of_a_sample_is_found_and_said():
+def test_what_is_held_and_late_by_a_part_of_a_sample_is_found_and_reported():
     late = 0.4
     model = with_holds(shipped_models()["mass-spring-damper"], {"force": ("zero", late)})
     made = []

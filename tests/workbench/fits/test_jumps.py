@@ -39,7 +39,7 @@ def test_what_goes_smoothly_has_no_jumps(bench, name):
     assert away_from_jumps(fitted(bench, name), bench.data.train, HORIZON) is None
 
 
-def test_the_floor_counts_the_samples_that_it_is_told(bench):
+def test_the_floor_counts_the_samples_that_it_is_given(bench):
     held_out, floor = bench.base.held_out, bench.floor
     every = np.ones(held_out.residuals.shape[:2], bool)
     assert floor.ratio(held_out, every) == pytest.approx(floor.ratio(held_out))

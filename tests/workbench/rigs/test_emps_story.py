@@ -92,7 +92,7 @@ def test_undo_brings_the_file_back_as_it_was(study: str, told: Told) -> None:
     assert main(["undo", study]) == 2
 
 
-def test_where_it_fails_is_told_with_samples(study: str, told: Told) -> None:
+def test_where_it_fails_is_reported_with_samples(study: str, told: Told) -> None:
     _, regions = told("locate", study)
     views = {region["view"] for region in regions}
     assert views >= {"time", "motion", "direction", "amplitude", "frequency"}

@@ -159,6 +159,6 @@ def test_the_package_loads_nothing_before_it_is_used() -> None:
     assert done.stdout.strip() == "[]"
 
 
-def test_a_name_that_is_not_there_is_told_with_those_that_are() -> None:
+def test_a_name_that_is_not_there_is_reported_with_those_that_are() -> None:
     with pytest.raises(AttributeError, match="Study"):
         _ = rigwatch.explains

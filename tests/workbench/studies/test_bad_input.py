@@ -81,7 +81,7 @@ def test_a_profile_agrees_with_the_interval_of_a_straight_line(made: Made) -> No
     assert profiled == pytest.approx(plain, rel=1e-3)
 
 
-def test_samples_that_are_missing_are_told_and_left_out(made: Made) -> None:
+def test_samples_that_are_missing_are_reported_and_left_out(made: Made) -> None:
     broken = good()
     broken["position"][50:60] = np.nan
     broken["force"][200:210] = np.nan
@@ -122,7 +122,7 @@ def test_a_study_is_not_written_over(made: Made, tmp_path: Path) -> None:
     assert (study.folder / "study.toml").read_bytes() == before
 
 
-def test_parameters_that_cannot_be_told_apart_are_named() -> None:
+def test_parameters_that_cannot_be_distinguished_are_named() -> None:
     text = MODEL.replace("k*position", "(k + k2)*position").replace(
         "parameters.k =", 'parameters.k2 = { value = 1.0, unit = "N/m" }\nparameters.k ='
     )

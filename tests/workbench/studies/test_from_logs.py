@@ -122,7 +122,9 @@ def test_columns_without_names_are_named_by_an_option(tmp_path, run):
         pytest.param((), [*MOTOR, "--set", "R"], "expected NAME=VALUE", id="no value"),
     ],
 )
-def test_what_is_missing_is_said_and_nothing_is_left_behind(tmp_path, capsys, columns, more, said):
+def test_what_is_missing_is_reported_and_nothing_is_left_behind(
+    tmp_path, capsys, columns, more, said
+):
     run = log(MACHINES["motor"], {}, 0.003, seed=1)
     table = dict(zip(columns or run, run.values(), strict=True))
     assert made(tmp_path, written(tmp_path / "run.csv", table), more=more) != 0

@@ -77,7 +77,7 @@ def test_without_ports_it_is_compared_and_explain_asks_for_one(tmp_path: Path) -
         ('measured = "v"', 'measured = "vel"', "states.v.measured: found channel 'vel'.*: u, v"),
     ],
 )
-def test_a_slip_is_told_when_the_study_is_made(
+def test_a_slip_is_reported_when_the_study_is_made(
     tmp_path: Path, old: str, new: str, message: str
 ) -> None:
     text = (SPEED + PORT).replace(old, new)
@@ -87,7 +87,7 @@ def test_a_slip_is_told_when_the_study_is_made(
     assert not (tmp_path / "study" / "study.toml").exists()
 
 
-def test_an_actuator_that_no_equation_uses_is_told(tmp_path: Path) -> None:
+def test_an_actuator_that_no_equation_uses_is_reported(tmp_path: Path) -> None:
     port = '[ports.drive]\nkind = "actuator"\nsignal = "u"\n'
     with pytest.raises(ModelError, match=r"ports.drive: found in no equation"):
         motor(tmp_path, SPEED.replace(" + load", "") + port)
@@ -98,7 +98,7 @@ def test_every_shipped_model_passes() -> None:
         check_model(model)
 
 
-def test_what_fills_no_horizon_is_said(tmp_path: Path) -> None:
+def test_what_fills_no_horizon_is_reported(tmp_path: Path) -> None:
     found = compare(motor(tmp_path, SPEED + PORT, "horizon = 0.8"))
     said = "train: the last 0.6 s of a recording are not counted, since they fill no horizon of 0.8"
     assert any(said in remark for remark in found.remarks)

@@ -34,7 +34,7 @@ def split(folder: Path, table: dict[str, np.ndarray], spans: str) -> str:
     return found.text
 
 
-def test_a_part_without_motion_is_told_and_another_split_is_proposed(tmp_path: Path) -> None:
+def test_a_part_without_motion_is_reported_and_another_split_is_proposed(tmp_path: Path) -> None:
     table = motor([0] * 5 + [1, -1, 0.5, 2, -2, 1, 0.5, -1, 1.5, 0])
     spans = '[[train]]\nsession = "run.mcap"\nend = 10.0\n'
     spans += '[[held_out]]\nsession = "run.mcap"\nstart = 10.0\n'
@@ -44,7 +44,7 @@ def test_a_part_without_motion_is_told_and_another_split_is_proposed(tmp_path: P
     assert "run.mcap from 0 s to 15 s and hold out ../run.mcap from 15 s to 30 s" in said
 
 
-def test_steps_without_their_transients_are_told(tmp_path: Path) -> None:
+def test_steps_without_their_transients_are_reported(tmp_path: Path) -> None:
     table = motor([1, -1, 0.5, 2, -2, 1, 0.5, -1, 1.5, 0.2])
     parts = [(use, 2 * k + 1.0) for k, use in enumerate(["train", "held_out"] * 5)]
     spans = "".join(

@@ -74,7 +74,7 @@ def test_nothing_is_missing_from_a_healthy_plant() -> None:
     assert bench.floor.ratio(bench.base.held_out) == pytest.approx(1.0, abs=0.1)
 
 
-def test_what_no_known_effect_explains_is_said_to_be_unknown() -> None:
+def test_what_no_known_effect_explains_is_reported_as_unknown() -> None:
     _, verdict = explained(study(), simulated((UNKNOWN[0],), 0.05))
     assert verdict.word == "unknown_effect"
 

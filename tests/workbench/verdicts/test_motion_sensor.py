@@ -8,7 +8,7 @@ import pytest
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.data.signals import MotionSensor
 from rigwatch.workbench.explain.explain import explanation, ranking
-from rigwatch.workbench.explain.motion_sensor import DIRECTIONS, undone
+from rigwatch.workbench.explain.motion_sensor import DIRECTIONS, corrected
 from rigwatch.workbench.report.text_report import doubt_of
 from tests.workbench.rigs import test_foreign_rig as rig
 
@@ -33,7 +33,7 @@ def test_a_fault_is_undone_in_position_and_speed(
 ) -> None:
     read = Recording(1 / 1024, np.stack([np.zeros_like(x), x, v], axis=1), np.zeros((2048, 1)))
 
-    found = undone(read, SENSOR, DIRECTIONS[effect], strength)
+    found = corrected(read, SENSOR, DIRECTIONS[effect], strength)
 
     assert found.inputs[5:-5, 1] == pytest.approx(TRUE[0][5:-5], abs=1e-4)
     assert found.inputs[5:-5, 2] == pytest.approx(TRUE[1][5:-5], abs=2e-3)

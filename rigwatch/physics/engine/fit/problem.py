@@ -24,7 +24,7 @@ START_STEPS = 2
 ENOUGH = 1e-3
 """Predicted reduction of a window's squared error that justifies a second one."""
 
-ASTRAY = 2.0
+OUTLIER = 2.0
 """Ratio of a window's squared error to the median above which its initial state may be wrong."""
 
 BACK = 0.8
@@ -54,7 +54,7 @@ class Started:
 
 
 @dataclass(frozen=True, eq=False)
-class _Met:
+class _Best:
     """The evaluation with the smallest error so far.
 
     Attributes:
@@ -113,7 +113,7 @@ class Problem:
             np.array([getattr(state, end) for state in system.states.values()])
             for end in ("low", "high")
         )
-        self._best: _Met | None = None
+        self._best: _Best | None = None
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
 
     @property
@@ -179,10 +179,10 @@ class Problem:
         self, parameters: FloatArray, columns: list[int], since: int = 0
     ) -> None:
         if columns and not self._cut.parts:
-            led = self._effect_states.at(parameters)
+            states = self._effect_states.at(parameters)
             self.initial = self.initial.copy()
             for column in columns:
-                self.initial[since:, column] = led[column][self._cut.starts[since:]]
+                self.initial[since:, column] = states[column][self._cut.starts[since:]]
 
     def simulated(
         self, parameters: FloatArray, rows: IntArray, initial: FloatArray
@@ -237,7 +237,7 @@ class Problem:
         if self._best is not None and np.array_equal(self._best.parameters, parameters):
             self.initial = self._best.initial
         error, slopes = self.settle(parameters)
-        found, rows = Started(parameters, self.initial, error, slopes), _astray(error)
+        found, rows = Started(parameters, self.initial, error, slopes), _outliers(error)
         if not (self.system.states and len(rows)) or self._cut.parts:
             return found
         self.initial = self.initial.copy()
@@ -268,7 +268,7 @@ class Problem:
         parameters: FloatArray,
         steps: int = 6,
         *,
-        worth: float = SETTLED,
+        least_reduction: float = SETTLED,
         rows: IntArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Fit the initial states; return scaled residuals and slopes there.
@@ -280,7 +280,8 @@ class Problem:
         Args:
             parameters: all parameters, shape (n_p,).
             steps: most simulations.
-            worth: smallest predicted relative reduction of a window's squared error for a step.
+            least_reduction: smallest predicted relative reduction of a window's squared error for
+                a step.
             rows: windows to settle, all if None.
         """
         self._follow_inputs(parameters)
@@ -297,27 +298,27 @@ class Problem:
         step = self._steps(error, slopes, rows)
         for further in reversed(range(steps - 1)):
             size = np.sum(error**2, axis=1)
-            (going,) = np.nonzero(self._promise(step, slopes) > worth * size)
-            if not len(going):
+            (moving,) = np.nonzero(self._predicted_reduction(step, slopes) > least_reduction * size)
+            if not len(moving):
                 break
-            there = np.clip(best[going] + step[going], self._low, self._high)
-            tried, tried_slopes = self.simulated(parameters, rows[going], there)
+            there = np.clip(best[moving] + step[moving], self._low, self._high)
+            tried, tried_slopes = self.simulated(parameters, rows[moving], there)
             usable = np.isfinite(tried_slopes).all(axis=tuple(range(1, tried_slopes.ndim)))
-            better = (np.sum(tried**2, axis=1) < size[going]) & usable
-            took = going[better]
-            best[took], error[took], slopes[took] = (
+            better = (np.sum(tried**2, axis=1) < size[moving]) & usable
+            improved = moving[better]
+            best[improved], error[improved], slopes[improved] = (
                 there[better],
                 tried[better],
                 tried_slopes[better],
             )
             if further:
-                step[took] = self._steps(error[took], slopes[took], rows[took])
-                step[going[~better]] /= 4
+                step[improved] = self._steps(error[improved], slopes[improved], rows[improved])
+                step[moving[~better]] /= 4
         self.initial = self.initial.copy()
         self.initial[rows] = best
         return error, slopes
 
-    def _promise(self, step: FloatArray, slopes: FloatArray) -> FloatArray:
+    def _predicted_reduction(self, step: FloatArray, slopes: FloatArray) -> FloatArray:
         """Predicted reduction of each window's squared error by a step, to first order."""
         moved = slopes[..., len(self.free) :] @ step[..., None]
         return np.asarray(np.sum(moved[..., 0] ** 2, axis=1))
@@ -363,10 +364,10 @@ class Problem:
     def _project(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         if self._best is not None:
             self.initial = self._best.initial
-        found = self.cleaned(*self.settle(parameters, START_STEPS, worth=ENOUGH))
+        found = self.cleaned(*self.settle(parameters, START_STEPS, least_reduction=ENOUGH))
         size = float(found[0] @ found[0])
         if self._best is None or size < self._best.size:
-            self._best = _Met(size, parameters.copy(), self.initial)
+            self._best = _Best(size, parameters.copy(), self.initial)
         return found
 
     def cleaned(self, error: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -377,7 +378,7 @@ class Problem:
         return -both[..., 0].ravel(), both[..., 1:].reshape(error.size, m)
 
 
-def _astray(error: FloatArray) -> IntArray:
+def _outliers(error: FloatArray) -> IntArray:
     """Windows, except the first, whose squared error is far above the median."""
     size = np.sum(error**2, axis=1)
-    return np.nonzero(size[1:] > ASTRAY * np.median(size))[0] + 1
+    return np.nonzero(size[1:] > OUTLIER * np.median(size))[0] + 1
