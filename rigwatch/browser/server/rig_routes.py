@@ -117,9 +117,9 @@ async def rig_rollback(request: Request) -> Response:
     """Restore the previous model of the rig's monitor."""
     link, root = _link(request), context_of(request).places.root
     done = await run_in_threadpool(roll_back, link.path, root)
-    if not done.granted.done:
-        raise RigwatchError(done.granted.text)
-    return answer({"text": f"the previous model is {done.granted.text}"})
+    if not done.reply.done:
+        raise RigwatchError(done.reply.text)
+    return answer({"text": f"the previous model is {done.reply.text}"})
 
 
 async def rig_alarm(request: Request) -> Response:

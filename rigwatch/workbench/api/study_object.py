@@ -160,7 +160,7 @@ class Study:
         Raises:
             ModelError: the monitor refuses, or the residual does not fall.
         """
-        done = hand_over(self._opened(), Path(rig), rollback=rollback).granted
+        done = hand_over(self._opened(), Path(rig), rollback=rollback).reply
         if not done.done:
             raise ModelError(f"{rig}: {done.text}")
         return done.text
