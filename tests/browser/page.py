@@ -26,6 +26,7 @@ from tests.waiting import eventually
 AXE = (Path(__file__).parent / "vendor" / "axe.min.js").read_text(encoding="utf-8")
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 SIZE = "1440,1000"
+ROOT = Path(__file__).parents[2]
 
 
 class Served:
@@ -36,13 +37,14 @@ class Served:
         address, token: of its pages.
     """
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
+    def __init__(self, folder: Path, *arguments: str, cwd: Path | None = None) -> None:
         self.folder = folder
         self.process = subprocess.Popen(
             [sys.executable, "-m", "rigwatch", "workbench", str(folder), "--json", *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)},
+            cwd=cwd,
         )
         self.said: list[str] = []
         assert self.process.stdout is not None

@@ -1,5 +1,6 @@
 """From files to a new study: inspect, import, combine with a model."""
 
+from rigwatch.browser.recordings.import_preview import import_preview
 from rigwatch.browser.recordings.looking import Look, look_at
 from rigwatch.browser.recordings.new_study import make_study, template_data, template_names
 from rigwatch.browser.recordings.recorded import (
@@ -16,6 +17,7 @@ __all__ = [
     "begin_story",
     "channels_of",
     "check_session",
+    "import_preview",
     "look_at",
     "make_study",
     "recordings_in",

@@ -17,10 +17,11 @@ from rigwatch.workbench.study import FILE, Span, Study, StudyFile, start_study
 USES = ("train", "held_out", "healthy")
 
 
-def template_names() -> dict[str, list[str]]:
-    """Names of templates and models from which a study can start."""
+def template_names(own: Path) -> dict[str, list[str]]:
+    """Names of templates, models and own models, in the folder `own`, to start from."""
     usable = [n for n in shipped_names("studies") if not _template(n).model.endswith(".toml")]
-    return {"templates": usable, "models": list(shipped_models())}
+    mine = sorted(path.name for path in own.glob("*.toml"))
+    return {"templates": usable, "models": list(shipped_models()), "own": mine}
 
 
 def template_data(name: str) -> dict[str, Any]:
@@ -48,13 +49,17 @@ def _template(name: str) -> StudyFile:
 
 
 def make_study(
-    folder: Path, begin: str, spans: Sequence[tuple[str, Path, float, float | None]]
+    folder: Path,
+    begin: str,
+    spans: Sequence[tuple[str, Path, float, float | None]],
+    own: Path | None = None,
 ) -> Study:
     """Create a study in `folder`.
 
     Args:
         folder: without a study.
         begin: name of a template, or "model:" followed by the name of a model.
+        own: own model file in place of `begin`.
         spans: use, recording, start and end [s] of each part.
 
     Raises:
@@ -66,19 +71,26 @@ def make_study(
     for use, path, start, end in spans:
         if use not in parts:
             raise RigwatchError(f"found use {use!r}, expected one of {', '.join(USES)}")
-        name = Path(os.path.relpath(path, folder)).as_posix()
+        name = _from(folder, path)
         parts[use].append(Span(session=name, start=start, end=float("inf") if end is None else end))
     if not (parts["train"] and parts["held_out"]):
         raise RigwatchError("found no training or no held-out recording, expected one of each")
     train, held_out, healthy = (tuple(parts[use]) for use in USES)
     kind, _, model = begin.partition(":")
-    if model:
+    if own is not None:
+        file = StudyFile(model=_from(folder, own), train=train, held_out=held_out, healthy=healthy)
+    elif model:
         if model not in (known := shipped_models()):
             raise RigwatchError(f"found model {model!r}, expected one of {', '.join(known)}")
         file = StudyFile(model=model, train=train, held_out=held_out, healthy=healthy)
     else:
         file = structs.replace(_template(kind), train=train, held_out=held_out, healthy=healthy)
     return start_study(folder, as_toml(_said(file)))
+
+
+def _from(folder: Path, path: Path) -> str:
+    """A path relative to a study's folder."""
+    return Path(os.path.relpath(path, folder)).as_posix()
 
 
 def _said(section: msgspec.Struct) -> dict[str, Any]:

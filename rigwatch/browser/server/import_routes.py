@@ -15,6 +15,7 @@ from rigwatch.browser.recordings import (
     begin_story,
     channels_of,
     check_session,
+    import_preview,
     look_at,
     make_study,
     recordings_in,
@@ -22,6 +23,7 @@ from rigwatch.browser.recordings import (
     template_names,
 )
 from rigwatch.browser.server.context import (
+    Context,
     answer,
     body_of,
     context_of,
@@ -29,7 +31,7 @@ from rigwatch.browser.server.context import (
     refused,
     told,
 )
-from rigwatch.browser.server.places import RECORDINGS, UPLOADS, PlaceError
+from rigwatch.browser.server.places import MODELS, RECORDINGS, UPLOADS, PlaceError
 from rigwatch.browser.server.signal_routes import packed, span_of
 from rigwatch.browser.signals import open_trace
 from rigwatch.browser.views import render
@@ -38,14 +40,17 @@ from rigwatch.wire.errors import ImportDataError, RigwatchError
 from rigwatch.wire.exchange import ImportMapping, import_file
 from rigwatch.wire.session import SUFFIX
 
+OWN = "own:"
+"""Start of the name of an own model that a study begins with."""
+
 
 async def new_page(request: Request) -> Response:
     """The page for creating a study."""
     context = context_of(request)
     return HTMLResponse(
         render(
-            "new.html", place="new", has_rig=context.rig is not None, begin=template_names(),
-            most=context.most_upload >> 20,
+            "new.html", place="new", has_rig=context.rig is not None,
+            begin=template_names(context.places.root / MODELS), most=context.most_upload >> 20,
         )
     )  # fmt: skip
 
@@ -98,9 +103,7 @@ async def _written(request: Request, path: Path, most: int) -> bool:
 async def take_in(request: Request) -> Response:
     """Import an uploaded file as a session."""
     context, wanted = context_of(request), await body_of(request)
-    source = context.places.inside(f"{UPLOADS}/{Path(str(wanted.get('upload'))).name}")
-    if not source.is_file():
-        raise PlaceError("found no uploaded file, expected one")
+    source = _uploaded(context, wanted)
     target = context.places.new(f"{wanted.get('name', '')}{SUFFIX}", RECORDINGS)
     target.parent.mkdir(exist_ok=True)
     if target.exists():
@@ -121,9 +124,29 @@ async def take_in(request: Request) -> Response:
             "recording": context.places.relative(target),
             "samples": made.samples,
             "rate": made.rate_hz,
-            "remarks": made.remarks,
+            "remarks": [one.replace(source.name, source.name[13:]) for one in made.remarks],
         }
     )
+
+
+async def preview(request: Request) -> Response:
+    """An uploaded file as it would be imported; nothing is kept."""
+    context, wanted = context_of(request), await body_of(request)
+    source = _uploaded(context, wanted)
+    mapping = _mapping(wanted.get("mapping"))
+    try:
+        found = await apart(import_preview, source, mapping)
+        told = [remark.replace(source.name, source.name[13:]) for remark in found["remarks"]]
+        return answer(found | {"remarks": told})
+    except RigwatchError as error:
+        raise ImportDataError(str(error).replace(str(source), source.name[13:])) from None
+
+
+def _uploaded(context: Context, wanted: dict[str, Any]) -> Path:
+    source = context.places.inside(f"{UPLOADS}/{Path(str(wanted.get('upload'))).name}")
+    if not source.is_file():
+        raise PlaceError("found no uploaded file, expected one")
+    return source
 
 
 def _mapping(given: object) -> ImportMapping:
@@ -179,7 +202,12 @@ async def make(request: Request) -> Response:
         spans.append(
             (str(part.get("use")), path, _seconds(part, "start") or 0.0, _seconds(part, "end"))
         )
-    study = await run_in_threadpool(make_study, folder, str(wanted.get("begin", "")), spans)
+    begin, own = str(wanted.get("begin", "")), None
+    if begin.startswith(OWN):
+        own = places.inside(f"{MODELS}/{begin.removeprefix(OWN)}")
+        if own.suffix != ".toml" or not own.is_file():
+            raise PlaceError(f"{begin}: no such model")
+    study = await run_in_threadpool(make_study, folder, begin, spans, own)
     return answer({"study": places.relative(study.folder)})
 
 
@@ -201,6 +229,7 @@ ROUTES = [
     Route("/new", new_page),
     Route("/api/upload/{file}", told(bring), methods=["PUT"]),
     Route("/api/import", told(take_in), methods=["POST"]),
+    Route("/api/import-preview", told(preview), methods=["POST"]),
     Route("/api/recordings", told(recordings)),
     Route("/api/recording/{file:path}", told(recording)),
     Route("/api/recording-signals/{file:path}", told(recording_signals)),

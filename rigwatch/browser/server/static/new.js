@@ -1,12 +1,16 @@
 // Brings recordings, maps their columns, and makes a study of parts of them.
 import { get, post, signals, Refused } from "./api.js";
-import { $, attempt, remark, say } from "./common.js";
+import { $, attempt, keysOn, remark, say, showHelp } from "./common.js";
+import { cursor } from "./cursor.js";
+import { figure } from "./figures.js";
 
 const USES = [["train", "training"], ["held_out", "held out"], ["healthy", "healthy"]];
 let upload = null;
 let recordings = [];
 let chosen = null;
 let chart = null;
+let columns = [];
+let begun = null; // the start of a span that the keyboard is about to set
 
 function field(value, label, width = 24) {
   const input = document.createElement("input");
@@ -50,6 +54,8 @@ async function bring(file) {
 
 function look(file, found, name) {
   $("mapping").hidden = false;
+  $("preview-box").hidden = true;
+  columns = found.columns.map((one) => one.name);
   $("mapping").dataset.rest = JSON.stringify(found.suggested);
   const told = found.mapping ? `, read as ${found.mapping}` : "";
   $("mapping-title").textContent = `${file}: ${found.rows} rows${told}`;
@@ -78,18 +84,40 @@ function look(file, found, name) {
   say(`${file} has ${found.columns.length} columns`);
 }
 
+/** "column * factor + offset [unit]" in its parts; a column's name may hold signs. */
+function parted(source) {
+  const [, rest, unit] = /^(.*?)\s*\[([^\]]*)\]\s*$/.exec(source) ?? ["", source, ""];
+  const column = [...columns].sort((a, b) => b.length - a.length).find((one) => rest === one || (rest.startsWith(one) && /^\s*[*+-]/.test(rest.slice(one.length)))) ?? rest;
+  const [, factor = "", sign = "", offset = ""] = /^\s*(?:\*\s*([^\s+-]+|[^\s]+))?\s*(?:([+-])\s*(\S+))?$/.exec(rest.slice(column.length)) ?? [];
+  return { column, factor, offset: `${sign === "-" ? "-" : ""}${offset}`, unit };
+}
+
+function joined({ column, factor, offset, unit }) {
+  const shift = offset ? ` ${offset.startsWith("-") ? "-" : "+"} ${offset.replace(/^[+-]/, "")}` : "";
+  return `${column}${factor || shift ? ` * ${factor || 1}` : ""}${shift}[${unit}]`;
+}
+
 function channelRow(channel = "", source = "") {
   const row = $("channels").tBodies[0].insertRow();
+  const parts = parted(source);
+  const of = channel || "the channel";
+  const which = document.createElement("select");
+  which.setAttribute("aria-label", `column of ${of}`);
+  which.append(...columns.map((one) => new Option(one, one)));
+  which.value = parts.column;
   cell(row, field(channel, "channel", 16));
-  cell(row, field(source, `source of ${channel || "the channel"}`, 30));
+  cell(row, which);
+  cell(row, field(parts.factor, `factor of ${of}: a number, or a constant of the file`, 8));
+  cell(row, field(parts.offset, `offset of ${of}`, 8));
+  cell(row, field(parts.unit, `unit of ${of}`, 10));
   cell(row, remover(row));
 }
 
 function mapping() {
   const channels = {};
   for (const row of $("channels").tBodies[0].rows) {
-    const [channel, source] = [...row.querySelectorAll("input")].map((one) => one.value.trim());
-    if (channel) channels[channel] = source;
+    const [channel, factor, offset, unit] = [...row.querySelectorAll("input")].map((one) => one.value.trim());
+    if (channel) channels[channel] = joined({ column: row.querySelector("select").value, factor, offset, unit });
   }
   const rate = $("rate").value.trim();
   return { ...JSON.parse($("mapping").dataset.rest), time: $("time").value.trim(), rate: rate ? Number(rate) : null, channels };
@@ -107,6 +135,7 @@ async function take(name, given) {
 
 async function list() {
   recordings = await get("/api/recordings");
+  $("no-recordings").hidden = recordings.length > 0;
   for (const select of document.querySelectorAll("#parts select.recording")) options(select, select.value);
 }
 
@@ -141,7 +170,7 @@ async function fill() {
   const body = $("parts").tBodies[0];
   let parts = [{ use: "train" }, { use: "held_out" }];
   $("needs").textContent = "";
-  if (!begin.startsWith("model:")) {
+  if (!begin.includes(":")) {
     const found = await get(`/api/template/${begin}`);
     parts = found.spans;
     if (begin !== $("begin").value) return;
@@ -152,13 +181,14 @@ async function fill() {
     const same = recordings.find((one) => one.split("/").pop() === part.session);
     partRow({ ...part, session: same ?? recordings[0] });
   }
-  if (!$("study-name").value && !begin.startsWith("model:")) $("study-name").value = begin;
+  if (!$("study-name").value && !begin.includes(":")) $("study-name").value = begin;
   choose(body.rows[0]);
 }
 
 function choose(row) {
   if (chosen === row && chart) return;
   chosen = row;
+  begun = null;
   for (const one of $("parts").tBodies[0].rows) one.classList.toggle("chosen", one === row);
   show();
 }
@@ -188,30 +218,69 @@ function draw(found, unit) {
     cursor: { drag: { x: true, y: false, setScale: false } },
     scales: { x: { time: false } },
     axes: [{ ...axis, label: "time [s]", labelSize: 14, labelFont: "11px system-ui" }, { ...axis, size: 62, label: `[${unit}]`, labelSize: 14, labelFont: "11px system-ui" }],
-    series: [{}, { stroke: colour("measured"), width: 1.3, points: { show: false } }],
+    series: [{}, { label: $("brush-channel").value, stroke: colour("measured"), width: 1.3, points: { show: false } }],
     hooks: { setSelect: [brushed], drawClear: [marked] },
   }, [found.lines[0].x, found.lines[0].y], $("brush"));
 }
 
 function brushed(plot) {
   if (plot.select.width < 4 || !chosen) return;
-  const ends = [plot.select.left, plot.select.left + plot.select.width].map((at) => plot.posToVal(at, "x").toFixed(3));
-  const [from, to] = chosen.querySelectorAll("input");
-  from.value = ends[0];
-  to.value = ends[1];
+  const ends = [plot.select.left, plot.select.left + plot.select.width].map((at) => plot.posToVal(at, "x"));
   plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
-  plot.redraw(false);
+  span(...ends);
 }
 
+/** Sets the span of the selected part. */
+function span(start, end) {
+  const [from, to] = chosen.querySelectorAll("input");
+  from.value = start === null ? "" : start.toFixed(3);
+  to.value = end === null ? "" : end.toFixed(3);
+  chart?.redraw(false);
+  $("brush-told").textContent = `${chosen.querySelector("select").selectedOptions[0].text}: ${from.value || "start"} to ${to.value || "end"} s`;
+}
+
+const COLOURS = { train: "train", held_out: "held", healthy: "floor" };
+
+/** Every part of the recording that is shown, the selected one with a frame. */
 function marked(plot) {
-  const [from, to] = chosen?.querySelectorAll("input") ?? [];
-  if (!from) return;
-  const left = plot.valToPos(Number(from.value || plot.scales.x.min), "x", true);
-  const right = plot.valToPos(Number(to.value || plot.scales.x.max), "x", true);
-  plot.ctx.save();
-  plot.ctx.fillStyle = colour("mark");
-  plot.ctx.fillRect(left, plot.bbox.top, right - left, plot.bbox.height);
-  plot.ctx.restore();
+  const session = chosen?.querySelector("select.recording").value;
+  const { ctx, bbox } = plot;
+  ctx.save();
+  for (const row of $("parts").tBodies[0].rows) {
+    const [use, which] = [...row.querySelectorAll("select")].map((one) => one.value);
+    if (which !== session) continue;
+    const [from, to] = [...row.querySelectorAll("input")].map((one) => one.value.trim());
+    const left = plot.valToPos(from ? Number(from) : plot.scales.x.min, "x", true);
+    const right = plot.valToPos(to ? Number(to) : plot.scales.x.max, "x", true);
+    ctx.fillStyle = ctx.strokeStyle = colour(COLOURS[use]);
+    ctx.globalAlpha = 0.22;
+    ctx.fillRect(left, bbox.top, right - left, bbox.height);
+    ctx.globalAlpha = 1;
+    ctx.font = "12px system-ui";
+    ctx.textAlign = "left";
+    ctx.fillText(USES.find(([name]) => name === use)[1], left + 4, bbox.top + 14 + 14 * (row.rowIndex - 1));
+    if (row === chosen) { ctx.lineWidth = 2; ctx.strokeRect(left, bbox.top + 1, right - left, bbox.height - 2); }
+  }
+  ctx.restore();
+}
+
+/** Enter sets the start of the selected part where the cursor is, Enter again its end. */
+function enter() {
+  const at = chart?.cursor.idx;
+  if (at === null || at === undefined || !chosen) return;
+  const time = chart.data[0][at];
+  if (begun === null) { begun = time; span(time, null); return; }
+  span(Math.min(begun, time), Math.max(begun, time));
+  begun = null;
+}
+
+async function preview() {
+  const found = await attempt(() => post("/api/import-preview", { upload, mapping: mapping() }));
+  $("preview-box").hidden = !found;
+  if (!found) return;
+  $("preview-told").textContent = [`${found.samples} samples, ${Number(found.rate.toPrecision(6))} Hz, ${Number(found.seconds.toPrecision(4))} s`, ...found.remarks].join("; ");
+  $("previews").replaceChildren(...found.figures.map((one) => figure(one)));
+  document.body.dataset.previewed = String(found.figures.length);
 }
 
 function parts() {
@@ -224,7 +293,14 @@ function parts() {
 
 $("file").addEventListener("change", (event) => { if (event.target.files[0]) attempt(() => bring(event.target.files[0])); });
 $("more-channels").addEventListener("click", () => channelRow());
-$("more-parts").addEventListener("click", () => { choose(partRow()); });
+$("preview").addEventListener("click", preview);
+$("parts").addEventListener("change", () => chart?.redraw(false));
+document.addEventListener("click", (event) => {
+  const use = event.target.closest("[data-add]")?.dataset.add;
+  if (use) { choose(partRow({ use, session: chosen?.querySelector("select.recording").value ?? recordings[0] })); chart?.redraw(false); }
+});
+cursor($("brush"), () => chart, (words) => { $("brush-told").textContent = words; }, { plain: true });
+$("brush").addEventListener("keydown", (event) => { if (event.key === "Enter") { event.preventDefault(); enter(); } });
 $("mapping").addEventListener("submit", (event) => { event.preventDefault(); attempt(() => take($("recording-name").value.trim(), mapping())); });
 $("begin").addEventListener("change", () => attempt(fill));
 $("brush-channel").addEventListener("change", () => show());
@@ -233,5 +309,5 @@ $("study").addEventListener("submit", async (event) => {
   const made = await attempt(() => post("/api/new", { name: $("study-name").value.trim(), begin: $("begin").value, spans: parts() }));
   if (made) location.href = `/study/${made.study}`;
 });
-addEventListener("keydown", (event) => { if (event.key === "?" && !event.target.closest("input, select")) $("help").showModal(); });
+addEventListener("keydown", (event) => { if (event.key === "?" && keysOn() && !event.target.closest("input, select")) showHelp(); });
 addEventListener("load", () => attempt(async () => { await list(); await fill(); }));
