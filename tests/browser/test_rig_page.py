@@ -1,4 +1,4 @@
-"""A hidden effect in the simulated rig: from the live alarm to the promoted model, in the browser."""
+"""A hidden effect in the simulated rig, in the browser: from the alarm to the promoted model."""
 
 import os
 import shutil
@@ -58,8 +58,8 @@ def seen(page: Page) -> None:
 @pytest.mark.long
 def test_from_the_alarm_to_a_residual_that_falls(shell: Shell, page: Page) -> None:
     page.open("/rig")
-    page.until(lambda: page.data("#link", "armed") == "absent", "the rig is absent")
-    assert "no router answers" in page.text("#absent-why")
+    page.until(lambda: "no router answers" in page.text("#absent-why"), "the rig is absent")
+    assert page.data("#link", "armed") == "absent"
     seen(page)
     shell.type("rigwatch up configs/story.toml &")
     watched = Watched(shell.config)

@@ -141,7 +141,8 @@ def test_the_story_by_keyboard_alone(page: Page, root: Path, told: Told) -> None
         # The dialog of the machine's own files is none of the page's: it gets the file's name.
         tab_to(page, "#file")
         page.find("#file").send_keys(str(measured("emps", file)))
-        page.until(lambda: page.run(f"return document.activeElement.value === '{name}'"), "focus")
+        there = f"return document.activeElement.value === '{name}'"
+        page.until(lambda told=there: page.run(told), "the form has the focus")
         tab_to(page, "#import")
         page.press(Keys.ENTER)
         wanted = f"recordings/{name}.mcap"
