@@ -209,6 +209,13 @@ class Page:
             for node in one["nodes"] or [{"html": ""}]
         ]
 
+    def pictured(self, name: str) -> None:
+        """Take the documents' picture, light, where a folder for it is given."""
+        if folder := os.environ.get("RIGWATCH_PICTURES"):
+            self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
+                {"name": "prefers-color-scheme", "value": "light"}]})  # fmt: skip
+            self.picture(Path(folder) / name)
+
     def picture(self, path: Path) -> None:
         """What is seen, as PNG."""
         self.driver.save_screenshot(str(path))

@@ -52,6 +52,8 @@ def test_a_slip_is_told_at_its_place_and_the_effect_is_drawn_and_saved(
     assert "unknown name 'w'" in page.text("#problems")
     assert page.text("#marks mark") == "w"
     assert not page.find("#save").is_enabled()
+    page.until(lambda: page.all("#figures svg"), "the picture of what was right")
+    page.pictured("browser-editor.png")
     assert page.violations(dark=False) == []
     assert page.violations(dark=True) == []
     page.click("#problems button")

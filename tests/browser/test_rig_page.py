@@ -1,6 +1,5 @@
 """A hidden effect in the simulated rig, in the browser: from the alarm to the promoted model."""
 
-import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -43,12 +42,6 @@ def page(shell: Shell) -> Iterator[Page]:
     assert not [line for line in served.said if "Traceback" in line], "".join(served.said)
 
 
-def pictured(page: Page, name: str) -> None:
-    """Take the documents' picture, where a folder for it is given."""
-    if folder := os.environ.get("RIGWATCH_PICTURES"):
-        page.picture(Path(folder) / name)
-
-
 def seen(page: Page) -> None:
     """Nothing on the page is out of reach for anybody, in light and dark."""
     assert page.violations(dark=False) == []
@@ -68,7 +61,7 @@ def test_from_the_alarm_to_a_residual_that_falls(shell: Shell, page: Page) -> No
         page.until(lambda: page.text("#link") == "watching", "armed")
         page.until(lambda: page.all(ALARM), "the alarm")
         page.until(lambda: "coulomb@load" in page.text(f"{ALARM} .probable"), "its cause")
-        pictured(page, "browser-rig.png")
+        page.pictured("browser-rig.png")
         watched.wait_for(ENOUGH)
         page.run("window.scrollTo(0, 0)")
         page.click(f"{ALARM} [data-act=acknowledge]")
@@ -97,7 +90,7 @@ def test_from_the_alarm_to_a_residual_that_falls(shell: Shell, page: Page) -> No
         page.until(lambda: "dry_friction" in page.text(in_force), "who promoted what, and when")
         page.until(lambda: page.text("#link") == "watching", "the page tells it, too")
         seen(page)
-        pictured(page, "browser-promoted.png")
+        page.pictured("browser-promoted.png")
 
         def back() -> bool:
             if not page.all('#promotions [data-step="rollback"]') and page.all("#rollback:enabled"):

@@ -1,7 +1,6 @@
 """EMPS in the browser, from the files to 2.01 N and a refusal: by mouse, and by keyboard alone."""
 
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -49,12 +48,6 @@ def equal_to_the_commands(page: Page, study: Path, told: Told) -> None:
     )
 
 
-def pictured(page: Page, name: str) -> None:
-    """Take the documents' picture, where a folder for it is given (`make pictures`)."""
-    if folder := os.environ.get("RIGWATCH_PICTURES"):
-        page.picture(Path(folder) / name)
-
-
 def held_out(page: Page) -> float:
     return float(page.data("#held-out") or "nan")
 
@@ -93,7 +86,7 @@ def test_the_story_by_mouse(page: Page, root: Path, told: Told) -> None:
         page.click(row)
         page.until(lambda e=effect: e.replace("_", " ") in page.text("#detail h3"), "the evidence")
         if effect == "constant_force":
-            pictured(page, "browser-study.png")
+            page.pictured("browser-study.png")
         page.after(lambda: page.click('#detail [data-act="add"]'), "add", "done")
         page.until(lambda e=error: held_out(page) == pytest.approx(e, abs=0.02), f"{error} N")
     equal_to_the_commands(page, study, told)

@@ -91,35 +91,47 @@ function pause(on) {
 
 function since(t_ns) { return new Date(t_ns / 1e6).toLocaleString([], { dateStyle: "short", timeStyle: "medium" }); }
 
+const items = new Map(); // of each alarm: what it shows, and its element
+
+/** Each alarm keeps its place, so that nothing moves away under the pointer; new ones come last. */
 function alarms(found) {
   const now = JSON.stringify(found);
   if (now === shown) return;
   shown = now;
-  const focused = document.activeElement?.dataset?.act ? `[data-alarm="${document.activeElement.closest("article")?.dataset.alarm}"] [data-act="${document.activeElement.dataset.act}"]` : "";
-  const items = found.map((one) => {
-    const item = element("article", "", { class: `alarm ${one.state}`, "data-alarm": one.name, "data-state": one.state });
-    item.append(element("h3", plain(one.name)), element("p", `${one.severity}, ${plain(one.state)}, since ${since(one.t_ns)}${one.first_out ? ", the first" : ""}${one.user ? `, by ${one.user}` : ""}`, { class: "note" }));
-    const [what, probable] = one.cause.split("; probably missing: ");
-    item.append(element("p", what));
-    if (probable) item.append(element("p", `probably missing: ${probable}`, { class: "probable" }));
-    item.append(element("p", one.guidance, { class: "note" }));
-    const acts = element("p", "", { class: "acts" });
-    const tell = (action) => async () => { await post("/api/rig/alarm", { name: one.name, action }); remark(`${plain(one.name)}: ${action} sent`, true); };
-    if (one.state === "unacknowledged" || one.state === "cleared_unacknowledged") acts.append(button("Acknowledge", tell("acknowledge"), { "data-act": "acknowledge" }));
-    if (one.state !== "normal") acts.append(button("Reset", tell("reset"), { "data-act": "reset" }));
-    if (one.seq >= 0) {
-      acts.append(button("Open as a study", async () => {
-        const made = await post("/api/rig/study", { name: one.name });
-        location.href = `/study/${made.study}`;
-      }, { class: "primary", "data-act": "study" }));
-    }
-    item.append(acts);
-    return item;
-  });
-  $("alarms").replaceChildren(...(items.length ? items : [element("p", "No alarms received.", { class: "note" })]));
-  if (focused) document.querySelector(focused)?.focus();
+  for (const one of found) {
+    const text = JSON.stringify(one);
+    const before = items.get(one.name);
+    if (before?.text === text) continue;
+    const made = alarm(one);
+    const focused = before?.made.contains(document.activeElement) ? document.activeElement.dataset.act : "";
+    if (before) before.made.replaceWith(made);
+    else { if (!items.size) $("alarms").replaceChildren(); $("alarms").append(made); }
+    if (focused) made.querySelector(`[data-act="${focused}"]`)?.focus();
+    items.set(one.name, { text, made });
+  }
   const standing = found.filter((one) => one.state !== "normal").map((one) => plain(one.name));
   say(standing.length ? `alarms: ${standing.join(", ")}` : "no standing alarms");
+}
+
+function alarm(one) {
+  const item = element("article", "", { class: `alarm ${one.state}`, "data-alarm": one.name, "data-state": one.state });
+  item.append(element("h3", plain(one.name)), element("p", `${one.severity}, ${plain(one.state)}, since ${since(one.t_ns)}${one.first_out ? ", the first" : ""}${one.user ? `, by ${one.user}` : ""}`, { class: "note" }));
+  const [what, probable] = one.cause.split("; probably missing: ");
+  item.append(element("p", what));
+  if (probable) item.append(element("p", `probably missing: ${probable}`, { class: "probable" }));
+  item.append(element("p", one.guidance, { class: "note" }));
+  const acts = element("p", "", { class: "acts" });
+  const tell = (action) => async () => { await post("/api/rig/alarm", { name: one.name, action }); remark(`${plain(one.name)}: ${action} sent`, true); };
+  if (one.state === "unacknowledged" || one.state === "cleared_unacknowledged") acts.append(button("Acknowledge", tell("acknowledge"), { "data-act": "acknowledge" }));
+  if (one.state !== "normal") acts.append(button("Reset", tell("reset"), { "data-act": "reset" }));
+  if (one.seq >= 0) {
+    acts.append(button("Open as a study", async () => {
+      const made = await post("/api/rig/study", { name: one.name });
+      location.href = `/study/${made.study}`;
+    }, { class: "primary", "data-act": "study" }));
+  }
+  item.append(acts);
+  return item;
 }
 
 function states() {
