@@ -46,13 +46,14 @@ def test_a_slip_is_told_at_its_place_and_the_effect_is_drawn_and_saved(
     page: Page, study: Study
 ) -> None:
     text = opened(page, "effect").replace("k*v", "k*x").replace("{F}/({v})", "{F}/({x})")
+    write(page, text)
+    page.until(lambda: page.all("#figures svg"), "the picture of what is right")
     write(page, text.replace("k*x", "k*w"))
     line = text[: text.index("k*x")].count("\n") + 1
     assert page.data("#problems button", "line") == str(line)
     assert "unknown name 'w'" in page.text("#problems")
     assert page.text("#marks mark") == "w"
     assert not page.find("#save").is_enabled()
-    page.until(lambda: page.all("#figures svg"), "the picture of what was right")
     page.pictured("browser-editor.png")
     assert page.violations(dark=False) == []
     assert page.violations(dark=True) == []

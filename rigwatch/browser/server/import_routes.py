@@ -135,7 +135,7 @@ async def preview(request: Request) -> Response:
     source = _uploaded(context, wanted)
     mapping = _mapping(wanted.get("mapping"))
     try:
-        found = await apart(import_preview, source, mapping)
+        found = await run_in_threadpool(apart, import_preview, source, mapping)
         told = [remark.replace(source.name, source.name[13:]) for remark in found["remarks"]]
         return answer(found | {"remarks": told})
     except RigwatchError as error:
