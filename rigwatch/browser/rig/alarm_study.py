@@ -6,7 +6,7 @@ from rigwatch.browser.recordings import make_study
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.rig_config import RigConfig
-from rigwatch.wire.session import newest, open_session, trim
+from rigwatch.wire.session import SUFFIX, Session, newest, open_session, trim
 from rigwatch.workbench.study import Study
 
 HEALTHY = 5.0
@@ -34,12 +34,12 @@ def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm) -> Study:
     """
     if config.recorder is None:
         raise SessionError("found no [recorder] of the rig, expected one that has what it did")
-    session = open_session(newest(Path(config.recorder.folder)))
+    held = (alarm.seq - alarm.onset_seq) / config.rig.sample_rate if alarm.onset_seq >= 0 else 0.0
+    onset = alarm.t_ns - round(held * 1e9)
+    session = _session_of(Path(config.recorder.folder), onset)
     times = [block.t_ns for block in session.samples()]
     if not times:
         raise SessionError(f"{session.path}: found no samples, expected those around the alarm")
-    held = (alarm.seq - alarm.onset_seq) / config.rig.sample_rate if alarm.onset_seq >= 0 else 0.0
-    onset = alarm.t_ns - round(held * 1e9)
     first, last = int(times[0][0]), int(times[-1][-1])
     before, after = (onset - first) / 1e9 - AROUND, (last - onset) / 1e9 - AROUND
     for seconds, where in ((before, "before"), (after, "after")):
@@ -65,3 +65,17 @@ def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm) -> Study:
         ("healthy", healthy, 0.0, None),
     ]
     return make_study(root / name, TEMPLATE, parts)
+
+
+def _session_of(folder: Path, onset: int) -> Session:
+    """The newest session with a healthy part before an onset [ns]; else the newest of all.
+
+    A recorder that was restarted has begun another one.
+    """
+    files = sorted(folder.glob(f"*/*{SUFFIX}"), key=lambda file: -file.stat().st_mtime)
+    for path in dict.fromkeys(file.parent for file in files):
+        session = open_session(path)
+        first = next(session.samples(size=1), None)
+        if first is not None and first.t_ns[0] <= onset - round((LEAST + AROUND) * 1e9):
+            return session
+    return open_session(newest(folder))

@@ -121,7 +121,7 @@ function alarm(one) {
   if (probable) item.append(element("p", `probably missing: ${probable}`, { class: "probable" }));
   item.append(element("p", one.guidance, { class: "note" }));
   const acts = element("p", "", { class: "acts" });
-  const tell = (action) => async () => { await post("/api/rig/alarm", { name: one.name, action }); remark(`${plain(one.name)}: ${action} sent`, true); };
+  const tell = (action) => () => post("/api/rig/alarm", { name: one.name, action });
   if (one.state === "unacknowledged" || one.state === "cleared_unacknowledged") acts.append(button("Acknowledge", tell("acknowledge"), { "data-act": "acknowledge" }));
   if (one.state !== "normal") acts.append(button("Reset", tell("reset"), { "data-act": "reset" }));
   if (one.seq >= 0) {
