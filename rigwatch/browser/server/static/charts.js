@@ -121,7 +121,7 @@ export class Charts {
       scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => (low === null ? [-1, 1] : uPlot.rangeNum(low, high, 0.1, true)) } },
       axes: [
         { ...axis, show: true, size: last ? 26 : 8, label: last ? "time [s]" : undefined, labelSize: 13, labelFont: "11px system-ui", values: last ? undefined : (_, ticks) => ticks.map(() => "") },
-        { ...axis, size: MARGIN, space: 26, label: `${last ? "residual" : this.query.get("channel")} [${this.unit}]`, labelSize: 16, labelFont: "11px system-ui", values: (_, ticks) => ticks.map(label) },
+        { ...axis, size: MARGIN, space: 18, label: `${last ? "residual" : this.query.get("channel")} [${this.unit}]`, labelSize: 16, labelFont: "11px system-ui", values: (_, ticks) => ticks.map(label) },
       ],
       series: [{}, ...names.map((name) => ({
         label: name, spanGaps: false, points: { show: false }, paths, width: STYLES[name].width,

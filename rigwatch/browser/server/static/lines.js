@@ -20,7 +20,10 @@ export function columns(plot, index) {
   ctx.fillStyle = series.stroke(plot, index);
   const thick = Math.max(series.width * uPlot.pxRatio, 1);
   const wide = Math.max(thick / 2, 1);
-  each(plot, index, (at, low, high) => ctx.fillRect(at, high - thick / 2, wide, low - high + thick));
+  const [on, off] = (series.dash ?? [1, 0]).map((length) => length * uPlot.pxRatio);
+  each(plot, index, (at, low, high) => {
+    if ((at - bbox.left) % (on + off) < on) ctx.fillRect(at, high - thick / 2, wide, low - high + thick);
+  });
   ctx.restore();
 }
 
