@@ -1,4 +1,4 @@
-"""Kill -9 of the workbench's server or of a study's process while it adds and undoes an effect."""
+"""Kill -9 of the workbench's server, or of a study's process, during add and undo."""
 
 import http.client
 import json

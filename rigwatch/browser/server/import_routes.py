@@ -63,15 +63,15 @@ async def bring(request: Request) -> Response:
     length = request.headers.get("content-length", "")
     if length.isdigit() and int(length) > most:
         return refused(f"found {int(length) >> 20} MB, expected at most {most >> 20} MB", 413)
-    folder = context.places.inside(UPLOADS)
-    folder.mkdir(exist_ok=True)
-    path = folder / f"{secrets.token_hex(6)}-{name}"
+    folder = context.places.inside(UPLOADS) / secrets.token_hex(6)
+    folder.mkdir(parents=True)
+    path = folder / name
     if not await _written(request, path, most):
         return refused(f"found more than {most >> 20} MB, expected less", 413)
     try:
-        return answer({"upload": path.name, "look": await _looked(path)})
+        return answer({"upload": f"{folder.name}/{name}", "look": await _looked(path)})
     except RigwatchError as error:
-        path.unlink()
+        _gone(path)
         raise ImportDataError(str(error).replace(f"{path}", name)) from None
 
 
@@ -96,8 +96,15 @@ async def _written(request: Request, path: Path, most: int) -> bool:
         whole = True
     finally:
         if not whole:
-            path.unlink(missing_ok=True)
+            _gone(path)
     return True
+
+
+def _gone(path: Path) -> None:
+    """Remove an upload and the folder that was made for it."""
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)
+        path.parent.rmdir()
 
 
 async def take_in(request: Request) -> Response:
@@ -110,15 +117,15 @@ async def take_in(request: Request) -> Response:
         raise ImportDataError(f"{target.name}: there is one already, expected another name")
     if source.suffix == SUFFIX:
         source.rename(target)
+        _gone(source)
         return answer({"recording": context.places.relative(target), "remarks": []})
     mapping = _mapping(wanted.get("mapping"))
     try:
         made = await run_in_threadpool(apart, import_file, source, target, mapping)
     except RigwatchError as error:
         target.unlink(missing_ok=True)
-        raise ImportDataError(str(error).replace(str(source), source.name[13:])) from None
-    with contextlib.suppress(OSError):
-        source.unlink()
+        raise ImportDataError(str(error).replace(str(source), source.name)) from None
+    _gone(source)
     return answer(
         {
             "recording": context.places.relative(target),
@@ -143,8 +150,9 @@ async def preview(request: Request) -> Response:
 
 
 def _uploaded(context: Context, wanted: dict[str, Any]) -> Path:
-    source = context.places.inside(f"{UPLOADS}/{Path(str(wanted.get('upload'))).name}")
-    if not source.is_file():
+    uploads = context.places.inside(UPLOADS)
+    source = context.places.inside(f"{UPLOADS}/{wanted.get('upload')}")
+    if not (source.is_file() and source.is_relative_to(uploads)):
         raise PlaceError("found no uploaded file, expected one")
     return source
 

@@ -129,7 +129,7 @@ class Desk:
         return self._process is not None
 
     def listen(self) -> asyncio.Queue[Told]:
-        """A queue of changes: "job" with the job, or "study" if its files changed."""
+        """A queue of changes: "job" with the job, or "study" if its files or results changed."""
         queue: asyncio.Queue[Told] = asyncio.Queue(MOST_WAITING)
         self._listeners.add(queue)
         return queue
@@ -184,6 +184,9 @@ class Desk:
             return
         if kind == "progress":
             self._change(text=str(content))
+            return
+        if kind == "shown":
+            self.tell("study")
             return
         if kind == "gone":
             self._end_process()

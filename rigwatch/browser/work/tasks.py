@@ -28,6 +28,7 @@ from rigwatch.workbench.steps import (
 from rigwatch.workbench.study import Study, ledger, open_study
 
 Progress = Callable[[str], None]
+RANKED = "ranked; preparing the previews"
 
 
 @dataclass
@@ -37,11 +38,13 @@ class Worker:
     Attributes:
         folder: the study's.
         progress: called with a line of text as each part begins.
+        shown: called once results can be shown, while the task goes on.
         warm: cache of fits for the next task.
     """
 
     folder: Path
     progress: Progress
+    shown: Callable[[], None] = lambda: None
     warm: Warm = field(default_factory=lambda: Warm(12))
 
     def step(self, count: int | None = None) -> Study:
@@ -72,12 +75,14 @@ class Worker:
         kept, bench = results_of(study), self.warm.bench(study)
         rows, verdict = ranking(bench, self.progress)
         told = explanation(bench, rows, verdict)
+        self.progress(RANKED)
+        kept.write("evidence", {row.label: _evidence(bench, row) for row in rows})
+        kept.write("explanation", told)
+        self.shown()
         with kept.whole("previews") as folder:
             for row in rows:
                 if row.fitted is not None:
                     _write_preview(Results(folder), bench, row.label, row.fitted)
-        kept.write("evidence", {row.label: _evidence(bench, row) for row in rows})
-        kept.write("explanation", told)
         if told.next_experiment is not None:
             _write_experiment(kept, bench, told.next_experiment)
         with kept.whole("directions") as folder:

@@ -13,7 +13,11 @@ from rigwatch.wire.errors import RigwatchError
 def work(pipe: Connection, folder: str) -> None:
     """Execute tasks from the pipe, one after another, until it is closed."""
     threading.Thread(target=end_with_parent, daemon=True).start()
-    worker = Worker(Path(folder), lambda text: pipe.send(("progress", text)))
+    worker = Worker(
+        Path(folder),
+        lambda text: pipe.send(("progress", text)),
+        lambda: pipe.send(("shown", None)),
+    )
     while True:
         try:
             task, arguments = pipe.recv()

@@ -24,15 +24,16 @@ export async function signals(path, signal) {
   const length = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   let at = 4 + length;
-  const lines = head.lines.map(([name, count]) => {
+  const times = (head.shared ? head.lines.slice(0, 1) : head.lines).map(([, count]) => {
     const x = new Float64Array(buffer, at, count);
     at += 8 * count;
-    return { name, count, x };
+    return x;
   });
-  for (const line of lines) {
-    line.y = Array.from(new Float32Array(buffer, at, line.count), (v) => (Number.isNaN(v) ? null : v));
-    at += 4 * line.count;
-  }
+  const lines = head.lines.map(([name, count], k) => {
+    const y = new Float32Array(buffer, at, count);
+    at += 4 * count;
+    return { name, count, x: times[head.shared ? 0 : k], y: y.some(Number.isNaN) ? Array.from(y, (v) => (Number.isNaN(v) ? null : v)) : y };
+  });
   return { ends: head.ends, lines };
 }
 

@@ -3,7 +3,7 @@ import { signals } from "./api.js";
 import { columns, paths } from "./lines.js";
 
 const MARGIN = 62;
-const EVERY = 50; // least time between two loads while the span moves [ms]
+const EVERY = 80; // least time between two loads while the span moves [ms]
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const STYLES = {
   measured: { stroke: "measured", width: 2.6 },
@@ -31,6 +31,7 @@ export class Charts {
     this.places = places;
     this.asked = {};
     this.width = 1000;
+    this.colours();
     new ResizeObserver(() => this.fit()).observe(places.signals);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.rebuild());
   }
@@ -120,7 +121,7 @@ export class Charts {
       scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => (low === null ? [-1, 1] : uPlot.rangeNum(low, high, 0.1, true)) } },
       axes: [
         { ...axis, show: true, size: last ? 26 : 8, label: last ? "time [s]" : undefined, labelSize: 13, labelFont: "11px system-ui", values: last ? undefined : (_, ticks) => ticks.map(() => "") },
-        { ...axis, size: MARGIN, space: 26, label: `${last ? "residual" : this.query.get("channel")} [${this.unit}]`, labelSize: 16, labelFont: "11px system-ui", values: (_, ticks) => ticks.map(label) },
+        { ...axis, size: MARGIN, space: 18, label: `${last ? "residual" : this.query.get("channel")} [${this.unit}]`, labelSize: 16, labelFont: "11px system-ui", values: (_, ticks) => ticks.map(label) },
       ],
       series: [{}, ...names.map((name) => ({
         label: name, spanGaps: false, points: { show: false }, paths, width: STYLES[name].width,
@@ -142,7 +143,7 @@ export class Charts {
     const { ctx, bbox } = plot;
     ctx.save();
     ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
-    ctx.fillStyle = colour("band");
+    ctx.fillStyle = this.fill.band;
     ctx.fillRect(bbox.left, high, bbox.width, low - high);
     ctx.restore();
   }
@@ -151,7 +152,7 @@ export class Charts {
     const { ctx, bbox } = plot;
     ctx.save();
     ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
-    ctx.fillStyle = colour("mark");
+    ctx.fillStyle = this.fill.mark;
     for (const [from, to] of this.marks) {
       const left = plot.valToPos(from, "x", true);
       ctx.fillRect(left, bbox.top, Math.max(plot.valToPos(to, "x", true) - left, 1.5), bbox.height);
@@ -227,7 +228,11 @@ export class Charts {
     this.loadSoon(120);
   }
 
+  /** Those of areas, looked up once: a look-up makes the browser compute its styles. */
+  colours() { this.fill = { band: colour("band"), mark: colour("mark") }; }
+
   rebuild() {
+    this.colours();
     for (const plot of Object.values(this.plots)) plot.destroy();
     this.plots = {};
     this.load();

@@ -15,36 +15,40 @@ export function columns(plot, index) {
   const series = plot.series[index];
   if (!series.dense) return;
   const { ctx, bbox } = plot;
-  const thick = Math.max(series.width * uPlot.pxRatio, 1);
   ctx.save();
   ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
   ctx.fillStyle = series.stroke(plot, index);
-  for (const [at, low, high] of bars(plot, index, series)) {
-    ctx.fillRect(at, high - thick / 2, Math.max(thick / 2, 1), low - high + thick);
-  }
+  const thick = Math.max(series.width * uPlot.pxRatio, 1);
+  const wide = Math.max(thick / 2, 1);
+  const [on, off] = (series.dash ?? [1, 0]).map((length) => length * uPlot.pxRatio);
+  each(plot, index, (at, low, high) => {
+    if ((at - bbox.left) % (on + off) < on) ctx.fillRect(at, high - thick / 2, wide, low - high + thick);
+  });
   ctx.restore();
 }
 
-/** Pixel column, lowest and highest place of each column of a line. */
-function* bars(plot, index, series) {
-  const { data, bbox, scales } = plot;
-  const [x, y, [first, last]] = [data[0], data[index], series.dense];
+/** Calls `bar` with pixel column, lowest and highest place of each column of a line. */
+function each({ data, bbox, scales, series }, index, bar) {
+  const [x, y, [first, last]] = [data[0], data[index], series[index].dense];
   const across = bbox.width / (scales.x.max - scales.x.min);
   const up = bbox.height / (scales.y.max - scales.y.min);
-  let at = null, low = 0, high = 0, before = null;
+  const left = bbox.left - scales.x.min * across;
+  const top = bbox.top + scales.y.max * up;
+  let at = -1, low = 0, high = 0, before = null;
   for (let k = first; k <= last; k++) {
-    if (y[k] === undefined) continue;
-    if (y[k] === null) { if (at !== null) yield [at, low, high]; at = before = null; continue; }
-    const column = Math.floor(bbox.left + (x[k] - scales.x.min) * across);
-    const place = bbox.top + (scales.y.max - y[k]) * up;
+    const value = y[k];
+    if (value === undefined) continue;
+    if (value === null) { if (at >= 0) bar(at, low, high); at = -1; before = null; continue; }
+    const column = Math.max(Math.floor(left + x[k] * across), 0);
+    const place = top - value * up;
     if (column !== at) {
-      if (at !== null) yield [at, low, high];
+      if (at >= 0) bar(at, low, high);
       at = column;
       low = high = before ?? place;
     }
-    low = Math.max(low, place);
-    high = Math.min(high, place);
+    if (place > low) low = place;
+    if (place < high) high = place;
     before = place;
   }
-  if (at !== null) yield [at, low, high];
+  if (at >= 0) bar(at, low, high);
 }

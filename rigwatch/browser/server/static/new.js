@@ -217,7 +217,7 @@ function draw(found, unit) {
     width: $("brush").clientWidth, height: 170, legend: { show: false },
     cursor: { drag: { x: true, y: false, setScale: false } },
     scales: { x: { time: false } },
-    axes: [{ ...axis, label: "time [s]", labelSize: 14, labelFont: "11px system-ui" }, { ...axis, size: 62, label: `[${unit}]`, labelSize: 14, labelFont: "11px system-ui" }],
+    axes: [{ ...axis, size: 26, label: "time [s]", labelSize: 14, labelFont: "11px system-ui" }, { ...axis, size: 62, space: 26, label: `[${unit}]`, labelSize: 14, labelFont: "11px system-ui" }],
     series: [{}, { label: $("brush-channel").value, stroke: colour("measured"), width: 1.3, points: { show: false } }],
     hooks: { setSelect: [brushed], drawClear: [marked] },
   }, [found.lines[0].x, found.lines[0].y], $("brush"));
@@ -304,6 +304,7 @@ $("brush").addEventListener("keydown", (event) => { if (event.key === "Enter") {
 $("mapping").addEventListener("submit", (event) => { event.preventDefault(); attempt(() => take($("recording-name").value.trim(), mapping())); });
 $("begin").addEventListener("change", () => attempt(fill));
 $("brush-channel").addEventListener("change", () => show());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show());
 $("study").addEventListener("submit", async (event) => {
   event.preventDefault();
   const made = await attempt(() => post("/api/new", { name: $("study-name").value.trim(), begin: $("begin").value, spans: parts() }));

@@ -14,10 +14,11 @@ let job = null;
 const over = new Set();
 let asked = 0;
 let wanted = null;
-const HOVER = 90;
+const HOVER = 60;
 let chosen = null;
 let place = null;
 let refreshing = null;
+let again = false;
 let sought = state.latest ? null : state.step; // the step that is shown or on its way; null: the newest
 
 const charts = new Charts({ signals: $("signals"), residual: $("residual") }, (what, content) => {
@@ -94,11 +95,18 @@ function channels() {
 
 /** Takes what the server says of the study; charts keep their span, lists their place. */
 async function refresh(step = sought) {
+  // An answer that is on its way is shown first, or changes in a row would put it off.
+  if (refreshing && step === sought) { again = true; return; }
   sought = step;
+  again = false;
   refreshing?.abort();
   refreshing = new AbortController();
   const query = step === null ? "" : `?step=${step}`;
-  const found = await attempt(() => get(`/api/parts/${path}${query}`, refreshing.signal));
+  const mine = refreshing;
+  const found = await attempt(() => get(`/api/parts/${path}${query}`, mine.signal));
+  if (refreshing !== mine) return;
+  refreshing = null;
+  if (again) refresh();
   if (!found) return;
   const before = state;
   state = found.state;
