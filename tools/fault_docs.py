@@ -12,12 +12,13 @@ INTRODUCTION = """# Faults
 
 <!-- Printed by `make docs` from tests/faults/catalogue.toml. -->
 
-What can go wrong on a rig, what rigwatch does then, within which time, and the test that injects it: into a real
-pseudo-terminal, a real Modbus server, router and processes, real files. [Alarms](alarms.md) lists the alarms.
+What can go wrong on a rig, what rigwatch does then, within which time, and the test that injects
+it: into a real pseudo-terminal, a real Modbus server, router and processes, real files.
+[Alarms](alarms.md) lists the alarms.
 
-Times are compared by sample numbers or by stamps that the system itself gives, where that is possible ("numbers", "stamps"), else by a
-stopwatch ("wall"). Where a time is shorter than other work on a machine may delay a process, the best of up to three injections counts:
-delays only lengthen it.
+Times are compared by sample numbers or by stamps that the system itself gives ("numbers",
+"stamps"), else by a stopwatch ("wall"). Where other work on a machine may delay a process for
+longer than the time allowed, the best of up to three injections counts: delays only lengthen it.
 """
 FINDINGS = """
 ## Found by probing

@@ -133,8 +133,8 @@ class StampedLine(PtyLine):
 class SerialDevice:
     """The device on a real serial line, sending at 256 Hz in a thread of this process."""
 
-    def __init__(self, link: Path) -> None:
-        self.source = WaveSource()
+    def __init__(self, link: Path, source: WaveSource | None = None) -> None:
+        self.source = source or WaveSource()
         self.device = Device(self.source)
         self.source.device = self.device
         self.faults = LineFaults()

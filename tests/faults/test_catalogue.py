@@ -1,4 +1,4 @@
-"""The fault catalogue is complete: 48 faults and 17 findings, each with tests that are collected."""
+"""The fault catalogue is complete: 48 faults, 17 findings, each with tests."""
 
 import ast
 import tomllib
@@ -16,7 +16,7 @@ MEASURED = {"numbers", "stamps", "wall", "-"}
 
 
 @cache
-def tests_in(path: str) -> frozenset[str]:
+def names_in(path: str) -> frozenset[str]:
     """Names of the test functions that pytest collects in a file."""
     tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
     return frozenset(
@@ -41,7 +41,7 @@ def test_every_row_has_tests_that_exist(row: dict[str, object]) -> None:
     for test in tests:
         path, name = test.split("::")
         assert Path(path).name.startswith("test_"), "or pytest does not collect it"
-        assert name in tests_in(path), test
+        assert name in names_in(path), test
 
 
 @pytest.mark.parametrize("row", TABLE["fault"], ids=lambda row: str(row["number"]))

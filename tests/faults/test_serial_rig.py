@@ -8,9 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from rigwatch.wire.bus import ask_alarm_list
 from rigwatch.wire.messages import SAMPLES
 from tests.bus.rig import ROOT
 from tests.faults.field import PERIOD_NS, RATE, Field, SerialDevice, least_of, serial_field
+from tests.monitor_process.model import MODEL
 from tests.waiting import PATIENCE, eventually
 
 pytestmark = [pytest.mark.xdist_group("faults-serial"), pytest.mark.long]
@@ -197,6 +199,24 @@ def test_15_a_gain_that_changes(rig: Field, device: SerialDevice) -> None:
     assert alarm.seq - first <= RATE
 
 
+def test_36_a_rig_that_stands_still(rig: Field, device: SerialDevice) -> None:
+    ready(rig, device)
+    chance = np.random.default_rng(3)
+
+    def still(codes: np.ndarray) -> None:
+        codes[:] = chance.integers(-2, 3, codes.shape)
+
+    first, began = device.source.inject(still, 700).sent(), time.time_ns()
+    alarm = rig.raised("not_observable", after_ns=began - 10**8)
+    assert alarm.seq - first <= 2 * MODEL.window.length, "once the window holds no motion"
+    boot = device.device.boot
+    for name in ("theta1", "theta2", "theta1_high", "theta2_high"):
+        frozen = estimated(rig, boot, alarm.seq, first + 650, name)
+        assert np.isfinite(frozen).all()
+        assert (frozen == frozen[0]).all(), "frozen and bounded"
+    rig.judged(boot, first + 760)
+
+
 def test_42_a_slow_reader(rig: Field, device: SerialDevice) -> None:
     slow = rig.bus.subscribe_lossy(SAMPLES, capacity=16)
     since, first, boot = len(rig.gaps), device.device.next_seq, device.device.boot
@@ -278,15 +298,36 @@ def test_02_a_device_plugged_in_under_another_name(rig: Field, device: SerialDev
 
 
 def test_18_a_second_daq_on_the_same_port(rig: Field, device: SerialDevice) -> None:
-    second = subprocess.run(
-        [sys.executable, "-m", "rigwatch", "daq", str(rig.rig.path)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    second = command("daq", str(rig.rig.path))
     assert second.returncode == 2
     assert second.stderr.count("\n") == 1
     assert "in use by another process" in second.stderr
     rig.judged(device.device.boot, device.device.next_seq)
+
+
+def command(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-m", "rigwatch", *arguments],
+        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False,
+    )  # fmt: skip
+
+
+def test_48_a_flood_an_acknowledgement_and_a_restart(rig: Field, device: SerialDevice) -> None:
+    """After more than ten alarms of the tests before, within ten minutes."""
+    flood = rig.raised("alarm_flood")
+    assert "first out was" in flood.cause
+    assert [e for e in rig.events if e.code == "alarm_grouped"], "announced as events"
+    shown = {alarm.name for alarm in rig.alarms if alarm.t_ns > flood.t_ns}
+    assert "link" in shown, "a critical one is never grouped"
+    done = command("ack", str(rig.rig.path), "link", "--user", "ann")
+    assert done.returncode == 0, done.stderr
+    record = rig.journalled("link")[-1].alarm
+    assert (record.state, record.user) == ("acknowledged", "ann")
+    assert abs(record.t_ns - time.time_ns()) < 60e9
+    before = {alarm.name: alarm.state for alarm in ask_alarm_list(rig.bus)}
+    rig.kill("monitor")
+    rig.start("monitor")
+    after = {alarm.name: alarm.state for alarm in ask_alarm_list(rig.bus)}
+    latched = {"link", "sensor_stuck.acceleration", "sensor_spike.position"}
+    assert latched <= before.keys()
+    assert {name: after[name] for name in latched} == {name: before[name] for name in latched}
