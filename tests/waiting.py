@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-PATIENCE = 40.0
+PATIENCE = 180.0
 """Longest that anything may take before a test fails; machines are slow at times [s]."""
 
 
