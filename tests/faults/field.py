@@ -254,6 +254,15 @@ class Field:
         self.start("monitor")
         self.settle(device)
 
+    def calm(self, device: Device, *names: str) -> None:
+        """A new monitor if one of the alarms has been raised so often that it soon chatters."""
+        recent = time.time_ns() - 60 * 10**9
+        for name in names:
+            raised = [one for one in self.journalled(name) if one.active]
+            if sum(one.alarm.t_ns > recent for one in raised) >= 3:
+                self.renew_monitor(device)
+                return
+
     def _listen(self, stop: threading.Event) -> None:
         subscriptions = {
             topic: self.bus.subscribe(topic) for topic in (ALARMS, ESTIMATES, EVENTS, GAPS, HEALTH)
