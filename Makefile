@@ -65,6 +65,7 @@ docs: $(STAMPS)/run  ## write the pages, tables and pictures that are made by th
 	@python -m tools.format_docs
 	@python -m tools.effect_docs
 	@python -m tools.alarm_docs
+	@python -m tools.fault_docs
 	@python -m tools.unit_docs
 	@python -m tools.pictures
 	@python -m tools.benchmark_page

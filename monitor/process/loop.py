@@ -100,6 +100,7 @@ class MonitorProcess:
         serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
         if self._journal:
             self.say(self.rig.alarms.restore(self._journal.newest(), time.time_ns()))
+            self._standing = self.rig.alarms.standing()
         self._models = ModelDesk(bus, self.rig, Path(section.model), check)
         self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)

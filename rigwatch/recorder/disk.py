@@ -36,6 +36,11 @@ class DiskWatch:
         self._level = len(_LEVELS)
 
     @property
+    def level(self) -> int:
+        """Number of the limit that the free space is above; the highest if there is enough."""
+        return self._level
+
+    @property
     def short(self) -> bool:
         """Whether there is too little space."""
         return self._level < len(_LEVELS)

@@ -45,6 +45,7 @@ class Recorder:
         self._disk = DiskWatch()
         self._retention = Retention(self.settings, config.rig.id)
         self._told_at = -HEALTH_EVERY
+        self._told_trouble = self._trouble()
         self._kept: Positions = {}
         bus.publish(RUN, run)
 
@@ -53,10 +54,18 @@ class Recorder:
         for message in self.feed.take():
             self.store.add(message)
         self._flush(now, t_ns)
-        if now - self._told_at >= HEALTH_EVERY:
-            self._told_at = now
+        share = free_share(self.store.folder)
+        self._tell(self._disk.update(share, t_ns))
+        due = now - self._told_at >= HEALTH_EVERY
+        if due:
             self._tell(self._retention.update(now, t_ns, self.store.folder))
-            self._report(t_ns)
+        if due or self._trouble() != self._told_trouble:
+            self._told_at, self._told_trouble = now, self._trouble()
+            self._bus.publish(HEALTH, self._health(share, t_ns))
+
+    def _trouble(self) -> tuple[bool, int]:
+        """What is wrong with the disk; a change is reported at once."""
+        return bool(self.store.failure), self._disk.level
 
     def _flush(self, now: float, t_ns: int) -> None:
         taken = self.feed.positions()
@@ -69,12 +78,6 @@ class Recorder:
         for event in events:
             self._bus.publish(EVENTS, event)
             self.store.add(event)
-
-    def _report(self, t_ns: int) -> None:
-        share = free_share(self.store.folder)
-        self._tell(self._disk.update(share, t_ns))
-        health = self._health(share, t_ns)
-        self._bus.publish(HEALTH, health)
 
     def _health(self, share: float, t_ns: int) -> Health:
         state = "recording" if not self.store.failure else "not recording"

@@ -4,10 +4,12 @@ plan.py        which processes a configuration asks for, and whose samples each 
 vitals.py      what a process has reported, and when it counts as hung
 child.py       one process: start, notifications, output, end
 supervisor.py  all processes: restart with back-off, status, orderly stop
+config_watch.py  a change of the configuration restarts what it concerns
 """
 
+from rigwatch.supervisor.config_watch import ConfigWatch
 from rigwatch.supervisor.console import Console, Flow
 from rigwatch.supervisor.plan import PROCESSES, plan
 from rigwatch.supervisor.supervisor import Supervisor
 
-__all__ = ["PROCESSES", "Console", "Flow", "Supervisor", "plan"]
+__all__ = ["PROCESSES", "ConfigWatch", "Console", "Flow", "Supervisor", "plan"]

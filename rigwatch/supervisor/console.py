@@ -66,6 +66,10 @@ class Console:
         mark = "|" if event.kind == "says" else f"{event.kind}:"
         self._print(f"{event.process:{NAME_WIDTH}} {mark} {event.text}")
 
+    def changed(self, text: str) -> None:
+        """One line about the configuration."""
+        self.event(ProcessEvent("configuration", "changed", text, 0, 0))
+
     def status(self, supervisor: Supervisor, flow: Flow) -> None:
         """The state of all processes, at intervals."""
         now = time.monotonic()

@@ -24,7 +24,16 @@ from rigwatch.supervisor.plan import ProcessPlan
 from rigwatch.supervisor.vitals import Limits, Vitals
 
 Kind = Literal[
-    "started", "ready", "says", "ended", "ill", "restarting", "finished", "stopping", "stopped"
+    "started",
+    "ready",
+    "says",
+    "ended",
+    "ill",
+    "restarting",
+    "finished",
+    "stopping",
+    "stopped",
+    "changed",
 ]
 TURN = 0.1
 """Time between two checks of the processes [s]."""
@@ -114,6 +123,16 @@ class Supervisor:
     def stop(self) -> None:
         """End `run` after the current turn; may be called from a signal handler."""
         self._stopped = True
+
+    def restart(self, name: str, reason: str) -> None:
+        """Stop a process in good order and start it anew in the next turn."""
+        watched = self._watched[name]
+        if watched.finished or watched.start_at is not None:
+            return
+        self._say(watched, "restarting", reason)
+        self._stop(watched)
+        watched.child.close_run()
+        watched.start_at = self._clock()
 
     def stop_on_signals(self) -> None:
         """Stop in order on SIGTERM and SIGINT."""

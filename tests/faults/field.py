@@ -133,8 +133,8 @@ class StampedLine(PtyLine):
 class SerialDevice:
     """The device on a real serial line, sending at 256 Hz in a thread of this process."""
 
-    def __init__(self, link: Path) -> None:
-        self.source = WaveSource()
+    def __init__(self, link: Path, source: WaveSource | None = None) -> None:
+        self.source = source or WaveSource()
         self.device = Device(self.source)
         self.source.device = self.device
         self.faults = LineFaults()
@@ -253,6 +253,15 @@ class Field:
         self.journal.unlink()
         self.start("monitor")
         self.settle(device)
+
+    def calm(self, device: Device, *names: str) -> None:
+        """A new monitor if one of the alarms has been raised so often that it soon chatters."""
+        recent = time.time_ns() - 60 * 10**9
+        for name in names:
+            raised = [one for one in self.journalled(name) if one.active]
+            if sum(one.alarm.t_ns > recent for one in raised) >= 3:
+                self.renew_monitor(device)
+                return
 
     def _listen(self, stop: threading.Event) -> None:
         subscriptions = {

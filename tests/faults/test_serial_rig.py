@@ -3,14 +3,23 @@
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 
+from rigwatch.wire.bus import ask_alarm_list
 from rigwatch.wire.messages import SAMPLES
 from tests.bus.rig import ROOT
-from tests.faults.field import PERIOD_NS, RATE, Field, SerialDevice, least_of, serial_field
+from tests.faults.field import (
+    AMPLITUDE,
+    PERIOD_NS,
+    RATE,
+    Field,
+    SerialDevice,
+    least_of,
+    serial_field,
+)
 from tests.waiting import PATIENCE, eventually
 
 pytestmark = [pytest.mark.xdist_group("faults-serial"), pytest.mark.long]
@@ -166,8 +175,9 @@ def test_17_spikes(rig: Field, device: SerialDevice) -> None:
     def quiet(codes: np.ndarray) -> None:
         """Nothing."""
 
-    device.source.inject(spike, 1).sent()
+    single = device.source.inject(spike, 1).sent()
     assert counted(rig, "flagged_spike") == before + 1
+    rig.judged(device.device.boot, single + 256)
     assert rig.journalled("sensor_spike.position") == []
     for _ in range(3):
         last = device.source.inject(spike, 1).sent()
@@ -197,6 +207,26 @@ def test_15_a_gain_that_changes(rig: Field, device: SerialDevice) -> None:
     assert alarm.seq - first <= RATE
 
 
+def test_36_a_rig_that_stands_still(rig: Field, device: SerialDevice) -> None:
+    ready(rig, device)
+    chance, stopped = np.random.default_rng(3), [False]
+
+    def still(codes: np.ndarray) -> None:
+        """From a turning point on, where the velocity is zero."""
+        stopped[0] = stopped[0] or abs(codes[0, POSITION]) >= AMPLITUDE - 1
+        if stopped[0]:
+            codes[:] = chance.integers(-2, 3, codes.shape)
+
+    first, boot = device.source.inject(still, 640).sent(), device.device.boot
+    still_from = first + round(RATE)
+    assert not estimated(rig, boot, still_from, first + 600, "observable").any()
+    for name in ("theta1", "theta2", "theta1_high", "theta2_high"):
+        frozen = estimated(rig, boot, still_from, first + 600, name)
+        assert np.isfinite(frozen).all()
+        assert (frozen == frozen[0]).all(), "frozen and bounded"
+    rig.judged(boot, first + 700)
+
+
 def test_42_a_slow_reader(rig: Field, device: SerialDevice) -> None:
     slow = rig.bus.subscribe_lossy(SAMPLES, capacity=16)
     since, first, boot = len(rig.gaps), device.device.next_seq, device.device.boot
@@ -207,6 +237,8 @@ def test_42_a_slow_reader(rig: Field, device: SerialDevice) -> None:
 
 
 def test_03_a_silent_device(rig: Field, device: SerialDevice) -> None:
+    rig.calm(device.device, "stale")
+
     def silence() -> float:
         device.silent = True
         began = time.time_ns()
@@ -219,6 +251,8 @@ def test_03_a_silent_device(rig: Field, device: SerialDevice) -> None:
 
 
 def test_16_a_slow_device(rig: Field, device: SerialDevice) -> None:
+    rig.calm(device.device, "slow_device")
+
     def slow() -> float:
         began = time.time_ns()
         device.slow_down(2.0)
@@ -232,6 +266,7 @@ def test_16_a_slow_device(rig: Field, device: SerialDevice) -> None:
 
 def test_04_garbage_on_the_line(rig: Field, device: SerialDevice) -> None:
     before = counted(rig, "skipped_bytes")
+    rig.calm(device.device, "line_noise")
 
     def garbage() -> float:
         began, first = time.time_ns(), device.device.next_seq
@@ -248,6 +283,8 @@ def test_04_garbage_on_the_line(rig: Field, device: SerialDevice) -> None:
 
 
 def test_01_an_unplugged_device(rig: Field, device: SerialDevice) -> None:
+    rig.calm(device.device, "link")
+
     def unplug() -> float:
         since, began = len(rig.gaps), time.time_ns()
         device.faults.start("unplug", 400)
@@ -278,15 +315,58 @@ def test_02_a_device_plugged_in_under_another_name(rig: Field, device: SerialDev
 
 
 def test_18_a_second_daq_on_the_same_port(rig: Field, device: SerialDevice) -> None:
-    second = subprocess.run(
-        [sys.executable, "-m", "rigwatch", "daq", str(rig.rig.path)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    second = command("daq", str(rig.rig.path))
     assert second.returncode == 2
     assert second.stderr.count("\n") == 1
     assert "in use by another process" in second.stderr
     rig.judged(device.device.boot, device.device.next_seq)
+
+
+def constant(channel: int, code: int | None) -> Callable[[np.ndarray], None]:
+    """One code in a channel; None leaves all as they are."""
+
+    def edit(codes: np.ndarray) -> None:
+        if code is not None:
+            codes[:, channel] = code
+
+    return edit
+
+
+def command(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-m", "rigwatch", *arguments],
+        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False,
+    )  # fmt: skip
+
+
+def test_48_a_flood_an_acknowledgement_and_a_restart(rig: Field, device: SerialDevice) -> None:
+    rig.renew_monitor(device.device)
+    began = time.time_ns()
+    for channel in range(3):
+        for edit, samples in ((constant(channel, 1234), 120), (constant(channel, 32767), 4)):
+            device.source.inject(edit, samples).sent()
+            device.source.inject(constant(channel, None), 8).sent()
+            time.sleep(0.5)
+    for _ in range(2):
+        device.faults.start("lose", 40)
+        device.faults.start("unplug", 64)
+        time.sleep(1.5)
+    flood = rig.raised("alarm_flood", after_ns=began)
+    device.faults.start("unplug", 64)
+    time.sleep(1.0)
+    assert "first out was" in flood.cause
+    assert [e for e in rig.events if e.code == "alarm_grouped"], "announced as events"
+    shown = {alarm.name for alarm in rig.alarms if alarm.t_ns > flood.t_ns}
+    assert "link" in shown, "a critical one is never grouped"
+    done = command("ack", str(rig.rig.path), "link", "--user", "ann")
+    assert done.returncode == 0, done.stderr
+    record = rig.journalled("link")[-1].alarm
+    assert (record.state, record.user) == ("acknowledged", "ann")
+    assert abs(record.t_ns - time.time_ns()) < 60e9
+    before = {alarm.name: alarm.state for alarm in ask_alarm_list(rig.bus)}
+    rig.kill("monitor")
+    rig.start("monitor")
+    after = {alarm.name: alarm.state for alarm in ask_alarm_list(rig.bus)}
+    latched = {"link", "sensor_stuck.acceleration", "sensor_saturated.position"}
+    assert latched <= before.keys()
+    assert {name: after[name] for name in latched} == {name: before[name] for name in latched}

@@ -131,7 +131,7 @@ async def take_in(request: Request) -> Response:
             "recording": context.places.relative(target),
             "samples": made.samples,
             "rate": made.rate_hz,
-            "remarks": [one.replace(source.name, source.name[13:]) for one in made.remarks],
+            "remarks": list(made.remarks),
         }
     )
 
@@ -142,11 +142,9 @@ async def preview(request: Request) -> Response:
     source = _uploaded(context, wanted)
     mapping = _mapping(wanted.get("mapping"))
     try:
-        found = await run_in_threadpool(apart, import_preview, source, mapping)
-        told = [remark.replace(source.name, source.name[13:]) for remark in found["remarks"]]
-        return answer(found | {"remarks": told})
+        return answer(await run_in_threadpool(apart, import_preview, source, mapping))
     except RigwatchError as error:
-        raise ImportDataError(str(error).replace(str(source), source.name[13:])) from None
+        raise ImportDataError(str(error).replace(str(source), source.name)) from None
 
 
 def _uploaded(context: Context, wanted: dict[str, Any]) -> Path:

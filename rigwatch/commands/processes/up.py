@@ -4,7 +4,7 @@ import argparse
 import time
 
 from rigwatch.commands.common import file_or_name
-from rigwatch.supervisor import PROCESSES, Console, Flow, Supervisor, plan
+from rigwatch.supervisor import PROCESSES, ConfigWatch, Console, Flow, Supervisor, plan
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import Heartbeat, endpoint_address, is_free
 from rigwatch.wire.rig_config import RigConfig, load_rig
@@ -41,12 +41,14 @@ def run(arguments: argparse.Namespace) -> int:
     supervisor = Supervisor(plans, console.event)
     supervisor.stop_on_signals()
     flow, heartbeat = Flow(supervisor), Heartbeat("up")
+    watch = ConfigWatch(arguments.config, config, supervisor, console.changed)
     stop_at = time.monotonic() + arguments.seconds
     is_ready = False
 
     def each_turn() -> None:
         nonlocal is_ready
         flow.look()
+        watch.look()
         console.status(supervisor, flow)
         if not is_ready and all(w.was_ready for w in supervisor.processes.values()):
             is_ready = True

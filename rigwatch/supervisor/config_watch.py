@@ -1,0 +1,84 @@
+"""Follows the configuration while the rig runs: what a change concerns is started anew.
+
+    file changed ─▶ read ─┬─ wrong: told with its line, everything runs on as it was
+                          └─ right: told, and the processes of the changed sections are restarted
+
+A recorder is restarted by every change, as a session carries the hash of its configuration.
+"""
+
+import hashlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from rigwatch.supervisor.plan import PROCESSES
+from rigwatch.supervisor.supervisor import Supervisor
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.rig_config import RigConfig, load_rig
+
+INTERVAL = 0.5
+"""Time between two looks at the file [s]."""
+_OF_ALL = ("rig", "bus", "channels")
+"""Sections that every process uses."""
+
+
+class ConfigWatch:
+    """The configuration of the rig that a supervisor runs.
+
+    Args:
+        path: its file.
+        config: as it was read.
+        supervisor: restarts the processes.
+        tell: called with one line for each change.
+        clock: seconds on a monotonic clock [s].
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        config: RigConfig,
+        supervisor: Supervisor,
+        tell: Callable[[str], None],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._path, self._config, self._supervisor = Path(path), config, supervisor
+        self._tell, self._clock = tell, clock
+        self._hash, self._looked_at = self._read(), clock()
+
+    def look(self) -> None:
+        """Look at the file if it is time to, and act on a change."""
+        if self._clock() - self._looked_at < INTERVAL:
+            return
+        self._looked_at = self._clock()
+        found = self._read()
+        if found in (self._hash, ""):
+            return
+        self._hash = found
+        try:
+            self._take(load_rig(self._path))
+        except ConfigError as error:
+            self._tell(f"{error}; everything runs on as it was configured before")
+
+    def _take(self, config: RigConfig) -> None:
+        names = affected(self._config, config)
+        self._config = config
+        running = [name for name in PROCESSES if name in names & self._supervisor.processes.keys()]
+        self._tell(f"{self._path} has changed; started anew: {', '.join(running) or 'nothing'}")
+        for name in running:
+            self._supervisor.restart(name, "its configuration has changed")
+
+    def _read(self) -> str:
+        """Hash of the file's content; "" while it cannot be read, as in the midst of a save."""
+        try:
+            return hashlib.sha256(self._path.read_bytes()).hexdigest()
+        except OSError:
+            return ""
+
+
+def affected(before: RigConfig, after: RigConfig) -> set[str]:
+    """The processes whose sections differ; all of them if a common section does."""
+    if any(getattr(before, name) != getattr(after, name) for name in _OF_ALL):
+        return set(PROCESSES)
+    sections = set(PROCESSES) - {"router"}
+    changed = {name for name in sections if getattr(before, name) != getattr(after, name)}
+    return changed | {"recorder"} if changed else changed

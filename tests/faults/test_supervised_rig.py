@@ -1,0 +1,170 @@
+"""Faults of the monitor's process and of the configuration, under `rigwatch up`."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from rigwatch.wire.bus import ask_alarm_list
+from rigwatch.wire.session import open_session
+from tests.bus.rig import ROOT
+from tests.faults.field import Field, SerialDevice, least_of, numbers
+from tests.tooling.test_up import Rig as Up
+from tests.waiting import PATIENCE, eventually
+
+pytestmark = [pytest.mark.xdist_group("faults-supervised"), pytest.mark.long]
+SECTIONS = """
+[recorder]
+folder = "{folder}/sessions"
+[witness]
+stale_after = 0.8
+[dashboard]
+viewer = "connect"
+"""
+
+
+class SupervisedRig(Field):
+    """The rig under a supervisor, and its device."""
+
+    def begin(self) -> None:
+        self.device = SerialDevice(self.folder / "line-a")
+        self.beside(self.device.serve)
+        self.up = Up(self.rig.path)
+        for process in ("router", "daq", "monitor", "witness"):
+            self.comes("ready", process)
+        self.bus = self.rig.bus("observer")
+        self.beside(self._listen)
+        self.settle(self.device.device)
+
+    def comes(self, kind: str, process: str, after: float = 0.0) -> dict[str, Any]:
+        """The first event of a kind and a process since a moment [s]; waits for it."""
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            for event in self.up.events:
+                if (event["event"], event.get("process")) == (kind, process) and (
+                    event["t"] >= after
+                ):
+                    return event
+            self.up.wait_for("status")
+        raise AssertionError(f"no {kind} of {process}")
+
+    def pid(self, process: str) -> int:
+        return int(self.up.wait_for("status")["processes"][process]["pid"])
+
+    def each_is_judged_once(self, first: int) -> None:
+        judged = [n for n in numbers(self.estimates(), self.device.device.boot) if n >= first]
+        assert judged == list(range(judged[0], judged[-1] + 1))
+
+    def goes_on(self, samples: int = 64) -> None:
+        self.judged(self.device.device.boot, self.device.device.next_seq + samples)
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SupervisedRig]:
+    folder = tmp_path_factory.mktemp("supervised")
+    section = f'adapter = "serial"\nport = "{folder}/line-*"'
+    with SupervisedRig(folder, section, extra=SECTIONS.format(folder=folder)) as made:
+        made.begin()
+        yield made
+        made.up.end()
+
+
+def rail(codes) -> None:  # type: ignore[no-untyped-def]
+    codes[:, 2] = 32767
+
+
+def test_40_a_monitor_that_is_killed(rig: SupervisedRig) -> None:
+    rig.raised("sensor_saturated.acceleration", after_seq=rig.device.source.inject(rail, 8).sent())
+    first = rig.device.device.next_seq
+
+    def kill() -> float:
+        pid, began = rig.pid("monitor"), time.time()
+        os.kill(pid, signal.SIGKILL)
+        return float(rig.comes("started", "monitor", began)["t"]) - began
+
+    least_of(kill, 2.0, lambda: None)
+    rig.goes_on()
+    rig.each_is_judged_once(first)
+    standing = {alarm.name: alarm for alarm in ask_alarm_list(rig.bus)}
+    assert standing["sensor_saturated.acceleration"].state in (
+        "unacknowledged",
+        "cleared_unacknowledged",
+    )
+
+
+def test_41_a_monitor_that_hangs(rig: SupervisedRig) -> None:
+    rig.goes_on()
+    first = rig.device.device.next_seq
+
+    def hang() -> tuple[float, float]:
+        pid, began = rig.pid("monitor"), time.time_ns()
+        os.kill(pid, signal.SIGSTOP)
+        started = float(rig.comes("started", "monitor", began * 1e-9)["t"])
+        rig.comes("ready", "monitor", started)
+        alarm = next(one for one in rig.alarms if one.name == "monitor_stale" and one.t_ns >= began)
+        rig.goes_on()
+        return (alarm.t_ns - began) * 1e-9, started - began * 1e-9
+
+    told, restarted = hang()
+    if told > 1.0 or restarted > 5.0:
+        told, restarted = hang()
+    assert told <= 1.0
+    assert restarted <= 5.0
+    rig.each_is_judged_once(first)
+
+
+def test_48_a_dashboard_that_is_absent_frozen_or_killed(rig: SupervisedRig) -> None:
+    for number in (signal.SIGSTOP, signal.SIGKILL):
+        pid, first, began = rig.pid("dashboard"), rig.device.device.next_seq, time.time()
+        os.kill(pid, number)
+        since = len(rig.gaps)
+        rig.goes_on(384)
+        rig.each_is_judged_once(first)
+        assert rig.gaps[since:] == []
+        assert rig.health_after("daq", time.time_ns()).counters["rate_hz"] >= 0.99 * 256.0
+    rig.comes("started", "dashboard", began)
+
+
+def changed(rig: SupervisedRig, text: str) -> str:
+    """The supervisor's word about a new content of the configuration."""
+    began, beside = time.time(), rig.rig.path.with_suffix(".new")
+    beside.write_text(text)
+    beside.replace(rig.rig.path)
+    return str(rig.comes("changed", "configuration", began)["text"])
+
+
+def test_44_a_configuration_that_is_wrong_or_changes(rig: SupervisedRig) -> None:
+    good = rig.rig.path.read_text()
+    wrong = good.replace("journal =", "jurnal =")
+    line = 1 + good[: good.index("journal =")].count("\n")
+    before = rig.pid("monitor")
+    told = changed(rig, wrong)
+    assert f"rig.toml:{line}: " in told
+    assert "jurnal" in told
+    assert rig.pid("monitor") == before, "all runs on"
+    path = rig.folder / "wrong.toml"
+    path.write_text(wrong)
+    refused = subprocess.run(
+        [sys.executable, "-m", "rigwatch", "daq", str(path)],
+        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False,
+    )  # fmt: skip
+    assert refused.returncode == 2
+    assert f"wrong.toml:{line}: " in refused.stderr
+    other = good + "[monitor.alarms.sensor_spike]\nenabled = false\n"
+    daq, first = rig.pid("daq"), rig.device.device.next_seq
+    assert "started anew: monitor, recorder" in changed(rig, other)
+    rig.goes_on()
+    assert rig.pid("daq") == daq
+    assert rig.pid("monitor") != before
+    rig.each_is_judged_once(first)
+
+    def hashes() -> set[str]:
+        folders = (rig.folder / "sessions").iterdir()
+        return {open_session(one).info.configuration for one in folders}
+
+    eventually(lambda: other in hashes() and good in hashes(), "each session has its own")
