@@ -25,7 +25,7 @@ VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
 BROWSER_PACKAGES := chromium chromium-driver
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test docs demo bench lint unit demo-headless mutate lock viewer-packages clean
+.PHONY: help setup test sbom docs demo bench lint unit demo-headless mutate lock viewer-packages clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -41,6 +41,7 @@ SYNC := $(if $(filter output-sync,$(.FEATURES)),--output-sync=target)
 test: $(STAMPS)/dev  ## everything that is checked: style, types, layers, demo, tests
 	@$(MAKE) --no-print-directory -j3 $(SYNC) lint demo-headless viewer-packages
 	@$(MAKE) --no-print-directory unit
+	@$(MAKE) --no-print-directory sbom
 
 lint: $(STAMPS)/dev  ## ruff, mypy --strict and the rules of which layer imports which
 	@ruff check .
@@ -69,6 +70,9 @@ docs: $(STAMPS)/run  ## write the pages, tables and pictures that are made by th
 	@python -m tools.unit_docs
 	@python -m tools.pictures
 	@python -m tools.benchmark_page
+
+sbom: $(STAMPS)/dev  ## software bill of materials (CycloneDX) of what is installed, in dist/rigwatch.cdx.json
+	@python -m tools.sbom dist/rigwatch.cdx.json
 
 mutate: $(STAMPS)/mutation  ## change the code a little and see which changes no test notices (MUTATE names some)
 	@mutmut run --max-children $(WORKERS) $(MUTATE)

@@ -15,6 +15,7 @@ from msgspec import inspect
 
 from rigwatch.wire.rig_config import RigConfig
 from rigwatch.wire.typed_files.loading import Section
+from rigwatch.witness.people import PeopleFile
 from sim_plant.scenario import Scenario
 
 TARGET = Path(__file__).parent.parent / "docs" / "configuration.md"
@@ -25,6 +26,13 @@ PAGES: tuple[tuple[str, str, type[Section]], ...] = (
         "relative to the folder in which the command runs. A key that is misspelt, missing or out "
         "of range stops the command with one line that names file, line and key.",
         RigConfig,
+    ),
+    (
+        "People",
+        "The file named by `witness.people`: who is notified of alarms, and when nobody is. It "
+        "holds passwords, so only its owner should be able to read it. It is read again when it "
+        "changes ([operations](operations.md#when-nobody-looks)).",
+        PeopleFile,
     ),
     (
         "Scenario of the simulated rig",
@@ -137,6 +145,8 @@ _NAMES: dict[type, str] = {
     inspect.BoolType: "true or false",
     inspect.IntType: "whole number",
     inspect.FloatType: "number",
+    inspect.DateTimeType: "date and time",
+    inspect.TimeType: "time",
     inspect.NoneType: "",
 }
 

@@ -21,7 +21,7 @@ compile() {
         ${UPGRADE:+--upgrade} "$@"
 }
 
-compile --extra dashboard --extra parquet --extra workbench --output-file requirements/lock.txt pyproject.toml
+compile --extra dashboard --extra notify --extra parquet --extra workbench --output-file requirements/lock.txt pyproject.toml
 for part in build dev bench mutation; do
     compile --output-file "requirements/$part.txt" "requirements/$part.in"
 done

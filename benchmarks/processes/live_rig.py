@@ -14,6 +14,8 @@ from pathlib import Path
 
 from rigwatch.demo.commissioning import ensure_model
 from rigwatch.demo.rig_file import write_rig_file
+from rigwatch.keys import Authority
+from rigwatch.wire.access import ROLES
 from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.typed_files import find_config
@@ -29,14 +31,17 @@ class LiveRig:
     Args:
         folder: for configuration, model and recordings.
         needs_model: commission the simulated rig first, as the demonstration does.
+        tls: with keys, so that all processes speak over mutual TLS.
     """
 
-    def __init__(self, folder: Path, *, needs_model: bool = True) -> None:
+    def __init__(self, folder: Path, *, needs_model: bool = True, tls: bool = False) -> None:
         self.folder = folder
         self.path = write_rig_file(find_config("demo.toml"), folder, "web")
         _set_apart(self.path)
         if needs_model:
             ensure_model(self.path, folder, lambda _: None)
+        if tls:
+            _secure(self.path, folder / "keys")
         self.config: RigConfig = load_rig(self.path)
         self._running: list[subprocess.Popen[bytes]] = []
 
@@ -86,11 +91,20 @@ def _set_apart(path: Path) -> None:
     path.write_text(re.sub(r'(?m)^id = ".*"$', f'id = "bench-{os.getpid()}"', text, count=1))
 
 
+def _secure(path: Path, keys: Path) -> None:
+    """Issue keys and use them."""
+    text = path.read_text().replace("tcp/127.0.0.1", "tls/127.0.0.1")
+    path.write_text(re.sub(r'(?m)^keys = ""', f'keys = "{keys}"', text, count=1))
+    authority = Authority.create(keys, load_rig(path).rig.id)
+    for role in ROLES:
+        authority.issue(role, role)
+
+
 @contextlib.contextmanager
-def live_rig(*, needs_model: bool = True) -> Iterator[LiveRig]:
+def live_rig(*, needs_model: bool = True, tls: bool = False) -> Iterator[LiveRig]:
     """A rig in a temporary folder."""
     with tempfile.TemporaryDirectory(prefix="rigwatch-bench-") as folder:
-        rig = LiveRig(Path(folder), needs_model=needs_model)
+        rig = LiveRig(Path(folder), needs_model=needs_model, tls=tls)
         try:
             yield rig
         finally:

@@ -8,14 +8,14 @@ from rigwatch.doctor.finding import Finding, judged
 from rigwatch.wire.bus import Bus, connect, unique_process
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import endpoint_address
-from rigwatch.wire.messages import ALIVE_KEY, HEALTH, Health
+from rigwatch.wire.messages import ALIVE_KEY, HEALTH, MONITOR_STALE, Health
 from rigwatch.wire.rig_config import PlantSection, RigConfig
 
 ROUTER_TIMEOUT = 3.0
 WORD_TIMEOUT = 3.0
 """Longest wait for a process's health, which it publishes every second [s]."""
-WELL = ("running", "recording")
-"""The states of a healthy process."""
+WELL = ("running", "recording", MONITOR_STALE)
+"""The states of a healthy process; a witness that finds the monitor stale does its work."""
 
 
 def check_alive(config: RigConfig, process: str) -> Finding:

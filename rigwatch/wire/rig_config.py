@@ -227,6 +227,24 @@ class WitnessSection(Section, frozen=True):
         str,
         Meta(description="file renewed every second while estimates come, empty for none"),
     ] = ""
+    heartbeat_url: Annotated[
+        str,
+        Meta(description="http(s) address requested while estimates come, empty for none"),
+    ] = ""
+    heartbeat_seconds: Annotated[
+        float, Meta(gt=0, description="interval of these requests [s]")
+    ] = 30.0
+    metrics: Annotated[
+        str,
+        Meta(
+            description="host:port of a Prometheus endpoint, such as 127.0.0.1:9464, empty for "
+            "none; needs `rigwatch[notify]`, beyond loopback also keys"
+        ),
+    ] = ""
+    people: Annotated[
+        str,
+        Meta(description="file with recipients of notifications and maintenance windows"),
+    ] = ""
     notify: Annotated[
         tuple[str, ...],
         Meta(

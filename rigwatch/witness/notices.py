@@ -1,40 +1,87 @@
-"""Decides when to notify of an alarm: at once, and again while it is unacknowledged."""
+"""Decides who is notified of which alarm and when: at once, repeated, escalated, or not now."""
+
+from dataclasses import dataclass, field
+from datetime import datetime
 
 from rigwatch.wire.messages import Alarm
-from rigwatch.wire.rig_config import WitnessSection
+from rigwatch.witness.people import SEVERITIES, PeopleFile, RecipientSection
 
-_SEVERITIES = ("info", "warning", "error", "critical")
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """One notification.
+
+    Attributes:
+        recipient: name of the recipient.
+        alarm: the alarm.
+        times: how often the recipient was notified of it before.
+        minutes: how long it has been unacknowledged [min].
+    """
+
+    recipient: str
+    alarm: Alarm
+    times: int
+    minutes: float
+
+
+@dataclass(slots=True)
+class _Unseen:
+    """An unacknowledged alarm: since when [s], and per recipient the last notice [s] and count."""
+
+    alarm: Alarm
+    since: float
+    told: dict[str, tuple[float, int]] = field(default_factory=dict)
 
 
 class Notices:
-    """Tracks notified alarms; receives the time and reads no clock.
+    """Tracks unacknowledged alarms; receives the time and reads no clock.
 
     Args:
-        settings: section [witness].
+        people: recipients and maintenance windows.
     """
 
-    def __init__(self, settings: WitnessSection) -> None:
-        self._settings = settings
-        self._lowest = _SEVERITIES.index(settings.notify_from)
-        self._unseen: dict[str, tuple[Alarm, float]] = {}
+    def __init__(self, people: PeopleFile) -> None:
+        self.people = people
+        self._unseen: dict[str, _Unseen] = {}
 
-    def hear(self, alarm: Alarm, now: float) -> list[Alarm]:
-        """Alarms to notify of after a change of one; `now` in seconds."""
-        if _SEVERITIES.index(alarm.severity) < self._lowest:
-            return []
+    def hear(self, alarm: Alarm, now: float) -> None:
+        """Take note of a change of an alarm; `now` is monotonic time [s]."""
         if alarm.state != "unacknowledged":
             self._unseen.pop(alarm.name, None)
-            return []
-        known = alarm.name in self._unseen
-        self._unseen[alarm.name] = alarm, self._unseen[alarm.name][1] if known else now
-        return [] if known else [alarm]
+        elif alarm.name in self._unseen:
+            self._unseen[alarm.name].alarm = alarm
+        else:
+            self._unseen[alarm.name] = _Unseen(alarm, now)
 
-    def due(self, now: float) -> list[Alarm]:
-        """Unacknowledged alarms that are due for another notification."""
-        again = self._settings.repeat_minutes * 60.0
-        found = [
-            alarm for alarm, told in self._unseen.values() if again > 0 and now - told >= again
-        ]
-        for alarm in found:
-            self._unseen[alarm.name] = alarm, now
+    def due(self, now: float, wall: datetime) -> list[Notice]:
+        """Notices to send now, each returned once.
+
+        Args:
+            now: monotonic time [s].
+            wall: the same instant with its time zone, for maintenance windows.
+        """
+        windows = [one for one in self.people.maintenance if one.holds(wall)]
+        found = []
+        for unseen in self._unseen.values():
+            severity = unseen.alarm.severity
+            if all(window.lets_through(severity) for window in windows):
+                found += [
+                    self._notice(unseen, recipient, now)
+                    for recipient in self.people.recipients
+                    if _is_due(unseen, recipient, now)
+                ]
         return found
+
+    def _notice(self, unseen: _Unseen, recipient: RecipientSection, now: float) -> Notice:
+        times = unseen.told.get(recipient.name, (0.0, 0))[1]
+        unseen.told[recipient.name] = now, times + 1
+        return Notice(recipient.name, unseen.alarm, times, (now - unseen.since) / 60.0)
+
+
+def _is_due(unseen: _Unseen, recipient: RecipientSection, now: float) -> bool:
+    if SEVERITIES.index(unseen.alarm.severity) < SEVERITIES.index(recipient.lowest):
+        return False
+    if recipient.name in unseen.told:
+        again = recipient.repeat_minutes * 60.0
+        return again > 0 and now - unseen.told[recipient.name][0] >= again
+    return now - unseen.since >= recipient.after_minutes * 60.0

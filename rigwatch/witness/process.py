@@ -3,18 +3,12 @@
 python -m rigwatch witness CONFIG
 """
 
-import contextlib
-import json
-import math
-import os
-import subprocess
 import threading
 import time
-from dataclasses import asdict
-from pathlib import Path
 
-from rigwatch.wire.bus import Bus, CommandCheck, connect, serve_alarm_list
-from rigwatch.wire.host import Heartbeat, replace_file
+from rigwatch.wire.bus import Bus, CommandCheck, ask_alarm_list, connect, serve_alarm_list
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.host import Heartbeat
 from rigwatch.wire.messages import (
     ALARMS,
     COMMANDS,
@@ -25,8 +19,9 @@ from rigwatch.wire.messages import (
     Alarm,
     Health,
 )
-from rigwatch.wire.rig_config import RigConfig, WitnessSection
-from rigwatch.witness.notices import Notices
+from rigwatch.wire.rig_config import RigConfig, SecuritySection, WitnessSection
+from rigwatch.witness.announcer import Announcer
+from rigwatch.witness.outputs import Outputs
 from rigwatch.witness.stale_alarm import StaleAlarm
 
 PROCESS = "witness"
@@ -44,19 +39,32 @@ class Witness:
         settings: section [witness].
         bus: on which the monitor publishes.
         now: monotonic time [s].
-        keys: folder of the rig's keys, "" for none.
+        security: section [bus.security].
+
+    Raises:
+        ConfigError: a heartbeat output or the file of people is invalid.
+        MissingExtraError: a package for notifications or the endpoint is not installed.
     """
 
-    def __init__(self, settings: WitnessSection, bus: Bus, now: float, keys: str = "") -> None:
+    def __init__(
+        self,
+        settings: WitnessSection,
+        bus: Bus,
+        now: float,
+        security: SecuritySection | None = None,
+    ) -> None:
+        security = security or SecuritySection()
         self.settings, self._bus = settings, bus
+        self._announcer = Announcer(settings, bus.rig)
+        self._outputs = Outputs(settings, bus, security)
         self._estimates = bus.subscribe_lossy(ESTIMATES)
         self._alarms = bus.listen(ALARMS)
-        self._notices = Notices(settings)
         self._heard_at = now + max(0.0, FOR_MONITOR - settings.stale_after)
-        self._stale = StaleAlarm(CommandCheck(bus, keys))
+        self._stale = StaleAlarm(CommandCheck(bus, security.keys))
         self._commands = bus.subscribe(COMMANDS)
-        self._running: list[subprocess.Popen[bytes]] = []
         self._told_at = now - 1.0
+        for alarm in _standing(bus):
+            self._hear(alarm, now)
         serve_alarm_list(bus, lambda: list(filter(None, [self._stale.standing])))
 
     def turn(self, now: float, t_ns: int) -> None:
@@ -68,11 +76,15 @@ class Witness:
             self._bus.publish(ALARMS, alarm)
         self._obey(t_ns)
         for alarm in self._alarms.drain():
-            self._notify(self._notices.hear(alarm, now))
-        self._notify(self._notices.due(now))
+            self._hear(alarm, now)
+        self._announcer.turn(now, t_ns)
         if now - self._told_at >= 1.0:
             self._told_at = now
-            self._report(silent, t_ns)
+            self._report(now, t_ns)
+
+    def _hear(self, alarm: Alarm, now: float) -> None:
+        self._announcer.hear(alarm, now)
+        self._outputs.figures.take_alarm(alarm)
 
     def _obey(self, t_ns: int) -> None:
         """Execute operators' commands, a few per turn."""
@@ -83,45 +95,33 @@ class Witness:
             for said in self._stale.command(command, t_ns):
                 self._bus.publish(ALARMS if isinstance(said, Alarm) else EVENTS, said)
 
-    def _notify(self, alarms: list[Alarm]) -> None:
-        """Start the command for each alarm without waiting for it."""
-        self._running = [one for one in self._running if one.poll() is None]
-        for alarm in alarms if self.settings.notify else ():
-            with contextlib.suppress(OSError):
-                self._start(alarm)
-
-    def _start(self, alarm: Alarm) -> None:
-        fields = {
-            key: None if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in asdict(alarm).items()
+    def _report(self, now: float, t_ns: int) -> None:
+        silent = max(0.0, now - self._heard_at)
+        stale = self._stale.standing is not None
+        counters = {
+            "estimates_silent_s": silent,
+            "lost_alarms": float(self._alarms.lost),
+            **self._announcer.counters,
+            **self._outputs.counters,
         }
-        started = subprocess.Popen(
-            [*self.settings.notify, alarm.name, alarm.severity, alarm.cause],
-            stdin=subprocess.PIPE,
-            env={**os.environ, "RIGWATCH_RIG": self._bus.rig},
-        )
-        assert started.stdin is not None
-        with contextlib.suppress(BrokenPipeError), started.stdin as pipe:
-            pipe.write(json.dumps(fields).encode())
-        self._running.append(started)
-
-    def _report(self, silent: float, t_ns: int) -> None:
-        state = MONITOR_STALE if self._stale.standing else "running"
-        counters = {"estimates_silent_s": max(0.0, silent), "lost_alarms": float(self._alarms.lost)}
-        self._bus.publish(HEALTH, Health(PROCESS, t_ns, state, "", counters))
-        if self.settings.heartbeat_file and not self._stale.standing:
-            self._beat(Path(self.settings.heartbeat_file), t_ns)
-
-    def _beat(self, path: Path, t_ns: int) -> None:
-        """Update the heartbeat file, whose age shows when the monitor last published."""
-        with contextlib.suppress(OSError):
-            text = f"{t_ns / 1e9:.3f} {self._bus.rig} running\n"
-            replace_file(path, text, durable=False)
+        state = MONITOR_STALE if stale else "running"
+        health = Health(PROCESS, t_ns, state, self._announcer.trouble, counters)
+        self._bus.publish(HEALTH, health)
+        self._outputs.renew(now, t_ns, silent, stale=stale)
 
     def close(self) -> None:
         """Close the connection to the bus."""
+        self._outputs.close()
         self._alarms.close()
         self._estimates.close()
+
+
+def _standing(bus: Bus) -> list[Alarm]:
+    """Alarms that the monitor raised before this process was there."""
+    try:
+        return ask_alarm_list(bus)
+    except BusError:
+        return []
 
 
 def run(config: RigConfig, stop: threading.Event) -> None:
@@ -136,7 +136,7 @@ def run(config: RigConfig, stop: threading.Event) -> None:
             config.witness or WitnessSection(),
             bus,
             time.monotonic(),
-            config.bus.security.keys,
+            config.bus.security,
         )
         heartbeat = Heartbeat(PROCESS)
         heartbeat.ready()

@@ -208,3 +208,21 @@ def test_a_journal_that_has_grown_is_rotated_and_keeps_the_state_of_every_alarm(
     reopened = AlarmJournal(path)
     assert {one.alarm.name for one in reopened.newest()} == {one.alarm.name for one in changes}
     reopened.close()
+
+
+def test_a_journal_without_identities_is_read(tmp_path):
+    """Of a version before commands were signed."""
+    path = tmp_path / "alarms.jsonl"
+    journal = AlarmJournal(path)
+    alarms = faulty_manager()
+    journal.write(alarms.take_changes())
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert {line["alarm"]["identity"] for line in lines} == {"", "not proved"}
+    for line in lines:
+        del line["alarm"]["identity"]
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    records, unread = read_journal(path)
+    assert unread == 0
+    assert {record.alarm.identity for record in records} == {""}
+    found, expected = restarted(path).standing(), alarms.standing()
+    assert [(one.name, one.state) for one in found] == [(one.name, one.state) for one in expected]

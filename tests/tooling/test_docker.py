@@ -128,8 +128,7 @@ def test_each_lasting_service_has_a_health_check_that_can_be_run(name: str) -> N
 
 def test_all_processes_of_a_rig_have_a_service_and_none_has_rights_or_a_writable_image() -> None:
     run = {service["command"][0].replace("record", "recorder") for service in services().values()}
-    # A witness is configured by a section of its own, and best runs on another machine.
-    assert set(PROCESSES) - {"witness"} <= run
+    assert set(PROCESSES) <= run
     for service in services().values():
         assert service["read_only"] is True
         assert service["cap_drop"] == ["ALL"]

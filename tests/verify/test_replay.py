@@ -12,6 +12,7 @@ from monitor.pipeline import RigMonitor
 from rigwatch.commands import main
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
+from rigwatch.wire.bus import command_mark
 from rigwatch.wire.messages.message_types import (
     Alarm,
     AlarmCommand,
@@ -126,3 +127,18 @@ def test_a_forged_change_of_the_model_is_reported_and_left_out(tmp_path: Path, m
     said = [one for item in judged for one in item.announced]
     assert [one.code for one in said if isinstance(one, Event)] == ["MODEL REFUSED"]
     assert "dry_friction" in [one.name for one in said if isinstance(one, Alarm)]
+
+
+def test_a_command_that_the_monitor_refused_is_not_replayed(tmp_path: Path) -> None:
+    path, t_ns = tmp_path / "refused.mcap", 1_767_225_600_000_000_000
+    forged = AlarmCommand("*", "acknowledge", "bob", t_ns, "", '{"nonce": "1"}')
+    genuine = AlarmCommand("*", "acknowledge", "ann", t_ns + 1, "", '{"nonce": "2"}')
+    refused = [f"acknowledge of * refused: why ({command_mark(c)})" for c in (forged, genuine)]
+    with SessionWriter(path, run_info("bench", 256.0), sync=False) as writer:
+        # The genuine one is repeated by somebody: executed once, then refused.
+        for message in (forged, genuine, genuine):
+            writer.write(message)
+        for text in refused:
+            event = Event("monitor/alarms", t_ns, "warning", "alarm_command_refused", text)
+            writer.write(event)
+    assert list(items(open_session(path))) == [genuine]

@@ -73,9 +73,12 @@ def as_line(alarm: "Alarm") -> str:
     """One line: time, severity, name, state."""
     from datetime import datetime
 
+    from rigwatch.wire.messages import PROVED
+
     when = datetime.fromtimestamp(alarm.t_ns / 1e9).astimezone()
     mark = " FIRST OUT" if alarm.first_out and alarm.state != "normal" else ""
-    who = f" by {alarm.user}" if alarm.user else ""
+    proved = " (proved)" if alarm.identity == PROVED else ""
+    who = f" by {alarm.user}{proved}" if alarm.user else ""
     state = alarm.state.replace("_", " ")
     return f"{when:%Y-%m-%d %H:%M:%S} {alarm.severity:8} {alarm.name}: {state}{who}{mark}"
 

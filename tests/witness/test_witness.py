@@ -10,10 +10,8 @@ from rigwatch.wire.bus import ask_alarm_list
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.messages import ALARMS, ESTIMATES, Alarm, EstimateBlock
 from rigwatch.wire.rig_config import WitnessSection
-from rigwatch.witness.notices import Notices
 from rigwatch.witness.process import Witness
 from tests.bus.rig import TestRig, stopped
-from tests.bus.test_complete_subscription import alarm as remark
 from tests.monitor_process.model import monitor_section
 from tests.waiting import eventually
 
@@ -53,22 +51,7 @@ def test_a_silent_monitor_is_an_alarm_that_clears_and_stands_in_the_list(tmp_pat
     assert ask_alarm_list(screen) == []
 
 
-def test_people_are_notified_once_and_again_until_somebody_has_seen_it() -> None:
-    notices = Notices(WitnessSection(repeat_minutes=1.0))
-    assert notices.hear(remark(1), 0.0) == []
-    assert [one.name for one in notices.hear(fault(), 0.0)] == ["stale"]
-    assert notices.hear(fault(), 5.0) == []
-    assert notices.due(59.0) == []
-    assert [one.name for one in notices.due(60.0)] == ["stale"]
-    assert notices.due(61.0) == []
-    notices.hear(fault(state="acknowledged"), 70.0)
-    assert notices.due(600.0) == []
-    assert len(notices.hear(fault(), 700.0)) == 1
-
-
-def test_a_hung_monitor_is_reported_by_the_witness_and_the_command_is_run(
-    tmp_path: Path,
-) -> None:
+def test_a_hung_monitor_is_reported_by_the_witness_and_the_command_is_run(tmp_path: Path) -> None:
     told = tmp_path / "told"
     line = "sys.argv[1] + ' ' + sys.stdin.read() + chr(10)"
     code = f"import sys; open({str(told)!r}, 'a').write({line})"

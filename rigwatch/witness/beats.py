@@ -1,0 +1,67 @@
+"""Heartbeat outputs: a file and a URL, renewed while the monitor publishes estimates.
+
+Another watchdog raises an alarm when they stop, whatever ended: monitor, witness or the machine.
+"""
+
+import contextlib
+import threading
+import urllib.request
+from pathlib import Path
+
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.host import replace_file
+
+TIMEOUT = 5.0
+"""Longest wait for the answer to a ping [s]."""
+
+
+def write_beat(path: Path, rig: str, t_ns: int) -> None:
+    """Renew the heartbeat file, whose age shows when the monitor last published."""
+    with contextlib.suppress(OSError):
+        replace_file(path, f"{t_ns / 1e9:.3f} {rig} running\n", durable=False)
+
+
+class Pinger:
+    """Requests a URL at intervals, in a thread of its own.
+
+    Args:
+        url: http or https, as a dead man's switch offers.
+        interval: shortest time between two pings [s].
+
+    Attributes:
+        sent, failed: number of pings answered with success, and of others.
+
+    Raises:
+        ConfigError: the URL is of another kind.
+    """
+
+    def __init__(self, url: str, interval: float) -> None:
+        if not url.startswith(("http://", "https://")):
+            kind = url.partition(":")[0]
+            raise ConfigError("configuration", "witness.heartbeat_url", kind, "http:// or https://")
+        self.sent = self.failed = 0
+        self._url, self._interval = url, interval
+        self._due_at = float("-inf")
+        self._wanted = threading.Event()
+        threading.Thread(target=self._run, name="ping", daemon=True).start()
+
+    def beat(self, now: float) -> None:
+        """Ping if it is due; never waits. `now` is monotonic time [s]."""
+        if now >= self._due_at:
+            self._due_at = now + self._interval
+            self._wanted.set()
+
+    def _run(self) -> None:
+        while self._wanted.wait():
+            self._wanted.clear()
+            if self._ping():
+                self.sent += 1
+            else:
+                self.failed += 1
+
+    def _ping(self) -> bool:
+        try:
+            with urllib.request.urlopen(self._url, timeout=TIMEOUT) as answer:
+                return 200 <= int(answer.status) < 300
+        except (OSError, ValueError):
+            return False

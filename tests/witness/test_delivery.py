@@ -1,0 +1,221 @@
+"""Notices reach people by command, webhook and e-mail; what fails is repeated, counted and told."""
+
+import json
+import socket
+import socketserver
+import sys
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.messages import ALARMS, HEALTH, Health
+from rigwatch.wire.rig_config import WitnessSection
+from rigwatch.witness import delivery
+from rigwatch.witness.process import Witness
+from tests.waiting import eventually
+from tests.witness.test_people import fault
+
+
+class Webhook(ThreadingHTTPServer):
+    """Takes what is posted; answers with `status`."""
+
+    def __init__(self) -> None:
+        self.status, self.got, self.gate = 200, list[dict[str, Any]](), threading.Event()
+        self.gate.set()
+        super().__init__(("127.0.0.1", 0), _Handler)
+        threading.Thread(target=self.serve_forever, daemon=True).start()
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: Webhook
+
+    def do_POST(self) -> None:
+        body = self.rfile.read(int(self.headers["Content-Length"]))
+        self.server.gate.wait()
+        if self.server.status == 200:
+            self.server.got.append(json.loads(body))
+        self.send_response(self.server.status)
+        self.end_headers()
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+@pytest.fixture
+def webhook() -> Iterator[Webhook]:
+    server = Webhook()
+    yield server
+    server.gate.set()
+    server.shutdown()
+    server.server_close()
+
+
+class Bench:
+    """A witness on a bus in memory, turned by hand."""
+
+    def __init__(self, folder: Path, people: str) -> None:
+        self.file = folder / "people.toml"
+        self.file.write_text(people)
+        network = MemoryNetwork()
+        self.monitor, self.screen = network.bus("r", "monitor"), network.bus("r", "screen")
+        self._healths = self.screen.subscribe(HEALTH)
+        self.health: Health | None = None
+        settings = WitnessSection(people=str(self.file), stale_after=1e6)
+        self.witness = Witness(settings, network.bus("r", "witness"), 0.0)
+        self.now = 0.0
+
+    def turn(self) -> None:
+        self.now += 0.1
+        self.witness.turn(self.now, 1)
+        self.health = (self._healths.drain() or [self.health])[-1]
+
+    def counted(self, name: str) -> float:
+        self.turn()
+        return self.health.counters[f"notifications_{name}"] if self.health else 0.0
+
+
+def test_webhook_and_command_are_told_and_a_slow_one_delays_nobody(
+    tmp_path: Path, webhook: Webhook
+) -> None:
+    told = tmp_path / "told"
+    code = f"import sys; open({str(told)!r}, 'a').write(' '.join(sys.argv[1:3]) + chr(10))"
+    command = ", ".join(map(json.dumps, (sys.executable, "-c", code)))
+    port = webhook.server_port
+    bench = Bench(
+        tmp_path,
+        f'[[recipients]]\nname = "hook"\nurl = "json://127.0.0.1:{port}/alarms"\n'
+        f'[[recipients]]\nname = "program"\ncommand = [{command}]\n',
+    )
+    webhook.gate.clear()
+    bench.monitor.publish(ALARMS, fault())
+    eventually(lambda: bench.counted("sent") == 1.0, "the command")
+    assert told.read_text() == "stale error\n"
+    webhook.gate.set()
+    eventually(lambda: bench.counted("sent") == 2.0, "the webhook")
+    assert webhook.got[0]["title"] == "[r] error: stale"
+    assert "why" in webhook.got[0]["message"]
+    assert bench.counted("failed") == 0.0
+
+
+def test_failures_are_repeated_counted_and_shown_in_health(
+    tmp_path: Path, webhook: Webhook, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(delivery, "RETRIES_S", (0.01, 0.01, 0.01))
+    url = f"json://127.0.0.1:{webhook.server_port}"
+    bench = Bench(tmp_path, f'[[recipients]]\nname = "hook"\nurl = "{url}"\n')
+    webhook.status = 500
+    bench.monitor.publish(ALARMS, fault())
+    eventually(lambda: bench.counted("given_up") == 1.0, "the end of the attempts")
+    assert bench.counted("failed") == 4.0
+
+    def text() -> str:
+        bench.turn()
+        return bench.health.text if bench.health else ""
+
+    eventually(lambda: text() == "notifications to hook fail", "the health")
+    webhook.status = 200
+    bench.monitor.publish(ALARMS, fault("loss"))
+    eventually(lambda: text() == "", "it works again")
+    assert bench.counted("sent") == 1.0
+
+
+def test_a_recipient_that_hangs_fills_only_its_own_queue(tmp_path: Path, webhook: Webhook) -> None:
+    url = f"json://127.0.0.1:{webhook.server_port}"
+    bench = Bench(tmp_path, f'[[recipients]]\nname = "hook"\nurl = "{url}"\n')
+    webhook.gate.clear()
+    for number in range(delivery.WAITING + 20):
+        bench.monitor.publish(ALARMS, fault(f"alarm-{number}"))
+    bench.turn()
+    eventually(lambda: bench.counted("dropped") >= 19.0, "what does not fit is counted")
+    assert bench.counted("waiting") <= delivery.WAITING
+
+
+def test_a_changed_file_is_in_force_and_a_wrong_one_changes_nothing(
+    tmp_path: Path, webhook: Webhook
+) -> None:
+    bench = Bench(tmp_path, "")
+    bench.file.write_text("[[recipients]]\n")
+
+    def text() -> str:
+        bench.turn()
+        return bench.health.text if bench.health else ""
+
+    eventually(lambda: "the recipients remain as they were" in text(), "the mistake is told")
+    url = f"json://127.0.0.1:{webhook.server_port}"
+    bench.file.write_text(f'[[recipients]]\nname = "new"\nurl = "{url}"\n')
+    eventually(lambda: text() == "", "the file is read again")
+    bench.monitor.publish(ALARMS, fault())
+    eventually(lambda: bench.counted("sent") == 1.0, "the new recipient is told")
+
+
+def test_an_alarm_that_stood_before_the_witness_is_told(tmp_path: Path, webhook: Webhook) -> None:
+    file = tmp_path / "people.toml"
+    url = f"json://127.0.0.1:{webhook.server_port}"
+    file.write_text(f'[[recipients]]\nname = "hook"\nurl = "{url}"\n')
+    network = MemoryNetwork()
+    from rigwatch.wire.bus import serve_alarm_list
+
+    serve_alarm_list(network.bus("r", "monitor"), lambda: [fault()])
+    settings = WitnessSection(people=str(file))
+    witness = Witness(settings, network.bus("r", "witness"), 0.0)
+    witness.turn(0.1, 1)
+    eventually(lambda: len(webhook.got) == 1, "the notice")
+
+
+def test_an_address_that_cannot_be_used_is_told_without_its_secrets(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"recipients\.ann\.url") as refused:
+        Bench(tmp_path, '[[recipients]]\nname = "ann"\nurl = "nosuch://user:secret@host"\n')
+    assert "secret" not in str(refused.value)
+
+
+class Mailbox(socketserver.ThreadingTCPServer):
+    """As much of an SMTP server as takes one letter."""
+
+    allow_reuse_address = daemon_threads = True
+
+    def __init__(self) -> None:
+        self.letters: list[str] = []
+        super().__init__(("127.0.0.1", 0), _Smtp)
+        threading.Thread(target=self.serve_forever, daemon=True).start()
+
+
+class _Smtp(socketserver.StreamRequestHandler):
+    server: Mailbox
+
+    def handle(self) -> None:
+        self.wfile.write(b"220 here\r\n")
+        while line := self.rfile.readline():
+            if line.upper().startswith(b"DATA"):
+                self.wfile.write(b"354 go\r\n")
+                letter = b"".join(iter(self.rfile.readline, b".\r\n"))
+                self.server.letters.append(letter.decode())
+            self.wfile.write(b"221 bye\r\n" if line.upper().startswith(b"QUIT") else b"250 ok\r\n")
+
+
+def test_an_e_mail_is_sent(tmp_path: Path) -> None:
+    mailbox = Mailbox()
+    port = mailbox.server_address[1]
+    assert isinstance(port, int)
+    url = f"mailto://127.0.0.1:{port}?from=rig@example.org&to=ann@example.org&mode=insecure"
+    bench = Bench(tmp_path, f'[[recipients]]\nname = "ann"\nurl = "{url}"\n')
+    bench.monitor.publish(ALARMS, fault())
+    eventually(lambda: bench.counted("sent") + bench.counted("failed") > 0, "an attempt")
+    assert bench.counted("sent") == 1.0
+    assert "[r] error: stale" in mailbox.letters[0]
+    mailbox.shutdown()
+    mailbox.server_close()
+
+
+def test_an_unreachable_host_blocks_nobody(tmp_path: Path) -> None:
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))
+        url = f"json://127.0.0.1:{closed.getsockname()[1]}"
+        bench = Bench(tmp_path, f'[[recipients]]\nname = "gone"\nurl = "{url}"\n')
+        bench.monitor.publish(ALARMS, fault())
+        eventually(lambda: bench.counted("failed") >= 1.0, "the failure is counted")

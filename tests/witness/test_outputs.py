@@ -1,0 +1,122 @@
+"""Heartbeats stop with the monitor; the endpoint shows the rig's figures."""
+
+import ssl
+import threading
+import urllib.error
+import urllib.request
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.errors import ConfigError, RigwatchError
+from rigwatch.wire.host import free_port
+from rigwatch.wire.messages import ALARMS, ESTIMATES, HEALTH, EstimateBlock, Health
+from rigwatch.wire.rig_config import SecuritySection, WitnessSection
+from rigwatch.witness.beats import Pinger
+from rigwatch.witness.metrics import MOST_SOURCES, Endpoint, Figures
+from rigwatch.witness.process import Witness
+from tests.access.secured_rig import make_keys
+from tests.waiting import eventually
+from tests.witness.test_people import fault
+
+
+def page(url: str, context: ssl.SSLContext | None = None) -> str:
+    with urllib.request.urlopen(url, timeout=30, context=context) as answer:
+        return str(answer.read().decode())
+
+
+def test_the_endpoint_shows_monitor_alarms_and_every_process() -> None:
+    network, port = MemoryNetwork(), free_port()
+    monitor = network.bus("r", "monitor")
+    settings = WitnessSection(metrics=f"127.0.0.1:{port}")
+    witness = Witness(settings, network.bus("r", "witness"), 0.0)
+    monitor.publish(ESTIMATES, EstimateBlock("rig", 7, 0, np.zeros(1, np.int64), ()))
+    monitor.publish(ALARMS, fault())
+    counters = {"rate_hz": 256.0, "lost_samples": 3.0}
+    monitor.publish(HEALTH, Health("daq/rig", 1, "running", "", counters))
+    witness.turn(10.0, 1)
+    text = page(f"http://127.0.0.1:{port}/metrics")
+    assert 'rigwatch_monitor_age_seconds{rig="r"} 0.0' in text
+    assert 'rigwatch_alarms{rig="r",severity="error",state="unacknowledged"} 1.0' in text
+    assert 'rigwatch_figure{figure="lost_samples",process="daq/rig",rig="r"} 3.0' in text
+    assert 'rigwatch_process_up{process="daq/rig",rig="r"} 1.0' in text
+    monitor.publish(ALARMS, fault(state="acknowledged"))
+    witness.turn(20.0, 1)
+    text = page(f"http://127.0.0.1:{port}/metrics")
+    assert 'rigwatch_monitor_age_seconds{rig="r"} 10.0' in text
+    assert 'rigwatch_alarms{rig="r",severity="error",state="acknowledged"} 1.0' in text
+    assert 'severity="error",state="unacknowledged"' not in text
+    assert 'rigwatch_process_up{process="daq/rig",rig="r"} 0.0' in text
+    with pytest.raises(RigwatchError, match="cannot listen"):
+        Witness(settings, network.bus("r", "witness"), 0.0)
+    witness.close()
+
+
+def test_the_figures_stay_bounded() -> None:
+    figures = Figures("r")
+    for number in range(3 * MOST_SOURCES):
+        figures.take_health(Health(f"p{number}", 1, "running", "", {}), 0.0)
+    (alive,) = (f for f in figures.collect() if f.name == "rigwatch_process_up")
+    assert len(alive.samples) == MOST_SOURCES
+
+
+def test_beyond_loopback_the_endpoint_asks_for_a_certificate(tmp_path: Path) -> None:
+    keys, port = make_keys(tmp_path / "keys"), free_port()
+    figures = Figures("r")
+    with pytest.raises(ConfigError, match="without keys, expected a loopback address"):
+        Endpoint("0.0.0.0:1", figures, SecuritySection())
+    with pytest.raises(ConfigError, match="host and port"):
+        Endpoint("9464", figures, SecuritySection())
+    endpoint = Endpoint(f"0.0.0.0:{port}", figures, SecuritySection(keys=str(keys)))
+    trusting = ssl.create_default_context(cafile=str(keys / "authority.pem"))
+    trusting.check_hostname = False
+    url = f"https://127.0.0.1:{port}/metrics"
+    with pytest.raises((urllib.error.URLError, ssl.SSLError, OSError)):
+        page(url, trusting)
+    trusting.load_cert_chain(keys / "ann.pem", keys / "ann.key")
+    assert "rigwatch_monitor_age_seconds" in page(url, trusting)
+    endpoint.close()
+
+
+class _Switch(BaseHTTPRequestHandler):
+    hits: list[str]
+
+    def do_GET(self) -> None:
+        self.hits.append(self.path)
+        self.send_response(200)
+        self.end_headers()
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_the_ping_comes_while_estimates_do() -> None:
+    hits: list[str] = []
+    server = HTTPServer(("127.0.0.1", 0), type("Switch", (_Switch,), {"hits": hits}))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    network = MemoryNetwork()
+    monitor, url = network.bus("r", "monitor"), f"http://127.0.0.1:{server.server_port}/rig"
+    settings = WitnessSection(heartbeat_url=url, heartbeat_seconds=10.0)
+    witness = Witness(settings, network.bus("r", "witness"), 0.0)
+    now = 0.0
+    for expected in (1, 2):
+        monitor.publish(ESTIMATES, EstimateBlock("rig", 7, 0, np.zeros(1, np.int64), ()))
+        now += 10.0
+        witness.turn(now, 1)
+        eventually(lambda wanted=expected: len(hits) == wanted, "the ping")
+    witness.turn(now + 9.0, 1)
+    witness.turn(now + 30.0, 1)
+    assert len(hits) == 2
+    server.shutdown()
+    server.server_close()
+
+
+def test_a_ping_that_fails_is_counted_and_waits_nowhere() -> None:
+    pinger = Pinger(f"http://127.0.0.1:{free_port()}", 1.0)
+    pinger.beat(0.0)
+    eventually(lambda: pinger.failed == 1, "the failure")
+    with pytest.raises(ConfigError, match="http:// or https://"):
+        Pinger("file:///etc/passwd", 1.0)

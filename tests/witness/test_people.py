@@ -1,0 +1,115 @@
+"""Who is notified of which alarm, and when."""
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.messages import Alarm
+from rigwatch.wire.rig_config import WitnessSection
+from rigwatch.witness.notices import Notices
+from rigwatch.witness.people import (
+    MaintenanceSection,
+    PeopleFile,
+    RecipientSection,
+    load_people,
+)
+
+MONDAY = datetime(2026, 11, 23, 3, 0).astimezone()
+
+
+def fault(name: str = "stale", state: str = "unacknowledged", severity: str = "error") -> Alarm:
+    figures = (0.0, 0.0, 0.0)
+    return Alarm(name, state, severity, "why", "", "", 0, -1, 1, *figures, False, "", -1)  # type: ignore[arg-type]
+
+
+def notices(*recipients: RecipientSection, windows: tuple[MaintenanceSection, ...] = ()) -> Notices:
+    return Notices(PeopleFile(recipients=recipients, maintenance=windows))
+
+
+def told(who: Notices, minute: float, wall: datetime = MONDAY) -> list[tuple[str, str]]:
+    return [(one.recipient, one.alarm.name) for one in who.due(minute * 60.0, wall)]
+
+
+ANN = RecipientSection(name="ann", url="json://ann", repeat_minutes=10.0)
+BOSS = RecipientSection(name="boss", url="json://boss", after_minutes=15.0, lowest="critical")
+
+
+def test_once_then_again_until_somebody_has_seen_it() -> None:
+    who = notices(ANN)
+    who.hear(fault(severity="warning", name="small"), 0.0)
+    assert told(who, 0) == []
+    who.hear(fault(), 0.0)
+    assert told(who, 0) == [("ann", "stale")]
+    who.hear(fault(), 5.0)
+    assert told(who, 9.9) == []
+    assert told(who, 10) == [("ann", "stale")]
+    assert told(who, 10.1) == []
+    who.hear(fault(state="acknowledged"), 700.0)
+    assert told(who, 100) == []
+    who.hear(fault(), 6000.0)
+    assert told(who, 101) == [("ann", "stale")]
+
+
+def test_what_nobody_has_seen_goes_to_others() -> None:
+    who = notices(ANN, BOSS)
+    who.hear(fault("a", severity="critical"), 0.0)
+    who.hear(fault("b", severity="critical"), 0.0)
+    who.hear(fault("c"), 0.0)
+    assert told(who, 0) == [("ann", "a"), ("ann", "b"), ("ann", "c")]
+    who.hear(fault("b", "acknowledged", "critical"), 600.0)
+    assert told(who, 14.9) == [("ann", "a"), ("ann", "c")]
+    assert told(who, 15) == [("boss", "a")]
+    assert told(who, 16) == []
+
+
+def test_in_maintenance_nobody_is_told_until_it_is_over() -> None:
+    once = MaintenanceSection(
+        name="bearing", begin=MONDAY, end=MONDAY + timedelta(hours=1), still="critical"
+    )
+    who = notices(ANN, windows=(once,))
+    who.hear(fault("a"), 0.0)
+    who.hear(fault("b", severity="critical"), 0.0)
+    who.hear(fault("c"), 0.0)
+    assert told(who, 0, MONDAY) == [("ann", "b")]
+    who.hear(fault("c", "cleared_unacknowledged"), 1.0)
+    assert told(who, 5, MONDAY + timedelta(minutes=59.9)) == []
+    assert told(who, 6, MONDAY + timedelta(hours=1)) == [("ann", "a")]
+
+
+def test_a_weekly_window_may_pass_midnight() -> None:
+    late = datetime(2026, 1, 1, 23, 30).time()
+    weekly = MaintenanceSection(name="wash", days=("sun",), at=late, minutes=60.0)
+    sunday = datetime(2026, 11, 22, 23, 45).astimezone()
+    for minutes, holds in ((-20, False), (-15, True), (0, True), (44, True), (45, False)):
+        assert weekly.holds(sunday + timedelta(minutes=minutes)) is holds
+        assert weekly.holds((sunday + timedelta(minutes=minutes)).astimezone(UTC)) is holds
+    assert not weekly.holds(sunday + timedelta(days=1))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[[recipients]]\nname = "a"', "neither url nor command"),
+        ('[[recipients]]\nname = "a"\nurl = "x:"\ncommand = ["y"]', "both url and command"),
+        ('[[recipients]]\nname = "a"\ncommand = ["y"]\n' * 2, "different names"),
+        ('[[maintenance]]\nname = "m"', "no time or two"),
+        ('[[maintenance]]\nname = "m"\ndays = ["sun"]\nat = 02:00:00', "no time or two"),
+        ('[[recipients]]\nnme = "a"', "nme"),
+    ],
+)
+def test_a_wrong_file_is_told_in_one_line(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "people.toml"
+    file.write_text(text)
+    with pytest.raises(ConfigError, match=words) as refused:
+        load_people(WitnessSection(people=str(file)))
+    assert str(refused.value).startswith(str(file))
+
+
+def test_the_command_of_the_section_is_a_recipient(tmp_path: Path) -> None:
+    file = tmp_path / "people.toml"
+    file.write_text('[[recipients]]\nname = "ann"\nurl = "json://localhost"\n')
+    settings = WitnessSection(people=str(file), notify=("tell",), notify_from="warning")
+    names = [(one.name, one.lowest) for one in load_people(settings).recipients]
+    assert names == [("command", "warning"), ("ann", "error")]
