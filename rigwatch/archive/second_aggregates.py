@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.messages import Column, EstimateBlock, blocks
+from rigwatch.wire.messages import EstimateBlock, blocks
 
 SECOND_NS = 1_000_000_000
 DAY_S = 86_400
+_TOGETHER = 1 << 14
+"""Samples whose figures are computed together."""
 Figures = NDArray[np.float64]
 
 
@@ -47,6 +49,8 @@ class SecondAggregates:
     def __init__(self) -> None:
         self._series: dict[str, _Series] = {}
         self._next: dict[tuple[str, int], int] = {}
+        self._waiting: list[EstimateBlock] = []
+        self._samples = 0
 
     def add(self, block: EstimateBlock) -> None:
         """Take the estimates of a block that are new."""
@@ -55,18 +59,30 @@ class SecondAggregates:
         if fresh is None or not len(fresh):
             return
         self._next[key] = fresh.seq + len(fresh)
-        seconds = fresh.t_ns // SECOND_NS
-        starts = np.flatnonzero(np.diff(seconds, prepend=seconds[0] - 1))
-        for column in fresh.columns:
-            self._add(column, seconds[starts], starts)
+        self._waiting.append(fresh)
+        self._samples += len(fresh)
+        if self._samples >= _TOGETHER:
+            self._reduce()
 
-    def _add(self, column: Column, seconds: NDArray[np.int64], starts: NDArray[np.intp]) -> None:
-        series = self._series.setdefault(column.name, _Series(column.unit))
-        series.seconds.append(seconds)
-        series.figures.append(_figures(column.values, starts))
+    def _reduce(self) -> None:
+        """Figures of all blocks that wait, those with the same columns together."""
+        for columns, found in groupby(self._waiting, key=_columns):
+            self._add(columns, list(found))
+        self._waiting, self._samples = [], 0
+
+    def _add(self, columns: tuple[tuple[str, str], ...], found: list[EstimateBlock]) -> None:
+        seconds = np.concatenate([block.t_ns for block in found]) // SECOND_NS
+        starts = np.flatnonzero(np.diff(seconds, prepend=seconds[0] - 1))
+        parts = [np.stack([column.values for column in block.columns]) for block in found]
+        figures = _figures(np.concatenate(parts, axis=1), starts)
+        for place, (name, unit) in enumerate(columns):
+            series = self._series.setdefault(name, _Series(unit))
+            series.seconds.append(seconds[starts])
+            series.figures.append(figures[place])
 
     def days(self) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Each day and its table: columns by name, each an array or a list."""
+        """Each day and its table: columns by name, each an array, texts as runs."""
+        self._reduce()
         parts = [part for name in sorted(self._series) for part in self._by_day(name)]
         parts.sort(key=lambda part: part[0])
         for day, found in groupby(parts, key=lambda part: part[0]):
@@ -88,15 +104,21 @@ def day_name(second: int) -> str:
     return datetime.fromtimestamp(second, UTC).strftime("%Y-%m-%d")
 
 
+def _columns(block: EstimateBlock) -> tuple[tuple[str, str], ...]:
+    return tuple((column.name, column.unit) for column in block.columns)
+
+
 def _figures(values: FloatArray, starts: NDArray[np.intp]) -> Figures:
+    """Figures (columns, seconds, 4) of values (columns, samples)."""
     finite = np.isfinite(values)
-    return np.column_stack(
+    return np.stack(
         (
-            np.add.reduceat(finite, starts, dtype=np.float64),
-            np.add.reduceat(np.where(finite, values, 0.0), starts),
-            np.minimum.reduceat(np.where(finite, values, np.inf), starts),
-            np.maximum.reduceat(np.where(finite, values, -np.inf), starts),
-        )
+            np.add.reduceat(finite, starts, axis=1, dtype=np.float64),
+            np.add.reduceat(np.where(finite, values, 0.0), starts, axis=1),
+            np.minimum.reduceat(np.where(finite, values, np.inf), starts, axis=1),
+            np.maximum.reduceat(np.where(finite, values, -np.inf), starts, axis=1),
+        ),
+        axis=2,
     )
 
 
@@ -110,8 +132,8 @@ def _joined(figures: Figures, starts: NDArray[np.intp]) -> Figures:
 def _rows(name: str, unit: str, seconds: NDArray[np.int64], figures: Figures) -> dict[str, Any]:
     count = len(seconds)
     return {
-        "name": [name] * count,
-        "unit": [unit] * count,
+        "name": [(name, count)],
+        "unit": [(unit, count)],
         "second": seconds,
         "count": figures[:, 0].astype(np.int32),
         "mean": figures[:, 1] / figures[:, 0],
@@ -124,7 +146,7 @@ def _whole(tables: list[dict[str, Any]]) -> dict[str, Any]:
     """Tables below each other."""
     texts = ("name", "unit")
     return {
-        key: [text for table in tables for text in table[key]]
+        key: [run for table in tables for run in table[key]]
         if key in texts
         else np.concatenate([table[key] for table in tables])
         for key in tables[0]

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rigwatch.wire.errors import ArchiveError, MissingExtraError
 
 _TEXT, _WHOLE, _REAL, _TRUTH, _TIME, _TEXTS = "text", "whole", "real", "truth", "time", "texts"
@@ -104,12 +106,17 @@ def read_rows(file: Path) -> list[dict[str, Any]]:
 
 
 def write_seconds(file: Path, table: dict[str, Any]) -> None:
-    """Write figures per second; texts that repeat and the slowly growing time take no room."""
+    """Write figures per second; texts that repeat and the slowly growing time take no room.
+
+    Args:
+        file: the new file.
+        table: arrays by column; of `name` and `unit` each text with the number of its rows.
+    """
     arrow, parquet = pyarrow()
     found = arrow.table(
         {
-            "name": arrow.array(table["name"]).dictionary_encode(),
-            "unit": arrow.array(table["unit"]).dictionary_encode(),
+            "name": _repeated(arrow, table["name"]),
+            "unit": _repeated(arrow, table["unit"]),
             "second": arrow.array(table["second"] * 1_000_000).cast(arrow.timestamp("us")),
             "count": arrow.array(table["count"]),
             **{name: arrow.array(table[name]) for name in ("mean", "low", "high")},
@@ -123,3 +130,11 @@ def write_seconds(file: Path, table: dict[str, Any]) -> None:
         use_dictionary=["name", "unit"],
         column_encoding={"second": "DELTA_BINARY_PACKED"},
     )
+
+
+def _repeated(arrow: Any, runs: list[tuple[str, int]]) -> Any:
+    """A column of texts from each text and how often it follows."""
+    texts = sorted({text for text, _ in runs})
+    places = [texts.index(text) for text, _ in runs]
+    indices = np.repeat(np.array(places, np.int32), [count for _, count in runs])
+    return arrow.DictionaryArray.from_arrays(arrow.array(indices), arrow.array(texts))

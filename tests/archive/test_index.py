@@ -13,6 +13,9 @@ from rigwatch.batch import executor_on
 from rigwatch.wire.errors import ArchiveError
 from tests.archive.sessions import DAY_S, RATE, theta1, write_session
 
+CHUNK = b"\x04\x00\x00\x00zstd"
+"""What stands before the compressed bytes of a chunk."""
+
 
 @pytest.fixture
 def archive(tmp_path: Path) -> Path:
@@ -95,7 +98,7 @@ def test_each_bad_session_has_a_sentence_and_the_rest_is_done(archive):
     (archive / "foreign.mcap").write_bytes(b"no session at all")
     (archive / "empty.mcap").touch()
     middle = bytearray(whole)
-    middle[len(whole) // 2] ^= 0xFF
+    middle[whole.rfind(CHUNK) + len(CHUNK) + 30] ^= 0xFF
     (archive / "hurt.mcap").write_bytes(middle)
     write_session(archive / "open.mcap", start_s=50, close=False)
     done = index(Store(str(archive)))
