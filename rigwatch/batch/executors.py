@@ -36,7 +36,7 @@ class Here(Executor):
 def processes(count: int) -> ProcessPoolExecutor:
     """Processes of this machine that load the code once, and end when this process ends."""
     context = multiprocessing.get_context("forkserver")
-    return ProcessPoolExecutor(count, context, initializer=_end_with_client)
+    return ProcessPoolExecutor(count, context, initializer=_begin, initargs=(dict(os.environ),))
 
 
 def preload(module: str) -> None:
@@ -45,8 +45,14 @@ def preload(module: str) -> None:
     multiprocessing.get_context("forkserver").set_forkserver_preload(modules)
 
 
-def _end_with_client() -> None:
-    """A client that is killed cannot tell its workers: they watch it."""
+def _begin(environment: dict[str, str]) -> None:
+    """Take the client's present environment, and end with it.
+
+    Workers come from a process that began with an older environment. A client that is killed
+    cannot tell its workers: they watch it.
+    """
+    os.environ.clear()
+    os.environ.update(environment)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_watch, args=(parent.sentinel,), daemon=True).start()

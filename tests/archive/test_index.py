@@ -98,7 +98,7 @@ def test_each_bad_session_has_a_sentence_and_the_rest_is_done(archive):
     (archive / "foreign.mcap").write_bytes(b"no session at all")
     (archive / "empty.mcap").touch()
     middle = bytearray(whole)
-    middle[whole.rfind(CHUNK) + len(CHUNK) + 30] ^= 0xFF
+    middle[whole.find(CHUNK, whole.find(CHUNK) + 1) + len(CHUNK) + 30] ^= 0xFF
     (archive / "hurt.mcap").write_bytes(middle)
     write_session(archive / "open.mcap", start_s=50, close=False)
     done = index(Store(str(archive)))
