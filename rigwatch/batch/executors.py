@@ -17,7 +17,9 @@ from rigwatch.wire.errors import BatchError, MissingExtraError
 T = TypeVar("T")
 Maker = Callable[[], Executor]
 CONNECT_S = 15.0
-"""Longest wait for a scheduler and its first worker [s]."""
+"""Longest wait for a scheduler [s]."""
+FIRST_WORKER_S = 60.0
+"""Longest wait for its first worker [s]."""
 
 
 class Here(Executor):
@@ -129,7 +131,7 @@ def _connected(client: Any, where: str) -> Any:
 def _check_workers(client: Any, where: str) -> None:
     """Raise if no worker comes, or one cannot load this version of rigwatch."""
     try:
-        client.wait_for_workers(1, timeout=CONNECT_S)
+        client.wait_for_workers(1, timeout=FIRST_WORKER_S)
         found = client.run(_version, on_error="return")
     except TimeoutError:
         raise BatchError(f"{where}: the scheduler has no worker, expected at least one") from None
