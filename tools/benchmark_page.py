@@ -41,6 +41,12 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         ("latency", "notification", "losses", "rogue_client", "replay", "windowed_least_squares"),
     ),
     (
+        "Many recordings and archives",
+        "A real Dask scheduler with worker processes, and an index in a folder: "
+        "[archive](archive.md).",
+        ("many_recordings", "archive_speed"),
+    ),
+    (
         "Explaining a recording",
         "Effects hidden in simulated plants whose equations and integrators are not those of the "
         "models. What was hidden and what it was called: [hidden effects](hidden-effects.md).",

@@ -9,7 +9,7 @@ such as "local:4" into an executor, `expand` turns paths, globs and folders into
 from rigwatch.batch.executors import executor_on
 from rigwatch.batch.expand import expand, recording_at
 from rigwatch.batch.job import Job, Outcome, content_hash, job_of
-from rigwatch.batch.mapping import Results, map_recordings
+from rigwatch.batch.mapping import Results, map_recordings, map_units
 
 __all__ = [
     "Job",
@@ -20,5 +20,6 @@ __all__ = [
     "expand",
     "job_of",
     "map_recordings",
+    "map_units",
     "recording_at",
 ]

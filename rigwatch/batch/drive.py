@@ -11,6 +11,8 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from dataclasses import dataclass
+from itertools import count
+from uuid import uuid4
 
 from rigwatch.batch.job import WORKER_DIED, Outcome
 from rigwatch.batch.pool import Pool
@@ -21,7 +23,7 @@ TASK_S = 0.3
 LARGEST_TASK = 256
 RETRIES = 3
 _LOOK_AGAIN_S = 5.0
-Run = Callable[[Sequence[str]], list[Outcome]]
+Run = Callable[[Sequence[str], str], list[Outcome]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +38,9 @@ class Drive:
 
     Args:
         pool: the workers.
-        run: a function of some paths that returns their outcomes; sent to the workers.
+        run: a function of some paths and of a label that returns their outcomes; sent to the
+            workers. The label is never the same: a scheduler may answer a call that it knows
+            with what came of it before, even the death of a worker.
         units: paths.
         retries: deaths of workers that a unit running alone may cause before it has failed.
         say: called with remarks for people.
@@ -52,7 +56,7 @@ class Drive:
         self._lost: Counter[str] = Counter()
         self._alone: Counter[str] = Counter()
         self._running: dict[Future[list[Outcome]], _Task] = {}
-        self._seconds = 0.0
+        self._seconds, self._labels = 0.0, (f"{uuid4()}/{number}" for number in count())
 
     def __iter__(self) -> Iterator[Outcome]:
         """Outcomes as they come."""
@@ -77,11 +81,11 @@ class Drive:
         if self._again:
             return (self._again.popleft(),)
         fitting = int(TASK_S / self._seconds) if self._seconds else 1
-        count = max(1, min(fitting, LARGEST_TASK, len(self._waiting) // window))
-        return tuple(self._waiting.popleft() for _ in range(count))
+        size = max(1, min(fitting, LARGEST_TASK, len(self._waiting) // window))
+        return tuple(self._waiting.popleft() for _ in range(size))
 
     def _submit(self, units: tuple[str, ...], *, alone: bool) -> None:
-        future = self._pool.submit(self._run, units)
+        future = self._pool.submit(self._run, units, next(self._labels))
         self._running[future] = _Task(units, self._pool.generation, alone)
 
     def _collected(self, future: "Future[list[Outcome]]") -> Iterator[Outcome]:

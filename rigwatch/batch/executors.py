@@ -17,7 +17,9 @@ from rigwatch.wire.errors import BatchError, MissingExtraError
 T = TypeVar("T")
 Maker = Callable[[], Executor]
 CONNECT_S = 15.0
-"""Longest wait for a scheduler and its first worker [s]."""
+"""Longest wait for a scheduler [s]."""
+FIRST_WORKER_S = 60.0
+"""Longest wait for its first worker [s]."""
 
 
 class Here(Executor):
@@ -36,7 +38,7 @@ class Here(Executor):
 def processes(count: int) -> ProcessPoolExecutor:
     """Processes of this machine that load the code once, and end when this process ends."""
     context = multiprocessing.get_context("forkserver")
-    return ProcessPoolExecutor(count, context, initializer=_end_with_client)
+    return ProcessPoolExecutor(count, context, initializer=_begin, initargs=(dict(os.environ),))
 
 
 def preload(module: str) -> None:
@@ -45,8 +47,14 @@ def preload(module: str) -> None:
     multiprocessing.get_context("forkserver").set_forkserver_preload(modules)
 
 
-def _end_with_client() -> None:
-    """A client that is killed cannot tell its workers: they watch it."""
+def _begin(environment: dict[str, str]) -> None:
+    """Take the client's present environment, and end with it.
+
+    Workers come from a process that began with an older environment. A client that is killed
+    cannot tell its workers: they watch it.
+    """
+    os.environ.clear()
+    os.environ.update(environment)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_watch, args=(parent.sentinel,), daemon=True).start()
@@ -123,7 +131,7 @@ def _connected(client: Any, where: str) -> Any:
 def _check_workers(client: Any, where: str) -> None:
     """Raise if no worker comes, or one cannot load this version of rigwatch."""
     try:
-        client.wait_for_workers(1, timeout=CONNECT_S)
+        client.wait_for_workers(1, timeout=FIRST_WORKER_S)
         found = client.run(_version, on_error="return")
     except TimeoutError:
         raise BatchError(f"{where}: the scheduler has no worker, expected at least one") from None

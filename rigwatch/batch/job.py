@@ -45,11 +45,13 @@ class Job:
         call: called with the path of a unit and the settings; returns plain data. A function of
             a module, so that it can be sent to a worker.
         content: hash of everything that the unit's result depends on.
+        unit: what a unit's text stands for, as `call` and `content` take it.
     """
 
     name: str
     call: Callable[..., Any]
-    content: Callable[[Path], str] = content_hash
+    content: Callable[[Any], str] = content_hash
+    unit: Callable[[str], Any] = Path
 
     def identity(self, settings: Mapping[str, Any]) -> str:
         """SHA-256 of the job, its settings and the version of rigwatch.
@@ -140,8 +142,9 @@ def run_units(
 def _run_unit(job: Job, settings: Mapping[str, Any], path: str) -> Outcome:
     content, began = "", time.perf_counter()
     try:
-        content = job.content(Path(path))
-        value = job.call(Path(path), **settings)
+        unit = job.unit(path)
+        content = job.content(unit)
+        value = job.call(unit, **settings)
         encoded = msgspec.json.encode(value, enc_hook=_plain, order="deterministic")
         return Outcome(path, content, encoded, seconds=time.perf_counter() - began)
     except RigwatchError as error:

@@ -98,7 +98,31 @@ def map_recordings(
     """
     file = None if results is None else Path(results)
     check_target(file)
-    wanted, units = job_of(job), expand(recordings, inside)
+    units = expand(recordings, inside)
+    return map_units(
+        job_of(job),
+        units,
+        settings,
+        executor=executor,
+        file=file,
+        retries=retries,
+        say=say,
+        seen=seen,
+    )
+
+
+def map_units(
+    wanted: Job,
+    units: list[str],
+    settings: dict[str, Any],
+    *,
+    executor: Executor | Maker | None = None,
+    file: Path | None = None,
+    retries: int = RETRIES,
+    say: Callable[[str], None] = lambda _: None,
+    seen: Callable[[Outcome], None] = lambda _: None,
+) -> Results:
+    """`map_recordings` over units that are named already, each once and in the final order."""
     journal = Journal(file, wanted.identity(settings))
     try:
         left = [unit for unit in units if not _is_done(journal, wanted, unit)]
@@ -123,7 +147,7 @@ def _is_done(journal: Journal, job: Job, unit: str) -> bool:
     if known is None or known.failed:
         return False
     try:
-        return job.content(Path(unit)) == known.content
+        return job.content(job.unit(unit)) == known.content
     except Exception:  # the job itself will say what is wrong
         return False
 
@@ -141,5 +165,5 @@ def _pool(job: Job, executor: Executor | Maker | None) -> Iterator[Pool]:
     pool.close()
 
 
-def _run(job: Job, settings: dict[str, Any], paths: tuple[str, ...]) -> list[Outcome]:
+def _run(job: Job, settings: dict[str, Any], paths: tuple[str, ...], _label: str) -> list[Outcome]:
     return run_units(job, settings, paths, __version__)

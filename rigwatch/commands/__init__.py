@@ -44,6 +44,7 @@ COMMANDS: dict[str, str] = {
     "doctor": "processes.doctor",
     "dashboard": "processes.dashboard",
     "view": "sessions.view",
+    "archive": "archive.archive",
     "structure": "structures.structure",
     "info": "sessions.info",
     "trim": "sessions.trim",

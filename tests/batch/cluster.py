@@ -38,7 +38,11 @@ class Cluster:
         size = ["--nworkers", str(self._count), "--nthreads", "1", "--memory-limit", "0"]
         at = ["--no-dashboard", "--local-directory", str(self._folder)]
         self._start("worker", [*place, *size, *at])
+        eventually(lambda: self._registered() >= self._count, "all workers")
         return self
+
+    def _registered(self) -> int:
+        return (self._folder / "worker.log").read_bytes().count(b"Registered to")
 
     def _start(self, kind: str, arguments: list[str]) -> None:
         command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *arguments]

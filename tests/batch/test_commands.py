@@ -84,3 +84,20 @@ def test_errors_of_a_study_as_a_line_of_results(tmp_path, capsys):
     assert "N, noise floor " in capsys.readouterr().out
     (row,) = polars.read_parquet(target).to_dicts()
     assert row["held_out_error"] > row["noise_floor"] > 0
+
+
+def test_cases_of_several_rigs_are_verified_and_one_that_differs_is_named(tmp_path, capsys):
+    one = '[[case]]\nname = "friction"\nrecording = "friction.mcap"\nmodel = "model.toml"\n'
+    for rig, reference in (("a", "friction.reference.mcap"), ("b", "none.mcap")):
+        (tmp_path / rig).mkdir()
+        for name in ("friction.mcap", "friction.reference.mcap", "model.toml"):
+            shutil.copy(VERIFY / name, tmp_path / rig / name)
+        (tmp_path / rig / "cases.toml").write_text(f'{one}reference = "{reference}"\n')
+    assert main(["verify", str(tmp_path), "--json"]) == 1
+    out, err = capsys.readouterr()
+    good, bad = (json.loads(line) for line in out.splitlines())
+    (said,) = good["result"]
+    assert said.startswith("friction: 2048 samples of ")
+    assert said.endswith("as in the reference")
+    assert "there is no reference yet" in bad["error"]
+    assert f"failed: {tmp_path}/b/cases.toml: friction: " in err

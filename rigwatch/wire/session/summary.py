@@ -1,6 +1,7 @@
 """Summary of a session: rates, gaps, quality, topics, alarms, damage."""
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -94,8 +95,12 @@ class Summary:
         return (self.end_ns - self.start_ns) / 1e9
 
 
-def summarise(session: Session) -> Summary:
+def summarise(session: Session, also: Callable[[Message], None] | None = None) -> Summary:
     """Summarise the whole session.
+
+    Args:
+        session: the session.
+        also: called with each message, for what else is wanted from the same pass.
 
     Raises:
         SessionError: a segment cannot be opened.
@@ -107,6 +112,8 @@ def summarise(session: Session) -> Summary:
     for item in session.messages():
         counts[item.topic.name] += 1
         message = item.message
+        if also is not None:
+            also(message)
         if isinstance(message, SampleBlock):
             devices.setdefault(message.device, _Device(message.device)).add(message)
             losses.add(message)

@@ -1,0 +1,1 @@
+"""Many recordings and archives: cost of a scheduler, kills, speed of an index and of questions."""

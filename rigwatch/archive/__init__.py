@@ -1,0 +1,27 @@
+"""A catalogue of many sessions, and figures of their estimates per second, for questions in SQL.
+
+    sessions ─▶ index (only new and changed ones are read) ─▶ Parquet ─▶ DuckDB, Polars, Spark, …
+
+An archive is a folder, or a place in an object store, with sessions at any depth. Its index lies
+in it, in the folder `rigwatch-index`.
+"""
+
+from rigwatch.archive.contents import Shown, show
+from rigwatch.archive.indexing import Indexed, index
+from rigwatch.archive.query import Answer, Bounds, ask, query
+from rigwatch.archive.questions import QUESTIONS, Question
+from rigwatch.archive.store import Store
+
+__all__ = [
+    "QUESTIONS",
+    "Answer",
+    "Bounds",
+    "Indexed",
+    "Question",
+    "Shown",
+    "Store",
+    "ask",
+    "index",
+    "query",
+    "show",
+]

@@ -1,0 +1,144 @@
+"""SQL over the index, read-only and bounded.
+
+DuckDB runs in this process, on the tables `sessions`, `alarms`, `losses` and `seconds`. One
+statement that selects is accepted; it reads no file outside of the index, loads no extension and
+changes no setting, and its memory, time and rows are bounded.
+"""
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from rigwatch.archive.connection import engine, first_line, opened
+from rigwatch.archive.questions import QUESTIONS
+from rigwatch.archive.store import Store
+from rigwatch.wire.errors import ArchiveError, nearest
+
+_BEGINNING = datetime(1970, 1, 1, tzinfo=UTC)
+_END = datetime(9999, 1, 1, tzinfo=UTC)
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What a query may take.
+
+    Attributes:
+        rows: most rows of an answer.
+        seconds: longest time [s].
+        memory_mb: most memory [MB].
+        threads: most threads.
+    """
+
+    rows: int = 1000
+    seconds: float = 60.0
+    memory_mb: int = 2000
+    threads: int = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer to a query.
+
+    Attributes:
+        columns: names.
+        rows: values.
+        more: whether there are more rows than allowed.
+    """
+
+    columns: list[str]
+    rows: list[tuple[Any, ...]]
+    more: bool
+
+    def as_dicts(self) -> list[dict[str, Any]]:
+        """The rows by column."""
+        return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+
+
+def query(
+    store: Store,
+    sql: str,
+    parameters: Mapping[str, Any] | None = None,
+    bounds: Bounds | None = None,
+) -> Answer:
+    """The answer to an SQL query.
+
+    Raises:
+        ArchiveError: there is no index, the query is wrong, is no single selection, or exceeds a
+            bound.
+        MissingExtraError: DuckDB is not installed.
+    """
+    bounds = bounds or Bounds()
+    duckdb = engine()
+    limits = {"memory_limit": f"{bounds.memory_mb}MB", "threads": bounds.threads}
+    with opened(store, limits) as connection:
+        _check(duckdb, connection, sql)
+        late = threading.Timer(bounds.seconds, connection.interrupt)
+        late.start()
+        try:
+            done = connection.execute(sql, dict(parameters or {}))
+            rows = done.fetchmany(bounds.rows + 1)
+            columns = [column[0] for column in done.description]
+        except duckdb.InterruptException:
+            text = f"query: took more than {bounds.seconds:g} s"
+            raise ArchiveError(f"{text}, expected a narrower one") from None
+        except duckdb.Error as error:
+            raise ArchiveError(f"query: {first_line(error)}") from None
+        finally:
+            late.cancel()
+    return Answer(columns, rows[: bounds.rows], len(rows) > bounds.rows)
+
+
+def ask(
+    store: Store,
+    name: str,
+    *,
+    rig: str = "%",
+    since: datetime | None = None,
+    until: datetime | None = None,
+    bounds: Bounds | None = None,
+) -> Answer:
+    """The answer to a question of `QUESTIONS`.
+
+    Args:
+        store: the archive.
+        name: the question.
+        rig: name of a rig, or a pattern with %.
+        since, until: span of time; by default all, up to the end of the last session.
+        bounds: what it may take.
+
+    Raises:
+        ArchiveError: no question has this name, or as in `query`.
+    """
+    if name not in QUESTIONS:
+        raise ArchiveError(f"query: no question {name!r}{nearest(name, QUESTIONS)}")
+    sql = QUESTIONS[name].sql
+    if until is None and "$until" in sql:
+        until = _after_all(store)
+    times = {"since": since or _BEGINNING, "until": until or _END}
+    given = {"rig": rig} | {name: _plain(time) for name, time in times.items()}
+    return query(store, sql, {k: v for k, v in given.items() if f"${k}" in sql}, bounds)
+
+
+def _plain(time: datetime) -> datetime:
+    """A time as the tables have it: UTC, without a zone."""
+    return time.astimezone(UTC).replace(tzinfo=None)
+
+
+def _after_all(store: Store) -> datetime:
+    """A time after the last session."""
+    rows = query(store, 'select max("end") + interval 1 second from sessions').rows
+    last: datetime | None = rows[0][0]
+    return last.replace(tzinfo=UTC) if last else _END
+
+
+def _check(duckdb: Any, connection: Any, sql: str) -> None:
+    """Raise unless the text is one statement that selects."""
+    try:
+        statements = connection.extract_statements(sql)
+    except duckdb.Error as error:
+        raise ArchiveError(f"query: {first_line(error)}") from None
+    if [statement.type for statement in statements] != [duckdb.StatementType.SELECT]:
+        kinds = ", ".join(statement.type.name for statement in statements) or "nothing"
+        raise ArchiveError(f"query: found {kinds}, expected one SELECT")

@@ -1,0 +1,43 @@
+"""`rigwatch archive index`: reads sessions that are new or changed into the catalogue."""
+
+import argparse
+
+from rigwatch.commands.common import print_json, say
+
+HELP = "bring the catalogue of an archive up to date: read what is new or changed"
+EXAMPLE = """\
+  rigwatch archive index sessions
+  rigwatch archive index sessions --on local:4
+  rigwatch archive index s3://recordings/rigs --on dask://host:8786 --json"""
+_NAMED = 20
+"""Most sessions that are named."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("url", metavar="URL", help="folder, or address such as s3://bucket/rigs")
+    parser.add_argument(
+        "--on",
+        metavar="WHERE",
+        help="workers: local:4 (processes of this machine) or dask://host:8786",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 if the catalogue is up to date, whatever state the sessions are in."""
+    from rigwatch.archive import Store, index
+    from rigwatch.batch import executor_on
+
+    store = Store(arguments.url)
+    with executor_on(arguments.on) as executor:
+        done = index(store, executor=executor, say=say)
+    if arguments.json:
+        print_json(done)
+        return 0
+    for remark in done.remarks[:_NAMED]:
+        print(remark)
+    if len(done.remarks) > _NAMED:
+        print(f"and {len(done.remarks) - _NAMED} more: rigwatch archive query {store.url} unsound")
+    statuses = ", ".join(f"{count} {status}" for status, count in done.statuses.items())
+    print(f"{done.sessions} sessions ({statuses}); {done.read} read, {done.removed} removed")
+    return 0

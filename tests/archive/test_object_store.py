@@ -1,0 +1,124 @@
+"""The same archive in an object store: moto's S3 behind a real HTTP server, which also fails."""
+
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import boto3
+import pytest
+from moto.server import DomainDispatcherApplication, create_backend_app
+from werkzeug.serving import make_server
+
+from rigwatch.archive import Store, ask, index, query
+from rigwatch.batch import executor_on
+from rigwatch.wire.errors import ArchiveError
+from tests.archive.sessions import DAY_S, write_session
+
+KEYS = {"aws_access_key_id": "key", "aws_secret_access_key": "secret", "region_name": "us-east-1"}
+
+
+class Sometimes:
+    """Answers every n-th request with an error of the server, before it has any effect."""
+
+    def __init__(self, application: Any) -> None:
+        self._application = application
+        self.every = 0
+        self.requests = self.failures = 0
+
+    def __call__(self, environ: dict[str, Any], start: Callable[..., Any]) -> Iterable[bytes]:
+        self.requests += 1
+        if self.every and self.requests % self.every == 0:
+            self.failures += 1
+            start("503 Slow Down", [("Content-Length", "0")])
+            return [b""]
+        answered: Iterable[bytes] = self._application(environ, start)
+        return answered
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[tuple[str, Sometimes]]:
+    """Address of the server, and what makes it fail."""
+    application = Sometimes(DomainDispatcherApplication(create_backend_app))
+    server = make_server("127.0.0.1", 0, application, threaded=True)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    yield f"http://127.0.0.1:{server.port}", application
+    server.shutdown()
+    thread.join()
+
+
+@pytest.fixture
+def bucket(
+    served: tuple[str, Sometimes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+) -> tuple[Store, Store]:
+    """The same sessions in a folder and in a bucket."""
+    address, _ = served
+    for name, value in (
+        ("AWS_ENDPOINT_URL", address),
+        ("AWS_ACCESS_KEY_ID", "key"),
+        ("AWS_SECRET_ACCESS_KEY", "secret"),
+        ("AWS_DEFAULT_REGION", "us-east-1"),
+    ):
+        monkeypatch.setenv(name, value)
+    for day in range(4):
+        write_session(tmp_path / f"one{day}.mcap", start_s=day * DAY_S, missing=day)
+    write_session(tmp_path / "segments" / "000001.mcap", rig="b 2", start_s=9)
+    write_session(tmp_path / "segments" / "000002.mcap", rig="b 2", start_s=13, boot=2)
+    client = boto3.client("s3", endpoint_url=address, **KEYS)
+    name = f"rigs-{abs(hash(request.node.name))}"
+    client.create_bucket(Bucket=name)
+    for file in tmp_path.rglob("*.mcap"):
+        client.upload_file(str(file), name, f"all/{file.relative_to(tmp_path)}")
+    return Store(str(tmp_path)), Store(f"s3://{name}/all")
+
+
+QUERY = "select * exclude (stamp) from sessions order by session"
+SECONDS = "select * from seconds order by rig, name, second"
+
+
+def test_a_bucket_gives_the_answers_of_a_folder(bucket):
+    here, there = bucket
+    assert index(here).sessions == index(there).sessions == 5
+    assert query(there, QUERY).rows == query(here, QUERY).rows
+    assert query(there, SECONDS).rows == query(here, SECONDS).rows
+    assert ask(there, "losses").rows == ask(here, "losses").rows
+    assert index(there).read == 0
+
+
+def test_workers_read_and_write_the_bucket(bucket):
+    here, there = bucket
+    index(here)
+    with executor_on("local:2") as executor:
+        assert index(there, executor=executor).read == 5
+    assert query(there, SECONDS).rows == query(here, SECONDS).rows
+
+
+def test_a_store_that_fails_every_tenth_request_loses_nothing(bucket, served):
+    here, there = bucket
+    index(here)
+    failing = served[1]
+    failing.every, failing.failures = 10, 0
+    try:
+        done = index(there)
+        assert done.statuses == {"ok": 5}
+        assert query(there, QUERY).rows == query(here, QUERY).rows
+        assert failing.failures > 2
+    finally:
+        failing.every = 0
+
+
+def test_a_query_stays_in_the_archive(bucket):
+    _, there = bucket
+    index(there)
+    for place in ("/etc/passwd", f"{there.url}/one0.mcap"):
+        with pytest.raises(ArchiveError, match="disabled by configuration"):
+            query(there, f"select * from read_text('{place}')")
+
+
+def test_a_bucket_that_is_not_there_is_said(bucket):
+    with pytest.raises(ArchiveError, match="s3://none/all"):
+        index(Store("s3://none/all"))
