@@ -18,6 +18,7 @@ from rigwatch.workbench.data import NoiseFloor, from_residual
 from rigwatch.workbench.explain.verdict import LITTLE_MORE, MUCH_WORSE
 from rigwatch.workbench.fit import Fitted, continued_train_error, fit_model
 from rigwatch.workbench.ranking import (
+    AGAIN,
     MATERIAL,
     STEP,
     Progress,
@@ -110,7 +111,7 @@ def combinations(
         if not level:
             break
         progress(f"trying {size} effects at once")
-        level = _best_in_training(_extended(bench, level, free))
+        level = _best_in_training(_extended(bench, level, free, last=size == MAX_EFFECTS))
         found += level
         if any(reaches_noise(bench, each.fitted) for each in level):
             break
@@ -137,12 +138,21 @@ def _best_in_training(level: Sequence[Combination]) -> list[Combination]:
     return sorted(level, key=lambda each: each.search_error)[:BEAM_WIDTH]
 
 
-def _extended(bench: Bench, level: Sequence[Combination], free: int) -> list[Combination]:
-    """Each set extended by one effect, without duplicates."""
+def _extended(
+    bench: Bench, level: Sequence[Combination], free: int, *, last: bool
+) -> list[Combination]:
+    """Each set extended by one effect, without duplicates.
+
+    Only sets that reach the noise are used of the last size, so its effect must explain a share of
+    what is above the noise, to first order.
+    """
     found: dict[frozenset[str], Combination] = {}
     for known in level:
+        least = AGAIN * floor_of(bench, known.fitted).above(known.fitted.held_out) if last else 0.0
         for row in next_candidates(bench, known):
             if known.labels | {row.label} in found or known.free + row.free > free:
+                continue
+            if row.explained < least:
                 continue
             _fit_with(bench, known.rows, known.fitted, row)
             if row.fitted is None:
