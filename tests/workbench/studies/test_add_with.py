@@ -24,9 +24,11 @@ OTHERS = ("saturation@drive", "coulomb@shaft")
 def motor(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A motor with three hidden effects, of which drag by direction shows little alone."""
     model = (resources.files("rigwatch.physics") / "models" / "motor.toml").read_text("utf-8")
-    made = [[recorded(seed)] for seed in (102, 1102)]
+    train, held_out = ([recorded(seed)] for seed in (102, 1102))
     rates = [MACHINES["motor"].rate] * 2
-    return studied(tmp_path_factory.mktemp("motor"), model, *made, UNITS, KEYS, rates).folder
+    return studied(
+        tmp_path_factory.mktemp("motor"), model, train, held_out, UNITS, KEYS, rates
+    ).folder
 
 
 def recorded(seed: int) -> dict[str, np.ndarray]:
