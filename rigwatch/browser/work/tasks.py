@@ -103,7 +103,8 @@ class Worker:
         study = open_study(self.folder)
         return self._done(
             try_add(
-                study, effect, port, anyway=anyway, progress=self.progress, warm=self.warm
+                study, effect, port, anyway=anyway, beside=_beside(study, f"{effect}@{port}"),
+                progress=self.progress, warm=self.warm,
             )
         )  # fmt: skip
 
@@ -152,6 +153,13 @@ class Worker:
         change = trial.commit()
         self.show()
         return {"step": change.step, "text": change.text}
+
+
+def _beside(study: Study, label: str) -> list[str]:
+    """The set in which the last explanation of the study names an effect; empty if it does not."""
+    told = results_of(study).read("explanation") or {}
+    named = [f"{row['effect']}@{row['port']}" for row in told.get("ranking", [])[:1]]
+    return list(told.get("beside", [])) if label in named else []
 
 
 def _lines(bench: Bench, fitted: Fitted, *, held_out: bool) -> tuple[FloatArray, FloatArray]:

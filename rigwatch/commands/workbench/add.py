@@ -9,6 +9,7 @@ HELP = "add an effect to the model of a study, refit, compare; refused if the he
 EXAMPLE = """\
   rigwatch add emps coulomb
   rigwatch add emps offset --port force_sensor
+  rigwatch add motor viscous_by_direction --with saturation@drive coulomb@shaft
   rigwatch add emps --effect-file my_effects.toml"""
 
 
@@ -19,6 +20,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", help="where it acts, if several places are possible")
     parser.add_argument(
         "--anyway", action="store_true", help="add it even though the held-out error does not fall"
+    )
+    parser.add_argument(
+        "--with",
+        dest="beside",
+        nargs="+",
+        default=[],
+        metavar="EFFECT@PORT",
+        help="effects that are missing as well: if refused alone, it is added if the whole set"
+        " lowers the held-out error and each effect of it does beside the others",
     )
     parser.add_argument(
         "--effect-file",
@@ -46,7 +56,10 @@ def run(arguments: argparse.Namespace) -> int:
             return 0
     if arguments.effect is None:
         raise ModelError("add: found no effect, expected its name, or --effect-file")
-    change = add(study, arguments.effect, arguments.port, anyway=arguments.anyway, progress=say)
+    change = add(
+        study, arguments.effect, arguments.port, anyway=arguments.anyway,
+        beside=arguments.beside, progress=say,
+    )  # fmt: skip
     if arguments.json:
         print_json(change)
     else:

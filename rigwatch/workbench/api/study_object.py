@@ -129,9 +129,17 @@ class Study:
         bench = self._warm.bench(self._opened())
         return Shown(explanation(bench, *ranking(bench)), explanation_lines, _ranking)
 
-    def add(self, effect: str, port: str | None = None, *, anyway: bool = False) -> Shown[Change]:
+    def add(
+        self,
+        effect: str,
+        port: str | None = None,
+        *,
+        anyway: bool = False,
+        beside: Sequence[str] = (),
+    ) -> Shown[Change]:
         """Add an effect to the model if the held-out error supports it (`rigwatch add`)."""
-        change = try_add(self._opened(), effect, port, anyway=anyway, warm=self._warm).commit()
+        trial = try_add(self._opened(), effect, port, anyway=anyway, beside=beside, warm=self._warm)
+        change = trial.commit()
         return Shown(change, change_lines, _errors)
 
     def undo(self) -> Shown[Change]:

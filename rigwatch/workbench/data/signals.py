@@ -14,6 +14,7 @@ from rigwatch.physics.engine.fit import Recording, Thinning
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.workbench.data.columns import Columns, bridged
+from rigwatch.workbench.data.derived_ends import without_ends
 from rigwatch.workbench.data.one_rate import on_one_rate
 from rigwatch.workbench.data.recorded_columns import read_columns, with_derived
 from rigwatch.workbench.data.signal_units import check_unit
@@ -153,7 +154,7 @@ def _recording(
             )
         u, y = _matched(study, table)
         inputs.append(u[:length])
-        outputs.append(y[:length])
+        outputs.append(without_ends(study, y, table.dt)[:length])
     thin = study.file.thin
     parts = tuple(len(u) for u in inputs)
     thinning = Thinning(thin.factor, thin.edge, parts) if thin else None

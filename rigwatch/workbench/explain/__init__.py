@@ -12,12 +12,14 @@ from rigwatch.workbench.explain.explain import (
     ranking,
 )
 from rigwatch.workbench.explain.next_experiment import Experiment, excitation
+from rigwatch.workbench.explain.set_gain import SetGain, set_gain
 from rigwatch.workbench.explain.verdict import Verdict, judge
 
 __all__ = [
     "Experiment",
     "Explanation",
     "Row",
+    "SetGain",
     "Verdict",
     "as_data",
     "excitation",
@@ -25,4 +27,5 @@ __all__ = [
     "explanation",
     "judge",
     "ranking",
+    "set_gain",
 ]

@@ -18,6 +18,7 @@ from rigwatch.workbench.data import NoiseFloor, from_residual
 from rigwatch.workbench.explain.verdict import LITTLE_MORE, MUCH_WORSE
 from rigwatch.workbench.fit import Fitted, continued_train_error, fit_model
 from rigwatch.workbench.ranking import (
+    AGAIN,
     MATERIAL,
     STEP,
     Progress,
@@ -110,10 +111,13 @@ def combinations(
         if not level:
             break
         progress(f"trying {size} effects at once")
-        level = _best_in_training(_extended(bench, level, free))
+        level = _best_in_training(_extended(bench, level, free, last=size == MAX_EFFECTS))
         found += level
         if any(reaches_noise(bench, each.fitted) for each in level):
-            break
+            return found
+    best = min(found, key=lambda each: each.search_error, default=None)
+    if best is not None and len(best.rows) > 1:
+        found += _exchanged(bench, best)
     return found
 
 
@@ -133,16 +137,62 @@ def _lowers(larger: Combination, smaller: float) -> bool:
 
 
 def _best_in_training(level: Sequence[Combination]) -> list[Combination]:
-    """The sets of one size with the smallest training errors."""
-    return sorted(level, key=lambda each: each.search_error)[:BEAM_WIDTH]
+    """The sets of one size with the smallest training errors, none much like a better one."""
+    chosen: list[Combination] = []
+    for each in sorted(level, key=lambda each: each.search_error):
+        if len(chosen) < BEAM_WIDTH and not any(_similar(each, other) for other in chosen):
+            chosen.append(each)
+    return chosen
 
 
-def _extended(bench: Bench, level: Sequence[Combination], free: int) -> list[Combination]:
-    """Each set extended by one effect, without duplicates."""
+def _similar(one: Combination, other: Combination) -> bool:
+    """Whether two sets differ by one effect only, which looks alike at the same port."""
+    own = [row for row in one.rows if row.label not in other.labels]
+    theirs = [row for row in other.rows if row.label not in one.labels]
+    if len(own) != 1 or len(theirs) != 1:
+        return False
+    (a,), (b,) = own, theirs
+    return a.port == b.port and (b.label in a.alike or a.label in b.alike)
+
+
+def _exchanged(bench: Bench, best: Combination) -> list[Combination]:
+    """A set with one of its effects exchanged for one that looks alike at the same port.
+
+    The search extends the better of two that look alike, such as a lag and a digital filter; with
+    the other effects in the model the other one may be better.
+    """
+    found = []
+    for row in best.rows:
+        if not any(label.endswith(f"@{row.port}") for label in row.alike):
+            continue
+        rest = without(bench, best, row)
+        if rest is None:
+            continue
+        study = with_rows(bench.study, rest.rows)
+        every = scored(study, bench.data, rest.fitted, candidates(study, bench.data.train))
+        alike = [r for r in every if r.port == row.port and r.label in row.alike]
+        for other in alike[:BRANCHES]:
+            _fit_with(bench, rest.rows, rest.fitted, other)
+            if other.fitted is not None:
+                found.append(_combination(bench, (*rest.rows, other)))
+    return found
+
+
+def _extended(
+    bench: Bench, level: Sequence[Combination], free: int, *, last: bool
+) -> list[Combination]:
+    """Each set extended by one effect, without duplicates.
+
+    Only sets that reach the noise are used of the last size, so its effect must explain a share of
+    what is above the noise, to first order.
+    """
     found: dict[frozenset[str], Combination] = {}
     for known in level:
+        least = AGAIN * floor_of(bench, known.fitted).above(known.fitted.held_out) if last else 0.0
         for row in next_candidates(bench, known):
             if known.labels | {row.label} in found or known.free + row.free > free:
+                continue
+            if row.explained < least:
                 continue
             _fit_with(bench, known.rows, known.fitted, row)
             if row.fitted is None:

@@ -70,6 +70,8 @@ class Explanation:
         wrong_probability: probability that the verdict is wrong, calibrated on simulated cases;
             None if a later step is judged along the measured motion, or if no case was like it.
         like_this: number of simulated cases with a similar verdict, and how many were wrong.
+        beside: the other effects of the set that the named effect was judged in; with them `add`
+            accepts it if it is refused alone.
     """
 
     verdict: str
@@ -81,6 +83,7 @@ class Explanation:
     next_experiment: Experiment | None = None
     wrong_probability: float | None = 0.5
     like_this: tuple[int, int] = (0, 0)
+    beside: list[str] = field(default_factory=list)
 
 
 def explain(study: Study, progress: Progress = no_progress) -> Explanation:
@@ -170,6 +173,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         experiment,
         probability,
         similar,
+        list(verdict.beside),
     )
 
 

@@ -185,19 +185,22 @@ def _set_verdict(
         refit(bench.study, bench.data, bench.base, row)
     found, second = first.verdict, then[0].verdict.members if first.certain and then else ()
     left = floor_of(bench, best.fitted).left_over(bench.base.held_out, best.fitted.held_out)
-    others = ", ".join(sorted(best.labels - {row.label}))
+    others = tuple(each.label for each in best.rows if each.label != row.label)
     return replace(
         found,
         best=row,
-        text=f"with {others}: {found.text}{_how_to_add(row)}",
+        text=f"with {', '.join(sorted(others))}: {found.text}{_how_to_add(row, others)}",
         second=second,
         evidence=Evidence(left, found.evidence.margin),
+        beside=others,
     )
 
 
-def _how_to_add(row: Ranked) -> str:
+def _how_to_add(row: Ranked, others: Sequence[str]) -> str:
     """How to add an effect that is not accepted alone; empty if it is accepted."""
-    return "" if row.accepted else "; alone it is refused: add it with --anyway, then the others"
+    if row.accepted:
+        return ""
+    return f"; alone it is refused: add it with --port {row.port} --with {' '.join(others)}"
 
 
 def _undetermined_by_sets(verdict: Verdict, best: Combination) -> Verdict:

@@ -59,6 +59,7 @@ class Verdict:
         text: the verdict in a sentence.
         second: labels of the second missing effect, if two are missing at once.
         evidence: what the verdict is based on.
+        beside: labels of the other effects of the set that it was judged in.
     """
 
     word: Word
@@ -68,6 +69,7 @@ class Verdict:
     text: str
     second: tuple[str, ...] = ()
     evidence: Evidence = field(default_factory=Evidence)
+    beside: tuple[str, ...] = ()
 
     @property
     def probability_wrong(self) -> float:

@@ -8,12 +8,13 @@ from rigwatch.workbench.ranking.acceptance import EXPLAINED, MATERIAL, STEP, jud
 from rigwatch.workbench.ranking.candidates import candidates, shapes_of
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.paired_test import difference
-from rigwatch.workbench.ranking.rank import rank
+from rigwatch.workbench.ranking.rank import AGAIN, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from
 from rigwatch.workbench.ranking.refitting import Progress, no_progress, refit
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
 
 __all__ = [
+    "AGAIN",
     "EXPLAINED",
     "MATERIAL",
     "SAME",

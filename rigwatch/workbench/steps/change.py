@@ -3,6 +3,7 @@
 Each change of the model is a trial (`trial.py`) and its commit; the ledger records all of them.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from rigwatch.physics.engine.equations import Effect, Model, Placement, compose, parse_effects
@@ -25,6 +26,7 @@ def add(
     port: str | None = None,
     *,
     anyway: bool = False,
+    beside: Sequence[str] = (),
     progress: Progress = no_progress,
 ) -> Change:
     """Add an effect to the model if the held-out error supports it.
@@ -34,13 +36,15 @@ def add(
         effect: its name.
         port: name of the port; optional if only one port is compatible.
         anyway: add it even if the held-out error does not fall.
+        beside: other effects, as "effect@port", that are missing as well: if it is refused alone,
+            it is added if the held-out error supports each effect of the whole set.
         progress: called with a line of text as each part begins.
 
     Raises:
         ModelError: effect or port is unknown or already there, the fit fails, or the study has been
             changed since it was opened.
     """
-    return try_add(study, effect, port, anyway=anyway, progress=progress).commit()
+    return try_add(study, effect, port, anyway=anyway, beside=beside, progress=progress).commit()
 
 
 def undo(study: Study, progress: Progress = no_progress) -> Change:

@@ -4,9 +4,11 @@ A trial fits but writes nothing, so it can be cancelled at any time. Its commit 
 file and the ledger's line, both or neither.
 
 An effect that does not lower the held-out error is refused. A lower training error is no evidence,
-since every further parameter lowers it.
+since every further parameter lowers it. An effect that is refused alone may be supported together
+with others that are not in the model yet: these are named, and the whole set is fitted and judged.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +17,7 @@ from msgspec import structs
 from rigwatch.physics.engine.score import suits
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.workbench.compare import Bench, Comparison, Warm, with_horizon_of
+from rigwatch.workbench.explain import SetGain, set_gain
 from rigwatch.workbench.fit import held_as
 from rigwatch.workbench.ranking import (
     Progress,
@@ -98,13 +101,14 @@ def try_add(
     port: str | None = None,
     *,
     anyway: bool = False,
+    beside: Sequence[str] = (),
     progress: Progress = no_progress,
     warm: Warm | None = None,
 ) -> Trial:
     """Try `add` without writing anything; can be cancelled at any time.
 
     Args:
-        study, effect, port, anyway: as for `add`.
+        study, effect, port, anyway, beside: as for `add`.
         progress: called with a line of text as each part begins.
         warm: cache of fits; new fits are added to it.
 
@@ -113,12 +117,16 @@ def try_add(
     """
     warm = warm or Warm()
     where = _port(study, effect, port)
+    others = _others(study, f"{effect}@{where}", beside)
     progress("fitting the current model")
     bench, before = warm.bench(study), warm.comparison(study)
     row = try_effect(study, effect, where, progress, warm)
     assert row.fitted is not None
     found = row.fitted.held_out_error
-    if not row.accepted and not anyway:
+    in_set = _in_set(bench, row, others, progress)
+    if in_set is not None and in_set.reason:
+        row = replace(row, reason=f"{row.reason}; {in_set.reason}")
+    if not (row.accepted or anyway or (in_set is not None and not in_set.reason)):
         return _refused(study, row, before, f"{_falls(row, before, found)}: {row.reason}")
     accepted = whole(row)
     # Hold and horizon are kept, so that errors before and after refer to the same inputs.
@@ -131,9 +139,40 @@ def try_add(
         row = replace(row, reason=f"refitted, it leaves {again:.4g} {after.unit}")
         return _refused(study, row, before, f"{_falls(row, before, found)}, but {row.reason}")
     line = {"parameters": accepted.parameters, "model_parameters": accepted.model}
-    errors = (after.train_error, again)
-    change = Change("add", effect, where, before, after, errors, _falls(row, before, again))
+    line |= _evidence(in_set)
+    errors, text = (after.train_error, again), _falls(row, before, again)
+    text = f"{text}; {in_set.text} {before.unit}" if in_set is not None else text
+    change = Change("add", effect, where, before, after, errors, text)
     return Trial(study, changed, change, _which(change) | line | _numbers(after))
+
+
+def _others(study: Study, label: str, beside: Sequence[str]) -> list[str]:
+    """The other effects of a set, as "effect@port".
+
+    Raises:
+        ModelError: one is unknown, in the model already, or named twice.
+    """
+    names = [each.partition("@") for each in beside]
+    found = [f"{name}@{_port(study, name, port or None)}" for name, _, port in names]
+    if len({label, *found}) <= len(found):
+        raise ModelError(f"{label}: found with {' '.join(found)}, expected each effect once")
+    return found
+
+
+def _in_set(bench: Bench, row: Ranked, others: Sequence[str], progress: Progress) -> SetGain | None:
+    """The set's evidence for an effect that is refused alone; None without a set."""
+    if row.accepted or not others:
+        return None
+    progress(f"fitting {row.label} with {', '.join(others)}")
+    return set_gain(bench, row.label, others)
+
+
+def _evidence(found: SetGain | None) -> dict[str, Any]:
+    """What the ledger keeps of the set that an effect was accepted in."""
+    if found is None:
+        return {}
+    errors = {"without_held_out_error": found.without, "held_out_error": found.held_out_error}
+    return {"set": {"with": list(found.others), **errors}}
 
 
 def _falls(row: Ranked, before: Comparison, after: float) -> str:

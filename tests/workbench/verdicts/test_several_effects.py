@@ -41,6 +41,7 @@ def test_one_of_three_hidden_effects_is_named_with_another(three, rows):
     assert set(found.second) & LABELS - set(found.members)
     assert found.best in rows
     assert found.evidence.left < 0.02
+    assert set(found.beside) == LABELS - set(found.members)
 
 
 def test_without_the_truth_among_them_no_effect_is_named_with_confidence(three, rows):

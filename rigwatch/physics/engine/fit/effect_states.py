@@ -17,11 +17,15 @@ from rigwatch.physics.engine.equations import (
     Parameter,
     State,
     System,
+    names_in,
     parse,
     symbol,
 )
 from rigwatch.physics.engine.fit.port_signals import Signals
+from rigwatch.physics.engine.fit.recent_runs import RecentRuns, digest
 from rigwatch.wire.arrays import FloatArray
+
+_RECENT = RecentRuns()
 
 
 class EffectStates:
@@ -45,12 +49,18 @@ class EffectStates:
         rows: int = 1,
         late: float = 0.0,
     ) -> None:
-        inputs = [name for name in signals if name not in {TIME, LEFT}]
-        self._driving = np.stack([signals[name] for name in inputs], axis=-1)
+        used = _used(effect)
+        # Until when an input stays is told by the inputs, whichever the equations use.
+        wanted = signals if LEFT in used else used
+        inputs = [name for name in signals if name not in {TIME, LEFT} and name in wanted]
+        self._driving = _side_by_side([signals[name] for name in inputs], signals)
         self._system = _alone(effect, inputs, hold, late)
         self._compiled: CompiledSystem = compile_system(self._system)
         self._first = np.array([[state.start for state in effect.states.values()]])
         self._spacing, self._rows = spacing, rows
+        # Systems with the same equations and names share a kernel.
+        equations = (self._compiled.kernel, spacing, rows, hold, late, self._first.tobytes())
+        self._key = (*equations, self._driving.shape, digest(self._driving))
 
     def run(self, values: Mapping[str, float], arriving: Signals | None = None) -> Signals:
         """Each state by name, shape (nodes,).
@@ -60,20 +70,39 @@ class EffectStates:
             arriving: signals that replace those given at construction.
         """
         parameters = self._compiled.vector(dict(values))
-        names = list(self._system.states)
-        driving = self._driven_by(arriving) if arriving else self._driving
+        if arriving:
+            found = self._simulated(self._driven_by(arriving), parameters)
+        else:
+            key = (*self._key, parameters.tobytes())
+            found = _RECENT.get(key, lambda: self._simulated(self._driving, parameters))
+        return dict(zip(self._system.states, found.T, strict=True))
+
+    def _simulated(self, driving: FloatArray, parameters: FloatArray) -> FloatArray:
+        """The states, shape (nodes, states)."""
         run = self._compiled.simulate(
             driving, self._spacing, np.zeros(1, np.int64), len(driving),
             initial=self._first, parameters=parameters, substeps=1, rows=self._rows,
         )  # fmt: skip
-        return dict(zip(names, run.outputs[0].T, strict=True))
+        return np.asarray(run.outputs[0], np.float64)
 
     def _driven_by(self, arriving: Signals) -> FloatArray:
         columns = [
             arriving.get(name, own)
             for name, own in zip(self._system.model.inputs, self._driving.T, strict=True)
         ]
-        return np.stack(columns, axis=-1)
+        return _side_by_side(columns, arriving)
+
+
+def _side_by_side(columns: list[FloatArray], signals: Mapping[str, FloatArray]) -> FloatArray:
+    """Signals as columns, shape (nodes, columns); without columns as long as the others."""
+    length = len(next(iter(signals.values())))
+    return np.stack(columns, axis=-1) if columns else np.empty((length, 0))
+
+
+def _used(effect: Effect) -> set[str]:
+    """Names in the equations of an effect's states."""
+    texts = [state.derivative or state.update for state in effect.states.values()]
+    return {name for text in texts for name in names_in(text, "state")}
 
 
 def hold_at(model: Model, port: str) -> Hold:

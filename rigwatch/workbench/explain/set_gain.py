@@ -1,0 +1,91 @@
+"""Whether the held-out recordings support an effect together with others, if not alone.
+
+Of several missing effects one may lower the held-out error only once the others are in the model.
+It is supported in a set of effects if each effect of the set is accepted in the model with all
+others, and the whole set lowers the error of the model without any of them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.explain.combinations import with_rows
+from rigwatch.workbench.fit import Fitted
+from rigwatch.workbench.ranking import Ranked, judge_fit, rank_only, refit, shapes_of
+
+
+@dataclass(frozen=True)
+class SetGain:
+    """What the held-out recordings say of an effect together with others.
+
+    Attributes:
+        label: the effect, as "effect@port".
+        others: the other effects of the set.
+        without, held_out_error: of the model with the others, and with the whole set.
+        reason: why the set does not support the effect; empty if it does.
+    """
+
+    label: str
+    others: tuple[str, ...]
+    without: float
+    held_out_error: float
+    reason: str
+
+    @property
+    def text(self) -> str:
+        """The evidence in a sentence."""
+        errors = f"{self.without:.4g} → {self.held_out_error:.4g}"
+        return f"with {', '.join(self.others)}: held-out error {errors}"
+
+
+def set_gain(bench: Bench, label: str, others: Sequence[str]) -> SetGain:
+    """Fit a set of effects, and the set without each of them, and judge.
+
+    Args:
+        bench: the study.
+        label: the effect, as "effect@port".
+        others: the others of the set, none of them in the model yet.
+
+    Raises:
+        ModelError: an effect does not fit its port, or a set cannot be fitted.
+    """
+    whole = _fitted_set(bench, [label, *others])
+    errors, reasons = {}, list[str]()
+    for each in whole:
+        rest = _fitted_set(bench, [row.label for row in whole if row is not each])
+        judged = replace(each, fitted=whole[-1].fitted)
+        judge_fit(_last(rest), judged)
+        errors[each.label] = _last(rest).held_out_error
+        if not judged.accepted:
+            names = ", ".join(sorted(row.label for row in rest))
+            reasons.append(f"{each.label} with {names}: {judged.reason}")
+    judged = replace(whole[0], fitted=whole[-1].fitted)
+    judge_fit(bench.base, judged)
+    if not judged.accepted:
+        reasons.append(f"all together: {judged.reason}")
+    found = _last(whole).held_out_error
+    return SetGain(label, tuple(others), errors[label], found, "; ".join(reasons[:1]))
+
+
+def _last(rows: Sequence[Ranked]) -> Fitted:
+    found = rows[-1].fitted
+    assert found is not None
+    return found
+
+
+def _fitted_set(bench: Bench, labels: Sequence[str]) -> list[Ranked]:
+    """Effects fitted one by one, in each step the one that explains most of what is left."""
+    fitted, rows, waiting = bench.base, list[Ranked](), list(labels)
+    while waiting:
+        study = with_rows(bench.study, rows)
+        shapes = [shapes_of(study, bench.data.train, *label.split("@")) for label in waiting]
+        found = [rank_only(study, bench.data, fitted, each) for each in shapes]
+        row = max(found, key=lambda each: each.explained)
+        refit(study, bench.data, fitted, row)
+        if row.fitted is None:
+            names = ", ".join(each.label for each in rows) or "the model"
+            raise ModelError(f"{row.label} with {names}: cannot be fitted: {row.failure}")
+        fitted, rows = row.fitted, [*rows, row]
+        waiting.remove(row.label)
+    return rows
