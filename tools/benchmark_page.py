@@ -62,6 +62,12 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         ),
     ),
     (
+        "The workbench in a browser",
+        "A headless Chromium that draws without a graphics processor, the real server, and five "
+        "and a half hours of the simulated rig at 256 Hz, fitted for real.",
+        ("browser_speed", "browser_bounds", "browser_kills"),
+    ),
+    (
         "Structures",
         "The Kabe antenna of the thesis's chapter 4. More figures: [damage](structure-damage.md).",
         ("structures", "structure_damage"),
