@@ -59,13 +59,13 @@ class Drive:
         self._seconds, self._labels = 0.0, (f"{uuid4()}/{number}" for number in count())
 
     def __iter__(self) -> Iterator[Outcome]:
-        """Outcomes as they come."""
+        """Outcomes as they come; those that come together in the order of their units."""
         self._fill()
         while self._running:
             done, _ = wait(self._running, _LOOK_AGAIN_S, FIRST_COMPLETED)
             if not done and not self._pool.workers:
                 self._say("no worker is left: waiting for one")
-            for future in done:
+            for future in [one for one in self._running if one in done]:
                 yield from self._collected(future)
             self._fill()
 

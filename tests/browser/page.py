@@ -176,8 +176,9 @@ class Page:
         self.until(ended, f"{task} is {state}")
 
     def errors(self) -> list[str]:
-        """What the browser complained of since it was last asked."""
-        return [entry["message"] for entry in self.driver.get_log("browser")]
+        """Errors of the console since the last call, but for pages that do not exist."""
+        found = (entry["message"] for entry in self.driver.get_log("browser"))
+        return [message for message in found if not _is_missing_page(message)]
 
     def requests(self) -> set[str]:
         """Where the page asked for something since it was last asked."""
@@ -219,3 +220,10 @@ class Page:
     def picture(self, path: Path) -> None:
         """What is seen, as PNG."""
         self.driver.save_screenshot(str(path))
+
+
+def _is_missing_page(message: str) -> bool:
+    """Whether a console error only tells that a page, not a part of one, was answered with 404."""
+    address, _, text = message.partition(" - ")
+    missing = "status of 404" in text
+    return missing and not urlsplit(address).path.startswith(("/static", "/api"))

@@ -3,6 +3,7 @@
 import ast
 import inspect
 import shlex
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from rigwatch.commands import main
 from rigwatch.workbench.study.ledger import lines
 from rigwatch.workbench.study.study import Study, open_study
 from tests.browser.page import Page, Served
+from tests.waiting import wait_until
 from tests.workbench.fits.test_accepted_fit import UNITS, WAVES, waves
 from tests.workbench.machine import recorded, studied
 
@@ -39,6 +41,12 @@ def downloads(page: Page, tmp_path: Path) -> Path:
     return tmp_path
 
 
+def _saved(page: Page, css: str, file: Path) -> bool:
+    """Press a button and wait for its file; Chromium drops downloads that follow too fast."""
+    page.click(css)
+    return wait_until(file.exists, 3.0)
+
+
 def test_an_explained_study_gives_every_figure_as_picture_and_as_numbers(
     page: Page, study: Study, downloads: Path
 ) -> None:
@@ -47,7 +55,7 @@ def test_an_explained_study_gives_every_figure_as_picture_and_as_numbers(
     page.until(lambda: page.all("#ranking tr.candidate"), "the ranking")
     page.press("j")
     page.until(lambda: page.text("#detail h3"), "the evidence")
-    wanted = set()
+    wanted = set[str]()
     for tab in ("missing", "where", "parameters"):
         page.click(f"#tab-{tab}")
         for figure in page.run(
@@ -55,10 +63,11 @@ def test_an_explained_study_gives_every_figure_as_picture_and_as_numbers(
             f"#{tab} figure[data-figure], #ledger figure[data-figure]",
         ):
             for button in ("SVG", "CSV"):
-                page.click(f'figure[data-figure="{figure}"] .export [aria-label$="{button}"]')
-            wanted |= {f"{figure}.svg", f"{figure}.csv"}
+                css = f'figure[data-figure="{figure}"] .export [aria-label$="{button}"]'
+                file = downloads / f"{figure}.{button.lower()}"
+                page.until(partial(_saved, page, css, file), file.name)
+                wanted.add(file.name)
     assert {"ranking.svg", "error-per-step.svg", "parameters.csv"} <= wanted
-    page.until(lambda: wanted <= {p.name for p in downloads.iterdir()}, "the files")
     for name in wanted:
         text = (downloads / name).read_text(encoding="utf-8")
         assert text.startswith("<svg") if name.endswith(".svg") else "," in text, name

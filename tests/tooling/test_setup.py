@@ -55,12 +55,13 @@ def test_lock_files_agree_with_each_other() -> None:
 def test_what_the_project_asks_for_is_locked() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
-    notebook = names(extras.pop("notebook"))
+    offline = names([*extras.pop("notebook"), *extras.pop("archive"), *extras.pop("dask")])
     locked = pins(ROOT / "requirements" / "lock.txt")
     asked = [text for extra in extras.values() for text in extra]
     assert names(project["dependencies"] + asked) <= locked.keys()
-    # A rig needs no notebook: its packages are those of the tests.
-    assert notebook <= pins(ROOT / "requirements" / "dev.txt").keys()
+    # A rig needs no notebook and no archive: their packages are those of the tests.
+    parts = [pins(ROOT / "requirements" / f"{part}.txt").keys() for part in ("lock", "dev")]
+    assert offline <= parts[0] | parts[1]
     for part in ("build", "dev", "bench"):
         lines = (ROOT / "requirements" / f"{part}.in").read_text(encoding="utf-8").splitlines()
         asked = [line for line in lines if line and not line.startswith(("#", "-"))]
