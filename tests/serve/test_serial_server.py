@@ -53,7 +53,7 @@ def test_the_schedule_is_absolute(tmp_path: Path) -> None:
     with in_thread(server.run):
         frames = []
         eventually((tmp_path / "rig").is_symlink, "the line")
-        frames = read_frames(tmp_path / "rig", 128)
+        frames = read_frames(tmp_path / "rig", 128)[:128]
     elapsed = time.monotonic() - began
     assert [f.seq for f in frames] == list(range(frames[0].seq, frames[0].seq + 128))
     assert server.sent <= elapsed * 256 + 1
