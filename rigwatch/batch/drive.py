@@ -63,11 +63,21 @@ class Drive:
         self._fill()
         while self._running:
             done, _ = wait(self._running, _LOOK_AGAIN_S, FIRST_COMPLETED)
-            if not done and not self._pool.workers:
-                self._say("no worker is left: waiting for one")
+            if not done:
+                yield from self._forgotten()
             for future in [one for one in self._running if one in done]:
                 yield from self._collected(future)
             self._fill()
+
+    def _forgotten(self) -> Iterator[Outcome]:
+        """Tasks of a pool that broke and took them along unsaid."""
+        if not self._pool.workers:
+            self._say("no worker is left: waiting for one")
+        self._pool.check()
+        old = [one for one, t in self._running.items() if t.generation < self._pool.generation]
+        for future in old:
+            if not future.done():
+                yield from self._died(self._running.pop(future))
 
     def _fill(self) -> None:
         window = 2 * max(1, self._pool.workers)

@@ -39,12 +39,31 @@ class Pool:
         return self._make()
 
     def submit(self, call: Callable[..., Any], *arguments: Any) -> "Future[Any]":
-        """Submit a call; a broken executor is replaced first."""
+        """Submit a call; a broken executor is replaced first.
+
+        Raises:
+            OSError: no further process can be started.
+        """
+        failed = 0
         while True:
             try:
                 return self.executor.submit(call, *arguments)
             except BrokenExecutor:
                 self.renew(self.generation)
+            except OSError:
+                # A pool that breaks while it starts a process fails so once, and is broken then.
+                failed += 1
+                if failed > 1:
+                    raise
+
+    def check(self) -> None:
+        """Replace an executor that broke without a word.
+
+        Before Python 3.12 a call that is submitted while the pool breaks may be forgotten: its
+        future is never done.
+        """
+        if isinstance(self.executor, ProcessPoolExecutor):
+            self.submit(int)
 
     def renew(self, generation: int) -> None:
         """Replace the executor of a generation that broke; once for all its calls.

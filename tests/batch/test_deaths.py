@@ -1,12 +1,13 @@
 """Workers that die: their units are done by others, and one that kills them is named."""
 
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
 
 import rigwatch
-from rigwatch.batch import executor_on, job_of
+from rigwatch.batch import drive, executor_on, job_of
 from rigwatch.batch.job import run_units
 from rigwatch.wire.errors import BatchError
 from tests.batch.jobs import deadly, make_files, sizes
@@ -40,6 +41,41 @@ def test_units_that_kill_every_worker_are_named_and_the_rest_is_done(files):
     assert [Path(text.partition(":")[0]).name for text in named] == ["run0004.mcap", "run0017.mcap"]
     assert all("its worker died each time it ran, alone too" in text for text in named)
     assert [value for _, value in found] == [n for n in range(COUNT) if n not in (4, 17)]
+
+
+class Breaking(ProcessPoolExecutor):
+    """A pool that breaks while calls are submitted: what it says to each, the last to all others.
+
+    CPython's own does so in a race (gh-94777, gh-109047): a refused process, a forgotten call.
+    """
+
+    def __init__(self, *said: Exception | Future) -> None:
+        super().__init__(1)
+        self._said = [*said]
+
+    def submit(self, fn, /, *args, **kwargs):
+        said = self._said.pop(0) if len(self._said) > 1 else self._said[0]
+        if isinstance(said, Exception):
+            raise said
+        return said
+
+
+BROKEN = BrokenProcessPool("a process terminated abruptly")
+
+
+@pytest.mark.parametrize("said", [OSError(9, "Bad file descriptor"), Future()], ids=type)
+def test_calls_that_a_breaking_pool_refuses_or_forgets_are_submitted_again(
+    files, monkeypatch, said
+):
+    monkeypatch.setattr(drive, "_LOOK_AGAIN_S", 0.1)
+    pools = iter([Breaking(said, BROKEN), ProcessPoolExecutor(2)])
+    found = rigwatch.map(sizes, [files], executor=lambda: next(pools))
+    assert len(list(found)) == COUNT
+
+
+def test_processes_that_cannot_be_started_end_the_work(files):
+    with pytest.raises(OSError, match="Too many open files"):
+        rigwatch.map(sizes, [files], executor=lambda: Breaking(OSError(24, "Too many open files")))
 
 
 def test_a_worker_of_another_version_is_refused(files):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rigwatch.wire.ordering import OPEN, Ask, Numbered, RingReply
+from rigwatch.wire.ordering import OPEN, UNKNOWN, Ask, Numbered, RingReply
 from rigwatch.wire.ordering.sample_order import (
     FORGED,
     LARGEST_SEQ,
@@ -365,18 +365,53 @@ def test_history_before_a_resumed_position_is_taken_as_far_as_the_ring_has_it() 
     assert bench.losses == []
 
 
-@pytest.mark.parametrize("restart", [False, True])
-def test_a_hole_that_the_ring_does_not_know_is_lost_with_its_reason(restart: bool) -> None:
-    bench = restarted(end=4) if restart else Bench()
-    if not restart:
-        bench.send(block(0))
-        bench.send(block(5))
-    ask = bench.asks.popleft()
-    bench.take(bench.order.on_reply(ask, RingReply(7, -1, ())))
-    first, last = (5, 4) if restart else (1, 4)
-    assert bench.losses == [Loss(7, first, last, "the source has restarted since")]
-    assert bench.order.counters.lost == last - first + 1
-    assert bench.order.position == ((8, 0) if restart else (7, 5))
+def test_the_end_of_a_boot_that_the_ring_does_not_know_is_lost_with_its_reason() -> None:
+    bench = restarted(end=4)
+    bench.take(bench.order.on_reply(bench.asks.popleft(), RingReply(7, UNKNOWN, ())))
+    assert bench.losses == [Loss(7, 5, 4, "the source has restarted since")]
+    assert bench.order.position == (8, 0)
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_another_ring_that_does_not_know_a_sending_boot_is_not_believed(there: bool) -> None:
+    bench = Bench()
+    if there:
+        tokens(bench, 7)
+    bench.send(block(0))
+    bench.keep(block(1, 4))
+    bench.send(block(5))
+    for _ in range(TRIES - 1):
+        ask = bench.asks.popleft()
+        bench.take(bench.order.on_reply(ask, RingReply(7, UNKNOWN, ())))
+    bench.reply_all()
+    bench.ledger.assert_complete(7, 0, 5)
+    assert bench.losses == []
+
+
+def test_a_stranger_that_is_silent_does_not_take_over_when_all_tokens_vanish() -> None:
+    bench = Bench()
+    tokens(bench, 7)
+    bench.send(block(0, 4))
+    bench.take(bench.order.on_block(block(0, boot=8)))
+    bench.send(block(4, 4))
+    bench.take(bench.order.on_token(7, 7, False))
+    assert bench.order.sources.current == 7
+    bench.take(bench.order.on_token(7, 7, True))
+    bench.send(block(8, 4))
+    bench.reply_all()
+    bench.ledger.assert_complete(7, 0, 11)
+    assert bench.losses == []
+
+
+def test_a_source_without_a_token_takes_over_when_it_goes_on_sending() -> None:
+    bench = Bench()
+    tokens(bench, 7)
+    bench.send(block(0, 4))
+    bench.send(block(0, boot=8))
+    bench.send(block(4, 4))
+    bench.take(bench.order.on_token(7, 7, False))
+    bench.send(block(1, boot=8))
+    assert bench.order.sources.current == 8
 
 
 def test_the_end_of_a_boot_is_asked_for_until_nothing_more_comes() -> None:

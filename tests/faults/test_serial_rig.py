@@ -30,7 +30,8 @@ POSITION, ACCELERATION = 1, 2
 @pytest.fixture(scope="module")
 def field(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Field, SerialDevice]]:
     keys = {"position": "spike_above = 0.004"}
-    with serial_field(tmp_path_factory.mktemp("serial"), keys=keys) as made:
+    silence = "[daq]\nstale_after = 0.09\n"
+    with serial_field(tmp_path_factory.mktemp("serial"), keys=keys, extra=silence) as made:
         yield made
 
 

@@ -322,6 +322,10 @@ class SampleOrder(Generic[S]):
 
     def _settle(self, ask: Ask, reply: RingReply[S]) -> None:
         front = self._line[0]
+        if reply.settled == UNKNOWN and self._still_sends(front):
+            # Another source's ring: after an interruption it may be reachable first.
+            self._no_reply(ask)
+            return
         self._unanswered = 0
         if reply.settled == UNKNOWN:
             self._give_up(front, ask, "the source has restarted since")
@@ -340,6 +344,9 @@ class SampleOrder(Generic[S]):
         self._skip(front, min(reply.settled, ask.last), "the ring no longer has them")
         if ask.last == OPEN and front.ended and not self._progressed(ask, front):
             self._leave(front)
+
+    def _still_sends(self, front: Stream[S]) -> bool:
+        return self.sources.is_alive(front.boot) or (bool(front.waiting) and not front.ended)
 
     def _drop_forged(self, front: Stream[S]) -> None:
         """Drop forged samples: every sample is in the ring before it is published.

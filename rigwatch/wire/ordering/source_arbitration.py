@@ -107,10 +107,15 @@ class Sources:
         return self.successor()
 
     def successor(self) -> tuple[int, int] | None:
-        """(boot, first sample) of the rival that takes over, if control is free."""
-        if not self._rivals or not self._released():
+        """(boot, first sample) of the rival that takes over, if control is free.
+
+        One that has neither a token nor sent anything since the source in control last did is no
+        successor: it takes over once it sends again.
+        """
+        sending = [b for b, one in self._rivals.items() if b in self._alive or not one.from_seq]
+        if not sending or not self._released():
             return None
-        boot = min(self._rivals, key=lambda b: self._alive.get(b, 2**63))
+        boot = min(sending, key=lambda b: self._alive.get(b, 2**63))
         return boot, self._rivals[boot].from_seq
 
     def take_control(self, boot: int) -> None:
