@@ -7,15 +7,13 @@ every alarm with its severity, cause, guidance and default settings.
 from monitor.alarms.journal import AlarmJournal, last_records, read_journal
 from monitor.alarms.kinds import ALARM_KINDS, AlarmKind, check_settings, settings_of
 from monitor.alarms.manager import AlarmManager, Announcement
-from monitor.alarms.operator import LONGEST_NAME, LONGEST_TEXT, bounded
+from monitor.alarms.operator import bounded
 from monitor.alarms.quality import SensorFlags
 from monitor.alarms.record import AlarmRecord
 from monitor.alarms.state import Occasion
 
 __all__ = [
     "ALARM_KINDS",
-    "LONGEST_NAME",
-    "LONGEST_TEXT",
     "AlarmJournal",
     "AlarmKind",
     "AlarmManager",

@@ -5,11 +5,8 @@ from dataclasses import dataclass, replace
 
 from monitor.alarms.kinds import split
 from monitor.alarms.state import UNSEEN, AlarmInstance
-from rigwatch.wire.messages import AlarmCommand, Identity
+from rigwatch.wire.messages import EVERY_ALARM, LONGEST_NAME, LONGEST_TEXT, AlarmCommand, Identity
 
-EVERY = "*"
-LONGEST_NAME, LONGEST_TEXT = 100, 500
-"""Longest names and text of a command that are kept [characters]."""
 MAX_CLOCK_DIFFERENCE_NS = 60_000_000_000
 """Largest difference between a command's time and the monitor's; beyond it, it is wrong [ns]."""
 
@@ -56,7 +53,7 @@ def _shortened(text: str, longest: int) -> str:
 def addressed(command: AlarmCommand, alarms: Iterable[AlarmInstance]) -> list[AlarmInstance]:
     """The alarms addressed: one, all channels of a kind, or with "*" all that can be changed."""
     alarms = list(alarms)
-    if command.name == EVERY:
+    if command.name == EVERY_ALARM:
         return [alarm for alarm in alarms if not obstacle(command, alarm)]
     return [alarm for alarm in alarms if command.name in {alarm.name, split(alarm.name)[0]}]
 
@@ -65,7 +62,7 @@ def refusal(command: AlarmCommand, found: list[AlarmInstance]) -> str:
     """Why the command is refused, in one line; "" if it can be executed."""
     if not command.user:
         return f"{command.action} of {command.name} refused: no user given"
-    if command.name == EVERY:
+    if command.name == EVERY_ALARM:
         return ""
     if not found:
         return f"{command.action} of {command.name} refused: no such alarm has been seen"

@@ -4,8 +4,7 @@ Two filters run side by side on the same model (Nowakowski, Boutayeb and Darouac
 2.54-2.61):
 
 * the plain one assumes a correct position sensor. Its innovations are white and of known size while
-that
-  is right; a sliding chi-square test of them detects the fault (`innovation_test.py`);
+  that is right; a sliding chi-square test of them detects the fault (`innovation_test.py`);
 * the generalised one takes the sensor's bias η as an unknown input of the measurement,
   y = H·x + G·η, and so estimates the fault-free states and the bias.
 

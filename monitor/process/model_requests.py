@@ -7,13 +7,12 @@ from pathlib import Path
 
 import msgspec
 
-from monitor.alarms import LONGEST_NAME, LONGEST_TEXT
 from monitor.model import RigModel, model_text, parse_model
 from monitor.model import model_versions as versions
 from monitor.pipeline import RigMonitor, check_can_follow
 from rigwatch.wire.bus import KEY, PATIENCE, Bus, CommandCheck, ModelReply, ModelRequest
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.messages import Identity, ModelChange
+from rigwatch.wire.messages import LONGEST_NAME, LONGEST_TEXT, Identity, ModelChange
 
 
 @dataclass(eq=False)

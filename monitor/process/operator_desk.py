@@ -3,11 +3,9 @@
 from collections.abc import Iterator
 
 from monitor.alarms import AlarmManager, Announcement, bounded
-from rigwatch.wire.bus import Bus, CommandCheck, command_mark
+from rigwatch.wire.bus import MOST_COMMANDS, Bus, CommandCheck, command_mark
 from rigwatch.wire.messages import COMMANDS, MONITOR_STALE, AlarmCommand, Event
 
-MOST_PER_TURN = 8
-"""Commands executed per turn of the loop, so that a flood of them does not delay samples."""
 SOURCE = "monitor/alarms"
 
 
@@ -36,10 +34,7 @@ class OperatorDesk:
             alarms: of the rig.
             now_ns: the monitor's Unix time [ns].
         """
-        for _ in range(MOST_PER_TURN):
-            command = self._commands.get(timeout=0)
-            if command is None:
-                return
+        for command in self._commands.drain(MOST_COMMANDS):
             if command.name != MONITOR_STALE:  # the witness's own alarm
                 yield self._executed(alarms, command, now_ns)
 

@@ -4,9 +4,8 @@ file(s) ─▶ one pass: summary, losses, alarms, figures per second ─▶ row,
 """
 
 import hashlib
-import re
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import quote
@@ -18,9 +17,8 @@ from rigwatch.archive.tables import write_seconds
 from rigwatch.batch import content_hash
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import PROBABLY_MISSING, EstimateBlock, Event, Gap, Message
-from rigwatch.wire.session import SUFFIX, Session, Summary, open_session, summarise
+from rigwatch.wire.session import SUFFIX, Session, Summary, is_segment, open_session, summarise
 
-_SEGMENT = re.compile(rf"(?:(?P<folder>.*)/)?\d{{6}}{re.escape(SUFFIX)}")
 OK, DAMAGED, UNFINISHED, UNREADABLE, DUPLICATE = (
     "ok",
     "damaged",
@@ -54,8 +52,9 @@ def entries(files: list[Stored]) -> list[Entry]:
     found: dict[str, list[Stored]] = {}
     for file in files:
         if file.name.endswith(SUFFIX):
-            segment = _SEGMENT.fullmatch(file.name)
-            name = segment["folder"] if segment and segment["folder"] else file.name
+            path = PurePosixPath(file.name)
+            in_folder = is_segment(path) and len(path.parts) > 1
+            name = str(path.parent) if in_folder else file.name
             found.setdefault(name, []).append(file)
     return [Entry(name, tuple(found[name])) for name in sorted(found)]
 

@@ -1,15 +1,12 @@
 """Paths, globs and folders as recordings or studies."""
 
 import glob
-import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from rigwatch.wire.errors import BatchError
-from rigwatch.wire.session import SUFFIX
+from rigwatch.wire.session import SUFFIX, is_segment
 
-_SEGMENT = re.compile(rf"\d{{6}}{re.escape(SUFFIX)}")
-"""Name of a segment, as the recorder writes it."""
 Finder = Callable[[Path], list[Path]]
 
 
@@ -19,14 +16,14 @@ def recording_at(folder: Path) -> list[Path]:
         return [folder]
     found: dict[Path, None] = {}
     for file in sorted(folder.rglob(f"*{SUFFIX}")):
-        whole = file.parent if _SEGMENT.fullmatch(file.name) else file
+        whole = file.parent if is_segment(file) else file
         found[whole] = None
     return list(found)
 
 
 def is_segmented(folder: Path) -> bool:
     """Whether a folder is one session, written by a recorder in segments."""
-    return any(_SEGMENT.fullmatch(file.name) for file in folder.glob(f"*{SUFFIX}"))
+    return any(is_segment(file) for file in folder.glob(f"*{SUFFIX}"))
 
 
 def expand(given: Iterable[Path | str], inside: Finder = recording_at) -> list[str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import EstimateBlock, Event, Message, RunInfo, SampleBlock, Severity
-from rigwatch.wire.session import SUFFIX, SessionWriter, merge_pending
+from rigwatch.wire.session import SessionWriter, merge_pending, segment_name
 
 SOURCE = "recorder"
 RAM_BYTES = 64 << 20
@@ -105,10 +105,10 @@ class Store:
         except OSError as error:
             reason = error.strerror or str(error)
             raise SessionError(f"{self.folder}: cannot be made: {reason}") from error
-        path = self.folder / f"{self.segment_count + 1:06d}{SUFFIX}"
+        path = self.folder / segment_name(self.segment_count + 1)
         while path.exists():
             self.segment_count += 1
-            path = self.folder / f"{self.segment_count + 1:06d}{SUFFIX}"
+            path = self.folder / segment_name(self.segment_count + 1)
         self._writer = SessionWriter(path, self._run)
         self.segment_count += 1
         self._opened_at = now

@@ -5,20 +5,17 @@ Notices ──▶ queue of the recipient ──▶ thread: command or Apprise, r
 
 import json
 import logging
-import math
 import os
 import queue
 import subprocess
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from rigwatch.wire.errors import ConfigError, MissingExtraError
-from rigwatch.wire.messages import Alarm
+from rigwatch.wire.messages import json_fields
 from rigwatch.witness.notices import Notice
 from rigwatch.witness.people import PeopleFile, RecipientSection
 
@@ -149,20 +146,13 @@ def _run_command(command: Sequence[str], notice: Notice, rig: str) -> bool:
     alarm = notice.alarm
     done = subprocess.run(
         [*command, alarm.name, alarm.severity, alarm.cause],
-        input=json.dumps(_plain(alarm)).encode(),
+        input=json.dumps(json_fields(alarm)).encode(),
         env={**os.environ, "RIGWATCH_RIG": rig},
         stdout=subprocess.DEVNULL,
         timeout=COMMAND_S,
         check=False,
     )
     return done.returncode == 0
-
-
-def _plain(alarm: Alarm) -> dict[str, Any]:
-    return {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in asdict(alarm).items()
-    }
 
 
 def _apprise_sender(recipient: RecipientSection, rig: str, file: Path) -> Send:

@@ -6,7 +6,14 @@ python -m rigwatch witness CONFIG
 import threading
 import time
 
-from rigwatch.wire.bus import Bus, CommandCheck, ask_alarm_list, connect, serve_alarm_list
+from rigwatch.wire.bus import (
+    MOST_COMMANDS,
+    Bus,
+    CommandCheck,
+    ask_alarm_list,
+    connect,
+    serve_alarm_list,
+)
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import Heartbeat
 from rigwatch.wire.messages import (
@@ -26,8 +33,6 @@ from rigwatch.witness.stale_alarm import StaleAlarm
 
 PROCESS = "witness"
 TURN = 0.1
-MOST_COMMANDS = 8
-"""Commands executed per turn."""
 FOR_MONITOR = 30.0
 """Time allowed until a monitor's first estimate [s]."""
 
@@ -88,10 +93,7 @@ class Witness:
 
     def _obey(self, t_ns: int) -> None:
         """Execute operators' commands, a few per turn."""
-        for _ in range(MOST_COMMANDS):
-            command = self._commands.get(timeout=0)
-            if command is None:
-                return
+        for command in self._commands.drain(MOST_COMMANDS):
             for said in self._stale.command(command, t_ns):
                 self._bus.publish(ALARMS if isinstance(said, Alarm) else EVENTS, said)
 

@@ -3,10 +3,18 @@
 from collections.abc import Iterator
 
 from rigwatch.wire.bus import CommandCheck
-from rigwatch.wire.messages import MONITOR_STALE, Alarm, AlarmCommand, AlarmState, Event, Identity
+from rigwatch.wire.messages import (
+    EVERY_ALARM,
+    LONGEST_NAME,
+    MONITOR_STALE,
+    Alarm,
+    AlarmCommand,
+    AlarmState,
+    Event,
+    Identity,
+)
 
 _NONE = float("nan")
-EVERY = "*"
 
 
 class StaleAlarm:
@@ -42,12 +50,12 @@ class StaleAlarm:
 
     def command(self, command: AlarmCommand, t_ns: int) -> Iterator[Alarm | Event]:
         """Execute an operator's command for this alarm, or say why not."""
-        if command.name not in (MONITOR_STALE, EVERY):
+        if command.name not in (MONITOR_STALE, EVERY_ALARM):
             return
         if why_not := self._obstacle(command):
             # Commands for all alarms are answered by the monitor.
             if command.name == MONITOR_STALE:
-                user = command.user[:100]
+                user = command.user[:LONGEST_NAME]
                 text = f"{command.action} of {MONITOR_STALE} by {user} refused: {why_not}"
                 yield Event("witness", t_ns, "warning", "alarm_command_refused", text)
             return
@@ -56,7 +64,7 @@ class StaleAlarm:
             text = f"{command.action} of {command.name} refused: {verdict.refusal}"
             yield Event("witness", t_ns, "warning", "alarm_command_refused", text)
             return
-        user = command.user[:100]
+        user = command.user[:LONGEST_NAME]
         self.standing = _alarm("acknowledged", "seen", t_ns, user, verdict.identity)
         yield self.standing
 

@@ -1,8 +1,8 @@
 """What a command may claim: the monitor's clock counts, and texts have bounds."""
 
 from monitor.alarms import AlarmManager, Occasion, bounded, last_records
-from monitor.alarms.operator import LONGEST_NAME, LONGEST_TEXT, MAX_CLOCK_DIFFERENCE_NS
-from rigwatch.wire.messages import Alarm, AlarmCommand
+from monitor.alarms.operator import MAX_CLOCK_DIFFERENCE_NS
+from rigwatch.wire.messages import LONGEST_NAME, LONGEST_TEXT, Alarm, AlarmCommand
 from tests.alarms.alarm_signals import condition, run, spell, time_of
 
 YEAR_NS = 365 * 86_400 * 1_000_000_000

@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from rigwatch.wire.messages import (
     Health,
     SampleBlock,
     columns_of,
+    json_fields,
 )
 
 SECONDS = 20.0
@@ -99,7 +99,7 @@ class LiveView:
 
     def alarms(self) -> list[dict[str, Any]]:
         """All alarms, standing ones first."""
-        found = [_plain(alarm) for alarm in self._alarms.values()]
+        found = [json_fields(alarm) for alarm in self._alarms.values()]
         return sorted(found, key=lambda a: (a["state"] == "normal", -a["t_ns"]))
 
     def states(self, now: float, learns: float) -> dict[str, Any]:
@@ -161,10 +161,3 @@ def _joined(parts: list[Lines]) -> dict[str, Any]:
 
 def _finite(values: FloatArray) -> list[float | None]:
     return [float(f"{v:.6g}") if math.isfinite(v) else None for v in values.tolist()]
-
-
-def _plain(alarm: Alarm) -> dict[str, Any]:
-    return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in asdict(alarm).items()
-    }

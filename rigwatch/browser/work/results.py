@@ -15,6 +15,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from rigwatch.wire.host import replace_file
 from rigwatch.workbench.study import Study, stands_on
 
 FOLDER = ".workbench"
@@ -73,9 +74,8 @@ class Results:
     def write(self, name: str, value: Any) -> None:
         """Write a result as JSON."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        beside = self.folder / f"{name}.{os.getpid()}.part"
-        beside.write_bytes(msgspec.json.encode(as_plain(value)))
-        beside.replace(self.folder / f"{name}.json")
+        content = msgspec.json.encode(as_plain(value))
+        replace_file(self.folder / f"{name}.json", content, durable=False)
 
     @contextmanager
     def whole(self, name: str) -> Iterator[Path]:

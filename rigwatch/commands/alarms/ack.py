@@ -19,7 +19,7 @@ TIMEOUT = 3.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
-    parser.add_argument("name", nargs="?", default="*", metavar="NAME", help="alarm; else all")
+    parser.add_argument("name", nargs="?", metavar="NAME", help="alarm; else all")
     parser.add_argument(
         "--user",
         default="",
@@ -31,9 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Send the command and print the changes; 1 if there are none."""
-    from rigwatch.commands.alarms.alarms import as_dict, as_line
+    from rigwatch.commands.alarms.alarms import as_line
     from rigwatch.wire.access import operator_name
     from rigwatch.wire.bus import command_alarms, connect, unique_process
+    from rigwatch.wire.messages import json_fields
     from rigwatch.wire.rig_config import load_rig
 
     config = load_rig(arguments.config)
@@ -44,7 +45,9 @@ def run(arguments: argparse.Namespace) -> int:
     finally:
         bus.close()
     if arguments.json:
-        print(json.dumps({"changed": [as_dict(alarm) for alarm in changed], "refusal": refusal}))
+        print(
+            json.dumps({"changed": [json_fields(alarm) for alarm in changed], "refusal": refusal})
+        )
     else:
         print("\n".join(as_line(alarm) for alarm in changed) or "nothing changed")
         if refusal:
@@ -54,7 +57,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def command_of(arguments: argparse.Namespace, user: str) -> "AlarmCommand":
     """The command of an operator."""
-    from rigwatch.wire.messages import AlarmCommand
+    from rigwatch.wire.messages import EVERY_ALARM, AlarmCommand
 
     action = "reset" if arguments.reset else "acknowledge"
-    return AlarmCommand(arguments.name, action, user, time.time_ns(), arguments.text)  # type: ignore[arg-type]
+    name = arguments.name or EVERY_ALARM
+    return AlarmCommand(name, action, user, time.time_ns(), arguments.text)  # type: ignore[arg-type]

@@ -2,10 +2,9 @@
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rigwatch.wire.bus import Subscription
@@ -26,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print the alarms; 0 whatever their number."""
     from rigwatch.wire.bus import ask_alarm_list, connect, unique_process
-    from rigwatch.wire.messages import ALARMS
+    from rigwatch.wire.messages import ALARMS, json_fields
     from rigwatch.wire.rig_config import load_rig
 
     bus = connect(load_rig(arguments.config), unique_process("alarms"), TIMEOUT)
@@ -36,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
         if changes is not None:
             _follow(standing, changes, arguments.json)
         elif arguments.json:
-            print(json.dumps([as_dict(alarm) for alarm in standing], indent=2))
+            print(json.dumps([json_fields(alarm) for alarm in standing], indent=2))
         else:
             print("\n\n".join(as_text(alarm) for alarm in standing) or "no alarm stands")
     finally:
@@ -55,18 +54,9 @@ def _follow(standing: "list[Alarm]", changes: "Subscription", as_json: bool) -> 
 
 
 def _print_line(alarm: "Alarm", as_json: bool) -> None:
-    print(json.dumps(as_dict(alarm)) if as_json else as_line(alarm), flush=True)
+    from rigwatch.wire.messages import json_fields
 
-
-def as_dict(alarm: "Alarm") -> dict[str, Any]:
-    """The alarm as JSON: null for a figure that does not exist."""
-    from dataclasses import asdict
-
-    plain = asdict(alarm)
-    return {
-        key: None if isinstance(value, float) and not math.isfinite(value) else value
-        for key, value in plain.items()
-    }
+    print(json.dumps(json_fields(alarm)) if as_json else as_line(alarm), flush=True)
 
 
 def as_line(alarm: "Alarm") -> str:

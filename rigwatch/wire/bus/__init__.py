@@ -15,13 +15,14 @@ from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
 from rigwatch.wire.bus.connection import connect, log_refusals, open_router
 from rigwatch.wire.bus.model_change import KEY, PATIENCE, ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.bus.ring_questions import RingQuestions
-from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
+from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.transport import DENIED_MARK, MAX_PAYLOAD, REFUSED_MARK, Close
 
 __all__ = [
     "DENIED_MARK",
     "KEY",
     "MAX_PAYLOAD",
+    "MOST_COMMANDS",
     "PATIENCE",
     "QUEUE_CAPACITY",
     "REFUSED_MARK",

@@ -1,10 +1,13 @@
 """Sends operator commands for alarms to a running monitor."""
 
 import time
+from dataclasses import dataclass, field
 
 from rigwatch.wire.bus.alarm_list import ask_alarm_list
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.command_check import signed
+from rigwatch.wire.bus.subscription import Subscription
+from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, Alarm, AlarmCommand
 
 TIMEOUT = 3.0
@@ -12,8 +15,26 @@ SETTLE = 0.2
 """Time for further answers after the first [s]."""
 
 
+@dataclass
+class _Answer:
+    """What the monitor said to one command.
+
+    Attributes:
+        interrupted: the link was down meanwhile, so that command or answer may be lost.
+    """
+
+    changed: list[Alarm] = field(default_factory=list)
+    refusal: str = ""
+    interrupted: bool = False
+
+    def __bool__(self) -> bool:
+        return bool(self.changed or self.refusal)
+
+
 def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
     """Sign and send a command; the transitions in the monitor's reply, and the reason of a refusal.
+
+    A command that may have been lost with the link, as when the router opens anew, is sent again.
 
     Raises:
         BusError: no monitor answers.
@@ -21,19 +42,40 @@ def command_alarms(bus: Bus, command: AlarmCommand) -> tuple[list[Alarm], str]:
     """
     changes, events = bus.subscribe(ALARMS), bus.subscribe(EVENTS)
     try:
-        ask_alarm_list(bus, TIMEOUT)
-        bus.publish(COMMANDS, signed(bus, command))
-        done: list[Alarm] = []
-        refusal = ""
-        deadline = time.monotonic() + TIMEOUT / 2
-        while time.monotonic() < deadline and not refusal:
-            alarm = changes.get(timeout=0.05)
-            if alarm is not None and alarm.user == command.user:
-                done.append(alarm)
-                deadline = min(deadline, time.monotonic() + SETTLE)
-            said = [event for event in events.drain() if event.code == "alarm_command_refused"]
-            refusal = said[0].text if said else refusal
-        return done, refusal
+        answer = _answer_to(bus, command, changes, events)
+        if answer.interrupted and not answer:
+            answer = _answer_to(bus, command, changes, events)
+        return answer.changed, answer.refusal
     finally:
         changes.close()
         events.close()
+
+
+def _answer_to(
+    bus: Bus, command: AlarmCommand, changes: Subscription, events: Subscription
+) -> _Answer:
+    _wait_for_monitor(bus)
+    bus.publish(COMMANDS, signed(bus, command))
+    answer = _Answer()
+    deadline = time.monotonic() + TIMEOUT / 2
+    while time.monotonic() < deadline and not answer.refusal:
+        alarm = changes.get(timeout=0.05)
+        if alarm is not None and alarm.user == command.user:
+            answer.changed.append(alarm)
+            deadline = min(deadline, time.monotonic() + SETTLE)
+        said = [event for event in events.drain() if event.code == "alarm_command_refused"]
+        answer.refusal = said[0].text if said else ""
+        answer.interrupted |= not bus.connected()
+    return answer
+
+
+def _wait_for_monitor(bus: Bus) -> None:
+    deadline = time.monotonic() + TIMEOUT
+    while True:
+        try:
+            ask_alarm_list(bus, TIMEOUT)
+            return
+        except BusError:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(SETTLE)

@@ -114,14 +114,13 @@ class CompleteSubscription(Subscription):
             self._look_for_more()
         return self._ready.popleft() if self._ready else None
 
-    def drain(self) -> list[Any]:
-        """All waiting messages, in order."""
+    def drain(self, most: int | None = None) -> list[Any]:
+        """The waiting messages, in order; `most` of them, or all."""
         for _ in range(self._inbox.qsize()):
             self._take(self._inbox.get_nowait())
         self._look_for_more()
-        found = list(self._ready)
-        self._ready.clear()
-        return found
+        count = len(self._ready) if most is None else min(most, len(self._ready))
+        return [self._ready.popleft() for _ in range(count)]
 
     def reports(self) -> list[Gap | Event]:
         """Reports of losses that this subscriber has published since the last call."""

@@ -10,6 +10,8 @@ from rigwatch.wire.bus.transport import MAX_PAYLOAD, Close
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import Topic, decode
 
+MOST_COMMANDS = 8
+"""Operators' commands executed per turn of a loop, so that a flood of them delays nothing else."""
 QUEUE_CAPACITY = 4096
 """Number of messages queued for a slow reader before the oldest are dropped."""
 
@@ -61,9 +63,15 @@ class Subscription:
                 return decode(self.topic.message, payload)
             self.rejected += 1
 
-    def drain(self) -> list[Any]:
-        """All waiting messages, oldest first."""
-        found = [self.get(timeout=0) for _ in range(self._waiting.qsize())]
+    def drain(self, most: int | None = None) -> list[Any]:
+        """The waiting messages, oldest first.
+
+        Args:
+            most: number of messages taken from the queue; None for all.
+        """
+        waiting = self._waiting.qsize()
+        count = waiting if most is None else min(most, waiting)
+        found = [self.get(timeout=0) for _ in range(count)]
         return [message for message in found if message is not None]
 
     def __iter__(self) -> Iterator[Any]:

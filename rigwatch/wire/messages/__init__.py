@@ -15,7 +15,11 @@ from rigwatch.wire.messages.blocks import (
     pieces,
     unseen,
 )
+from rigwatch.wire.messages.json_fields import json_fields
 from rigwatch.wire.messages.message_types import (
+    EVERY_ALARM,
+    LONGEST_NAME,
+    LONGEST_TEXT,
     MONITOR_STALE,
     NOT_PROVED,
     PROBABLY_MISSING,
@@ -62,8 +66,11 @@ __all__ = [
     "COMMANDS",
     "ESTIMATES",
     "EVENTS",
+    "EVERY_ALARM",
     "GAPS",
     "HEALTH",
+    "LONGEST_NAME",
+    "LONGEST_TEXT",
     "MODELS",
     "MONITOR_STALE",
     "NON_FINITE",
@@ -102,6 +109,7 @@ __all__ = [
     "cut",
     "decode",
     "encode",
+    "json_fields",
     "merged",
     "pieces",
     "protobuf",

@@ -154,6 +154,10 @@ class Health:
 
 
 PROBABLY_MISSING = "PROBABLY MISSING"
+EVERY_ALARM = "*"
+"""Name in a command that addresses all alarms."""
+LONGEST_NAME, LONGEST_TEXT = 100, 500
+"""Longest names and text of a command that are kept [characters]."""
 MONITOR_STALE = "monitor_stale"
 """The alarm that the witness raises, all others are the monitor's."""
 

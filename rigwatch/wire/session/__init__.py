@@ -8,12 +8,12 @@ from rigwatch.wire.session.edit import Written, first_time, iso_time, newest, re
 from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
 from rigwatch.wire.session.reader import (
     MERGED_SAMPLES,
-    SUFFIX,
     LostSpan,
     Recorded,
     Session,
     open_session,
 )
+from rigwatch.wire.session.segment import SUFFIX, is_segment, segment_name
 from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.summary import ChannelSummary, DeviceSummary, Summary, summarise
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
@@ -31,6 +31,7 @@ __all__ = [
     "Summary",
     "Written",
     "first_time",
+    "is_segment",
     "iso_time",
     "merge_pending",
     "message_time",
@@ -38,6 +39,7 @@ __all__ = [
     "open_session",
     "recover",
     "run_info",
+    "segment_name",
     "summarise",
     "topic_counts",
     "trim",

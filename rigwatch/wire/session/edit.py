@@ -10,7 +10,8 @@ import numpy as np
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm, Message, RunInfo, SampleBlock, blocks
-from rigwatch.wire.session.reader import SUFFIX, LostSpan, Recorded, Session
+from rigwatch.wire.session.reader import LostSpan, Recorded, Session
+from rigwatch.wire.session.segment import SUFFIX
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
 
 FLUSH_EVERY = 4096

@@ -31,10 +31,10 @@ from rigwatch.wire.messages import protobuf as schema
 from rigwatch.wire.session.chunk_reader import ChunkReader
 from rigwatch.wire.session.chunks import Damage, ends_closed, scan
 from rigwatch.wire.session.packed import decode_block
+from rigwatch.wire.session.segment import SUFFIX
 from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.writer import message_time
 
-SUFFIX = ".mcap"
 MERGED_SAMPLES = 16384
 """Samples in an uninterrupted block of `Session.samples`."""
 

@@ -1,0 +1,17 @@
+"""Names of a recorder's files: numbered segments of one folder."""
+
+import re
+from pathlib import PurePath
+
+SUFFIX = ".mcap"
+_NAME = re.compile(rf"\d{{6}}{re.escape(SUFFIX)}")
+
+
+def segment_name(number: int) -> str:
+    """Name of a folder's segment, from 1 on."""
+    return f"{number:06d}{SUFFIX}"
+
+
+def is_segment(path: PurePath) -> bool:
+    """Whether a file is named like a segment."""
+    return _NAME.fullmatch(path.name) is not None
