@@ -16,7 +16,8 @@ from monitor.detectors.detector import Channels
 from monitor.detectors.high_pass import high_passed, leaky
 from monitor.detectors.innovation_test import nis_limit
 from monitor.detectors.parity import OperatingPoint, ParityDetector
-from monitor.detectors.unknown_input import NoiseModel, UnknownInputDetector
+from monitor.detectors.unknown_input import UnknownInputDetector
+from monitor.detectors.unknown_input_filters import NoiseModel
 from monitor.signals import GOOD, NEW_BOOT
 from rigwatch.physics.transfer import TransferFunction
 from rigwatch.wire.arrays import FloatArray

@@ -25,7 +25,7 @@ from rigwatch.wire.messages import (
     Message,
     SampleBlock,
 )
-from rigwatch.wire.messages.protobuf import file_descriptor_set, type_name
+from rigwatch.wire.messages.protobuf_schema import file_descriptor_set, type_name
 from rigwatch.wire.session import LARGEST_BLOCK, SessionWriter, open_session, run_info
 from rigwatch.wire.session.merging import merge_pending
 from rigwatch.wire.session.writer import SPILL, message_time

@@ -11,7 +11,7 @@ from rigwatch.wire.errors import SessionError
 from rigwatch.wire.exchange.exporting import export_session, variable_names
 from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping
-from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages import encode
 from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.session import Session, SessionWriter, open_session, run_info
 
@@ -57,8 +57,8 @@ def test_round_trip(tmp_path: Path, session: Session, ending: str, kind: str) ->
     target = tmp_path / f"a{ending}"
     export_session(session, target, estimates=kind == "estimates")
     again = open_session(import_file(target, tmp_path / "b.mcap", ImportMapping()).path)
-    before = [schema.encode(block) for block in getattr(session, kind)()]
-    after = [schema.encode(block) for block in getattr(again, kind)()]
+    before = [encode(block) for block in getattr(session, kind)()]
+    after = [encode(block) for block in getattr(again, kind)()]
     assert len(before) == (3 if kind == "samples" else 1)
     assert after == before
 
@@ -85,7 +85,7 @@ def test_a_single_row_survives(tmp_path: Path) -> None:
         export_session(session, tmp_path / f"a{ending}", estimates=True)
         made = import_file(tmp_path / f"a{ending}", tmp_path / f"b{ending}.mcap", ImportMapping())
         (block,) = open_session(made.path).estimates()
-        assert schema.encode(block) == schema.encode(estimates(0, 1))
+        assert encode(block) == encode(estimates(0, 1))
 
 
 def test_names_for_matlab_are_valid_and_different() -> None:

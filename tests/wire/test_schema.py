@@ -2,9 +2,10 @@
 
 import importlib.util
 import json
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
-from types import ModuleType
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,7 +29,8 @@ from rigwatch.wire.messages.message_types import (
     RunInfo,
     SampleBlock,
 )
-from rigwatch.wire.messages.protobuf import decode, encode, file_descriptor_set, type_name
+from rigwatch.wire.messages.protobuf import decode, encode
+from rigwatch.wire.messages.protobuf_schema import file_descriptor_set, type_name
 from rigwatch.wire.messages.topics import TOPICS
 
 SCHEMA = Path(__file__).with_name("schema.txt")
@@ -129,14 +131,18 @@ def test_a_column_is_found_by_name():
 
 
 @pytest.fixture
-def started() -> ModuleType:
-    """The codec as a process builds it when it starts: no table of another test is in it."""
-    spec = importlib.util.find_spec("rigwatch.wire.messages.protobuf")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def started(monkeypatch) -> SimpleNamespace:
+    """Schema and codec as a process builds them at its start: no table of another test is left."""
+    found = {}
+    for name in ("protobuf_schema", "protobuf"):
+        spec = importlib.util.find_spec(f"rigwatch.wire.messages.{name}")
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        monkeypatch.setitem(sys.modules, spec.name, module)
+        found |= vars(module)
+    return SimpleNamespace(**found)
 
 
 def described(message: descriptor_pb2.DescriptorProto) -> list[str]:

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages import encode
+from rigwatch.wire.messages import protobuf_schema as schema
 from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.session import Session, SessionWriter, open_session, run_info
 from rigwatch.wire.session.chunks import MAGIC, Chunk, Damage, scan
@@ -64,7 +65,7 @@ def delivered(session: Session) -> list[int]:
         assert isinstance(found, SampleBlock)
         number, rest = divmod(found.seq, BLOCK)
         assert rest == 0
-        assert schema.encode(found) == schema.encode(block(number))
+        assert encode(found) == encode(block(number))
         seen += range(found.seq, found.seq + len(found))
     return seen
 
@@ -201,7 +202,7 @@ def foreign(path: Path, topic: str, metadata: dict[str, str]) -> Path:
             "rigwatch.SampleBlock", "protobuf", schema.file_descriptor_set()
         )
         channel = writer.register_channel(topic, "protobuf", number, metadata)
-        writer.add_message(channel, T0, schema.encode(block(0)), T0)
+        writer.add_message(channel, T0, encode(block(0)), T0)
         writer.finish()  # type: ignore[no-untyped-call]
     return path
 

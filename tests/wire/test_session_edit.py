@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 
 from rigwatch.commands import main
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages import encode
 from rigwatch.wire.messages.message_types import (
     Alarm,
     AlarmState,
@@ -114,7 +114,7 @@ def test_trim_by_seconds(session: Path, tmp_path: Path, capsys: pytest.CaptureFi
     found = output(capsys, "trim", str(session), str(target), *options)
     part = open_session(target)
     (block,) = part.samples()
-    assert schema.encode(block) == schema.encode(samples(400, 400))
+    assert encode(block) == encode(samples(400, 400))
     assert found["samples"] == 400
     alarms = [item.message for item in part.messages(["alarms"])]
     assert [item.name for item in alarms if isinstance(item, Alarm)] == ["link", "dry_friction"]
@@ -167,8 +167,8 @@ def encoded(path: Path) -> list[bytes]:
     """All samples and estimates, however they are cut."""
     session = open_session(path)
     return [
-        *(schema.encode(block) for block in session.samples()),
-        *(schema.encode(block) for block in session.estimates()),
+        *(encode(block) for block in session.samples()),
+        *(encode(block) for block in session.estimates()),
     ]
 
 

@@ -11,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages import encode
 from rigwatch.wire.messages.message_types import (
     Alarm,
     AlarmCommand,
@@ -48,7 +48,7 @@ def estimates(seq: int, n: int) -> EstimateBlock:
 
 
 def same(first: SampleBlock | EstimateBlock, second: SampleBlock | EstimateBlock) -> bool:
-    return schema.encode(first) == schema.encode(second)
+    return encode(first) == encode(second)
 
 
 ALARM = Alarm(
@@ -74,9 +74,7 @@ def test_every_kind_of_message_comes_back(tmp_path: Path) -> None:
     session = open_session(tmp_path / "a.mcap")
     read = [recorded.message for recorded in session.messages()]
     assert session.info == run
-    assert [schema.encode(message) for message in read] == [
-        schema.encode(message) for message in (run, *written)
-    ]
+    assert [encode(message) for message in read] == [encode(message) for message in (run, *written)]
     assert session.lost == ()
 
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages import decode, encode
 from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.session.packed import decode_block
 
@@ -38,9 +38,9 @@ def blocks(draw: st.DrawFn) -> Block:
 
 def said(kind: type[Block], data: bytes, fast: bool) -> bytes | str:
     try:
-        decode: Callable[..., Block] = decode_block if fast else schema.decode
-        message = decode(kind, data)
-        return schema.encode(message)
+        read: Callable[..., Block] = decode_block if fast else decode
+        message = read(kind, data)
+        return encode(message)
     except MessageError:
         return "refused"
 
@@ -49,7 +49,7 @@ def said(kind: type[Block], data: bytes, fast: bool) -> bytes | str:
 @given(st.lists(blocks(), min_size=1, max_size=5))
 def test_blocks_come_back_whatever_came_before(several: list[Block]) -> None:
     for block in (*several, *several):
-        data = schema.encode(block)
+        data = encode(block)
         assert said(type(block), data, fast=True) == data
 
 
@@ -57,7 +57,7 @@ def test_blocks_come_back_whatever_came_before(several: list[Block]) -> None:
 @given(blocks(), st.data())
 def test_damaged_bytes_are_judged_alike(block: Block, draw: st.DataObject) -> None:
     """Behind a checksum such bytes come from another writer, never from the disk."""
-    data = bytearray(schema.encode(block))
+    data = bytearray(encode(block))
     said(type(block), bytes(data), fast=True)
     for _ in range(draw.draw(st.integers(1, 3))):
         if data:
@@ -69,7 +69,7 @@ def test_damaged_bytes_are_judged_alike(block: Block, draw: st.DataObject) -> No
 def test_a_number_that_runs_on_for_ever_is_left_to_the_general_decoder() -> None:
     """The layout of the block before it must not be what decides."""
     block = SampleBlock("voltage", 1, 2**55, np.array([5]), np.array([7]), ())
-    data = bytearray(schema.encode(block))
+    data = bytearray(encode(block))
     said(SampleBlock, bytes(data), fast=True)
     start = data.index(0x18) + 1
     data[start : start + 9] = b"\xff" * 9

@@ -4,7 +4,7 @@
 table of topics. `blocks` cuts and joins blocks of samples without touching a value.
 """
 
-from rigwatch.wire.messages import blocks, protobuf, quality_flags
+from rigwatch.wire.messages import blocks, protobuf_schema, quality_flags
 from rigwatch.wire.messages.blocks import (
     Block,
     columns_of,
@@ -112,7 +112,7 @@ __all__ = [
     "json_fields",
     "merged",
     "pieces",
-    "protobuf",
+    "protobuf_schema",
     "quality_flags",
     "topic",
     "unseen",

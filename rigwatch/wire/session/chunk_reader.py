@@ -11,7 +11,7 @@ from mcap.records import Channel, Schema
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import TOPICS, Topic
-from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages import protobuf_schema as schema
 from rigwatch.wire.session.writer import FORMAT, FORMAT_KEY
 
 _RECORD = struct.Struct("<BQ")

@@ -12,8 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rigwatch.wire.messages import ByteArray, Column, EstimateBlock, SampleBlock
-from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages import ByteArray, Column, EstimateBlock, SampleBlock, decode
+from rigwatch.wire.messages import protobuf_schema as schema
 
 _NO_QUALITY: ByteArray = np.zeros(0, np.uint8)
 _F8, _I8, _U1 = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
@@ -79,7 +79,7 @@ def decode_block(kind: type[K], data: bytes) -> K:
     try:
         layout = _layout_of(kind, data)
     except (_UnfamiliarError, IndexError, ValueError):
-        return schema.decode(kind, data)
+        return decode(kind, data)
     return _read(kind, layout, data)
 
 

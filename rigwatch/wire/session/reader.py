@@ -25,9 +25,9 @@ from rigwatch.wire.messages import (
     SampleBlock,
     Topic,
     blocks,
+    decode,
     topic,
 )
-from rigwatch.wire.messages import protobuf as schema
 from rigwatch.wire.session.chunk_reader import ChunkReader
 from rigwatch.wire.session.chunks import Damage, ends_closed, scan
 from rigwatch.wire.session.packed import decode_block
@@ -250,7 +250,7 @@ class Session:
         if line is SAMPLES or line is ESTIMATES:
             return cast(Message, blocks.owned(self._block(line, data)))
         try:
-            return schema.decode(line.message, data)
+            return decode(line.message, data)
         except MessageError as error:
             raise SessionError(f"{self.path}: {error}") from error
 

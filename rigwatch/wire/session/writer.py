@@ -26,8 +26,9 @@ from rigwatch.wire.messages import (
     Message,
     RunInfo,
     SampleBlock,
+    encode,
 )
-from rigwatch.wire.messages import protobuf as schema
+from rigwatch.wire.messages import protobuf_schema as schema
 from rigwatch.wire.session.file_output import FileOutput
 from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
 
@@ -118,7 +119,7 @@ class SessionWriter:
 
     def _add(self, message: Message) -> None:
         t_ns = max(0, message_time(message))
-        self._mcap.add_message(_CHANNEL_IDS[type(message)], t_ns, schema.encode(message), t_ns)
+        self._mcap.add_message(_CHANNEL_IDS[type(message)], t_ns, encode(message), t_ns)
 
     def close(self) -> None:
         """Write the rest and the index, and close the file.

@@ -13,6 +13,7 @@ import numpy as np
 from msgspec import structs
 
 from rigwatch.physics.engine.fit import Recording, filled
+from rigwatch.physics.engine.score import autocorrelation, first_below
 from rigwatch.wire.arrays import ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import predicts_along_motion, prepare, quiet_scale
@@ -110,8 +111,4 @@ def _from_correlation(recording: Recording) -> float:
 
 def _correlation_time(signal: FloatArray) -> int:
     """Samples until the autocorrelation has fallen to 1/e."""
-    left = signal - signal.mean()
-    spectrum = np.abs(np.fft.rfft(left, 2 * len(left))) ** 2
-    correlation = np.fft.irfft(spectrum)[: len(left)]
-    below = np.nonzero(correlation < UNCORRELATED * max(float(correlation[0]), 1e-300))[0]
-    return int(below[0]) if len(below) else len(left)
+    return first_below(autocorrelation(signal - signal.mean(), len(signal)), UNCORRELATED)

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.stats import norm
 
 from rigwatch.physics.engine.fit import Fit
+from rigwatch.physics.engine.score import autocorrelation, first_below
 from rigwatch.wire.arrays import FloatArray
 
 UNCORRELATED = 0.1
@@ -82,11 +83,8 @@ def _correlation_time(one: FloatArray, other: FloatArray) -> float:
     apart = one - other
     share = np.sum(one * apart) / max(float(np.sum(apart**2)), 1e-300)
     product_ = np.sum((one - share * apart) * apart, axis=1)
-    spectrum = np.abs(np.fft.rfft(product_, 2 * len(product_))) ** 2
-    together = np.fft.irfft(spectrum)[: max(len(product_) // MIN_BLOCKS, 1)]
-    correlation = together / max(float(together[0]), 1e-300)
-    below = np.nonzero(correlation < UNCORRELATED)[0]
-    last = int(below[0]) if len(below) else len(correlation)
+    correlation = autocorrelation(product_, max(len(product_) // MIN_BLOCKS, 1))
+    last = first_below(correlation, UNCORRELATED)
     return float(1 + 2 * np.sum(correlation[1:last]))
 
 

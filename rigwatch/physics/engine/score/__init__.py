@@ -5,6 +5,7 @@ the outputs, `score_test` the share of the residual that each explains, `signifi
 the number of candidates, `ranking` selects the best shapes and forms classes of similar effects.
 """
 
+from rigwatch.physics.engine.score.autocorrelation import autocorrelation, first_below
 from rigwatch.physics.engine.score.candidates import (
     Candidate,
     candidates,
@@ -24,11 +25,13 @@ __all__ = [
     "Projector",
     "Scores",
     "Standing",
+    "autocorrelation",
     "best_of",
     "candidates",
     "corrected_p_values",
     "cosines_with",
     "directions",
+    "first_below",
     "freed",
     "has_variables",
     "possible",

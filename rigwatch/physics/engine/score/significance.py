@@ -7,6 +7,7 @@ chance; the p-values allow for both.
 import numpy as np
 from scipy.stats import chi2
 
+from rigwatch.physics.engine.score.autocorrelation import autocorrelation
 from rigwatch.physics.engine.score.score_test import Scores, best_of
 from rigwatch.wire.arrays import FloatArray
 
@@ -27,8 +28,8 @@ def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> F
     along = scores.units.T @ residual
     left = residual[:, None] - scores.units * along
     own, other = (
-        _autocorrelation(left.reshape(shape)),
-        _autocorrelation(scores.units.reshape(shape)),
+        _tapered(left.reshape(shape)),
+        _tapered(scores.units.reshape(shape)),
     )
     swollen = np.maximum(1.0, own[0] * other[0] + 2 * np.sum(own[1:] * other[1:], axis=0))
     spread = np.maximum(np.sum(left**2, axis=0), 1e-300) / max(len(residual) - 1, 1)
@@ -36,12 +37,8 @@ def corrected_p_values(scores: Scores, residual: FloatArray, windows_: int) -> F
     return best_of(alone, int(np.sum(scores.score > 0)))
 
 
-def _autocorrelation(signals: FloatArray) -> FloatArray:
+def _tapered(signals: FloatArray) -> FloatArray:
     """Autocorrelation over windows (windows, samples, k), tapered, up to a quarter of a window."""
-    count = signals.shape[1]
-    spectrum = np.fft.rfft(signals, 2 * count, axis=1)
-    power = np.mean(np.abs(spectrum) ** 2, axis=0)
-    together = np.fft.irfft(power, axis=0)[: max(min(count // 4, 200), 1)]
-    taper = 1 - np.arange(len(together)) / len(together)
-    start = np.where(together[0] > 0, together[0], 1.0)
-    return np.asarray(together / start * taper[:, None])
+    lags = max(min(signals.shape[1] // 4, 200), 1)
+    taper = 1 - np.arange(lags) / lags
+    return np.asarray(autocorrelation(signals, lags) * taper[:, None])
