@@ -54,7 +54,9 @@ def test_a_model_of_a_speed_needs_no_angle(tmp_path: Path) -> None:
 
 def test_without_ports_it_is_compared_and_explain_asks_for_one(tmp_path: Path) -> None:
     study = motor(tmp_path, SPEED.replace(" + load", ""))
-    assert compare(study).held_out_error > 0
+    found = compare(study)
+    # The dry friction that the model lacks.
+    assert found.held_out_error > 5 * found.noise_floor
     with pytest.raises(ModelError, match="found no port, expected one where effects may enter"):
         explain(study)
 
