@@ -172,9 +172,9 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "monitor_reset",
         "error",
-        "a filter left its limits or lost its numbers and was reset",
-        "See the event log. Estimates are valid again after one "
-        "window; commission anew if it repeats.",
+        "a filter diverged (NaN or out of range) and was reset",
+        "See the event log. Estimates are valid again after one window; commission again if it "
+        "repeats.",
         _AT_ONCE,
     ),
     # The wiring, checked over the first seconds of motion.
@@ -188,7 +188,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "wiring_scale",
         "critical",
-        "the acceleration is not as large as the motion of the position; nothing is judged",
+        "acceleration and position disagree about the size of the motion; nothing is judged",
         "Check unit, gain and range of both channels (mm or m, g or m/s^2, range of the "
         "amplifier), then restart the monitor.",
         _AT_ONCE,
@@ -237,7 +237,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "sensor_stuck",
         "error",
-        "the {channel} code has not changed for longer than a live sensor can leave it",
+        "the {channel} reading has not changed for longer than a working sensor's noise allows",
         "Check the sensor's wiring and supply; move the rig by hand and watch the channel.",
         _AT_ONCE,
     ),
@@ -259,7 +259,8 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "sensor_invalid",
         "error",
         "a channel that the estimates need has been invalid for too long",
-        "See which sensor alarm stands beside this one. Estimates go on once the channel is back.",
+        "See which sensor alarm stands beside this one. Estimates resume once the channel is "
+        "valid.",
         _AT_ONCE,
     ),
     # The rig itself.
@@ -301,15 +302,15 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "parity_arma",
         "warning",
-        "output and model differ: the ARMA parity residual left its adaptive threshold",
+        "output and model differ: the ARMA parity residual exceeds its adaptive threshold",
         "Compare with the friction estimates; a constant residual points to a sensor offset.",
         _LASTING,
     ),
     AlarmKind(
         "parity_ma",
         "warning",
-        "the model's difference equation no longer holds: the MA "
-        "parity residual left its threshold",
+        "the model's difference equation no longer holds: the MA parity residual exceeds its "
+        "threshold",
         "Compare with the friction estimates; short bursts point to impacts or spikes.",
         _LASTING,
     ),
@@ -324,16 +325,16 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "excitation_changed",
         "warning",
-        "the excitation is not the one that the healthy reference was taken with",
-        "Go back to the known excitation, or record a healthy "
-        "stretch with the new one and arm anew.",
+        "the excitation differs from that of the healthy reference",
+        "Return to the known excitation, or record a healthy stretch with the new one and arm "
+        "again.",
         _PASSING,
     ),
     AlarmKind(
         "reference_learnt",
         "info",
         "the model file holds no healthy recording of this excitation: the reference was learnt "
-        "from this run, and a fault that was there before counts as healthy",
+        "from this run, and a fault already present then counts as healthy",
         "Make sure that the rig was healthy at the start, or commission with a healthy recording "
         "of this excitation.",
         _REMARK,
@@ -349,7 +350,7 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "not_judged",
         "warning",
         "the motion is beyond the range that the model was fitted to; nothing is judged",
-        "Go back to a motion that commissioning has seen, or commission again with a healthy "
+        "Return to a motion that commissioning covered, or commission again with a healthy "
         "recording of this one.",
         _PASSING,
     ),

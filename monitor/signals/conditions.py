@@ -44,7 +44,7 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
         DEPARTURE,
         "largest deviation from the healthy rig, in standard deviations",
         "1",
-        "an estimate or a residual has left its thresholds",
+        "an estimate or a residual exceeds its thresholds",
         True,
     ),
     ConditionKind(
@@ -107,7 +107,7 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
         MONITOR_RESET,
         "1 where the filters were reset",
         "1",
-        "a filter left its limits or lost its numbers and was reset",
+        "a filter diverged (NaN or out of range) and was reset",
         True,
     ),
     ConditionKind(
