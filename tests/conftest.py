@@ -1,11 +1,18 @@
 """What holds for all tests: generated cases are judged by their outcome, never by their time."""
 
+import atexit
 import os
+import shutil
+import tempfile
 
 import pytest
 from hypothesis import Phase, settings
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do, before NumPy is imported
+# Processes of rigs make the secret of the account there.
+if "XDG_STATE_HOME" not in os.environ:
+    os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="rigwatch-state-")
+    atexit.register(shutil.rmtree, os.environ["XDG_STATE_HOME"], ignore_errors=True)
 settings.register_profile("rigwatch", deadline=None, derandomize=os.environ.get("CI") == "true")
 settings.register_profile(
     "mutation",  # of a change in the code it matters only whether a test fails, not how simply

@@ -91,16 +91,17 @@ class MonitorProcess:
         self._recorder_alive = False
         self._unsuitable = ""
         self._standing = self.rig.alarms.standing()
-        check = CommandCheck(bus, config.bus.security.keys)
+        check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
         self._healths = bus.subscribe(HEALTH)
         bus.watch_tokens(f"{ALIVE_KEY}/daq", self._daq_changed)
         bus.watch_tokens(f"{ALIVE_KEY}/recorder", self._recorder_changed)
         self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
-        serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
         if self._journal:
             self.say(self.rig.alarms.restore(self._journal.newest(), time.time_ns()))
             self._standing = self.rig.alarms.standing()
+        # Only now: before, an answer would say that no alarm stands.
+        serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))
         self._models = ModelDesk(bus, self.rig, Path(section.model), check)
         self._judged_ns = 0
         self.reader = SampleReader(bus, self._done, config.daq.ring if self._done else 0)
@@ -156,11 +157,11 @@ class MonitorProcess:
             self.bus.publish(EVENTS, Event("monitor", seen.t_ns, "warning", "ROUTER BACK", text))
 
     def say(self, announcements: Iterable[Announcement]) -> None:
-        """Write changes to the journal, then publish them."""
+        """Write changes to the journal, then list and publish them."""
         if changes := self.rig.alarms.take_changes():
-            self._standing = self.rig.alarms.standing()
             if self._journal:
                 self._journal.write(changes)
+            self._standing = self.rig.alarms.standing()
         for said in announcements:
             if isinstance(said, Alarm):
                 self._explainer.hear(said)

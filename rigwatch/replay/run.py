@@ -13,6 +13,7 @@ from monitor.alarms import Announcement
 from monitor.model import RigModel, parse_model
 from monitor.pipeline import RigMonitor, Watched
 from rigwatch.replay.source import Item, items
+from rigwatch.wire.access import names_a_person
 from rigwatch.wire.errors import RigwatchError, SessionError
 from rigwatch.wire.messages import (
     NOT_PROVED,
@@ -117,7 +118,7 @@ def judge(session: Session, monitor: RigMonitor, found: Iterable[Item]) -> Itera
 
 
 def _commanded(monitor: RigMonitor, command: AlarmCommand) -> list[Announcement]:
-    return monitor.alarms.command(command, PROVED if command.proof else NOT_PROVED)
+    return monitor.alarms.command(command, PROVED if names_a_person(command.proof) else NOT_PROVED)
 
 
 def _adopted(monitor: RigMonitor, change: ModelChange, session: Session) -> list[Announcement]:

@@ -38,6 +38,13 @@ class SecuritySection(Section, frozen=True):
     operator: Annotated[
         Text, Meta(description="name of the certificate used by commands on this machine")
     ] = "operator"
+    secret: Annotated[
+        str,
+        Meta(
+            description="without keys: file of the secret that commands are signed with, empty for "
+            "`commands.secret` in the account's state folder"
+        ),
+    ] = ""
     isolated_network: Annotated[
         bool,
         Meta(

@@ -65,7 +65,7 @@ class Witness:
         self._estimates = bus.subscribe_lossy(ESTIMATES)
         self._alarms = bus.listen(ALARMS)
         self._heard_at = now + max(0.0, FOR_MONITOR - settings.stale_after)
-        self._stale = StaleAlarm(CommandCheck(bus, security.keys))
+        self._stale = StaleAlarm(CommandCheck(bus, security))
         self._commands = bus.subscribe(COMMANDS)
         self._told_at = now - 1.0
         for alarm in _standing(bus):

@@ -11,7 +11,9 @@ from monitor.alarms import Occasion
 from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
+from rigwatch.wire.access import signer_of
 from rigwatch.wire.bus.alarm_list import ask_alarm_list
+from rigwatch.wire.bus.command_check import signed
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.delivery.ring import SampleRing
@@ -43,7 +45,8 @@ class Bench:
         self.path, self.config = rig.path, rig.config
         self.network = MemoryNetwork()
         self.daq = self.network.bus("bench", "daq")
-        self.observer = self.network.bus("bench", "observer")
+        security = self.config.bus.security
+        self.observer = self.network.bus("bench", "observer", signer_of(security, ""))
         self.ring = SampleRing(self.daq, 65536)
         self.heard = {t: self.observer.subscribe(t) for t in (ESTIMATES, ALARMS, EVENTS, HEALTH)}
         self.start()
@@ -180,10 +183,11 @@ def test_commands_are_obeyed_and_refusals_explained(bench: Bench) -> None:
     bench.monitor.say(bench.monitor.rig.alarms.report("disk", at, active=True))
     assert [a.name for a in ask_alarm_list(bench.observer)] == ["disk"]
     command = AlarmCommand("disk", "acknowledge", "ann", time.time_ns())
-    bench.observer.publish(COMMANDS, command)
+    bench.observer.publish(COMMANDS, signed(bench.observer, command))
     bench.turn()
     assert ("disk", "acknowledged") in bench.alarm_states()
-    bench.observer.publish(COMMANDS, AlarmCommand("dsk", "reset", "ann", time.time_ns()))
+    unknown = AlarmCommand("dsk", "reset", "ann", time.time_ns())
+    bench.observer.publish(COMMANDS, signed(bench.observer, unknown))
     bench.turn()
     codes = [event.code for event in bench.heard[EVENTS].drain()]
     assert "alarm_command_refused" in codes

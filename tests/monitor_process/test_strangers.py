@@ -9,6 +9,7 @@ import pytest
 
 from monitor.alarms import Occasion
 from monitor.process.cursor import Cursor
+from rigwatch.wire.bus.command_check import signed
 from rigwatch.wire.bus.model_change import ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.messages import ALARMS, COMMANDS, ESTIMATES, AlarmCommand
 from tests.bus.publisher import wave
@@ -55,7 +56,7 @@ def test_a_command_from_the_future_has_the_monitors_time_and_its_user_is_cut(ben
     bench.monitor.say(alarms.report(stuck, Occasion(t_ns=time.time_ns()), active=True))
     ahead = time.time_ns() + 50 * YEAR_NS
     command = AlarmCommand(stuck, "acknowledge", "e" * 200_000, ahead)
-    bench.observer.publish(COMMANDS, command)
+    bench.observer.publish(COMMANDS, signed(bench.observer, command))
     bench.turn()
     last = bench.got(ALARMS)[-1]
     assert last.state == "acknowledged"  # type: ignore[attr-defined]

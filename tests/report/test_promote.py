@@ -16,6 +16,7 @@ from monitor.process.loop import MonitorProcess, suitable_model
 from rigwatch.commands import main
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
+from rigwatch.wire.access import signer_of
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.model_change import ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.errors import ConfigError, ModelError
@@ -63,10 +64,11 @@ class Bench:
         self.path = folder / "rig.toml"
         self.path.write_text(RIG.format(model=self.model))
         network = MemoryNetwork()
-        self.daq, self.observer = (network.bus("drive", name) for name in ("daq", "observer"))
+        config = load_rig(self.path)
+        self.daq = network.bus("drive", "daq")
+        self.observer = network.bus("drive", "observer", signer_of(config.bus.security, ""))
         self.estimates = self.observer.subscribe(ESTIMATES)
         self.changes = self.observer.subscribe(MODELS)
-        config = load_rig(self.path)
         self.monitor = MonitorProcess(
             config, self.path, suitable_model(config, self.path), network.bus("drive", "monitor")
         )

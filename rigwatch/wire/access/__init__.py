@@ -5,6 +5,8 @@ certificates    mutual TLS of a process; the operator of a machine
 access_list     topics allowed for each role, enforced by the router
 signing         Signer: an operator signs a command ─▶ proof (`statement`)
 verifying       Verifier: monitor and witness check it against authority and register
+account_proof   the same without keys, with a secret of the account (`account_secret`)
+proving         which of the two a rig uses
 """
 
 from rigwatch.wire.access.access_list import access_settings
@@ -13,6 +15,12 @@ from rigwatch.wire.access.certificates import (
     check_exposure,
     operator_name,
     tls_settings,
+)
+from rigwatch.wire.access.proving import (
+    CommandSigner,
+    CommandVerifier,
+    signer_of,
+    verifier_of,
 )
 from rigwatch.wire.access.register import (
     REGISTER,
@@ -24,11 +32,14 @@ from rigwatch.wire.access.register import (
     read_register,
 )
 from rigwatch.wire.access.signing import Signer
+from rigwatch.wire.access.statement import names_a_person
 from rigwatch.wire.access.verifying import Verifier
 
 __all__ = [
     "REGISTER",
     "ROLES",
+    "CommandSigner",
+    "CommandVerifier",
     "Issued",
     "Register",
     "Signer",
@@ -38,7 +49,10 @@ __all__ = [
     "certificate_name",
     "check_exposure",
     "key_files",
+    "names_a_person",
     "operator_name",
     "read_register",
+    "signer_of",
     "tls_settings",
+    "verifier_of",
 ]

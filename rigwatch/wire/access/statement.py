@@ -1,4 +1,4 @@
-"""What an operator signs: the command, its rig, its receivers' runs, a nonce and the time.
+"""What is signed: the command, its rig, its receivers' runs, a nonce and the time.
 
     certificate ─┐
     signature ───┼─▶ Proof ─▶ text in the field `proof` of a command or model request
@@ -21,11 +21,12 @@ class Proof(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The signature of a command and what is needed to verify it.
 
     Attributes:
-        certificate: the operator's, PEM.
+        certificate: the operator's, PEM; "" on a rig without keys.
         runs: runs of the receivers that may execute the command.
         nonce: random, different for each command.
         t_ns: time of signing [ns].
-        signature: ECDSA with SHA-256 over `statement`, hexadecimal.
+        signature: ECDSA with SHA-256 over `statement`, without keys HMAC with SHA-256;
+            hexadecimal.
     """
 
     certificate: str
@@ -66,3 +67,11 @@ def read_proof(text: str) -> Proof:
         return msgspec.json.decode(text.encode(), type=Proof)
     except (ValueError, RecursionError):
         raise KeysError("its proof cannot be read") from None
+
+
+def names_a_person(text: str) -> bool:
+    """Whether a verified proof is that of a certificate, which names a person."""
+    try:
+        return bool(read_proof(text).certificate)
+    except KeysError:
+        return False

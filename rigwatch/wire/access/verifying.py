@@ -28,7 +28,10 @@ class Verifier:
 
     Attributes:
         run: random identity of this run; a command must name it.
+        proves_user: the name in a command is that of the certificate.
     """
+
+    proves_user = True
 
     def __init__(self, folder: Path, rig: str) -> None:
         self.run = secrets.token_hex(16)

@@ -13,7 +13,7 @@ import os
 import threading
 from collections.abc import Callable, Mapping
 
-from rigwatch.wire.access import Signer
+from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
 from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, Outlet
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
@@ -29,11 +29,11 @@ class Bus:
         transport: carries the bytes.
         rig: the rig's id, first part of every key.
         process: name of the process, such as "daq"; a liveliness token exists while it lives.
-        signer: the operator of this machine, who signs commands; None without keys.
+        signer: signs the commands of this machine's operator; None for a process that sends none.
     """
 
     def __init__(
-        self, transport: Transport, rig: str, process: str, signer: Signer | None = None
+        self, transport: Transport, rig: str, process: str, signer: CommandSigner | None = None
     ) -> None:
         self.transport = transport
         self.signer = signer

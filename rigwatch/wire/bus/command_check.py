@@ -1,19 +1,18 @@
 """Signed commands: an operator's side asks for the receivers' runs, a receiver's side verifies.
 
-Without keys commands are not signed, and the user's name is not proved.
+Without keys the secret of the account signs, and the user's name is not proved.
 """
 
 import contextlib
 import hashlib
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from rigwatch.wire.access import Signer, Verifier
+from rigwatch.wire.access import signer_of, verifier_of
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.errors import BusError, KeysError
 from rigwatch.wire.messages import NOT_PROVED, PROVED, AlarmCommand, Identity, encode
-from rigwatch.wire.rig_config import BusSection
+from rigwatch.wire.rig_config import BusSection, SecuritySection
 
 if TYPE_CHECKING:
     from rigwatch.wire.bus.model_change import ModelRequest
@@ -42,37 +41,34 @@ class CommandCheck:
 
     Args:
         bus: of the process.
-        keys: folder of the rig's keys, "" for none.
+        security: section [bus.security].
 
     Attributes:
         refused: number of commands refused.
     """
 
-    def __init__(self, bus: Bus, keys: str) -> None:
+    def __init__(self, bus: Bus, security: SecuritySection) -> None:
         self.refused = 0
-        self._verifier = Verifier(Path(keys), bus.rig) if keys else None
-        if self._verifier:
-            run = self._verifier.run.encode()
-            bus.serve(RUN_KEY, lambda _: [run])
+        self._verifier = verifier_of(security, bus.rig)
+        run = self._verifier.run.encode()
+        bus.serve(RUN_KEY, lambda _: [run])
 
     def judge(self, command: "AlarmCommand | ModelRequest") -> Verdict:
         """Whether `command` may be executed."""
-        if self._verifier is None:
-            return Verdict(NOT_PROVED)
         try:
             self._verifier.check(command.user, command.proof, _said(command))
         except KeysError as error:
             self.refused += 1
             return Verdict(NOT_PROVED, str(error))
-        return Verdict(PROVED)
+        return Verdict(PROVED if self._verifier.proves_user else NOT_PROVED)
 
 
 def signed(bus: Bus, command: Command) -> Command:
-    """The command with the operator's proof; unchanged without keys.
+    """The command with the operator's proof; unchanged on a bus without a signer.
 
     Raises:
         BusError: no monitor answers.
-        KeysError: the operator's key cannot be read.
+        KeysError: the operator's key or the account's secret cannot be read.
     """
     if bus.signer is None:
         return command
@@ -93,13 +89,15 @@ def command_mark(command: AlarmCommand) -> str:
 def proved_here(bus: BusSection, rig: str, command: "AlarmCommand | ModelRequest") -> Identity:
     """Prove the operator of this machine without a monitor, for a change of files.
 
+    Without keys the permissions of the files decide.
+
     Raises:
         KeysError: why the operator may not act.
     """
-    if not (keys := bus.security.keys):
+    if not bus.security.keys:
         return NOT_PROVED
-    verifier, said = Verifier(Path(keys), rig), _said(command)
-    proof = Signer(Path(keys), bus.security.operator).sign(rig, (verifier.run,), said)
+    verifier, said = verifier_of(bus.security, rig), _said(command)
+    proof = signer_of(bus.security, bus.security.operator).sign(rig, (verifier.run,), said)
     verifier.check(command.user, proof, said)
     return PROVED
 

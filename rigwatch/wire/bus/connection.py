@@ -3,13 +3,11 @@
 Zenoh is slow to import and not needed for a bus in memory, so it is imported on first use.
 """
 
-from pathlib import Path
-
 from rigwatch.wire.access import (
-    Signer,
     access_settings,
     certificate_name,
     check_exposure,
+    signer_of,
     tls_settings,
 )
 from rigwatch.wire.bus.bus import Bus
@@ -33,10 +31,10 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
         ZenohTransport,  # slow to import, not needed in memory
     )
 
-    name, keys = certificate_name(config.bus, process), config.bus.security.keys
+    name = certificate_name(config.bus, process)
     tls = tls_settings(config.bus, name)
     transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease, tls)
-    return Bus(transport, config.rig.id, process, Signer(Path(keys), name) if keys else None)
+    return Bus(transport, config.rig.id, process, signer_of(config.bus.security, name))
 
 
 def log_refusals() -> None:

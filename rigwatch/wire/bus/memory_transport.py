@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
-from rigwatch.wire.access import Signer
+from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, answered
 
@@ -28,7 +28,7 @@ class MemoryNetwork:
         self.watchers: list[tuple[str, Callable[[str, bool], None]]] = []
         self.up = True
 
-    def bus(self, rig: str, process: str, signer: Signer | None = None) -> Bus:
+    def bus(self, rig: str, process: str, signer: CommandSigner | None = None) -> Bus:
         """A process's bus on this network."""
         return Bus(MemoryTransport(self), rig, process, signer)
 

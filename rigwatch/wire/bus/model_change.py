@@ -23,7 +23,7 @@ class ModelRequest:
         model: the model file's text; empty for a rollback.
         user: who makes the request.
         text: the reason.
-        proof: the operator's signature, "" on a rig without keys.
+        proof: the operator's signature, or without keys that of the account.
     """
 
     action: Literal["promote", "rollback"]

@@ -1,0 +1,63 @@
+"""What the list of standing alarms says around a kill: nothing that is not yet on disk, all later.
+
+A query is asked at the very moment at which a client may first get an answer.
+"""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from monitor.alarms import AlarmJournal, AlarmRecord, Occasion
+from rigwatch.wire.bus import Bus, Close, ask_alarm_list
+from rigwatch.wire.bus.alarm_list import KEY
+from rigwatch.wire.bus.transport import Answer
+from tests.monitor_process.test_process import Bench
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    made = Bench(tmp_path)
+    yield made
+    made.monitor.close()
+
+
+def raise_disk(bench: Bench) -> None:
+    at = Occasion("rig", 7, 1, time.time_ns())
+    bench.monitor.say(bench.monitor.rig.alarms.report("disk", at, active=True))
+
+
+def test_a_monitor_that_starts_again_answers_with_all_its_alarms_from_the_first_moment(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    raise_disk(bench)
+    bench.kill()
+    first: list[list[str]] = []
+    serve = Bus.serve
+
+    def serve_and_ask(bus: Bus, key: str, answer: Answer) -> Close:
+        close = serve(bus, key, answer)
+        if key == KEY:
+            first.append([alarm.name for alarm in ask_alarm_list(bench.observer)])
+        return close
+
+    monkeypatch.setattr(Bus, "serve", serve_and_ask)
+    bench.start()
+    assert first == [["disk"]]
+
+
+def test_no_alarm_is_listed_that_a_kill_could_lose(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed: list[list[str]] = []
+    write = AlarmJournal.write
+
+    def ask_and_write(journal: AlarmJournal, records: list[AlarmRecord]) -> None:
+        listed.append([alarm.name for alarm in ask_alarm_list(bench.observer)])
+        write(journal, records)
+
+    monkeypatch.setattr(AlarmJournal, "write", ask_and_write)
+    raise_disk(bench)
+    assert listed == [[]]
+    assert [alarm.name for alarm in ask_alarm_list(bench.observer)] == ["disk"]
