@@ -32,13 +32,14 @@ class TooSoonError(SessionError):
         self.seconds = seconds
 
 
-def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm) -> Study:
+def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm, now: float | None = None) -> Study:
     """Cut the recording around an alarm's onset and create a study from it, once per onset.
 
     Args:
         root: folder of the studies.
         config: the rig's configuration.
         alarm: the alarm.
+        now: Unix time, that of this machine if None [s].
 
     Raises:
         TooSoonError: the fault lasts, and its recording goes on.
@@ -52,7 +53,7 @@ def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm) -> Study:
     name = f"{alarm.name}-{onset.t_ns // 1_000_000_000}"
     if (root / name / FILE).exists():
         return open_study(root / name)
-    before, after = _lengths(alarm, onset)
+    before, after = _lengths(alarm, onset, time.time() if now is None else now)
     folder = root / "recordings"
     folder.mkdir(exist_ok=True)
     healthy = _cut(onset, folder / f"{name}-healthy.mcap", -AROUND - before, -AROUND)
@@ -66,10 +67,10 @@ def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm) -> Study:
     return make_study(root / name, TEMPLATE, parts)
 
 
-def _lengths(alarm: Alarm, onset: Onset) -> tuple[float, float]:
+def _lengths(alarm: Alarm, onset: Onset, now: float) -> tuple[float, float]:
     """Lengths of the healthy part and of the part with the fault [s]."""
     before, after = onset.recorded(AROUND + HEALTHY, AROUND + FAULTY)
-    age, lasted = time.time() - onset.t_ns / 1e9 - after, onset.lasted(alarm.name)
+    age, lasted = now - onset.t_ns / 1e9 - after, onset.lasted(alarm.name)
     before, after = before - AROUND, min(after, lasted or after) - AROUND
     if lasted is None and age < FRESH and (missing := FAULTY - after) > AROUND / 10:
         raise TooSoonError(alarm.name, missing)

@@ -1,7 +1,7 @@
 """Finds the onset of an alarm in a rig's recordings, by the number of its sample.
 
-An alarm's time is that of its latest transition: an operator who acknowledges it moves the time, not
-the onset.
+An alarm's time is that of its latest transition: an operator who acknowledges it moves the time,
+not the onset.
 """
 
 from collections.abc import Iterator
