@@ -1,11 +1,114 @@
-"""The rig's page: why the monitor does not watch, and the history of promotions."""
+"""A hidden effect in the simulated rig, in the browser: from the alarm to the promoted model."""
 
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
 
 from rigwatch.browser.rig.live_view import LiveView
 from rigwatch.browser.rig.promotions import can_roll_back, promotions
 from rigwatch.wire.messages.message_types import Health
-from tests.workbench.rigs.test_rig_story import Shell
+from tests.browser.page import Page, Served, browser
+from tests.bus.rig import ROOT
+from tests.workbench.rigs.test_rig_story import Shell, Watched
+
+ALARM = '[data-alarm="dry_friction"]'
+
+
+@pytest.fixture
+def shell(tmp_path: Path) -> Iterator[Shell]:
+    made = Shell(tmp_path)
+    (tmp_path / "story").mkdir()
+    shutil.copy(ROOT / "tests" / "verify" / "model.toml", tmp_path / "story" / "model.toml")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def page(shell: Shell) -> Iterator[Page]:
+    studies = shell.folder / "studies"
+    studies.mkdir()
+    served = Served(studies, "--rig", str(shell.config), cwd=shell.folder)
+    try:
+        with browser() as driver:
+            found = Page(driver, served)
+            found.enter()
+            yield found
+            assert found.errors() == []
+            assert found.requests() <= {served.address}
+    finally:
+        served.end()
+    assert not [line for line in served.said if "Traceback" in line], "".join(served.said)
+
+
+def residual(page: Page) -> float:
+    """The monitor's residual over the last second, as the rig's page tells it [m/s^2]."""
+    return float(page.data('[data-signal="residual"]') or "nan")
+
+
+def settled(page: Page, watched: Watched) -> float:
+    """The residual once the monitor watches again and the page says so."""
+    watched.wait_until_armed()
+    page.until(lambda: page.text("#link") == "watching", "the page tells it, too")
+    page.until(lambda: residual(page) == pytest.approx(watched.residual(), rel=0.2), "its residual")
+    return residual(page)
+
+
+def seen(page: Page) -> None:
+    """Nothing on the page is out of reach for anybody, in light and dark."""
+    assert page.violations(dark=False) == []
+    assert page.violations(dark=True) == []
+
+
+@pytest.mark.long
+def test_from_the_alarm_to_a_residual_that_falls(shell: Shell, page: Page) -> None:
+    page.open("/rig")
+    page.until(lambda: "no router answers" in page.text("#absent-why"), "the rig is absent")
+    assert page.data("#link", "armed") == "absent"
+    seen(page)
+    shell.type("rigwatch up configs/story.toml &")
+    watched = Watched(shell.config)
+    try:
+        page.until(lambda: "learns the healthy reference" in page.text("#link"), "not armed")
+        page.until(lambda: page.text("#link") == "watching", "armed")
+        page.until(lambda: page.all(ALARM), "the alarm")
+        page.until(lambda: "coulomb@load" in page.text(f"{ALARM} .probable"), "its cause")
+        page.pictured("browser-rig.png")
+        page.click(f"{ALARM} [data-act=acknowledge]")
+        page.until(lambda: page.data(ALARM, "state") == "acknowledged", "acknowledged")
+        rubbing = settled(page, watched)
+        page.click(f"{ALARM} [data-act=study]")
+        page.until(lambda: "/study/" in page.driver.current_url, "the alarm as a study")
+        page.until(lambda: page.data("#held-out"), "the study of the alarm, fitted")
+        first = float(page.data("#held-out") or "nan")
+        page.after(lambda: page.click("#explain"), "explain", "done")
+        page.until(lambda: page.data("#ranking tbody tr", "effect") == "coulomb", "the ranking")
+        assert page.data("#headline", "verdict") == "missing_effect"
+        page.click('#ranking tr[data-label="coulomb@load"]')
+        page.until(lambda: "coulomb" in page.text("#detail h3"), "the evidence")
+        page.after(lambda: page.click('#detail [data-act="add"]'), "add", "done")
+        page.until(lambda: float(page.data("#held-out") or "nan") < 0.2 * first, "the error falls")
+        page.click("#tab-parameters")
+        friction = float(page.data('[data-parameter="load_coulomb_Fc"]') or "nan")
+        assert friction == pytest.approx(0.12, rel=0.1)
+        page.after(lambda: page.click("[data-act=rehearse]"), "rehearse", "done")
+        page.until(lambda: page.all("[data-act=promote]"), "what was rehearsed can go live")
+        assert "residual" in page.text("#rehearsal")
+        seen(page)
+        page.after(lambda: page.click("[data-act=promote]"), "promote", "done")
+        page.open("/rig")
+        in_force = '#promotions [data-step="promote"][data-in-force="yes"]'
+        page.until(lambda: "dry_friction" in page.text(in_force), "who promoted what, and when")
+        assert settled(page, watched) < 0.7 * rubbing
+        seen(page)
+        page.pictured("browser-promoted.png")
+        page.click("#rollback")
+        page.until(lambda: page.all('#promotions [data-step="rollback"]'), "the previous model")
+        assert settled(page, watched) == pytest.approx(rubbing, rel=0.3)
+        page.until(lambda: page.all("#rollback") == [], "there is no model before it")
+    finally:
+        watched.close()
 
 
 def test_why_the_monitor_does_not_watch() -> None:

@@ -1,7 +1,7 @@
 """The rig's page: live signals and alarms, promotions of its model, a study made from an alarm."""
 
-from rigwatch.browser.rig.alarm_study import study_of_alarm
+from rigwatch.browser.rig.alarm_study import TooSoonError, study_of_alarm
 from rigwatch.browser.rig.link import RigLink
 from rigwatch.browser.rig.promotions import can_roll_back, promotions, roll_back
 
-__all__ = ["RigLink", "can_roll_back", "promotions", "roll_back", "study_of_alarm"]
+__all__ = ["RigLink", "TooSoonError", "can_roll_back", "promotions", "roll_back", "study_of_alarm"]

@@ -1,13 +1,15 @@
 """A study made from an alarm: healthy data before its onset, and data after it."""
 
+import time
 from pathlib import Path
 
 from rigwatch.browser.recordings import make_study
+from rigwatch.browser.rig.onset import Onset, onset_of
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.rig_config import RigConfig
-from rigwatch.wire.session import SUFFIX, Session, newest, open_session, trim
-from rigwatch.workbench.study import Study
+from rigwatch.wire.session import trim
+from rigwatch.workbench.study import FILE, Study, open_study
 
 HEALTHY = 5.0
 """Length of the healthy part [s]."""
@@ -17,48 +19,46 @@ LEAST = 4.0
 """Shortest useful part [s]."""
 AROUND = 0.5
 """Time skipped on both sides of the onset, and between training and held-out data [s]."""
+FRESH = 3.0
+"""Age of the last sample up to which the recording is taken to go on [s]."""
 TEMPLATE = "rig"
 
 
-def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm) -> Study:
-    """Cut the recording around an alarm's onset and create a study from it.
+class TooSoonError(SessionError):
+    """The fault is still being recorded; `seconds` more make the longest part."""
+
+    def __init__(self, name: str, seconds: float) -> None:
+        super().__init__(f"{name}: its recording lasts {seconds:.0f} s more")
+        self.seconds = seconds
+
+
+def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm, now: float | None = None) -> Study:
+    """Cut the recording around an alarm's onset and create a study from it, once per onset.
 
     Args:
         root: folder of the studies.
         config: the rig's configuration.
         alarm: the alarm.
+        now: Unix time, that of this machine if None [s].
 
     Raises:
+        TooSoonError: the fault lasts, and its recording goes on.
         SessionError: too little was recorded before or after the onset.
-        ConfigError: there is such a study already.
     """
     if config.recorder is None:
         raise SessionError("found no [recorder] of the rig, expected one that has what it did")
-    held = (alarm.seq - alarm.onset_seq) / config.rig.sample_rate if alarm.onset_seq >= 0 else 0.0
-    onset = alarm.t_ns - round(held * 1e9)
-    session = _session_of(Path(config.recorder.folder), onset)
-    times = [block.t_ns for block in session.samples()]
-    if not times:
-        raise SessionError(f"{session.path}: found no samples, expected those around the alarm")
-    first, last = int(times[0][0]), int(times[-1][-1])
-    before, after = (onset - first) / 1e9 - AROUND, (last - onset) / 1e9 - AROUND
-    for seconds, where in ((before, "before"), (after, "after")):
-        if seconds < LEAST:
-            raise SessionError(
-                f"{alarm.name}: found {max(seconds, 0):.1f} s recorded {where} its onset, expected"
-                f" at least {LEAST:g} s"
-            )
-    name = f"{alarm.name}-{alarm.t_ns // 1_000_000_000}"
+    if alarm.seq < 0:
+        raise SessionError(f"{alarm.name}: found no sample that raised it, expected one")
+    onset = onset_of(Path(config.recorder.folder), alarm)
+    name = f"{alarm.name}-{onset.t_ns // 1_000_000_000}"
+    if (root / name / FILE).exists():
+        return open_study(root / name)
+    before, after = _lengths(alarm, onset, time.time() if now is None else now)
     folder = root / "recordings"
     folder.mkdir(exist_ok=True)
-    healthy, faulty = (folder / f"{name}-{part}.mcap" for part in ("healthy", "fault"))
-    around = round(AROUND * 1e9)
-    if not healthy.exists():
-        trim(session, healthy, onset - around - round(min(before, HEALTHY) * 1e9), onset - around)
-    length = min(after, FAULTY)
-    if not faulty.exists():
-        trim(session, faulty, onset + around, onset + around + round(length * 1e9))
-    half = (length - AROUND) / 2
+    healthy = _cut(onset, folder / f"{name}-healthy.mcap", -AROUND - before, -AROUND)
+    faulty = _cut(onset, folder / f"{name}-fault.mcap", AROUND, AROUND + after)
+    half = (after - AROUND) / 2
     parts = [
         ("train", faulty, 0.0, half),
         ("held_out", faulty, half + AROUND, None),
@@ -67,15 +67,24 @@ def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm) -> Study:
     return make_study(root / name, TEMPLATE, parts)
 
 
-def _session_of(folder: Path, onset: int) -> Session:
-    """The newest session with a healthy part before an onset [ns]; else the newest of all.
+def _lengths(alarm: Alarm, onset: Onset, now: float) -> tuple[float, float]:
+    """Lengths of the healthy part and of the part with the fault [s]."""
+    before, after = onset.recorded(AROUND + HEALTHY, AROUND + FAULTY)
+    age, lasted = now - onset.t_ns / 1e9 - after, onset.lasted(alarm.name)
+    before, after = before - AROUND, min(after, lasted or after) - AROUND
+    if lasted is None and age < FRESH and (missing := FAULTY - after) > AROUND / 10:
+        raise TooSoonError(alarm.name, missing)
+    for seconds, what in ((before, "before its onset"), (after, "of the fault")):
+        if seconds < LEAST:
+            raise SessionError(
+                f"{alarm.name}: found {max(seconds, 0):.1f} s recorded {what}, expected at least"
+                f" {LEAST:g} s"
+            )
+    return before, after
 
-    A recorder that was restarted has begun another one.
-    """
-    files = sorted(folder.glob(f"*/*{SUFFIX}"), key=lambda file: -file.stat().st_mtime)
-    for path in dict.fromkeys(file.parent for file in files):
-        session = open_session(path)
-        first = next(session.samples(size=1), None)
-        if first is not None and first.t_ns[0] <= onset - round((LEAST + AROUND) * 1e9):
-            return session
-    return open_session(newest(folder))
+
+def _cut(onset: Onset, target: Path, start: float, end: float) -> Path:
+    """The file with a span of the recording, in seconds after the onset."""
+    if not target.exists():
+        trim(onset.session, target, *(onset.t_ns + round(at * 1e9) for at in (start, end)))
+    return target

@@ -15,6 +15,7 @@ from starlette.routing import Route
 
 from rigwatch.browser.rig import (
     RigLink,
+    TooSoonError,
     can_roll_back,
     promotions,
     roll_back,
@@ -137,12 +138,15 @@ async def rig_alarm(request: Request) -> Response:
 
 
 async def rig_study(request: Request) -> Response:
-    """Create a study from an alarm."""
+    """Create a study from an alarm, or say for how long its fault is still to be recorded [s]."""
     wanted, link, places = await body_of(request), _link(request), context_of(request).places
     alarm = link.alarm(str(wanted.get("name", "")))
     if alarm is None:
         raise PlaceError(f"{wanted.get('name')!r}: no alarm of this rig")
-    study = await run_in_threadpool(study_of_alarm, places.root, link.config, alarm)
+    try:
+        study = await run_in_threadpool(study_of_alarm, places.root, link.config, alarm)
+    except TooSoonError as error:
+        return answer({"wait": error.seconds})
     return answer({"study": places.relative(study.folder)})
 
 

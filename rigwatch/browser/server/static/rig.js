@@ -48,17 +48,30 @@ function draw() {
     for (const [name, values] of Object.entries(lines)) {
       const chart = charts[name] ?? make(kind, name, [since, values]);
       chart.plot.setData([since, values]);
-      chart.value.textContent = `${label(values.at(-1))} ${units[name] ?? ""}`;
+      told(chart.value, name, times, values);
       numbers(name, values);
     }
   }
   document.body.dataset.frames = String(Number(document.body.dataset.frames ?? 0) + 1);
 }
 
+/** A signal's value; of the residual, which swings about zero, its size over the last second. */
+function told(place, name, times, values) {
+  const swings = name === "residual";
+  const value = swings ? rms(values.slice(times.findIndex((at) => at > times.at(-1) - 1))) : values.at(-1);
+  place.dataset.value = value ?? "";
+  place.textContent = `${swings ? "rms " : ""}${label(value)} ${units[name] ?? ""}`;
+}
+
+function rms(values) {
+  const real = values.filter((value) => value !== null);
+  return real.length ? Math.sqrt(real.reduce((sum, value) => sum + value * value, 0) / real.length) : null;
+}
+
 function make(kind, name, data) {
   if (!Object.keys(charts).length) { $("live-charts").replaceChildren(); }
   const words = `${plain(name)} [${units[name] ?? ""}]`;
-  const value = element("b", "", { class: "value" });
+  const value = element("b", "", { class: "value", "data-signal": name });
   const box = element("div", "", { class: "live", role: "img", tabindex: "0", "aria-label": `${words} over the last seconds; arrow keys read its points` });
   $("live-charts").append(element("h3", `${words} `, {}, value), box);
   const axis = { stroke: colour("soft"), grid: { stroke: colour("line"), width: 1 }, font: "11px system-ui" };
@@ -125,13 +138,20 @@ function alarm(one) {
   if (one.state === "unacknowledged" || one.state === "cleared_unacknowledged") acts.append(button("Acknowledge", tell("acknowledge"), { "data-act": "acknowledge" }));
   if (one.state !== "normal") acts.append(button("Reset", tell("reset"), { "data-act": "reset" }));
   if (one.seq >= 0) {
-    acts.append(button("Open as a study", async () => {
-      const made = await post("/api/rig/study", { name: one.name });
-      location.href = `/study/${made.study}`;
-    }, { class: "primary", "data-act": "study" }));
+    acts.append(button("Open as a study", () => openStudy(one.name), { class: "primary", "data-act": "study" }));
   }
   item.append(acts);
   return item;
+}
+
+/** A fault that has just begun is recorded a little longer first. */
+async function openStudy(name) {
+  for (;;) {
+    const { study, wait } = await post("/api/rig/study", { name });
+    if (study) { location.href = `/study/${study}`; return; }
+    remark(`The fault is being recorded: ${Math.ceil(wait)} s more, then the study opens`, true);
+    await new Promise((done) => { setTimeout(done, 1000 * Math.min(wait, 1)); });
+  }
 }
 
 function states() {
