@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 HELP = "make a study of logs and a model, or from a template"
 EXAMPLE = """\
   rigwatch study new drive --data run1.csv run2.csv --model motor --set R=2.0 --set K=0.06
+  rigwatch study new drive --data a.csv b.csv --model motor --set a:J=2e-4 --set b:J=5e-4
   rigwatch study new drive --data log.csv --model motor --map 'speed=n[rpm]' --time 't[ms]'
   rigwatch study new emps --template emps --sessions recordings/"""
 
@@ -40,8 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--set",
         action="append",
         default=[],
-        metavar="NAME=VALUE",
-        help="a parameter of the model that you know, in its unit",
+        metavar="[LOG:]NAME=VALUE",
+        help="a parameter of the model that you know, in its unit; of one log alone if it is named",
     )
     add_log_columns(parser)
 
@@ -87,20 +88,31 @@ def _logs(arguments: argparse.Namespace) -> "Logs":
         arguments.model,
         tuple(arguments.healthy),
         mapping,
-        dict(map(_value, arguments.set)),
+        *_known(arguments.set),
     )
 
 
-def _value(text: str) -> tuple[str, float]:
-    """A parameter and its value.
+def _known(given: list[str]) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
+    """Known parameters of all logs, and of single ones by the log's name."""
+    start: dict[str, float] = {}
+    of_log: dict[str, dict[str, float]] = {}
+    for text in given:
+        log, name, value = _value(text)
+        (of_log.setdefault(log, {}) if log else start)[name] = value
+    return start, of_log
+
+
+def _value(text: str) -> tuple[str, str, float]:
+    """A log or "", a parameter and its value.
 
     Raises:
-        ModelError: the text is not NAME=VALUE.
+        ModelError: the text is not NAME=VALUE or LOG:NAME=VALUE.
     """
     from rigwatch.wire.errors import ModelError
 
     name, _, value = text.partition("=")
+    log, _, name = name.rpartition(":")
     try:
-        return name.strip(), float(value)
+        return log.strip(), name.strip(), float(value)
     except ValueError:
         raise ModelError(f"--set: found {text!r}, expected NAME=VALUE such as R=2.0") from None

@@ -22,11 +22,22 @@ def run(arguments: argparse.Namespace) -> int:
     study = open_study(arguments.study)
     steps = list(ledger.lines(study))
     if arguments.json:
-        print_json({"model": study.model.name, "effects": study.file.effects, "ledger": steps})
+        print_json(
+            {
+                "model": study.model.name,
+                "known": study.known,
+                "effects": study.file.effects,
+                "ledger": steps,
+            }
+        )
         return 0
     print(f"{study.folder}: model {study.model.name}: {study.model.summary}")
     for name in study.file.variants:
         print(f"  with {name}: {study.model.variants[name].physics}")
+    for one in study.known:
+        print(f"  known of {one}")
+    if moving := study.moving():
+        print(f"  fitted per recording: {', '.join(moving)}")
     for accepted in study.file.effects:
         print(f"  + {accepted.effect}@{accepted.port}: {study.effects[accepted.effect].physics}")
     rows = [

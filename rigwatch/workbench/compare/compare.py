@@ -80,7 +80,7 @@ def comparison(bench: Bench) -> Comparison:
     alone = len(channels) == 1
     total = floor.rms[0] if alone else np.sqrt(np.mean((floor.rms / base.train.scale) ** 2))
     found = values(base.train, added_variances(bench.study, bench.data, bench.bare, base))
-    weak = [f"{name}: {value.note}" for name, value in found.items() if value.note]
+    weak = [f"{n}: {value.note}" for n, value in found.items() if value.note and value.interval]
     return Comparison(
         base.train_error,
         base.held_out_error,

@@ -18,6 +18,7 @@ from rigwatch.workbench.data.derived_ends import without_ends
 from rigwatch.workbench.data.one_rate import on_one_rate
 from rigwatch.workbench.data.recorded_columns import read_columns, with_derived
 from rigwatch.workbench.data.signal_units import check_unit
+from rigwatch.workbench.data.telling import divided
 from rigwatch.workbench.study import Span, Study, StudyFile
 
 USUAL = 0.5
@@ -51,6 +52,8 @@ class Data:
         remarks: notes for the user.
         along_motion: whether the recordings are for a model along its measured motion.
         motion: sensors whose position and rate are inputs of that model.
+        telling: first samples of held-out recordings that tell what moves between recordings; None
+            if nothing has to be told.
     """
 
     train: Recording
@@ -60,13 +63,15 @@ class Data:
     remarks: tuple[str, ...]
     along_motion: bool = False
     motion: tuple[MotionSensor, ...] = ()
+    telling: Recording | None = None
 
     @property
     def of_healthy(self) -> "Data | None":
         """The healthy recording as both training and held-out data; None if there is none."""
         if self.healthy is None:
             return None
-        return replace(self, train=self.healthy, held_out=self.healthy, healthy=None, remarks=())
+        own = self.healthy
+        return replace(self, train=own, held_out=own, healthy=None, remarks=(), telling=None)
 
 
 def prepare(study: Study) -> Data:
@@ -88,9 +93,12 @@ def prepare(study: Study) -> Data:
     tables = _on_one_rate(study, tables, remarks)
     dt = tables["train"][0].dt
     horizon = max(round((file.horizon or USUAL) / dt), 2)
+    groups: dict[str, list[Columns]] = _with_known(study, tables)
+    groups["held_out"], groups["telling"], told = divided(study, groups["held_out"], horizon)
+    remarks += told
     made = {
         use: _recording(study, group, horizon, use, remarks) if group else None
-        for use, group in _with_known(study, tables).items()
+        for use, group in groups.items()
     }
     assert made["train"] is not None
     assert made["held_out"] is not None
@@ -99,7 +107,8 @@ def prepare(study: Study) -> Data:
             f"horizon {file.horizon:g} s, chosen from {study.horizon_from}; set `horizon` in the"
             " study to override"
         )
-    return Data(made["train"], made["held_out"], made["healthy"], horizon, tuple(remarks))
+    uses = made["train"], made["held_out"], made["healthy"]
+    return Data(*uses, horizon, tuple(remarks), telling=made["telling"])
 
 
 def _with_known(study: Study, tables: Mapping[str, list[Columns]]) -> dict[str, list[Columns]]:
@@ -160,7 +169,8 @@ def _recording(
     thinning = Thinning(thin.factor, thin.edge, parts) if thin else None
     u, y = np.concatenate(inputs), np.concatenate(outputs)
     u, y = _without_holes(study.model, u, y, use, remarks)
-    _check_excitation(study.model, u, use)
+    if use != "telling":
+        _check_excitation(study.model, u, use)
     return Recording(tables[0].dt, u, y, thinning, parts)
 
 
@@ -205,9 +215,11 @@ def _without_holes(
 
 
 def _check_excitation(model: Model, u: FloatArray, use: str) -> None:
+    driving = model.driving()
+    u = u[:, [name in driving for name in model.inputs]]
     if u.size and not np.any(np.ptp(u, axis=0) > 1e-12 * np.maximum(np.abs(u).max(axis=0), 1e-300)):
         raise ModelError(
-            f"{use}: found inputs {', '.join(model.inputs)} that never change, expected a recording"
+            f"{use}: found inputs {', '.join(driving)} that never change, expected a recording"
             " with excitation"
         )
 

@@ -30,7 +30,9 @@ def unexcited(bench: Bench) -> Verdict | None:
     """The verdict if another split determines parameters that the training data do not."""
     undetermined = {n: v for n, v in _own(bench).items() if _width(v) > UNDETERMINED}
     in_memory = len(bench.data.train.parts) != len(bench.study.file.train)
-    if not undetermined or in_memory or bench.data.along_motion or bench.study.model.rough:
+    # A split decides which recordings have values of their own, so another is another model.
+    fixed_split = in_memory or bench.data.along_motion or bench.study.moving()
+    if not undetermined or fixed_split or bench.study.model.rough:
         return None
     for study in _splits(bench.study, bench.data):
         found, judged = _values(study, bench)

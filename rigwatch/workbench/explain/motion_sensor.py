@@ -132,7 +132,8 @@ def _corrected_data(
     train, held_out = (
         corrected(r, sensor, direction, strength) for r in (data.train, data.held_out)
     )
-    return replace(data, train=train, held_out=held_out)
+    telling = data.telling and corrected(data.telling, sensor, direction, strength)
+    return replace(data, train=train, held_out=held_out, telling=telling)
 
 
 def corrected(

@@ -194,7 +194,7 @@ def _same_shift(best: Ranked, row: Ranked) -> bool:
     if not shifts or best.fitted is None or row.port == best.port:
         return False
     model = best.fitted.compiled.system.model
-    return len(model.inputs) == len(model.outputs) == 1 and best.cosines[row.label] > SIMILAR
+    return len(model.driving()) == len(model.outputs) == 1 and best.cosines[row.label] > SIMILAR
 
 
 def _rivals(best: Ranked, row: Ranked, cosine: float, *, trusted: bool) -> bool:

@@ -17,6 +17,7 @@ from rigwatch.physics.engine.fit import (
     initial_states,
     untied,
     windows,
+    with_told,
 )
 from rigwatch.physics.engine.search import (
     Convergence,
@@ -208,6 +209,7 @@ def _judged(  # noqa: PLR0917 -- they belong together
     """A fit with its held-out error."""
     length = data.horizon if study.model.states else len(data.held_out)
     substeps = study.file.substeps
+    found = with_told(found, study.model, data.telling, data.horizon, substeps)
     # Along the motion hidden states follow it; a rough model is judged with its reference.
     judging = not (data.along_motion or study.model.rough)
     judged = evaluate(found, data.held_out, length, substeps, initial, judging=judging)

@@ -26,6 +26,7 @@ from rigwatch.workbench.fit.fitted import blocks
 CONFIDENCE = 0.95
 ENOUGH = 12
 """Number of windows above which each is a block of its own."""
+TOLD = "told by the first samples of a held-out recording"
 TIED = 0.98
 """Correlation above which two parameters count as tied."""
 
@@ -111,7 +112,8 @@ def values(fitted: Fit, added_variances: Mapping[str, float] | None = None) -> d
     for name, value in fitted.values().items():
         interval = (value - spread[name], value + spread[name]) if name in spread else None
         parameter = system.parameters[name]
-        found[name] = Value(value, parameter.unit, interval, notes.get(name, ""))
+        told = TOLD if parameter.per_recording and parameter.fixed else ""
+        found[name] = Value(value, parameter.unit, interval, notes.get(name, told))
     return found
 
 

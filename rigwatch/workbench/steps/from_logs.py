@@ -12,7 +12,7 @@ from pathlib import Path
 from msgspec import structs
 
 from rigwatch.physics.engine.equations import Input, Model, Output, model_named
-from rigwatch.wire.errors import ModelError, RigwatchError
+from rigwatch.wire.errors import ModelError, RigwatchError, nearest
 from rigwatch.wire.exchange import ImportMapping, import_file, read_table
 from rigwatch.workbench.data import (
     RATES_ALIKE,
@@ -43,6 +43,7 @@ class Logs:
         healthy: logs of the healthy machine.
         mapping: columns, time and rate, if headers are not sufficient.
         start: known values of the model's parameters, in their units.
+        known: values that hold for one log alone, by its file name without suffix.
     """
 
     data: tuple[Path, ...]
@@ -50,6 +51,7 @@ class Logs:
     healthy: tuple[Path, ...] = ()
     mapping: ImportMapping = field(default_factory=ImportMapping)
     start: Mapping[str, float] = field(default_factory=dict)
+    known: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
@@ -88,6 +90,10 @@ def _imported(
     names = [path.stem for path in (*logs.data, *logs.healthy)]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ModelError(f"--data: found {min(twice)} twice, expected files of different names")
+    if other := [name for name in logs.known if name not in names]:
+        raise ModelError(
+            f"--set: found log {min(other)!r}{nearest(min(other), dict.fromkeys(names))}"
+        )
     reading, remarks = None, list[str]()
     for path in (*logs.data, *logs.healthy):
         target = folder / f"{path.stem}.mcap"
@@ -126,8 +132,7 @@ def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str
     if max(rates) / min(rates) > 1 + RATES_ALIKE:
         lines.append(f"rate = {min(rates):.6g}  # the slowest log's")
     if logs.start:
-        values = ", ".join(f"{name} = {value!r}" for name, value in logs.start.items())
-        lines.append(f"start = {{ {values} }}")
+        lines.append(f"start = {_inline(logs.start)}")
     if reading.rates:
         sources = sorted({channel for channel, _ in reading.rates.values()})
         low_pass = max(proposed_low_pass(tables, name) for name in sources)
@@ -145,11 +150,12 @@ def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str
             choices.append(f"residuals low-passed alike: every {factor}th sample counts")
     for use, parts in (("train", train), ("held_out", held_out)):
         for part in parts:
-            lines += _span(use, logs.data[part.recording].stem, part)
+            lines += _span(use, logs.data[part.recording].stem, part, logs)
             choices.append(f"{use.replace('_', ' ')}: {_in_words(logs, part)}")
     for path in logs.healthy:
-        lines += _span("healthy", path.stem, Part(0))
-    known = [n for n, p in model.parameters.items() if p.fixed and n not in logs.start]
+        lines += _span("healthy", path.stem, Part(0), logs)
+    given = {*logs.start, *(name for values in logs.known.values() for name in values)}
+    known = [n for n, p in model.parameters.items() if p.fixed and n not in given]
     if known:
         choices.append(
             f"{', '.join(known)}: not fitted, taken from the model file; set known values with"
@@ -170,13 +176,20 @@ def _named(folder: Path, model: str) -> str:
     return Path(model).name
 
 
-def _span(use: str, session: str, part: Part) -> list[str]:
+def _span(use: str, session: str, part: Part, logs: Logs) -> list[str]:
     lines = ["", f"[[{use}]]", f'session = "{session}.mcap"']
     if part.start:
         lines.append(f"start = {part.start:.6g}")
     if part.end != float("inf"):
         lines.append(f"end = {part.end:.6g}")
+    if known := logs.known.get(session):
+        lines.append(f"parameters = {_inline(known)}")
     return lines
+
+
+def _inline(values: Mapping[str, float]) -> str:
+    """An inline TOML table of numbers by name."""
+    return f"{{ {', '.join(f'{name} = {value!r}' for name, value in values.items())} }}"
 
 
 def _in_words(logs: Logs, part: Part) -> str:

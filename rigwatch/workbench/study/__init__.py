@@ -12,6 +12,8 @@ from rigwatch.workbench.study.edits import (
 )
 from rigwatch.workbench.study.folder import FILE, digest
 from rigwatch.workbench.study.ledger import append, check_data, commit, lines, model_hash, stands_on
+from rigwatch.workbench.study.moving_parameters import judged_alone
+from rigwatch.workbench.study.recording_parameters import Known
 from rigwatch.workbench.study.study import GIVEN, Held, Kept, Study, open_study, study_of, varied
 from rigwatch.workbench.study.study_file import Accepted, Derive, Derived, Span, StudyFile
 
@@ -23,6 +25,7 @@ __all__ = [
     "Derived",
     "Held",
     "Kept",
+    "Known",
     "Span",
     "Study",
     "StudyFile",
@@ -35,6 +38,7 @@ __all__ = [
     "digest",
     "discard",
     "drop_effect",
+    "judged_alone",
     "keep_holds",
     "ledger",
     "lines",

@@ -35,8 +35,14 @@ from rigwatch.wire.errors import ConfigError, ModelError, nearest
 from rigwatch.wire.typed_files import parse, read_text
 from rigwatch.wire.units import Unit, unit_of
 from rigwatch.workbench.study.folder import FILE, LEDGER, settle
+from rigwatch.workbench.study.moving_parameters import fitted_by_recording, told_apart
 from rigwatch.workbench.study.own_files import NOTHING_UNSAVED, Unsaved, content
-from rigwatch.workbench.study.recording_parameters import known_as_inputs, known_in_si
+from rigwatch.workbench.study.recording_parameters import (
+    Known,
+    known_as_inputs,
+    known_in_si,
+    known_of,
+)
 from rigwatch.workbench.study.study_file import Accepted, StudyFile
 
 GIVEN = ("the study", "the model file")
@@ -93,6 +99,7 @@ class Study:
         horizon_from: what the horizon was chosen from, in words; empty if given.
         own_files: content of own effect and model files when opened, by name.
         unsaved: own files, by name, that `commit` is to write.
+        known: what the file gives for single recordings.
     """
 
     folder: Path
@@ -106,6 +113,7 @@ class Study:
     horizon_from: str = ""
     own_files: Mapping[str, str] = dataclass_field(default_factory=dict)
     unsaved: Mapping[str, Unsaved] = dataclass_field(default_factory=dict)
+    known: tuple[Known, ...] = ()
 
     @property
     def ledger(self) -> Path:
@@ -116,6 +124,10 @@ class Study:
         """Paths of the recordings, by their names in the file."""
         spans = (*self.file.train, *self.file.held_out, *self.file.healthy)
         return {span.session: self.folder / span.session for span in spans}
+
+    def moving(self) -> tuple[str, ...]:
+        """Parameters that are fitted per recording, one for each session."""
+        return tuple(n for n, p in self.model.parameters.items() if p.per_recording)
 
     def with_effects(self, effects: Sequence[Accepted]) -> "Study":
         """The study with these effects in its model, in memory only."""
@@ -177,8 +189,9 @@ def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_U
         given |= parse_effects(own_files[name], folder / name)
     effects = {**library(), **given}
     written = _written(folder, file, own_files)
-    file = known_in_si(written, file, folder / FILE)
-    model, holds = _held(known_as_inputs(written, file), file)
+    in_si = known_in_si(written, file, folder / FILE)
+    known, file = known_of(written, file), told_apart(written, in_si)
+    model, holds = _held(_by_recording(written, file), file)
     study = Study(
         folder,
         file,
@@ -189,6 +202,7 @@ def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_U
         text=text,
         own_files=own_files,
         unsaved=unsaved,
+        known=known,
     )
     for accepted in file.effects:
         study.effect(accepted.effect)
@@ -256,8 +270,14 @@ def varied(study: Study, variants: Sequence[str]) -> Study:
         ModelError: a variant is unknown, or two of them exclude each other.
     """
     file = structs.replace(study.file, variants=tuple(variants))
-    model, holds = _held(known_as_inputs(_written(study.folder, file, study.own_files), file), file)
+    written = _written(study.folder, file, study.own_files)
+    model, holds = _held(_by_recording(written, file), file)
     return replace(study, file=file, model=model, kept=None, holds=holds)
+
+
+def _by_recording(model: Model, file: StudyFile) -> Model:
+    """The model with what its recordings give, and with what is fitted for each of them."""
+    return fitted_by_recording(known_as_inputs(model, file), file)
 
 
 def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
@@ -278,6 +298,6 @@ def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
         hold = hold or own.hold or model.hold
         late = own.late if late is None else late
         inputs[name] = structs.replace(own, hold=hold, late=late)
-        if hold:
+        if hold and not own.constant:
             holds[name] = Held(hold, late, 0.0, source)
     return structs.replace(model, inputs=inputs), holds

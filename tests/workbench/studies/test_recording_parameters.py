@@ -1,12 +1,17 @@
 """Parameters that are known of each recording: a load that was changed between two runs."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rigwatch.commands import main
 from rigwatch.wire.errors import ConfigError
+from rigwatch.workbench.compare import compare, open_bench
 from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.report import comparison_lines
+from rigwatch.workbench.study import open_study
 from rigwatch.workbench.study.creation import create
 from tests.workbench.machine import recorded
 
@@ -62,3 +67,59 @@ def test_what_is_known_of_a_recording_counts_in_it_alone(tmp_path: Path) -> None
 def test_a_parameter_that_the_model_does_not_have_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"'mass'.*parameters of the model: m0, m, c"):
         create(tmp_path / "study", template(tmp_path, "mass"))
+
+
+def test_without_what_is_known_of_each_recording_the_fit_is_bad(tmp_path: Path) -> None:
+    path = template(tmp_path)
+    path.write_text("\n".join(x for x in path.read_text().splitlines() if "parameters" not in x))
+    bench = open_bench(create(tmp_path / "study", path))
+    assert bench.base.held_out_error > 0.05
+
+
+def test_what_is_known_is_shown_in_its_unit(tmp_path: Path, capsys) -> None:
+    study = create(tmp_path / "study", template(tmp_path))
+    assert main(["study", "show", str(study.folder)]) == 0
+    shown = capsys.readouterr().out
+    assert "full.mcap (train): m = 1500 g" in shown
+    assert [str(one).removeprefix("../") for one in study.known] == [
+        "empty.mcap (train): m = 0 g",
+        "full.mcap (train): m = 1500 g",
+        "half.mcap (held out): m = 500 g",
+    ]
+    lines = "\n".join(comparison_lines(compare(study)))
+    assert "input push" in lines
+    assert "input m" not in lines
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("inf", r"held_out\[0\].parameters.m: found inf, expected a finite number"),
+        ("'heavy'", r"parameters.m: found 'heavy', expected float"),
+    ],
+)
+def test_a_value_that_is_no_number_is_refused(tmp_path: Path, given: str, said: str) -> None:
+    path = template(tmp_path)
+    path.write_text(path.read_text().replace("m = 500.0", f"m = {given}"))
+    with pytest.raises(ConfigError, match=said):
+        create(tmp_path / "study", path)
+
+
+def test_logs_with_known_loads_become_a_study(tmp_path: Path, capsys) -> None:
+    template(tmp_path)
+    logs = [str(tmp_path / f"{name}.csv") for name in LOADS]
+    known = [f"--set={name}:m={1e3 * load}" for name, load in LOADS.items()]
+    for log in logs:
+        path = Path(log)
+        _, *rest = path.read_text().splitlines()
+        rows = [f"{0.01 * i:.2f},{row}" for i, row in enumerate(rest)]
+        path.write_text("\n".join(["time[s],push[N],v[m/s]", *rows]) + "\n")
+    folder = tmp_path / "study"
+    begin = ["study", "new", str(folder), "--data", *logs, "--model", str(tmp_path / "model.toml")]
+    assert main([*begin, *known]) == 0
+    file = open_study(folder).file
+    given = {span.session: span.parameters["m"] for span in (*file.train, *file.held_out)}
+    assert given == {f"{name}.mcap": load for name, load in LOADS.items()}
+    shutil.rmtree(folder)
+    assert main([*begin, "--set", "ful:m=1"]) == 2
+    assert "--set: found log 'ful'; did you mean 'full'?" in capsys.readouterr().err

@@ -48,6 +48,9 @@ class Input(Section, frozen=True, kw_only=True):
     late: Annotated[
         float, Meta(ge=0, le=1, description="delay of a held input, as a share of a sample")
     ] = 0.0
+    constant: Annotated[
+        bool, Meta(description="constant within a recording, as a load: excites nothing")
+    ] = False
 
     def __post_init__(self) -> None:
         into_si(self)
@@ -87,6 +90,10 @@ class Parameter(Section, frozen=True, kw_only=True):
         float,
         Meta(ge=0, description="standard deviation of a fixed value"),
     ] = 0.0
+    per_recording: Annotated[
+        bool,
+        Meta(description="fitted for each recording, as a zero that moves between them"),
+    ] = False
     meaning: Annotated[str, Meta(description="what it is, in words")] = ""
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
@@ -207,6 +214,10 @@ class Model(Section, frozen=True, kw_only=True):
     def held(self, name: str) -> Hold:
         """The hold of an input between samples; linear by default."""
         return self.inputs[name].hold or self.hold or "linear"
+
+    def driving(self) -> tuple[str, ...]:
+        """Inputs that change within a recording."""
+        return tuple(name for name, own in self.inputs.items() if not own.constant)
 
     def unheld(self) -> tuple[str, ...]:
         """Inputs without a hold in the model."""

@@ -32,6 +32,7 @@ def check_model(model: Model, where: str = "") -> System:
         _check_names(model)
         _check_channels(model)
         _check_quantities(model)
+        _check_per_recording(model)
         system = compose(model)
     except ModelError as error:
         raise ModelError(f"{where}: {error}" if where else str(error)) from None
@@ -82,6 +83,15 @@ def _check_names(model: Model) -> None:
             if name in seen:
                 raise ModelError(f"{key}: found {name!r} again after {seen[name]}, expected one")
             seen[name] = key
+
+
+def _check_per_recording(model: Model) -> None:
+    for name, own in model.parameters.items():
+        if own.per_recording and (own.fixed or own.kept):
+            raise ModelError(
+                f"parameters.{name}: found per_recording and {'fixed' if own.fixed else 'kept'},"
+                " expected one of them"
+            )
 
 
 def _check_channels(model: Model) -> None:

@@ -18,6 +18,7 @@ from rigwatch.physics.engine.fit.recording import (
     windows,
 )
 from rigwatch.physics.engine.fit.ties import untied
+from rigwatch.physics.engine.fit.told_parameters import with_told
 from rigwatch.physics.engine.fit.windowed_fit import (
     Fit,
     bounds,
@@ -49,4 +50,5 @@ __all__ = [
     "result_of",
     "untied",
     "windows",
+    "with_told",
 ]

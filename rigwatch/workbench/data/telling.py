@@ -1,0 +1,60 @@
+"""First samples of held-out recordings, which tell parameters that move between recordings.
+
+A parameter with `per_recording` has a value of its own in a recording that is held out. If counted
+samples determined it, it would be a free constant for every effect alike. The first part of such a
+recording tells it instead and is not counted.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from rigwatch.workbench.data.columns import Columns
+from rigwatch.workbench.study import Span, Study, judged_alone
+
+LEAD = 0.1
+"""Share of a held-out recording that tells its own parameters."""
+
+
+def divided(
+    study: Study, tables: Sequence[Columns], horizon: int
+) -> tuple[list[Columns], list[Columns], list[str]]:
+    """Held-out recordings without what tells their own parameters, what tells them, and remarks.
+
+    Args:
+        study: its model has a fixed parameter for each held-out session of which no part is fitted.
+        tables: the held-out recordings.
+        horizon: samples of a window; a model with states is told over whole windows.
+    """
+    moving = [n for n, p in study.model.parameters.items() if p.per_recording and p.fixed]
+    spans = study.file.held_out
+    if not moving:
+        return list(tables), [], []
+    counted, telling, remarks = [], [], []
+    for table, span, first in zip(tables, spans, _first_parts(study, spans), strict=True):
+        lead = _lead(len(table), horizon if study.model.states else 1) if first else 0
+        counted.append(_part(table, slice(lead, None)))
+        if lead:
+            telling.append(_part(table, slice(lead)))
+            remarks.append(
+                f"held out: the first {lead * table.dt:.3g} s of {span.session} tell what moves"
+                " between recordings and are not counted"
+            )
+    return counted, telling, remarks
+
+
+def _first_parts(study: Study, spans: Sequence[Span]) -> Iterator[bool]:
+    """Whether each span is the first of a session of which no part is fitted."""
+    alone = judged_alone(study.file)
+    for span in spans:
+        yield span.session in alone
+        alone = [session for session in alone if session != span.session]
+
+
+def _lead(samples: int, step: int) -> int:
+    """Samples that tell: whole windows, and fewer than the recording has."""
+    wanted = -(-max(round(LEAD * samples), 2) // step) * step
+    return min(wanted, (samples - 1) // step * step)
+
+
+def _part(table: Columns, samples: slice) -> Columns:
+    return replace(table, values={name: column[samples] for name, column in table.values.items()})
