@@ -19,7 +19,14 @@ import numpy as np
 
 from benchmarks.explaining.hidden import collected
 from benchmarks.family.rig_folder import RigFolder
-from benchmarks.family.rig_folder_explain import ACCEPTED, explanation, is_right, named, strength_of
+from benchmarks.family.rig_folder_explain import (
+    ACCEPTED,
+    CLOSE,
+    explanation,
+    is_right,
+    named,
+    strength_of,
+)
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.explain import verdict_calibration
 from sim_plant.family import FLAVOURS, draw, write_rig
@@ -31,12 +38,13 @@ MODELS = {"servo-pneumatic": False, "fourth-order": True}
 
 @dataclass(frozen=True)
 class Case:
-    """A recording of a drawn rig, and the base model."""
+    """A recording of a drawn rig, the base model, and whether the study is told the mass."""
 
     member: str
     seed: int
     model: str
     recording: str
+    weighed: bool = False
 
 
 @dataclass(frozen=True)
@@ -110,6 +118,19 @@ def _rows(outcomes: Sequence[Outcome]) -> Iterator[Row]:
         yield Row(f"wrong verdicts along the motion on other rigs, {model}: promised and found",
                   f"{promised:.1f} and {came} of {len(known)}", "at most promised and 2 sd", "", "",
                   came <= promised + spread if known else None)  # fmt: skip
+        for weighed in (False, True):
+            yield from _strengths(model, [o for o in own if o.case.weighed == weighed])
+
+
+def _strengths(model: str, outcomes: Sequence[Outcome]) -> Iterator[Row]:
+    found = [o.strength for o in outcomes if o.strength is not None]
+    if not found:
+        return
+    told = "told" if outcomes[0].case.weighed else "not told"
+    close = sum(abs(value / true - 1) <= CLOSE for _, true, value, _, _ in found)
+    inside = sum(low <= true <= high for _, true, _, low, high in found)
+    yield Row(f"strength within {CLOSE:.0%} of the truth, {model}, mass {told}",
+              f"{close} of {len(found)}", "", "", f"in its interval: {inside}", None)  # fmt: skip
 
 
 def _cases(chosen: argparse.Namespace) -> Iterator[Case]:
@@ -120,7 +141,7 @@ def _cases(chosen: argparse.Namespace) -> Iterator[Case]:
                     truth = _rig(chosen.folder, member, seed).truth("explain")
                     for name, told in truth.items():
                         if told["what"] != "healthy":
-                            yield Case(member, seed, model, name)
+                            yield Case(member, seed, model, name, chosen.weighed)
 
 
 def _rig(folder: Path, member: str, seed: int) -> RigFolder:
@@ -133,7 +154,7 @@ def _rig(folder: Path, member: str, seed: int) -> RigFolder:
 def _solve(folder: Path, case: Case) -> Outcome:
     rig = _rig(folder, case.member, case.seed)
     told = rig.truth("explain")[case.recording]
-    said, failed = explanation(rig, case.recording, case.model)
+    said, failed = explanation(rig, case.recording, case.model, weighed=case.weighed)
     if not said:
         raise RigwatchError(failed)
     top, names = named(said)
@@ -157,6 +178,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--members", nargs="+", default=["calibration"])
     parser.add_argument("--models", nargs="+", default=list(MODELS), choices=MODELS)
     parser.add_argument("--seed", type=int, nargs="+", default=[5])
+    parser.add_argument("--weighed", action="store_true", help="tell studies the mass, within 1 %%")
     parser.add_argument("--minutes", type=float, default=1e9, help="start no case after these")
     parser.add_argument("--calibrate", action="store_true", help="write the calibration file")
     return parser

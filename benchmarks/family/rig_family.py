@@ -34,14 +34,16 @@ def main() -> int:
         if not arguments.write_only:
             rig = RigFolder(folder, folder / "work")
             group = FLAVOURS[flavour].group
-            for title, tally in _scores(rig, parts, arguments.models):
+            for title, tally in _scores(rig, parts, arguments):
                 totals.setdefault(f"{group}, {title}", Tally()).add(tally)
     for title, tally in totals.items():
         print(f"all of {title}: {tally}")
     return 0
 
 
-def _scores(rig: RigFolder, parts: tuple[str, ...], models: list[str]) -> list[tuple[str, Tally]]:
+def _scores(
+    rig: RigFolder, parts: tuple[str, ...], chosen: argparse.Namespace
+) -> list[tuple[str, Tally]]:
     """Plays the parts, prints them recording by recording, returns the counts of right results."""
     scores = []
     if "watch" in parts:
@@ -50,8 +52,8 @@ def _scores(rig: RigFolder, parts: tuple[str, ...], models: list[str]) -> list[t
         watch.tally.count("other faults not called friction", right=not watch.miscalled)
         scores.append(("watch", watch.tally))
     if "explain" in parts:
-        for model in models:
-            found = explained(rig, model)
+        for model in chosen.models:
+            found = explained(rig, model, weighed=chosen.weighed)
             title = f"{rig.recordings.name} explain {model}"
             print(*found.lines, f"{title}: {found.summary()}", sep="\n", flush=True)
             found.tally.count("members without a wrong one", right=not found.wrong)
@@ -79,6 +81,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--models", nargs="+", default=["servo-pneumatic", "fourth-order"], help="bases of explain"
     )
+    parser.add_argument("--weighed", action="store_true", help="tell studies the mass, within 1 %%")
     parser.add_argument("--write-only", action="store_true", help="write, do not play")
     return parser
 

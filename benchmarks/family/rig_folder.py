@@ -7,11 +7,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 CHANNELS = (
     ("voltage", "voltage_V[V]"),
     ("position", "position_m[m]"),
     ("acceleration", "acceleration_m_s2[m/s^2]"),
 )
+WEIGHING = 0.01
+"""Relative standard deviation of the mass that is weighed."""
 
 
 @dataclass
@@ -52,6 +56,13 @@ class RigFolder:
         """The truth of each recording of `part`."""
         told = json.loads((self.recordings / "truth.json").read_text(encoding="utf-8"))
         return dict(told.get(part, {}))
+
+    def weighed(self) -> float | None:
+        """The moving mass [kg] as a user weighs it, within 1 %; None if the truth lacks it."""
+        told = json.loads((self.recordings / "truth.json").read_text(encoding="utf-8"))
+        random = np.random.default_rng([*self.recordings.name.encode()])
+        error = WEIGHING * float(random.normal())
+        return float(told["mass"]) * (1 + error) if "mass" in told else None
 
     def session(self, part: str, name: str) -> Path:
         """The recording as a session, imported once."""

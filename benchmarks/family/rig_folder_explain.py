@@ -4,7 +4,7 @@ import shutil
 from dataclasses import dataclass, field
 from typing import Any
 
-from benchmarks.family.rig_folder import RigFolder, Tally, answer, command
+from benchmarks.family.rig_folder import WEIGHING, RigFolder, Tally, answer, command
 
 DRY = ("coulomb", "lugre", "stribeck", "dahl", "bliman", "jenkins", "bouc")
 ACCEPTED: dict[str, tuple[str, ...]] = {
@@ -23,6 +23,12 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
 STRENGTHS = {"dry": "Fc", "deadband": "b", "saturation": "us", "cubic": "k3", "spring": "k"}
 """The library's symbol for the strength of a hidden effect."""
 CLOSE = 0.15
+MASS = """\
+[start]
+m = {mass:.6g}
+[deviation]
+m = {deviation:.2g}
+"""
 STUDY = """\
 model = "{model}"
 [[train]]
@@ -57,23 +63,34 @@ class Explained:
         return f"{self.tally}, wrong with confidence {self.wrong}"
 
 
-def explained(rig: RigFolder, model: str) -> Explained:
-    """Explains every recording of `explain` with the base `model` and counts."""
+def explained(rig: RigFolder, model: str, *, weighed: bool = False) -> Explained:
+    """Explains every recording of `explain` with the base `model` and counts.
+
+    Args:
+        rig: the recordings.
+        model: name of the base model.
+        weighed: tell the study the moving mass.
+    """
     found = Explained()
     for name, told in rig.truth("explain").items():
         if told["what"] != "healthy":
-            _judge(found, name, told, *explanation(rig, name, model))
+            _judge(found, name, told, *explanation(rig, name, model, weighed=weighed))
     return found
 
 
-def explanation(rig: RigFolder, name: str, model: str) -> tuple[dict[str, Any], str]:
+def explanation(
+    rig: RigFolder, name: str, model: str, *, weighed: bool = False
+) -> tuple[dict[str, Any], str]:
     """The result of `rigwatch explain` for a recording, or its failure in words."""
     rig.session("explain", "healthy")
     rig.session("explain", name)
     folder = rig.work / "explain"
     study, template = folder / f"study_{name}_{model}", folder / f"{name}_{model}.toml"
     shutil.rmtree(study, ignore_errors=True)
-    template.write_text(STUDY.format(model=model, name=name), encoding="utf-8")
+    text = STUDY.format(model=model, name=name)
+    if weighed and (mass := rig.weighed()):
+        text += MASS.format(mass=mass, deviation=WEIGHING * mass)
+    template.write_text(text, encoding="utf-8")
     made = command("study", "new", study, "--template", template, "--sessions", folder)
     if made.returncode:
         return {}, made.stderr.strip()[-200:]

@@ -29,8 +29,11 @@ def members(group: str, seed: int = 1) -> dict[str, Member]:
 
 
 def write_rig(folder: Path, member: Member, parts: tuple[str, ...] = ("watch", "explain")) -> None:
-    """Writes the recordings of `parts` and truth.json, which includes strengths, to `folder`."""
-    truth: dict[str, dict[str, Any]] = {}
+    """Writes the recordings of `parts` and truth.json to `folder`.
+
+    The truth includes strengths and the moving mass `mass` [kg].
+    """
+    truth: dict[str, Any] = {"mass": member["mass"]}
     for part in parts:
         (folder / part).mkdir(parents=True, exist_ok=True)
         truth[part] = {}

@@ -11,6 +11,7 @@ from rigwatch.workbench.compare.preparation import (
     prepared,
 )
 from rigwatch.workbench.compare.uncertainty_budget import added_variances, apparent_strength
+from rigwatch.workbench.compare.unweighed import unweighed
 from rigwatch.workbench.compare.warm import Warm
 
 __all__ = [
@@ -29,5 +30,6 @@ __all__ = [
     "open_bench",
     "prepared",
     "sample_numbers",
+    "unweighed",
     "with_horizon_of",
 ]

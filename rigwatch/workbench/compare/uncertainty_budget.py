@@ -5,7 +5,7 @@ healthy recording, and those known to a stated deviation (for example a mass), a
 their covariance, and J_θ and J_κ the derivatives of the residual by the fitted and the kept
 parameters,
 
-    Cov θ ← Cov θ + A·S·Aᵀ,   A = J_θ⁺·J_κ
+    Cov θ ← Cov θ + A·S·Aᵀ,   A = -J_θ⁺·J_κ
 
 Second, model error mimics a little of every effect. The apparent strength of an effect on a healthy
 recording is used as a standard deviation of its strength. Third, along the measured motion the
@@ -21,6 +21,7 @@ from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Placement, compose
 from rigwatch.physics.engine.fit import evaluate
 from rigwatch.physics.engine.score import Candidate
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, with_kept_free
 from rigwatch.workbench.ranking import score_all
@@ -47,7 +48,7 @@ def added_variances(
     healthy = data.of_healthy
     if study.kept is None or bare is None or healthy is None or not fitted.compiled.system.free:
         return {}
-    found = _from_kept(study, study.kept, data, fitted)
+    found = _variances(study, study.kept, data, fitted)
     for placement in fitted.placements:
         name = placement.prefix + placement.effect.strength
         if name in found:
@@ -65,8 +66,15 @@ def _add_response_error(found: dict[str, float], placement: Placement, fitted: F
             found[whole] += (RESPONSE_ERROR * (values[whole] - parameter.neutral)) ** 2
 
 
-def _from_kept(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str, float]:
+def _variances(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str, float]:
     """Variances of the fitted parameters due to the kept ones."""
+    turn = _by_kept(study, kept, data, fitted)
+    variances = np.diag(turn @ kept.covariance @ turn.T)
+    return dict(zip(fitted.compiled.system.free, variances.tolist(), strict=True))
+
+
+def _by_kept(study: Study, kept: Kept, data: Data, fitted: Fitted) -> FloatArray:
+    """Derivatives of the fitted parameters by the kept ones, shape (fitted, kept)."""
     train = fitted.train
     compiled = compile_system(compose(with_kept_free(study.model, kept.names), fitted.placements))
     loose = dataclasses.replace(
@@ -77,9 +85,28 @@ def _from_kept(study: Study, kept: Kept, data: Data, fitted: Fitted) -> dict[str
     free, own = list(compiled.system.free), fitted.compiled.system.free
     by_own = jacobian[:, [free.index(name) for name in own]]
     by_kept = jacobian[:, [free.index(name) for name in kept.names]]
-    turn = np.linalg.lstsq(by_own, by_kept, rcond=None)[0]
-    variances = np.diag(turn @ kept.covariance @ turn.T)
-    return dict(zip(own, variances.tolist(), strict=True))
+    return np.asarray(-np.linalg.lstsq(by_own, by_kept, rcond=None)[0])
+
+
+def by_known(study: Study, data: Data, fitted: Fitted) -> dict[str, dict[str, float]]:
+    """Derivatives of the fitted parameters by each known one with a stated deviation.
+
+    They include that the kept parameters move with the known one: by Cov(κ, m)/Var(m).
+
+    Args:
+        study, data: as fitted.
+        fitted: the model with some effects.
+    """
+    kept = study.kept
+    if kept is None or not fitted.compiled.system.free:
+        return {}
+    turn, found = _by_kept(study, kept, data, fitted), {}
+    for index, name in enumerate(kept.names):
+        if study.model.parameters[name].deviation:
+            moves = kept.covariance[:, index] / kept.covariance[index, index]
+            values = zip(fitted.compiled.system.free, (turn @ moves).tolist(), strict=True)
+            found[name] = dict(values)
+    return found
 
 
 def apparent_strength(healthy: Data, bare: Fitted, placement: Placement, fitted: Fitted) -> float:

@@ -1,9 +1,16 @@
 """Ranks the effects that may be missing, gives a verdict and proposes the next experiment."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from rigwatch.workbench.compare import Bench, Comparison, added_variances, comparison, open_bench
+from rigwatch.workbench.compare import (
+    Bench,
+    Comparison,
+    added_variances,
+    comparison,
+    open_bench,
+    unweighed,
+)
 from rigwatch.workbench.explain.adequacy import inadequate, unchecked, with_base_offered
 from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.excitation import unexcited
@@ -13,6 +20,7 @@ from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
     limited_verdict,
+    much_left,
     undetermined_if_much_left,
 )
 from rigwatch.workbench.explain.several_effects import may_need_several, several_effects
@@ -25,7 +33,14 @@ from rigwatch.workbench.explain.verdict_calibration import (
     probability_wrong_along,
 )
 from rigwatch.workbench.fit import Value, as_written, values
-from rigwatch.workbench.ranking import Progress, Ranked, no_progress, rank, rank_all
+from rigwatch.workbench.ranking import (
+    Progress,
+    Ranked,
+    no_progress,
+    rank,
+    rank_all,
+    with_refinements,
+)
 from rigwatch.workbench.study import Study
 
 
@@ -110,6 +125,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
         return rows, with_base_offered(bench.study, stopped)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = credible_verdict(bench, rows)
+    rows, verdict = _refined(bench, rows, verdict, progress)
     along = bench.data.along_motion
     # Sets of effects are judged by whether only noise is left, which a rough model never reaches.
     if along or bench.study.model.rough:
@@ -125,6 +141,22 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
+
+
+def _refined(
+    bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Progress
+) -> tuple[list[Ranked], Verdict]:
+    """Ranking and verdict with refinements of the best effect, if it leaves much along the motion.
+
+    Verdicts on free runs are calibrated without them.
+    """
+    best = verdict.best
+    if not bench.data.along_motion or best is None or best.fitted is None:
+        return rows, verdict
+    if not much_left(bench.base, bench.floor, best.fitted):
+        return rows, verdict
+    more = with_refinements(bench.study, bench.data, bench.base, rows, best, progress)
+    return more, verdict if len(more) == len(rows) else credible_verdict(bench, more)
 
 
 def _by_pairs(bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Progress) -> Verdict:
@@ -157,17 +189,20 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     if verdict.best is not None and rivals and not bench.data.along_motion:
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
     more: dict[str, float] = {}
+    compared = comparison(bench)
     if verdict.best is not None and verdict.best.fitted is not None:
         more = added_variances(bench.study, bench.data, bench.bare, verdict.best.fitted)
-    told = [
+        told = unweighed(bench, verdict.best.placement, verdict.best.fitted)
+        compared = replace(compared, remarks=[*compared.remarks, *told])
+    listed = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
     ]
     probability, similar = _reliability(bench, verdict)
     return Explanation(
         verdict.word,
         verdict.text,
-        comparison(bench),
-        told,
+        compared,
+        listed,
         rivals,
         list(verdict.second),
         experiment,

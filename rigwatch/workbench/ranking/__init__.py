@@ -1,7 +1,8 @@
 """Ranks every effect at every port: score test, refit of the best, held-out error, classes.
 
 `candidates` are scored (`scoring`) and become rows (`ranked`); the most promising (`fit_selection`)
-are fitted (`refitting`) and judged by the held-out error (`acceptance`). `rank` runs all of these.
+are fitted (`refitting`) and judged by the held-out error (`acceptance`). `rank` runs all of these;
+`with_refinements` adds effects that describe the best one in more detail.
 """
 
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, MATERIAL, STEP, judge_fit, left_over
@@ -10,6 +11,7 @@ from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import AGAIN, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from
+from rigwatch.workbench.ranking.refinements import with_refinements
 from rigwatch.workbench.ranking.refitting import Progress, no_progress, refit
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
 
@@ -36,4 +38,5 @@ __all__ = [
     "scored",
     "select_for_fit",
     "shapes_of",
+    "with_refinements",
 ]

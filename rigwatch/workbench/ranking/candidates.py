@@ -35,3 +35,15 @@ def shapes_of(study: Study, recording: Recording, effect: str, port: str) -> lis
     check_ports(study)
     sizes = port_sizes(study.model, recording)[port]
     return shaped(effect, study.effect_at(effect, port).scaled(sizes), port)
+
+
+def refining(study: Study, recording: Recording, effect: str, port: str) -> list[Candidate]:
+    """The elective effects that refine one effect at its port, in each of their shapes."""
+    placed = {(a.effect, a.port) for a in study.file.effects}
+    names = [
+        name
+        for name, other in study.effects.items()
+        if other.elective and other.refines == effect and (name, port) not in placed
+        if suits(other, study.model.ports[port], study.model)
+    ]
+    return [c for name in names for c in shapes_of(study, recording, name, port)]

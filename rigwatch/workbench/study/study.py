@@ -35,6 +35,7 @@ from rigwatch.wire.errors import ConfigError, ModelError, nearest
 from rigwatch.wire.typed_files import parse, read_text
 from rigwatch.wire.units import Unit, unit_of
 from rigwatch.workbench.study.folder import FILE, LEDGER, settle
+from rigwatch.workbench.study.known_values import with_known_values
 from rigwatch.workbench.study.moving_parameters import fitted_by_recording, told_apart
 from rigwatch.workbench.study.own_files import NOTHING_UNSAVED, Unsaved, content
 from rigwatch.workbench.study.recording_parameters import (
@@ -216,7 +217,17 @@ def _in_si(study: Study) -> Study:
         for name, value in study.file.start.items()
     }
     effects = [converted(study, a, "to_si") for a in study.file.effects]
-    return replace(study, file=structs.replace(study.file, start=start, effects=tuple(effects)))
+    widths = {
+        name: _width(_unit(study.model.parameters.get(name)), value)
+        for name, value in study.file.deviation.items()
+    }
+    file = structs.replace(study.file, start=start, deviation=widths, effects=tuple(effects))
+    return replace(study, file=file, model=with_known_values(study.model, file))
+
+
+def _width(unit: Unit, value: float) -> float:
+    """A difference in SI, whatever the zero of its unit."""
+    return float(unit.to_si(value) - unit.to_si(0.0))
 
 
 def converted(study: Study, accepted: Accepted, way: Literal["to_si", "from_si"]) -> Accepted:
@@ -272,6 +283,7 @@ def varied(study: Study, variants: Sequence[str]) -> Study:
     file = structs.replace(study.file, variants=tuple(variants))
     written = _written(study.folder, file, study.own_files)
     model, holds = _held(_by_recording(written, file), file)
+    model = with_known_values(model, file)
     return replace(study, file=file, model=model, kept=None, holds=holds)
 
 

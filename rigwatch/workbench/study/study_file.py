@@ -102,7 +102,17 @@ class StudyFile(Section, frozen=True, kw_only=True):
     ] = field(default_factory=dict)
     start: Annotated[
         dict[str, float],
-        Meta(description="initial values of model parameters, in their units"),
+        Meta(
+            description="initial values of model parameters, in their units; a fixed parameter"
+            " keeps the value"
+        ),
+    ] = field(default_factory=dict)
+    deviation: Annotated[
+        dict[str, Annotated[float, Meta(ge=0)]],
+        Meta(
+            description="standard deviations of fixed parameters, for example of a weighed mass, in"
+            " their units; 0 if `start` gives the value alone"
+        ),
     ] = field(default_factory=dict)
     hold: Annotated[
         dict[str, Hold],

@@ -5,8 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.compare import Comparison, compare
-from rigwatch.workbench.study.study import open_study
+from rigwatch.workbench.compare.preparation import open_bench
+from rigwatch.workbench.compare.unweighed import unweighed
+from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.machine import Table, recorded, studied
 
 MODEL = """
@@ -38,14 +41,18 @@ def run(seed: int, friction: float, samples: int, noise: float = 0.002) -> Table
     return {"u": u, "v": v + noise * generator.normal(size=samples)}
 
 
-def compared(folder: Path, healthy: Table, deviation: str) -> Comparison:
+def compared(folder: Path, healthy: Table, deviation: str, keys: str = "") -> Comparison:
     """A study of rubbing recordings with friction in its model, told by a healthy recording."""
+    return compare(rubbing(folder, healthy, deviation, keys))
+
+
+def rubbing(folder: Path, healthy: Table, deviation: str, keys: str = "") -> Study:
     model = MODEL.replace("DEVIATION", deviation)
-    study = studied(folder, model, [run(0, 0.3, 1000)], [run(1, 0.3, 1000)], UNITS)
+    study = studied(folder, model, [run(0, 0.3, 1000)], [run(1, 0.3, 1000)], UNITS, keys)
     recorded(folder / "healthy.mcap", healthy, UNITS)
     with (study.folder / "study.toml").open("a") as file:
         file.write('[[healthy]]\nsession = "../healthy.mcap"\n' + EFFECT)
-    return compare(open_study(study.folder))
+    return open_study(study.folder)
 
 
 def test_a_strength_is_no_better_known_than_the_mass_it_is_told_by(tmp_path: Path) -> None:
@@ -59,6 +66,39 @@ def test_a_strength_is_no_better_known_than_the_mass_it_is_told_by(tmp_path: Pat
     assert widths[0] < 0.1
     # A mass that is off by a tenth makes every force so.
     assert widths[1] == pytest.approx(1.96 * 0.1, rel=0.2)
+
+
+def test_a_mass_that_was_weighed_replaces_the_model_files(tmp_path: Path) -> None:
+    widths = []
+    for name, keys in (
+        ("alone", "start = { m = 1.2 }"),
+        ("deviation", "start = { m = 1.2 }\ndeviation = { m = 0.012 }"),
+    ):
+        found = compared(tmp_path / name, run(2, 0.0, 1000), "deviation = 0.3,", keys)
+        friction = found.parameters["load_coulomb_Fc"]
+        # The recordings show the force for each kilogram.
+        assert friction.value == pytest.approx(0.3 * 1.2, rel=0.05)
+        assert friction.interval is not None
+        widths.append((friction.interval[1] - friction.interval[0]) / 2 / friction.value)
+    assert widths[0] < 0.1
+    added = np.sqrt(widths[1] ** 2 - widths[0] ** 2)
+    assert added == pytest.approx(1.96 * 0.01, rel=0.2)
+
+
+def test_a_strength_says_how_it_moves_with_a_mass_that_nobody_weighed(tmp_path: Path) -> None:
+    told = []
+    for name, keys in (("prior", ""), ("weighed", "start = { m = 1.2 }\ndeviation = { m = 0.1 }")):
+        study = rubbing(tmp_path / name, run(2, 0.0, 1000), "deviation = 0.1,", keys)
+        bench = open_bench(study)
+        told.append(unweighed(bench, bench.base.placements[0], bench.base))
+    assert len(told[0]) == 1
+    assert "Fc of coulomb@load moves by 1 % for each percent of m (" in told[0][0]
+    assert not told[1]
+
+
+def test_the_deviation_of_a_parameter_that_is_fitted_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r"deviation: found 'c', expected a fixed parameter of"):
+        rubbing(tmp_path, run(2, 0.0, 1000), "", "deviation = { c = 0.1 }")
 
 
 def test_a_healthy_recording_says_what_it_leaves_open(tmp_path: Path) -> None:

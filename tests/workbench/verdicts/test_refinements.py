@@ -1,0 +1,86 @@
+"""A guide that binds and bends before it slips is found by a refinement of `binding`."""
+
+from pathlib import Path
+
+import numpy as np
+
+from rigwatch.wire.kernel import kernel
+from rigwatch.workbench.compare.preparation import open_bench
+from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.study.study import open_study
+from tests.workbench.machine import Table, recorded, studied
+
+MODEL = """
+name = "slide"
+summary = "A lagging motor moves a mass on a spring; position and acceleration are measured."
+inputs.u = { unit = "N", hold = "zero" }
+states.x = { unit = "m", derivative = "v", measured = "x" }
+states.v = { unit = "m/s", derivative = "acceleration", rate_of = "x" }
+states.s = { unit = "N", derivative = "w*(u - s)" }
+quantities.acceleration = { expression = "(s - c*v - k*x + load)/m", unit = "m/s^2" }
+parameters.m = { value = 1.0, unit = "kg", fixed = true }
+parameters.c = { value = 2.0, unit = "N s/m", low = 0.0, kept = true }
+parameters.k = { value = 100.0, unit = "N/m", low = 0.0, kept = true }
+parameters.w = { value = 50.0, unit = "1/s", low = 1.0, high = 500.0, kept = true }
+outputs.x = { unit = "m", expression = "x" }
+outputs.a = { unit = "m/s^2", expression = "acceleration" }
+[ports.load]
+kind = "force"
+unit = "N"
+variables.x = { expression = "x", unit = "m" }
+variables.v = { expression = "v", unit = "m/s" }
+"""
+UNITS = {"u": "N", "x": "m", "a": "m/s^2"}
+RATE, STEPS = 256.0, 40
+CENTRE, REACH = 0.004, 2e-4
+
+
+@kernel()
+def slid(u: np.ndarray, binding: float, steps: int, h: float) -> np.ndarray:
+    """Position and acceleration at each sample; the force of the contact is bent over `REACH`."""
+    out = np.zeros((u.size, 2))
+    x = v = s = z = 0.0
+    for n in range(u.size):
+        for j in range(steps):
+            a = s - 2.0 * v - 100.0 * x - binding * abs(x - CENTRE) * z
+            if j == 0:
+                out[n, 0], out[n, 1] = x, a
+            v += h * a
+            x += h * v
+            z += h * (v - abs(v) * z) / REACH
+            s += h * 60.0 * (u[n] - s)
+    return out
+
+
+def run(seed: int, binding: float, samples: int = 4096) -> Table:
+    generator = np.random.default_rng(seed)
+    lines = np.arange(3, 120)
+    spectrum = np.zeros(513, dtype=complex)
+    spectrum[lines] = np.exp(2j * np.pi * np.random.default_rng(7).random(lines.size))
+    drive = np.fft.irfft(spectrum, 1024)
+    u = np.tile(2.0 * drive / drive.std(), samples // 1024)
+    moved = slid(u, binding, STEPS, 1.0 / (RATE * STEPS))
+    moved += generator.normal(size=moved.shape) * [2e-6, 0.01]
+    return {"u": u, "x": moved[:, 0], "a": moved[:, 1]}
+
+
+def test_presliding_and_centre_of_a_slide_that_binds_are_found(tmp_path: Path) -> None:
+    made = studied(tmp_path, MODEL, [run(0, 20.0)], [run(1, 20.0)], UNITS, rates=[RATE, RATE])
+    recorded(tmp_path / "healthy.mcap", run(2, 0.0), UNITS, RATE)
+    with (made.folder / "study.toml").open("a") as file:
+        file.write('[[healthy]]\nsession = "../healthy.mcap"\n')
+    bench = open_bench(open_study(made.folder))
+    assert bench.data.along_motion
+
+    rows, verdict = ranking(bench)
+
+    assert verdict.word == "missing_effect"
+    assert verdict.best is rows[0]
+    assert verdict.best.label == "binding_with_memory@load"
+    assert verdict.best.fitted is not None
+    values = verdict.best.fitted.train.values()
+    assert abs(values["load_binding_with_memory_xb"] - CENTRE) < 1e-4
+    strength = values["load_binding_with_memory_Fb"] / values["load_binding_with_memory_xe"]
+    assert abs(strength / 20.0 - 1) < 0.05
+    # Rows know the refinement as they know each other.
+    assert all(verdict.best.label in row.cosines for row in rows if row is not verdict.best)
