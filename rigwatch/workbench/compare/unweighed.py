@@ -24,7 +24,8 @@ def unweighed(bench: Bench, placement: Placement, fitted: Fitted) -> list[str]:
     model, values = bench.study.model, fitted.train.values()
     own = placement.effect.parameters[placement.effect.strength]
     strength = placement.prefix + placement.effect.strength
-    found, size = [], values[strength] - own.neutral
+    # A fault of the sensor whose motion drives the model is no parameter of the fit.
+    found, size = [], values.get(strength, own.neutral) - own.neutral
     for name, slopes in by_known(bench.study, bench.data, fitted).items():
         share = slopes.get(strength, 0.0) * values[name] / size if size else 0.0
         if name not in bench.study.file.start and abs(share) >= MATTERS:

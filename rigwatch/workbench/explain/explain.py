@@ -155,8 +155,18 @@ def _refined(
         return rows, verdict
     if not much_left(bench.base, bench.floor, best.fitted):
         return rows, verdict
-    more = with_refinements(bench.study, bench.data, bench.base, rows, best, progress)
-    return more, verdict if len(more) == len(rows) else credible_verdict(bench, more)
+    known = {row.label for row in rows}
+    rows = with_refinements(bench.study, bench.data, bench.base, rows, best, progress)
+    for row in rows:
+        if row.label not in known and _explains_the_rest(bench, row):
+            # The coarser effect is named in place of a finer one while other physics is missing.
+            best.accepted, best.reason = False, f"leaves much that {row.label} explains"
+    return rows, verdict if len(rows) == len(known) else credible_verdict(bench, rows)
+
+
+def _explains_the_rest(bench: Bench, row: Ranked) -> bool:
+    fitted = row.fitted if row.accepted else None
+    return fitted is not None and not much_left(bench.base, bench.floor, fitted)
 
 
 def _by_pairs(bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Progress) -> Verdict:

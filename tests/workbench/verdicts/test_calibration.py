@@ -5,8 +5,10 @@ import pytest
 from rigwatch.workbench.explain.verdict_calibration import (
     Evidence,
     cases_seen,
+    cases_seen_along,
     cell_of,
     probability_wrong,
+    probability_wrong_along,
 )
 
 
@@ -29,3 +31,15 @@ def test_cells_part_at_their_edges() -> None:
     assert cell_of("missing_effect", Evidence(0.02, 3.0)) == ("missing_effect", 0, 0)
     assert cell_of("missing_effect", Evidence(0.021, 3.1)) == ("missing_effect", 1, 1)
     assert cell_of("missing_effect", Evidence(0.11, 6.1)) == ("missing_effect", 2, 2)
+
+
+@pytest.mark.parametrize("rough", [False, True])
+@pytest.mark.parametrize("word", ["missing_effect", "nothing_missing", "undetermined"])
+def test_a_verdict_along_the_motion_is_doubted_by_its_own_word(word: str, rough: bool) -> None:
+    cases, wrong = cases_seen_along(word, rough=rough)
+    assert 0 <= wrong < cases
+    assert probability_wrong_along(word, rough=rough) == pytest.approx((wrong + 1) / (cases + 2))
+
+
+def test_along_the_motion_nothing_is_promised_for_a_word_that_was_not_counted() -> None:
+    assert probability_wrong_along("model_inadequate", rough=False) is None

@@ -54,5 +54,7 @@ def test_gain_of_the_position_sensor_is_named_and_nothing_else(
     assert verdict.best.label == "gain@position_sensor"
     assert verdict.best.start["g"] == pytest.approx(1.08, rel=0.03)
     told = explanation(bench, rows, verdict)
-    assert told.wrong_probability is None
-    assert "not calibrated" in doubt_of(told)
+    cases, wrong = told.like_this
+    assert cases
+    assert told.wrong_probability == pytest.approx((wrong + 1) / (cases + 2))
+    assert f"of {cases} similar simulated cases {wrong} were wrong" in doubt_of(told)

@@ -82,5 +82,8 @@ def test_presliding_and_centre_of_a_slide_that_binds_are_found(tmp_path: Path) -
     assert abs(values["load_binding_with_memory_xb"] - CENTRE) < 1e-4
     strength = values["load_binding_with_memory_Fb"] / values["load_binding_with_memory_xe"]
     assert abs(strength / 20.0 - 1) < 0.05
+    coarse = next(row for row in rows if row.label == "binding@load")
+    assert not coarse.accepted
+    assert coarse.reason == "leaves much that binding_with_memory@load explains"
     # Rows know the refinement as they know each other.
     assert all(verdict.best.label in row.cosines for row in rows if row is not verdict.best)
