@@ -10,11 +10,10 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.routing import Route
 
-from rigwatch.browser.recordings import stories
 from rigwatch.browser.rig import can_roll_back, study_in_force
 from rigwatch.browser.server.context import Context, answer, context_of, number_of, told
 from rigwatch.browser.server.places import PlaceError
-from rigwatch.browser.views import AtRig, candidate_html, listed, parts_of, render, state_of
+from rigwatch.browser.views import AtRig, candidate_html, parts_of, render, state_of
 from rigwatch.browser.work import Job, as_plain, model_in_force
 from rigwatch.wire.errors import RigwatchError
 
@@ -22,18 +21,6 @@ from rigwatch.wire.errors import RigwatchError
 def _step(request: Request) -> int | None:
     step = number_of(request, "step")
     return None if step is None else int(step)
-
-
-async def studies_page(request: Request) -> Response:
-    """The list of studies."""
-    context = context_of(request)
-    found = await run_in_threadpool(listed, context.places.root)
-    return HTMLResponse(
-        render(
-            "studies.html", studies=found, folder=context.places.root.name, place="studies",
-            has_rig=context.rig is not None, stories=stories(context.places.root),
-        )
-    )  # fmt: skip
 
 
 async def study_page(request: Request) -> Response:
@@ -116,7 +103,6 @@ FILES = {"report": "report.html", "experiment": "experiment.csv"}
 ROUTES = [
     Route("/api/file/report/{name:path}", told(study_file)),
     Route("/api/file/experiment/{name:path}", told(study_file)),
-    Route("/", studies_page),
     Route("/study/{name:path}", study_page),
     Route("/api/parts/{name:path}", told(study_parts)),
     Route("/api/candidate/{name:path}", told(study_candidate)),
