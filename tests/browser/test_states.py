@@ -138,6 +138,32 @@ def test_cancelled_and_failed_are_told_and_stay_to_be_read(page: Page, study: St
     assert "found no effect to undo" in page.text("#job-text")
 
 
+def test_what_is_refused_is_added_anyway_and_the_ledger_says_so(page: Page, study: Study) -> None:
+    opened(page)
+    page.after(lambda: page.press("e"), "explain", "done")
+    page.until(lambda: page.all("#ranking tr.candidate"), "the ranking")
+    label = page.run(
+        "return [...document.querySelectorAll('#ranking tr.candidate:not([hidden])')].at(-1)"
+        ".dataset.label"
+    )
+    page.click(f'#ranking tr[data-label="{label}"]')
+    page.until(lambda: page.all('#detail [data-act="preview"]'), "the evidence")
+    assert not page.all('#detail [data-act="anyway"]'), "it has not been fitted yet"
+    page.after(lambda: page.click('#detail [data-act="preview"]'), "preview", "done")
+    page.until(lambda: page.all('#detail [data-act="anyway"]'), "it is not supported")
+    page.after(lambda: page.click('#detail [data-act="add"]'), "add", "refused")
+    assert not open_study(study.folder).file.effects
+    page.click(f'#ranking tr[data-label="{label}"]')
+    page.after(lambda: page.click('#detail [data-act="anyway"]'), "add", "done")
+    page.until(lambda: page.all("#undo:enabled"), "it can be undone")
+    (added,) = open_study(study.folder).file.effects
+    assert f"{added.effect}@{added.port}" == label
+    assert list(lines(open_study(study.folder)))[-1]["reason"].startswith("added anyway: ")
+    assert "added anyway" in page.text("#ledger ol.book li")
+    page.after(lambda: page.click("#undo"), "undo", "done")
+    assert not open_study(study.folder).file.effects
+
+
 def test_data_that_changed_are_told_and_taken(page: Page, study: Study) -> None:
     opened(page)
     file = study.folder.parent / "train0.mcap"

@@ -2,6 +2,14 @@
 
 from rigwatch.browser.rig.alarm_study import TooSoonError, study_of_alarm
 from rigwatch.browser.rig.link import RigLink
-from rigwatch.browser.rig.promotions import can_roll_back, promotions, roll_back
+from rigwatch.browser.rig.promotions import can_roll_back, promotions, roll_back, study_in_force
 
-__all__ = ["RigLink", "TooSoonError", "can_roll_back", "promotions", "roll_back", "study_of_alarm"]
+__all__ = [
+    "RigLink",
+    "TooSoonError",
+    "can_roll_back",
+    "promotions",
+    "roll_back",
+    "study_in_force",
+    "study_of_alarm",
+]

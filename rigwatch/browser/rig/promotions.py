@@ -63,15 +63,31 @@ def can_roll_back(rig: Path) -> bool:
         return False
 
 
+def study_in_force(rig: Path, root: Path) -> str:
+    """Name of the study that the model in force is from; empty if it is from none.
+
+    Raises:
+        ConfigError: the rig's configuration or the history cannot be read.
+    """
+    path = model_path(rig)
+    now = model_versions.digest_of(path)
+    promoted = [
+        one.why
+        for one in model_versions.history(path)
+        if one.step == "promote" and one.sha256 == now
+    ]
+    return _study(root, promoted[-1]) if promoted else ""
+
+
 def roll_back(rig: Path, root: Path) -> ModelHandover:
     """Restore the previous model, with a line in the ledger of the study that is rolled back.
 
     Raises:
         ConfigError: there is no previous model.
     """
-    current = next((one for one in promotions(rig, root) if one.in_force), None)
-    if current is not None and current.study:
-        return hand_over(open_study(root / current.study), rig, rollback=True)
+    study = study_in_force(rig, root)
+    if study:
+        return hand_over(open_study(root / study), rig, rollback=True)
     return restore(rig)
 
 

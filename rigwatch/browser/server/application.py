@@ -19,19 +19,19 @@ from rigwatch.browser.server import (
     editor_routes,
     import_routes,
     job_routes,
+    list_routes,
     rig_routes,
     signal_routes,
     study_routes,
 )
 from rigwatch.browser.server.access import Access, Guard
 from rigwatch.browser.server.context import Context
+from rigwatch.browser.views import stamp
 from rigwatch.browser.work import warm_up
 from rigwatch.page import STYLE
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.workbench.study import FILE
 
 STATIC = Path(str(files("rigwatch.browser.server").joinpath("static")))
-LEDGER = "ledger.jsonl"
 
 
 def application(context: Context, access: Access) -> Starlette:
@@ -44,6 +44,7 @@ def application(context: Context, access: Access) -> Starlette:
         *rig_routes.ROUTES,
         *signal_routes.ROUTES,
         *job_routes.ROUTES,
+        *list_routes.ROUTES,
         *study_routes.ROUTES,
     ]
     app = Starlette(
@@ -68,7 +69,7 @@ async def _lifespan(app: Starlette) -> AsyncIterator[None]:
     warm_up()
     with contextlib.suppress(RigwatchError):  # the rig's page tells what is wrong
         rig_routes.link_of(app)
-    watching = asyncio.create_task(context.desks.watch(_state))
+    watching = asyncio.create_task(context.desks.watch(stamp))
     try:
         yield
     finally:
@@ -76,16 +77,3 @@ async def _lifespan(app: Starlette) -> AsyncIterator[None]:
         context.desks.close()
         if hasattr(app.state, "link"):
             app.state.link.close()
-
-
-def _state(folder: Path) -> object:
-    """What tells that a study was changed."""
-    found = []
-    for name in (FILE, LEDGER):
-        try:
-            stat = (folder / name).stat()
-        except OSError:
-            found.append((0, 0, 0))
-        else:
-            found.append((stat.st_ino, stat.st_size, stat.st_mtime_ns))
-    return tuple(found)

@@ -10,29 +10,17 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.routing import Route
 
-from rigwatch.browser.recordings import stories
-from rigwatch.browser.server.context import answer, context_of, number_of, told
+from rigwatch.browser.rig import can_roll_back, study_in_force
+from rigwatch.browser.server.context import Context, answer, context_of, number_of, told
 from rigwatch.browser.server.places import PlaceError
-from rigwatch.browser.views import candidate_html, listed, parts_of, render, state_of
-from rigwatch.browser.work import Job, as_plain
+from rigwatch.browser.views import AtRig, candidate_html, parts_of, render, state_of
+from rigwatch.browser.work import Job, as_plain, model_in_force
 from rigwatch.wire.errors import RigwatchError
 
 
 def _step(request: Request) -> int | None:
     step = number_of(request, "step")
     return None if step is None else int(step)
-
-
-async def studies_page(request: Request) -> Response:
-    """The list of studies."""
-    context = context_of(request)
-    found = await run_in_threadpool(listed, context.places.root)
-    return HTMLResponse(
-        render(
-            "studies.html", studies=found, folder=context.places.root.name, place="studies",
-            has_rig=context.rig is not None, stories=stories(context.places.root),
-        )
-    )  # fmt: skip
 
 
 async def study_page(request: Request) -> Response:
@@ -44,7 +32,7 @@ async def study_page(request: Request) -> Response:
     }  # fmt: skip
     try:
         folder = await run_in_threadpool(context.places.checked, name)
-        state, parts = await run_in_threadpool(_drawn, folder, name, _step(request), context.rig)
+        state, parts = await run_in_threadpool(_drawn, folder, name, _step(request), context)
     except RigwatchError as error:
         return HTMLResponse(render("study.html", **(values | {"trouble": str(error)})), 404)
     shown = {name: Markup(html) for name, html in parts.items()}
@@ -56,7 +44,7 @@ async def study_parts(request: Request) -> Response:
     """The parts of a study's page and the data for its script."""
     context, name = context_of(request), request.path_params["name"]
     folder = await run_in_threadpool(context.places.checked, name)
-    state, parts = await run_in_threadpool(_drawn, folder, name, _step(request), context.rig)
+    state, parts = await run_in_threadpool(_drawn, folder, name, _step(request), context)
     return answer({"parts": parts, "state": state, "job": job_data(context.desk(request).job)})
 
 
@@ -81,10 +69,22 @@ async def study_file(request: Request) -> Response:
 
 
 def _drawn(
-    folder: Path, name: str, step: int | None, rig: Path | None
+    folder: Path, name: str, step: int | None, context: Context
 ) -> tuple[dict[str, Any], dict[str, str]]:
     state = state_of(folder, name, step)
-    return state.plain(), parts_of(state, rig)
+    return state.plain(), parts_of(state, _at_rig(context))
+
+
+def _at_rig(context: Context) -> AtRig | None:
+    """The rig to promote to; what is wrong with its configuration is said on its own page."""
+    rig = context.rig
+    if rig is None:
+        return None
+    try:
+        study = study_in_force(rig, context.places.root)
+        return AtRig(rig, model_in_force(rig), study, can_roll_back(rig))
+    except RigwatchError:
+        return AtRig(rig)
 
 
 def _script(state: dict[str, Any]) -> Any:
@@ -103,7 +103,6 @@ FILES = {"report": "report.html", "experiment": "experiment.csv"}
 ROUTES = [
     Route("/api/file/report/{name:path}", told(study_file)),
     Route("/api/file/experiment/{name:path}", told(study_file)),
-    Route("/", studies_page),
     Route("/study/{name:path}", study_page),
     Route("/api/parts/{name:path}", told(study_parts)),
     Route("/api/candidate/{name:path}", told(study_candidate)),

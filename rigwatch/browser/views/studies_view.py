@@ -7,7 +7,7 @@ from pathlib import Path
 from rigwatch.browser.views.study_state import State, state_of
 from rigwatch.browser.views.study_view import headline
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.workbench.study import FILE
+from rigwatch.workbench.study import FILE, LEDGER
 
 DEEP = 3
 """Depth of folders below the root in which studies are searched."""
@@ -53,7 +53,20 @@ class Listed:
 
 def listed(root: Path) -> list[Listed]:
     """All studies below a folder."""
-    return [_listed(root, folder) for folder in _folders(root)]
+    return [_listed(root, folder) for folder in study_folders(root)]
+
+
+def stamp(folder: Path) -> object:
+    """What tells that a study was changed."""
+    return tuple(_state(folder / name) for name in (FILE, LEDGER))
+
+
+def _state(file: Path) -> tuple[int, int, int]:
+    try:
+        found = file.stat()
+    except OSError:
+        return (0, 0, 0)
+    return (found.st_ino, found.st_size, found.st_mtime_ns)
 
 
 def _listed(root: Path, folder: Path) -> Listed:
@@ -64,7 +77,7 @@ def _listed(root: Path, folder: Path) -> Listed:
         return Listed(name, None, str(error))
 
 
-def _folders(root: Path) -> Iterator[Path]:
+def study_folders(root: Path) -> Iterator[Path]:
     """Folders with a study; links that lead out of the root are not followed."""
     found = {
         path.parent

@@ -1,9 +1,9 @@
 """The parts of a study's page, each a fragment of HTML that replaces the previous one."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
+from rigwatch.browser.views.at_rig import AtRig, falls, in_force, rehearsal_of
 from rigwatch.browser.views.equivalents import adding, every_step
 from rigwatch.browser.views.motion_map import motion_map
 from rigwatch.browser.views.pages import render
@@ -61,8 +61,9 @@ class Candidate:
         return str(self.told.get("reason", self.row.reason))
 
 
-def parts_of(state: State, rig: Path | None = None) -> dict[str, str]:
-    """All parts by name; `rig`: configuration of the rig to promote to."""
+def parts_of(state: State, rig: AtRig | None = None) -> dict[str, str]:
+    """All parts by name; `rig`: the rig to promote to."""
+    rehearsal = rehearsal_of(state, rig)
     values = {
         "s": state,
         "headline": headline(state),
@@ -71,10 +72,12 @@ def parts_of(state: State, rig: Path | None = None) -> dict[str, str]:
         "regions": regions(state),
         "views": VIEWS,
         "maps": motion_map(state),
-        "commands": every_step(state.whole, rig),
+        "commands": every_step(state.whole, rig.config if rig else None),
         "no_experiment": no_experiment(state),
-        "rig": rig is not None,
-        "rehearsal": state.results.read("rehearsal") if rig else None,
+        "rig": rig,
+        "rehearsal": rehearsal,
+        "falls": falls(rehearsal),
+        "in_force": in_force(state, rig),
     }
     return {name: render(f"{name}.html", **values) for name in PARTS}
 

@@ -3,6 +3,7 @@
 from rigwatch.browser.work.apart import ApartError, apart
 from rigwatch.browser.work.desk import Desk, Desks, Job, warm_up
 from rigwatch.browser.work.directions import Directions
+from rigwatch.browser.work.rehearsal import model_in_force
 from rigwatch.browser.work.results import FOLDER as RESULTS
 from rigwatch.browser.work.results import Results, as_plain, results_of, signal_key
 
@@ -16,6 +17,7 @@ __all__ = [
     "Results",
     "apart",
     "as_plain",
+    "model_in_force",
     "results_of",
     "signal_key",
     "warm_up",

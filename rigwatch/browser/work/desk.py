@@ -225,6 +225,11 @@ class Desks:
             other.close()
         return desk
 
+    def jobs(self) -> dict[Path, Job]:
+        """The running job of each study, or its last one, by the study's folder."""
+        found = ((folder, desk.job) for folder, desk in self._desks.items())
+        return {folder: job for folder, job in found if job is not None}
+
     def close(self) -> None:
         """End all processes."""
         for desk in self._desks.values():

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from monitor.model import load_model
+from monitor.model import load_model, model_versions
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import newest, open_session
@@ -12,6 +12,11 @@ from rigwatch.workbench.study import Study
 
 MINUTES = 3.0
 """Longest recording used for a rehearsal [min]."""
+
+
+def model_in_force(rig: Path) -> str:
+    """Digest of the model of a rig's monitor, which a rehearsal is compared with."""
+    return model_versions.digest_of(model_path(rig))
 
 
 def rehearsal(study: Study, rig: Path, progress: Callable[[str], None]) -> Rehearsal:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigwatch.browser.signals import write_trace
 from rigwatch.browser.work.directions import write_directions
-from rigwatch.browser.work.results import Results, results_of, signal_key
+from rigwatch.browser.work.results import Results, as_plain, results_of, signal_key
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Bench, Warm, locate, sample_numbers
 from rigwatch.workbench.explain import Experiment, excitation, explanation, ranking
@@ -125,12 +125,13 @@ class Worker:
 
     def rehearse(self, rig: str) -> dict[str, Any]:
         """Run the monitor with the study's results over the rig's latest samples."""
-        from rigwatch.browser.work.rehearsal import rehearsal
+        from rigwatch.browser.work.rehearsal import model_in_force, rehearsal
 
         study = open_study(self.folder)
         self.progress("making the monitor's model")
+        against = model_in_force(Path(rig))
         found = rehearsal(study, Path(rig), self.progress)
-        results_of(study).write("rehearsal", found)
+        results_of(study).write("rehearsal", as_plain(found) | {"against": against})
         raised = f"raises {', '.join(found.alarms)}" if found.alarms else "raises no alarm"
         text = f"over the last {found.seconds:.0f} s the monitor's residual goes from"
         return {"text": f"{text} {found.before:.3g} to {found.after:.3g} m/s^2 and it {raised}"}

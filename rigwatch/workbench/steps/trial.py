@@ -126,7 +126,8 @@ def try_add(
     in_set = _in_set(bench, row, others, progress)
     if in_set is not None and in_set.reason:
         row = replace(row, reason=f"{row.reason}; {in_set.reason}")
-    if not (row.accepted or anyway or (in_set is not None and not in_set.reason)):
+    supported = row.accepted or (in_set is not None and not in_set.reason)
+    if not (supported or anyway):
         return _refused(study, row, before, f"{_falls(row, before, found)}: {row.reason}")
     accepted = whole(row)
     # Hold and horizon are kept, so that errors before and after refer to the same inputs.
@@ -135,11 +136,12 @@ def try_add(
     progress(f"refitting with {row.label}")
     after = warm.comparison(changed)
     again = after.held_out_error
-    if not (keeps_gain(before.held_out_error, found, again, after.noise_floor) or anyway):
-        row = replace(row, reason=f"refitted, it leaves {again:.4g} {after.unit}")
-        return _refused(study, row, before, f"{_falls(row, before, found)}, but {row.reason}")
+    if supported and not keeps_gain(before.held_out_error, found, again, after.noise_floor):
+        supported, row = False, replace(row, reason=f"refitted, it leaves {again:.4g} {after.unit}")
+        if not anyway:
+            return _refused(study, row, before, f"{_falls(row, before, found)}, but {row.reason}")
     line = {"parameters": accepted.parameters, "model_parameters": accepted.model}
-    line |= _evidence(in_set)
+    line |= _evidence(in_set) | ({} if supported else {"reason": f"added anyway: {row.reason}"})
     errors, text = (after.train_error, again), _falls(row, before, again)
     text = f"{text}; {in_set.text} {before.unit}" if in_set is not None else text
     change = Change("add", effect, where, before, after, errors, text)

@@ -10,7 +10,7 @@ from rigwatch.workbench.study.edits import (
     use_model_file,
     use_variants,
 )
-from rigwatch.workbench.study.folder import FILE, digest
+from rigwatch.workbench.study.folder import FILE, LEDGER, digest
 from rigwatch.workbench.study.ledger import append, check_data, commit, lines, model_hash, stands_on
 from rigwatch.workbench.study.moving_parameters import judged_alone
 from rigwatch.workbench.study.recording_parameters import Known
@@ -20,6 +20,7 @@ from rigwatch.workbench.study.study_file import Accepted, Derive, Derived, Span,
 __all__ = [
     "FILE",
     "GIVEN",
+    "LEDGER",
     "Accepted",
     "Derive",
     "Derived",

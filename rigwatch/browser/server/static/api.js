@@ -38,16 +38,16 @@ export async function signals(path, signal) {
 }
 
 /** Server-sent events for as long as the page is looked at: a browser has few connections. */
-export function listen(path, heard) {
+export function listen(path, heard, kinds = ["job", "study"]) {
   let source = null;
   const open = () => {
     if (source || document.hidden) return;
     source = new EventSource(path);
-    for (const kind of ["job", "study"]) source.addEventListener(kind, (event) => heard(kind, JSON.parse(event.data)));
+    for (const kind of kinds) source.addEventListener(kind, (event) => heard(kind, JSON.parse(event.data)));
   };
   const close = () => { source?.close(); source = null; };
   document.addEventListener("visibilitychange", () => {
-    if (document.hidden) close(); else { open(); heard("study", {}); }
+    if (document.hidden) close(); else { open(); heard(kinds.at(-1), {}); }
   });
   addEventListener("pagehide", close);
   open();

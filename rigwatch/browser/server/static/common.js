@@ -22,6 +22,12 @@ export async function attempt(action) {
   }
 }
 
+/** A bar as far as a task's text says, such as "fitting lugre@load, 3 of 12"; else one that only moves. */
+export function advance(bar, text) {
+  const steps = /(\d+) of (?:at most )?(\d+)/.exec(text);
+  if (steps) { bar.max = Number(steps[2]); bar.value = Number(steps[1]); } else bar.removeAttribute("value");
+}
+
 const stored = "rigwatch.keys";
 export function keysOn() { return localStorage.getItem(stored) !== "off"; }
 

@@ -1,6 +1,6 @@
 // The page of a study: parts from the server, charts, candidates, places, keys.
 import { get, post, listen } from "./api.js";
-import { $, attempt, keysOn, remark, say, showHelp } from "./common.js";
+import { $, advance, attempt, keysOn, remark, say, showHelp } from "./common.js";
 import { Charts } from "./charts.js";
 import { cursor } from "./cursor.js";
 import { exportable } from "./figures.js";
@@ -168,9 +168,8 @@ function showJob() {
   const box = $("job");
   box.hidden = !(job.active || (["failed", "refused", "cancelled"].includes(job.state) && job.task !== "show"));
   $("dismiss").hidden = job.active;
-  const steps = /(\d+) of (?:at most )?(\d+)/.exec(job.text);
   const bar = $("job-progress");
-  if (steps && job.active) { bar.max = Number(steps[2]); bar.value = Number(steps[1]); } else bar.removeAttribute("value");
+  advance(bar, job.active ? job.text : "");
   bar.hidden = !job.active;
   $("cancel").hidden = !job.active;
   $("job-text").textContent = job.text || job.task;

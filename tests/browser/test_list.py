@@ -1,0 +1,46 @@
+"""The list of studies: it shows what a study's process does, and what changed meanwhile."""
+
+import shutil
+
+import pytest
+
+from rigwatch.workbench.study.study import Study
+from tests.browser.page import Page, Served
+from tests.workbench.fits.test_accepted_fit import UNITS, WAVES, waves
+from tests.workbench.machine import studied
+
+pytestmark = pytest.mark.xdist_group("browser")
+ROW = 'tr[data-study="listed/study"]'
+
+
+@pytest.fixture
+def study(served: Served) -> Study:
+    return studied(served.folder / "listed", WAVES, [waves(0)], [waves(1)], UNITS)
+
+
+def test_a_running_task_is_shown_and_its_result_when_it_ends(page: Page, study: Study) -> None:
+    page.open("/")
+    page.until(lambda: page.data(ROW, "running") == "", "a study at rest")
+    assert "not fitted yet" in page.text(ROW).lower()
+    assert page.data(f"{ROW} .last", "last").startswith("new, ")  # type: ignore[union-attr]
+    page.run(
+        "window.seen = new Set();"
+        "const cell = () => document.querySelector(arguments[0] + ' .last');"
+        "new MutationObserver(() => { const bar = cell()?.querySelector('progress');"
+        " if (bar) window.seen.add(cell().textContent); })"
+        ".observe(document.getElementById('studies'),"
+        " {childList: true, subtree: true, characterData: true});"
+        "fetch('/api/begin/listed/study', {method: 'POST', headers: {'content-type':"
+        " 'application/json'}, body: JSON.stringify({task: 'explain', arguments: {}})})",
+        ROW,
+    )
+    page.until(lambda: page.data(ROW, "running") == "explain", "the running task")
+    page.until(lambda: page.data(ROW, "running") == "", "its end")
+    page.until(lambda: "missing" in page.text(ROW), "the verdict")
+    assert any(text.startswith("fitting") for text in page.run("return [...window.seen]"))
+    assert not page.all(f"{ROW} progress")
+    assert page.data(f"{ROW} .last", "last") == page.text(f"{ROW} .last")
+    assert page.violations(dark=True) == []
+    # What is removed elsewhere leaves the list by itself.
+    shutil.rmtree(study.folder)
+    page.until(lambda: not page.all(ROW), "the study is gone")
