@@ -3,9 +3,11 @@
     bus ──samples──▶ RigMonitor.update ──estimates, alarms──▶ bus
 
 The cursor survives a kill, `model_requests` applies model changes between two samples,
-`link_watch` detects silence and losses, and `startup_grace` gives other processes time to start.
+`link_watch` detects silence and losses, `startup_grace` gives other processes time to start, and
+`several` runs the monitors of several rigs in one process.
 """
 
 from monitor.process.loop import monitor_section, run
+from monitor.process.several import run_several
 
-__all__ = ["monitor_section", "run"]
+__all__ = ["monitor_section", "run", "run_several"]

@@ -123,10 +123,14 @@ class MonitorProcess:
         left = self._stale_after - self.reader.silent_for()
         return min(left, TURN) if left > 0.0 else TURN
 
-    def look_around(self) -> None:
-        """Store the position, execute commands, check the link, publish the health."""
+    def keep_position(self) -> None:
+        """Store the position; all samples read so far have been processed."""
         if self._cursor and (position := self.reader.position):
             self._cursor.write(*position)
+
+    def look_around(self) -> None:
+        """Store the position, execute commands, check the link, publish the health."""
+        self.keep_position()
         for announced in self._operators.execute(self.rig.alarms, time.time_ns()):
             self.say(announced)
         self._change_models()
@@ -302,15 +306,31 @@ def suitable_model(config: RigConfig, path: Path | str) -> RigModel:
     return model
 
 
+def prepared(config: RigConfig, path: Path | str) -> RigModel:
+    """The model of the rig, with all kernels that its monitor needs compiled.
+
+    Raises:
+        ConfigError: as in `suitable_model`, or a detector does not suit.
+    """
+    model = suitable_model(config, path)
+    names = monitor_section(config, path).detectors
+    compile_kernels(model, detectors_of(names, model, path))
+    return model
+
+
 def watch(process: MonitorProcess, stop: threading.Event) -> None:
     """The loop: samples as they arrive, everything else in between, until `stop` is set."""
     heartbeat = Heartbeat("monitor")
     prepare_for_real_time()
     heartbeat.ready()
+    looked = 0.0
     while not stop.is_set():
         for item in process.reader.read(process.turn_s()):
             process.take(item)
-        process.look_around()
+        process.keep_position()
+        if (now := time.monotonic()) - looked >= TURN:
+            looked = now
+            process.look_around()
         heartbeat.advance(process.reader.counters.delivered)
     heartbeat.stopping()
 
@@ -323,10 +343,7 @@ def run(path: Path | str) -> int:
     """
     stop = set_at_signal()
     config = load_rig(path)
-    model = suitable_model(config, path)
-    # Before joining the bus, so that a monitor visible there is ready.
-    names = monitor_section(config, path).detectors
-    compile_kernels(model, detectors_of(names, model, path))
+    model = prepared(config, path)  # before joining: a monitor that is visible there is ready
     raise_priority(MONITOR)
     bus = connect(config, "monitor")
     try:

@@ -14,7 +14,7 @@ import msgspec
 from rigwatch.archive.catalogue import FAILED, Catalogue, Row, load, save
 from rigwatch.archive.entry import Entry, catalogued, entries
 from rigwatch.archive.layout import INDEX, SECONDS
-from rigwatch.archive.store import Store
+from rigwatch.archive.store import Store, Stored
 from rigwatch.archive.tables import pyarrow
 from rigwatch.batch import Job, Outcome, map_units
 
@@ -61,7 +61,7 @@ def index(
     """
     pyarrow()
     store.check()
-    found = {entry.name: entry for entry in entries(_outside_index(store))}
+    found = {entry.name: entry for entry in entries(outside_index(store))}
     kept = load(store)
     due = sorted(set(found) - kept.still_right({name: e.stamp for name, e in found.items()}))
     gone = set(kept.sessions) - set(found)
@@ -74,11 +74,12 @@ def index(
         save(store, kept)
         if len(due) > batch:
             say(f"{start + len(part)} of {len(due)} sessions are in the catalogue")
-    _remove_unused(store, kept)
+    remove_unused(store, kept)
     return _summary(kept, len(due), len(gone))
 
 
-def _outside_index(store: Store) -> list[Any]:
+def outside_index(store: Store) -> list[Stored]:
+    """All files of an archive but those of its index."""
     return [file for file in store.listed() if not file.name.startswith(f"{INDEX}/")]
 
 
@@ -115,7 +116,7 @@ def _entry(text: str) -> Entry:
 _JOB = Job("archive index", read_entry, content=_stamp, unit=_entry)
 
 
-def _remove_unused(store: Store, kept: Catalogue) -> None:
+def remove_unused(store: Store, kept: Catalogue) -> None:
     """Remove figures per second of sessions that are gone, or were read and not catalogued."""
     used = kept.files()
     for file in store.listed(SECONDS):

@@ -6,7 +6,7 @@ A request that fails is made again a few times, later each time: object stores f
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -82,6 +82,16 @@ class Store:
         files = (_stored(path[len(self.root) + 1 :], about) for path, about in found.items())
         return sorted(files, key=lambda file: file.name)
 
+    def glob(self, pattern: str) -> list[str]:
+        """Names of files and folders that a pattern matches.
+
+        Raises:
+            ArchiveError: the archive cannot be reached.
+        """
+        self.files.invalidate_cache()
+        found = self._again(lambda: self.files.glob(self.path(pattern)), pattern)
+        return [path[len(self.root) + 1 :] for path in found]
+
     def check(self) -> None:
         """Raise ArchiveError if there is no such archive."""
         try:
@@ -123,11 +133,14 @@ class Store:
             raise ArchiveError(f"{target}: cannot be written: {_reason(error)}") from None
 
     def remove(self, name: str) -> None:
-        """Remove a file, if it is there."""
+        """Remove a file, if it is there, and its folder if that is empty then."""
         try:
             self._again(lambda: self.files.rm_file(self.path(name)), name)
         except FileNotFoundError:
             return
+        if self.is_local and "/" in name:
+            with suppress(OSError):
+                Path(self.path(name)).parent.rmdir()
 
     def _again(self, call: Callable[[], T], what: str) -> T:
         """The call, made again if it fails for a reason that may pass."""

@@ -26,21 +26,30 @@ def is_segmented(folder: Path) -> bool:
     return any(is_segment(file) for file in folder.glob(f"*{SUFFIX}"))
 
 
+def is_address(text: str) -> bool:
+    """Whether a unit lies in an object store, such as "s3://bucket/run.mcap"."""
+    return "://" in text
+
+
 def expand(given: Iterable[Path | str], inside: Finder = recording_at) -> list[str]:
     """The units named by paths, globs and folders: each once, in order of their names.
 
     Args:
-        given: paths of units or of folders with units in them, and globs (`**` for any depth).
+        given: paths of units or of folders with units in them, and globs (`**` for any depth);
+            the address of a unit in an object store stands for itself.
         inside: units of a folder.
 
     Raises:
         BatchError: a path does not exist, or a glob or a folder holds nothing.
     """
-    found: dict[Path, str] = {}
-    for text in given:
-        for path in _paths(str(text)):
+    found: dict[str, str] = {}
+    for text in map(str, given):
+        if is_address(text):
+            found[text] = text
+            continue
+        for path in _paths(text):
             for unit in inside(path) if path.is_dir() else [path]:
-                found.setdefault(unit.resolve(), str(unit))
+                found.setdefault(str(unit.resolve()), str(unit))
     if not found:
         names = ", ".join(map(str, given)) or "no path"
         raise BatchError(f"{names}: found nothing to work on, expected recordings or studies")

@@ -145,8 +145,7 @@ def _run_unit(job: Job, settings: Mapping[str, Any], path: str) -> Outcome:
         unit = job.unit(path)
         content = job.content(unit)
         value = job.call(unit, **settings)
-        encoded = msgspec.json.encode(value, enc_hook=_plain, order="deterministic")
-        return Outcome(path, content, encoded, seconds=time.perf_counter() - began)
+        return Outcome(path, content, as_json(value), seconds=time.perf_counter() - began)
     except RigwatchError as error:
         kind, text = type(error).__name__, str(error)
     except OSError as error:
@@ -155,6 +154,15 @@ def _run_unit(job: Job, settings: Mapping[str, Any], path: str) -> Outcome:
         kind, text = type(error).__name__, f"{path}: {error}"
     line = " ".join(text.split())
     return Outcome(path, content, b"", kind, line, time.perf_counter() - began)
+
+
+def as_json(value: Any) -> bytes:
+    """A result as JSON, the same bytes for the same result.
+
+    Raises:
+        NotImplementedError: it is no plain data.
+    """
+    return msgspec.json.encode(value, enc_hook=_plain, order="deterministic")
 
 
 def _plain(value: Any) -> Any:

@@ -38,6 +38,7 @@ COMMANDS: dict[str, str] = {
     "record": "processes.record",
     "witness": "processes.witness",
     "commission": "processes.commission",
+    "fleet": "processes.fleet",
     "alarms": "alarms.alarms",
     "ack": "alarms.ack",
     "keys": "keys.keys",

@@ -1,5 +1,11 @@
-"""The recorder process: writes the recorded topics of the bus to session files."""
+"""The recorder process: writes the recorded topics of the bus to session files.
 
+`expired` holds its rules of retention, which archives use too; `POSITIONS` is the name of the file
+that it keeps beside segments.
+"""
+
+from rigwatch.recorder.positions import FILE as POSITIONS
 from rigwatch.recorder.process import run
+from rigwatch.recorder.retention_rules import expired
 
-__all__ = ["run"]
+__all__ = ["POSITIONS", "expired", "run"]

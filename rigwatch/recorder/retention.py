@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigwatch.recorder.positions import FILE
+from rigwatch.recorder.retention_rules import expired
 from rigwatch.wire.messages import ALARMS, Event
 from rigwatch.wire.rig_config import RecorderSection
 from rigwatch.wire.session import SUFFIX, topic_counts
 
-DAY = 86_400.0
-GIGABYTE = 1e9
 EVERY = 60.0
 """Time between checks of the folder [s]."""
 
@@ -62,21 +61,7 @@ class Retention:
 
     def expired(self, now_s: float, current: Path) -> list[Segment]:
         """Segments to be removed, oldest first, those without alarms before those with alarms."""
-        found = sorted(self._segments(current), key=lambda one: (one.alarms, one.ended))
-        old = [one for one in found if self._is_old(one, now_s)]
-        excess = sum(one.size for one in found) - sum(one.size for one in old)
-        limit = self._settings.keep_gigabytes * GIGABYTE
-        for one in found:
-            if not limit or excess <= limit:
-                break
-            if one not in old:
-                old.append(one)
-                excess -= one.size
-        return old
-
-    def _is_old(self, one: Segment, now_s: float) -> bool:
-        days = self._settings.keep_alarm_days if one.alarms else self._settings.keep_days
-        return days > 0 and now_s - one.ended > days * DAY
+        return expired(self._segments(current), self._settings, now_s)
 
     def _segments(self, current: Path) -> Iterator[Segment]:
         root = Path(self._settings.folder)

@@ -1,5 +1,6 @@
 """The same archive in an object store: moto's S3 behind a real HTTP server, which also fails."""
 
+import json
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -10,11 +11,14 @@ import pytest
 from moto.server import DomainDispatcherApplication, create_backend_app
 from werkzeug.serving import make_server
 
-from rigwatch.archive import Store, ask, index, query
+from rigwatch.archive import Store, ask, index, query, retain
 from rigwatch.batch import executor_on
+from rigwatch.commands import main
 from rigwatch.wire.errors import ArchiveError
+from rigwatch.wire.rig_config import RecorderSection
 from tests.archive.sessions import DAY_S, write_session
 
+VERIFY = Path(__file__).parents[1] / "verify"
 KEYS = {"aws_access_key_id": "key", "aws_secret_access_key": "secret", "region_name": "us-east-1"}
 
 
@@ -122,3 +126,59 @@ def test_a_query_stays_in_the_archive(bucket):
 def test_a_bucket_that_is_not_there_is_said(bucket):
     with pytest.raises(ArchiveError, match="s3://none/all"):
         index(Store("s3://none/all"))
+
+
+def test_old_sessions_of_a_bucket_go_although_it_fails_now_and_then(bucket, served):
+    _, there = bucket
+    index(there)
+    served[1].every = 7
+    try:
+        done = retain(there, RecorderSection(keep_days=1), remove=True)
+    finally:
+        served[1].every = 0
+    assert (done.removed, done.failures) == (5, [])
+    assert there.listed() == there.listed("rigwatch-index")
+    assert query(there, "select * from sessions").rows == []
+
+
+@pytest.fixture
+def replayed(bucket: tuple[Store, Store]) -> tuple[Path, str]:
+    """A folder and a bucket that also hold two recordings of a rig, one of them in segments."""
+    here, there = bucket
+    for name in ("friction.mcap", "stiction/000001.mcap"):
+        source = VERIFY / f"{name.split('/')[0].removesuffix('.mcap')}.mcap"
+        there.put(source, f"replay/{name}")
+        here.put(source, f"replay/{name}")
+    return Path(here.root, "replay"), f"{there.url}/replay"
+
+
+def _replayed(given: list[str], target: Path, *on: str) -> dict[str, bytes]:
+    words = ["--model", str(VERIFY / "model.toml"), "--results", str(target), *on]
+    assert main(["replay", *given, *words]) == 0
+    lines = map(json.loads, target.read_bytes().splitlines())
+    return {line["path"]: json.dumps(line["value"]).encode() for line in lines}
+
+
+def test_recordings_of_a_bucket_are_replayed_as_those_of_a_folder(replayed, tmp_path):
+    folder, address = replayed
+    here = _replayed([str(folder)], tmp_path / "here.jsonl")
+    there = _replayed([address], tmp_path / "there.jsonl", "--on", "local:2")
+    assert set(there) == {f"{address}/friction.mcap", f"{address}/stiction"}
+    assert there == {name.replace(str(folder), address): value for name, value in here.items()}
+    some = _replayed([f"{address}/fric*", str(folder / "stiction")], tmp_path / "some.jsonl")
+    assert set(some) == {f"{address}/friction.mcap", str(folder / "stiction")}
+    one = _replayed([f"{address}/stiction"], tmp_path / "one.jsonl")
+    assert one == {f"{address}/stiction": there[f"{address}/stiction"]}
+
+
+def test_a_recording_that_is_not_in_the_bucket_is_named_by_its_address(replayed, capsys):
+    _, address = replayed
+    given = [f"{address}/none.mcap", f"{address}/friction.mcap"]
+    assert main(["replay", *given, "--model", str(VERIFY / "model.toml")]) == 1
+    out, err = capsys.readouterr()
+    assert f"{address}/friction.mcap: 2048 samples" in out
+    assert f"failed: {address}/none.mcap: found no session, expected one" in err
+    assert main(["replay", f"{address}/x*", "--model", str(VERIFY / "model.toml")]) == 2
+    assert "found no session, expected at least one" in capsys.readouterr().err
+    assert main(["explain", address]) == 2
+    assert "only recordings are read from an object store" in capsys.readouterr().err

@@ -11,7 +11,7 @@ import pytest
 import rigwatch
 from rigwatch.batch import executor_on
 from rigwatch.commands import main
-from rigwatch.wire.errors import BatchError
+from rigwatch.wire.errors import BatchError, ConfigError, MissingExtraError
 from tests.batch.cluster import Cluster
 from tests.batch.jobs import ROOT, deadly, make_files, sizes
 from tests.waiting import eventually
@@ -79,6 +79,33 @@ def test_a_command_runs_on_the_cluster(cluster, tmp_path, capsys):
     assert main([*words, "--results", str(tmp_path / "dask.jsonl"), "--on", cluster.address]) == 0
     assert "dry_friction" in capsys.readouterr().out
     assert (tmp_path / "dask.jsonl").read_bytes() == (tmp_path / "here.jsonl").read_bytes()
+
+
+def test_a_cluster_declared_in_a_file_runs_its_workers_as_jobs(files, tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    file = tmp_path / "cluster.toml"
+    options = (
+        f'cores = 1\nmemory = "1GB"\nlocal_directory = "{tmp_path}"\nlog_directory = "{tmp_path}"'
+    )
+    file.write_text(f'kind = "local"\njobs = 2\n[options]\n{options}\n')
+    target = tmp_path / "jobs.jsonl"
+    with executor_on(str(file)) as executor:
+        assert rigwatch.map(sizes, [files], executor=executor, results=target).done == COUNT
+    rigwatch.map(sizes, [files], results=tmp_path / "plain.jsonl")
+    assert target.read_bytes() == (tmp_path / "plain.jsonl").read_bytes()
+
+
+def test_a_wrong_file_of_a_cluster_is_one_sentence(tmp_path, monkeypatch):
+    file = tmp_path / "cluster.toml"
+    file.write_text('kind = "abacus"')
+    with pytest.raises(ConfigError, match="kind: found 'abacus'"), executor_on(str(file)):
+        pass
+    file.write_text('kind = "slurm"')
+    with pytest.raises(BatchError, match=r"options: .*cores"), executor_on(str(file)):
+        pass
+    monkeypatch.setitem(sys.modules, "dask_jobqueue", None)
+    with pytest.raises(MissingExtraError, match="rigwatch\\[dask\\]"), executor_on(str(file)):
+        pass
 
 
 def test_at_last_a_scheduler_that_goes_away_is_reported_and_results_are_kept(

@@ -167,11 +167,11 @@ def test_a_setting_that_is_a_file_counts_with_its_content(tmp_path):
     ("where", "said"),
     [
         ("local:0", "expected local:N"),
-        ("cloud", "expected local:4 or dask://host:8786"),
+        ("cloud", "expected local:4, dask://host:8786 or cluster.toml"),
         ("dask://127.0.0.1:1", "no scheduler of this version answers"),
     ],
 )
 def test_an_executor_that_is_not_there_is_reported_plainly(where, said, monkeypatch):
-    monkeypatch.setattr("rigwatch.batch.executors.CONNECT_S", 0.5)
+    monkeypatch.setattr("rigwatch.batch.dask_clients.CONNECT_S", 0.5)
     with pytest.raises(BatchError, match=said), executor_on(where):
         pass

@@ -3,7 +3,8 @@
 import os
 from pathlib import Path
 
-from rigwatch.recorder.retention import DAY, Retention
+from rigwatch.recorder.retention import Retention
+from rigwatch.recorder.retention_rules import DAY
 from rigwatch.wire.messages import Alarm, Event
 from rigwatch.wire.rig_config import RecorderSection
 from rigwatch.wire.session import SessionWriter, run_info

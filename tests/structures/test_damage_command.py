@@ -114,3 +114,23 @@ def test_a_page_that_cannot_be_written_is_one_plain_line(
     arguments = ["structure", "damage", str(KABE), str(table), "--known", "--report", str(target)]
     assert main(arguments) == 2
     assert "cannot be written" in capsys.readouterr().err
+
+
+def test_several_records_give_what_each_gives_alone(
+    table: Path, session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = tmp_path / "whole.csv"
+    assert main(["structure", "simulate", str(KABE), str(whole), "--duration", "4"]) == 0
+    target = tmp_path / "damages.jsonl"
+    given = [str(path) for path in (table, session, whole)]
+    words = ["structure", "damage", str(KABE)]
+    assert main([*words, *given, "--results", str(target)]) == 0
+    assert "damaged.csv: at 4.9" in (told := capsys.readouterr().out)
+    assert "k4_46" in told
+    lines = {line["path"]: line["value"] for line in map(json.loads, target.open())}
+    for path in given:
+        assert main([*words, path, "--json"]) == 0
+        alone = json.loads(capsys.readouterr().out)
+        assert {name: lines[path][name] for name in alone} == alone
+    assert main([*words, *given, "--report", str(tmp_path / "page.html")]) == 2
+    assert "expected one" in capsys.readouterr().err

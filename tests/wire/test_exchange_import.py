@@ -17,6 +17,7 @@ from rigwatch.wire.exchange.column_units import conversion
 from rigwatch.wire.exchange.importing import Imported, import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
 from rigwatch.wire.exchange.mat5 import read_mat5
+from rigwatch.wire.messages import encode
 from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.messages.message_types import SampleBlock
 from rigwatch.wire.session import open_session
@@ -349,3 +350,34 @@ def test_json_that_is_no_table_is_reported(tmp_path: Path, text: str, message: s
     source.write_text(text)
     with pytest.raises(ImportDataError, match=message):
         import_file(source, tmp_path / "run.mcap", simple())
+
+
+def test_several_files_become_sessions_of_a_folder(tmp_path, capsys):
+    logs, target = tmp_path / "logs", tmp_path / "sessions"
+    (logs / "more").mkdir(parents=True)
+    target.mkdir()
+    for name in ("a.csv", "more/b.csv"):
+        (logs / name).write_text(GOOD)
+    (logs / "bad.csv").write_text("t,other\n0,1\n")
+    options = ["--time", "t[ms]", "--map", "position=qm[mm]"]
+    words = ["import", str(logs), str(target), *options]
+    assert main([*words, "--results", str(tmp_path / "made.jsonl")]) == 1
+    out, err = capsys.readouterr()
+    assert f"a.csv: {target}/a.mcap: 3 samples at 1000 Hz of position [m]" in out
+    assert "2 done, 1 failed: 1 ImportDataError" in err
+    assert sorted(path.name for path in target.iterdir()) == ["a.mcap", "b.mcap"]
+    alone = tmp_path / "alone.mcap"
+    assert main(["import", str(logs / "a.csv"), str(alone), *options]) == 0
+    (one,), (other,) = (open_session(p).samples(size=99) for p in (alone, target / "a.mcap"))
+    assert encode(one) == encode(other)
+
+
+def test_files_that_would_become_one_session_are_refused(tmp_path, capsys):
+    for folder in ("x", "y"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "run.csv").write_text(GOOD)
+    given = [str(tmp_path / folder / "run.csv") for folder in ("x", "y")]
+    assert main(["import", *given, str(tmp_path)]) == 2
+    assert f"both become {tmp_path}/run.mcap" in capsys.readouterr().err
+    assert main(["import", *given, str(tmp_path / "none")]) == 2
+    assert "found no such folder" in capsys.readouterr().err

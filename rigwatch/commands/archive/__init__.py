@@ -1,1 +1,1 @@
-"""The commands of archives: index, query, show."""
+"""The commands of archives: index, query, show, retain."""

@@ -9,4 +9,5 @@ ACTIONS = {
     "index": "archive.archive_index",
     "query": "archive.archive_query",
     "show": "archive.archive_show",
+    "retain": "archive.archive_retain",
 }

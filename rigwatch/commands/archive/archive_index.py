@@ -2,7 +2,7 @@
 
 import argparse
 
-from rigwatch.commands.common import print_json, say
+from rigwatch.commands.common import add_on, print_json, say
 
 HELP = "bring the catalogue of an archive up to date: read what is new or changed"
 EXAMPLE = """\
@@ -16,11 +16,7 @@ _NAMED = 20
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("url", metavar="URL", help="folder, or address such as s3://bucket/rigs")
-    parser.add_argument(
-        "--on",
-        metavar="WHERE",
-        help="workers: local:4 (processes of this machine) or dask://host:8786",
-    )
+    add_on(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

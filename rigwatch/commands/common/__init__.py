@@ -3,7 +3,7 @@
 from rigwatch.commands.common import watched
 from rigwatch.commands.common.drawing import ready_to_draw, show_until_closed
 from rigwatch.commands.common.log_arguments import add_log_columns
-from rigwatch.commands.common.many import add_many, run_many, the_one
+from rigwatch.commands.common.many import add_many, add_on, add_where, run_many, the_one
 from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
 from rigwatch.commands.common.session_files import (
@@ -23,9 +23,11 @@ from rigwatch.commands.common.shipped_argument import file_or_name
 __all__ = [
     "add_log_columns",
     "add_many",
+    "add_on",
     "add_session_and_target",
     "add_span",
     "add_studies",
+    "add_where",
     "check_folder",
     "damage_lines",
     "file_or_name",

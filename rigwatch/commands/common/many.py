@@ -21,19 +21,19 @@ Finder = Callable[[Path], list[Path]]
 
 def add_many(parser: argparse.ArgumentParser, name: str, help_: str) -> None:
     """The argument for the units, called `name`, and where and how they are worked on."""
-    parser.add_argument(
-        name, type=Path, nargs="+", help=f"{help_}; several, globs and folders of them too"
-    )
+    several = f"{help_}; several, globs and folders of them too"
+    parser.add_argument(name, type=_place, nargs="+", help=several)
     add_where(parser)
+
+
+def _place(text: str) -> Path | str:
+    """A path, or an address such as s3://bucket/rigs, which must stay as it is."""
+    return text if "://" in text else Path(text)
 
 
 def add_where(parser: argparse.ArgumentParser) -> None:
     """Options `--on` and `--results`."""
-    parser.add_argument(
-        "--on",
-        metavar="WHERE",
-        help="workers: local:4 (processes of this machine) or dask://host:8786",
-    )
+    add_on(parser)
     parser.add_argument(
         "--results",
         type=Path,
@@ -42,8 +42,18 @@ def add_where(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_on(parser: argparse.ArgumentParser) -> None:
+    """Option `--on`."""
+    parser.add_argument(
+        "--on",
+        metavar="WHERE",
+        help="workers: local:4 (processes of this machine), dask://host:8786, or a file "
+        "cluster.toml (dask-jobqueue)",
+    )
+
+
 def the_one(
-    arguments: argparse.Namespace, given: list[Path], inside: Finder | None = None
+    arguments: argparse.Namespace, given: list[Path | str], inside: Finder | None = None
 ) -> Path | None:
     """The only unit that is given, to be treated by itself; None for work over several.
 
@@ -52,10 +62,13 @@ def the_one(
         given: its paths.
         inside: units of a folder, None for recordings.
     """
+    first = given[0]
     alone = len(given) == 1 and arguments.on is None and arguments.results is None
-    if not alone or (glob.has_magic(str(given[0])) and not given[0].exists()):
+    if not alone or isinstance(first, str):
         return None
-    return None if _holds_units(given[0], inside or _recordings) else given[0]
+    if glob.has_magic(str(first)) and not first.exists():
+        return None
+    return None if _holds_units(first, inside or _recordings) else first
 
 
 def _holds_units(path: Path, inside: Finder) -> bool:
@@ -74,7 +87,7 @@ def _recordings(folder: Path) -> list[Path]:
 
 def run_many(
     arguments: argparse.Namespace,
-    given: list[Path],
+    given: list[Path | str],
     job: "Job",
     settings: Mapping[str, Any],
     *,
@@ -85,7 +98,7 @@ def run_many(
 
     Args:
         arguments: of the command.
-        given: paths, globs and folders.
+        given: paths, globs and folders; for recordings also addresses of an object store.
         job: what is done with each unit.
         settings: of the job.
         line: a result for people.
@@ -99,6 +112,9 @@ def run_many(
     """
     from rigwatch.batch import executor_on, map_recordings
 
+    addresses = [place for place in given if isinstance(place, str)]
+    if addresses:
+        job, given = _anywhere(job, given, addresses, inside)
     with executor_on(arguments.on) as executor:
         found = map_recordings(
             job,
@@ -112,6 +128,25 @@ def run_many(
         )
     _conclude(found.summary(), list(found.failures()), found.file)
     return EXIT_FAILED if found.failed else 0
+
+
+def _anywhere(
+    job: "Job", given: list[Path | str], addresses: list[str], inside: Finder | None
+) -> "tuple[Job, list[Path | str]]":
+    """The job for recordings in object stores too, and the addresses of all of them.
+
+    Raises:
+        BatchError: the units are no recordings.
+    """
+    from rigwatch.archive import Anywhere, content_anywhere, sessions_at
+    from rigwatch.batch import Job
+    from rigwatch.wire.errors import BatchError
+
+    if inside is not None:
+        raise BatchError(f"{addresses[0]}: only recordings are read from an object store")
+    found: list[Path | str] = [place for place in given if isinstance(place, Path)]
+    found += [unit for address in addresses for unit in sessions_at(address)]
+    return Job(job.name, Anywhere(job.call), content_anywhere, str), found
 
 
 class _Printer:

@@ -3,17 +3,23 @@
 import argparse
 from pathlib import Path
 
-HELP = "monitor a rig: samples in, friction estimates and alarms out"
-EXAMPLE = "  rigwatch monitor configs/demo.toml"
+HELP = "monitor one or several rigs: samples in, friction estimates and alarms out"
+EXAMPLE = """\
+  rigwatch monitor configs/demo.toml
+  rigwatch monitor rigs/*.toml          # several rigs in one process"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("config", type=Path, metavar="CONFIG", help="configuration of the rig")
+    help_ = "configuration of a rig; several rigs share the process"
+    parser.add_argument("config", type=Path, nargs="+", metavar="CONFIG", help=help_)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Monitor until a signal ends it."""
     from monitor.process import run as run_monitor
+    from monitor.process import run_several
 
-    return run_monitor(arguments.config)
+    if len(arguments.config) == 1:
+        return run_monitor(arguments.config[0])
+    return run_several(arguments.config)

@@ -1,25 +1,37 @@
-"""`rigwatch import`: makes a session from a CSV, MAT, Parquet or JSON file."""
+"""`rigwatch import`: makes sessions from CSV, MAT, Parquet or JSON files."""
 
 import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rigwatch.commands.common import add_log_columns, file_or_name, print_json, say
+from rigwatch.commands.common import (
+    add_log_columns,
+    add_many,
+    file_or_name,
+    print_json,
+    run_many,
+    say,
+    the_one,
+)
+from rigwatch.wire.errors import ImportDataError
 
 if TYPE_CHECKING:
-    from rigwatch.wire.exchange import ImportMapping
+    from rigwatch.wire.exchange import Imported, ImportMapping
 
-HELP = "make a session from a CSV, MAT, Parquet or JSON file"
+HELP = "make a session from a CSV, MAT, Parquet or JSON file, or many from many"
 EXAMPLE = """\
   rigwatch import DATA_EMPS.mat emps.mcap --mapping emps
   rigwatch import run.csv run.mcap --time 't[ms]' --map 'position=qm[mm]' --map 'force=u*35.15[N]'
-  rigwatch import exported.csv run.mcap"""
+  rigwatch import exported.csv run.mcap
+  rigwatch import 'logs/*.csv' sessions --on local:4 --results imported.jsonl"""
+_ENDINGS = (".csv", ".mat", ".parquet", ".json")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("source", type=Path, help="the file to import")
-    parser.add_argument("target", type=Path, help="the new session file (.mcap)")
+    add_many(parser, "source", "the file to import")
+    help_ = "the new session file (.mcap); of several, the folder for them"
+    parser.add_argument("target", type=Path, help=help_)
     parser.add_argument(
         "--mapping",
         type=file_or_name("imports"),
@@ -42,27 +54,92 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 if the session is written."""
-    from rigwatch.commands.common import unix_time
-    from rigwatch.wire.exchange import import_file
-
-    start_ns = unix_time(arguments.start, "--start") if arguments.start else 0
-    made = import_file(arguments.source, arguments.target, _mapping(arguments), start_ns)
+    """0 if the session is written, or all of several; 1 if some of several are not."""
+    source = the_one(arguments, arguments.source, tables_in)
+    if source is None or arguments.target.is_dir():
+        return _run_many(arguments)
+    made = _imported(source, arguments.target, _mapping(arguments), arguments.start)
     if arguments.json:
         print_json(made)
         return 0
-    channels = ", ".join(f"{name} [{unit}]" for name, unit in made.channels.items())
-    print(f"{made.path}: {made.samples} samples at {made.rate_hz:g} Hz of {channels}")
+    print(f"{made.path}: {_size(made.samples, made.rate_hz, made.channels)}")
     for remark in made.remarks:
         say(remark)
     return 0
+
+
+def _imported(
+    source: Path, target: Path, mapping: "ImportMapping", start: str | None
+) -> "Imported":
+    from rigwatch.commands.common import unix_time
+    from rigwatch.wire.exchange import import_file
+
+    return import_file(source, target, mapping, unix_time(start, "--start") if start else 0)
+
+
+def _size(samples: int, rate_hz: float, channels: dict[str, str]) -> str:
+    named = ", ".join(f"{name} [{unit}]" for name, unit in channels.items())
+    return f"{samples} samples at {rate_hz:g} Hz of {named}"
+
+
+def _run_many(arguments: argparse.Namespace) -> int:
+    import msgspec
+
+    from rigwatch.batch import Job, expand
+
+    folder = arguments.target
+    if not folder.is_dir():
+        raise ImportDataError(f"{folder}: found no such folder, expected one for several sessions")
+    if all(isinstance(place, Path) for place in arguments.source):
+        _check_targets(folder, expand(arguments.source, tables_in))
+    mapping = msgspec.to_builtins(_mapping(arguments))
+    settings = {"folder": str(folder.resolve()), "mapping": mapping, "start": arguments.start}
+    job = Job("import", imported)
+    return run_many(arguments, arguments.source, job, settings, line=_line, inside=tables_in)
+
+
+def imported(
+    source: Path, folder: str, mapping: dict[str, Any], start: str | None
+) -> dict[str, Any]:
+    """One of several files as a session in a folder, whole or not at all; what was made."""
+    import msgspec
+
+    from rigwatch.wire.exchange import ImportMapping
+
+    target = _target(Path(folder), source)
+    made = _imported(source, target, msgspec.convert(mapping, ImportMapping), start)
+    found: dict[str, Any] = msgspec.to_builtins(made, enc_hook=str)
+    return found
+
+
+def _line(found: dict[str, Any]) -> str:
+    size = _size(found["samples"], found["rate_hz"], found["channels"])
+    return "; ".join([f"{found['path']}: {size}", *found["remarks"]])
+
+
+def tables_in(folder: Path) -> list[Path]:
+    """The tables in a folder, at any depth."""
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in _ENDINGS)
+
+
+def _target(folder: Path, source: Path) -> Path:
+    return folder / f"{source.stem}.mcap"
+
+
+def _check_targets(folder: Path, sources: list[str]) -> None:
+    """Raise if two files would become the same session."""
+    made: dict[Path, str] = {}
+    for source in sources:
+        other = made.setdefault(_target(folder, Path(source)), source)
+        if other != source:
+            name = _target(folder, Path(source))
+            raise ImportDataError(f"{source}, {other}: both become {name}, expected other names")
 
 
 def _mapping(arguments: argparse.Namespace) -> "ImportMapping":
     """The mapping file's content, overridden by the options."""
     import msgspec
 
-    from rigwatch.wire.errors import ImportDataError
     from rigwatch.wire.exchange import ImportMapping, parse_map_option
     from rigwatch.wire.typed_files import load
 

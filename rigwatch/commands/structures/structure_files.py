@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from rigwatch.structures.model import Structure
 
 
+RECORD = "record with columns t, x6, ... (.csv or .npz), or a session (.mcap or its folder)"
+
+
 def add_problem(parser: argparse.ArgumentParser) -> None:
     """Arguments for structure, record and unknowns."""
     parser.add_argument(
@@ -67,11 +70,7 @@ def write_page(path: Path, text: str) -> None:
 
 def add_record(parser: argparse.ArgumentParser) -> None:
     """The argument for a record: a table or a session."""
-    parser.add_argument(
-        "record",
-        type=Path,
-        help="record with columns t, x6, ... (.csv or .npz), or a session (.mcap or its folder)",
-    )
+    parser.add_argument("record", type=Path, help=RECORD)
 
 
 def problem_from(arguments: argparse.Namespace) -> "Problem":

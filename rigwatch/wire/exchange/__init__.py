@@ -3,7 +3,7 @@
 from rigwatch.wire.exchange.column_units import AMBIGUOUS, conversion
 from rigwatch.wire.exchange.exporting import export_session
 from rigwatch.wire.exchange.headers import Header, read_header
-from rigwatch.wire.exchange.importing import import_file
+from rigwatch.wire.exchange.importing import Imported, import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option, parse_source
 from rigwatch.wire.exchange.table_files import columns_of, read_table
 
@@ -11,6 +11,7 @@ __all__ = [
     "AMBIGUOUS",
     "Header",
     "ImportMapping",
+    "Imported",
     "columns_of",
     "conversion",
     "export_session",

@@ -1,0 +1,209 @@
+"""Several rigs in one process: they take turns, and none waits for another.
+
+    rigs ──turn──▶ every sample that has come since ─▶ judged together ─▶ estimates, alarms
+
+Most of the cost of a sample is that of a call, and results do not depend on how samples are divided
+into blocks: the samples of a turn are judged as one block. Under load turns get longer, blocks with
+them, and a sample costs less. A rig joins when its router answers; one that fails is left alone for
+a while and starts anew, as its process would.
+"""
+
+import logging
+import queue
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from monitor.model import RigModel
+from monitor.process.loop import (
+    LONGEST_BLOCK,
+    MonitorProcess,
+    monitor_section,
+    prepared,
+)
+from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.delivery import Item
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.host import (
+    MONITOR,
+    Heartbeat,
+    prepare_for_real_time,
+    raise_priority,
+    set_at_signal,
+)
+from rigwatch.wire.messages import SampleBlock, pieces
+from rigwatch.wire.rig_config import RigConfig, load_rig
+
+TURN = 0.025
+"""Time from one turn to the next: samples wait for half of it on average [s]."""
+MOST_BLOCKS = 4
+"""Blocks of one rig in a turn while it catches up, so that the others go on."""
+FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0
+"""Pauses before a rig that failed starts anew [s]."""
+Say = Callable[[str], None]
+_log = logging.getLogger(__name__)
+
+
+class Seat:
+    """One rig of the process: joined, or waiting for its router or for another attempt.
+
+    Args:
+        path: its configuration.
+        config: the same, loaded.
+        model: of the rig.
+        say: called with remarks for people.
+        join: connects to the rig's bus, and waits for its router.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        config: RigConfig,
+        model: RigModel,
+        say: Say,
+        join: Callable[[RigConfig, str], Bus] = connect,
+    ) -> None:
+        self._path, self._config, self._model = path, config, model
+        self._say, self._join = say, join
+        self._process: MonitorProcess | None = None
+        self._due: deque[Item] = deque()
+        self._joined: queue.SimpleQueue[Bus] = queue.SimpleQueue()
+        self._pause, self._again_at = FIRST_PAUSE, float("inf")
+        self._before = 0
+        self._connect()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the rig is watched now."""
+        return self._process is not None
+
+    @property
+    def delivered(self) -> int:
+        """Samples read so far, by all runs of the rig."""
+        now = self._process.reader.counters.delivered if self._process else 0
+        return self._before + now
+
+    def turn(self) -> None:
+        """Judge what has come; a failure ends this rig's run and no other's."""
+        if self._process is None:
+            self._start()
+            return
+        try:
+            self._work(self._process)
+        except Exception as error:  # whatever is wrong with one rig, the others are watched
+            self._fail(error)
+
+    def _work(self, process: MonitorProcess) -> None:
+        if not self._due:
+            self._due.extend(_divided(process.reader.read(0.0)))
+        for _ in range(min(MOST_BLOCKS, len(self._due))):
+            process.take(self._due.popleft())
+        if not self._due:  # only then all that was read has been judged
+            process.look_around()
+            self._pause = FIRST_PAUSE
+
+    def _connect(self) -> None:
+        """Wait for the rig's router in a thread: it may never answer."""
+        call = threading.Thread(target=self._await_router, daemon=True)
+        call.start()
+
+    def _await_router(self) -> None:
+        try:
+            self._joined.put(self._join(self._config, "monitor"))
+        except Exception as error:  # said, and tried again, in the loop's thread
+            self._say(f"{self._path}: {_line(error)}")
+            self._again_at = time.monotonic() + LONGEST_PAUSE
+
+    def _start(self) -> None:
+        if not self._joined.empty():
+            bus = self._joined.get()
+            try:
+                self._process = MonitorProcess(self._config, self._path, self._model, bus)
+            except Exception as error:  # as in `turn`
+                bus.close()
+                self._wait(error)
+        elif time.monotonic() >= self._again_at:
+            self._again_at = float("inf")
+            self._connect()
+
+    def _fail(self, error: Exception) -> None:
+        self._before = self.delivered
+        self.close()
+        self._wait(error)
+
+    def _wait(self, error: Exception) -> None:
+        self._say(f"{self._path}: {_line(error)}; starts anew in {self._pause:.0f} s")
+        self._again_at = time.monotonic() + self._pause
+        self._pause = min(2 * self._pause, LONGEST_PAUSE)
+
+    def close(self) -> None:
+        """Leave the rig's bus."""
+        process, self._process = self._process, None
+        self._due.clear()
+        if process is None:
+            return
+        try:
+            process.close()
+        except Exception as error:  # the bus is left in any case
+            self._say(f"{self._path}: {_line(error)}")
+        finally:
+            process.bus.close()
+
+
+def _divided(items: Iterable[Item]) -> Iterable[Item]:
+    for item in items:
+        if isinstance(item, SampleBlock):
+            yield from pieces(item, LONGEST_BLOCK)
+        else:
+            yield item
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def take_turns(seats: list[Seat], stop: threading.Event, heartbeat: Heartbeat) -> None:
+    """The loop over all rigs until `stop` is set."""
+    while not stop.is_set():
+        began = time.monotonic()
+        for seat in seats:
+            seat.turn()
+        heartbeat.advance(sum(seat.delivered for seat in seats))
+        stop.wait(max(0.0, began + TURN - time.monotonic()))
+
+
+def run_several(paths: list[Path]) -> int:
+    """Monitor the rigs at `paths` until a signal ends it; the exit code.
+
+    Raises:
+        RigwatchError: a configuration or model is invalid, or two are of one rig or one journal.
+    """
+    stop = set_at_signal()
+    loaded = [(path, load_rig(path)) for path in paths]
+    _check_apart(loaded)
+    models = [prepared(config, path) for path, config in loaded]
+    raise_priority(MONITOR)
+    heartbeat = Heartbeat("monitor")
+    prepare_for_real_time()
+    seats = [Seat(*rig, model, _log.warning) for rig, model in zip(loaded, models, strict=True)]
+    heartbeat.ready()
+    take_turns(seats, stop, heartbeat)
+    heartbeat.stopping()
+    for seat in seats:
+        seat.close()
+    return 0
+
+
+def _check_apart(loaded: list[tuple[Path, RigConfig]]) -> None:
+    """Raise if two configurations are of one rig, or write one journal."""
+    seen: dict[tuple[str, str], Path] = {}
+    for path, config in loaded:
+        journal = monitor_section(config, path).journal
+        marks = [("rig.id", f"{config.bus.router} {config.rig.id}")]
+        marks += [("monitor.journal", str(Path(journal).resolve()))] if journal else []
+        for key, value in marks:
+            other = seen.setdefault((key, value), path)
+            if other is not path:
+                raise ConfigError(path, key, f"that of {other}", "one of its own")

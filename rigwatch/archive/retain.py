@@ -1,0 +1,133 @@
+"""Removes old sessions of an archive, by the rules that the recorder has for its own.
+
+Only what the catalogue knows as it is goes: a session that is new, has changed, is still being
+recorded or could not be read stays.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from itertools import groupby
+
+from rigwatch.archive.catalogue import FAILED, Catalogue, Row, load, save
+from rigwatch.archive.entry import UNFINISHED, UNREADABLE, Entry, entries
+from rigwatch.archive.indexing import outside_index, remove_unused
+from rigwatch.archive.store import Store
+from rigwatch.recorder import POSITIONS, expired
+from rigwatch.wire.errors import ArchiveError
+from rigwatch.wire.rig_config import RecorderSection
+
+_STAYS = (UNFINISHED, UNREADABLE, FAILED)
+
+
+@dataclass(frozen=True, slots=True)
+class Old:
+    """A session of the archive: its end as Unix time [s], size [bytes], whether it has alarms."""
+
+    session: str
+    rig: str
+    ended: float
+    size: int
+    alarms: bool
+
+
+@dataclass(slots=True)
+class Retained:
+    """What the rules say, and what was done.
+
+    Attributes:
+        sessions: number in the catalogue before.
+        expired: sessions that the rules remove, oldest first.
+        removed: number of them that are removed.
+        unknown: sessions that stay because they are new or have changed since the last index.
+        failures: a sentence on each that cannot be removed.
+    """
+
+    sessions: int = 0
+    expired: list[Old] = field(default_factory=list)
+    removed: int = 0
+    unknown: list[str] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
+
+
+def retain(
+    store: Store,
+    rules: RecorderSection,
+    *,
+    rig: str | None = None,
+    now: datetime | None = None,
+    remove: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> Retained:
+    """Find the sessions that rules remove from an archive, rig by rig, and remove them if wanted.
+
+    Args:
+        store: the archive, with an index.
+        rules: `keep_days`, `keep_alarm_days` and `keep_gigabytes` (of each rig); 0 for no limit.
+        rig: only this one.
+        now: present time; by default the clock's.
+        remove: remove the files; otherwise only find them.
+        say: called with progress.
+
+    Raises:
+        ArchiveError: there is no index, or the archive cannot be read or written.
+    """
+    store.check()
+    kept = load(store)
+    if not kept.sessions:
+        raise ArchiveError(f"{store.url}: has no index, make one with rigwatch archive index")
+    found = {entry.name: entry for entry in entries(outside_index(store))}
+    known = [row for name, row in kept.sessions.items() if _is_same(found.get(name), row)]
+    done = Retained(len(kept.sessions), unknown=sorted(set(found) - {r["session"] for r in known}))
+    now_s = (now or datetime.now(UTC)).timestamp()
+    old = sorted((o for o in map(_old, known) if o and rig in (None, o.rig)), key=lambda o: o.rig)
+    for _, of_rig in groupby(old, key=lambda one: one.rig):
+        done.expired += expired(of_rig, rules, now_s)
+    if remove and done.expired:
+        _remove(store, kept, found, done, say)
+    return done
+
+
+def _is_same(entry: Entry | None, row: Row) -> bool:
+    return entry is not None and entry.stamp == row["stamp"]
+
+
+def _old(row: Row) -> Old | None:
+    """A session that may be removed; one that is damaged may hide an alarm."""
+    if row["status"] in _STAYS or row["end"] is None:
+        return None
+    ended = row["end"].replace(tzinfo=UTC).timestamp()
+    alarms = bool(row["raised"]) or bool(row["damaged_bytes"])
+    return Old(row["session"], row["rig"], ended, row["bytes"], alarms)
+
+
+def _remove(
+    store: Store,
+    kept: Catalogue,
+    found: dict[str, Entry],
+    done: Retained,
+    say: Callable[[str], None],
+) -> None:
+    """Files first: a catalogue that lags behind is mended by the next index."""
+    gone = set()
+    for one in done.expired:
+        failure = next(_failures(store, found[one.session]), None)
+        if failure is None:
+            gone.add(one.session)
+        else:
+            done.failures.append(f"{one.session}: {failure}")
+    kept.forget(gone)
+    save(store, kept)
+    remove_unused(store, kept)
+    done.removed = len(gone)
+    say(f"{len(gone)} of {len(done.expired)} sessions removed")
+
+
+def _failures(store: Store, entry: Entry) -> Iterator[str]:
+    """Remove the files of an entry; why one of them cannot be removed."""
+    beside = [] if entry.name == entry.files[0].name else [f"{entry.name}/{POSITIONS}"]
+    for name in [*beside, *(file.name for file in entry.files)]:
+        try:
+            store.remove(name)
+        except (ArchiveError, OSError) as error:
+            yield str(error)

@@ -1,0 +1,137 @@
+"""Clients of Dask: of a scheduler that runs already, or of a cluster that a file declares.
+
+The file is for dask-jobqueue, which submits workers to a batch system as jobs.
+"""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from urllib.parse import urlsplit
+
+from msgspec import Meta, field
+
+from rigwatch.version import __version__
+from rigwatch.wire.errors import BatchError, MissingExtraError
+from rigwatch.wire.typed_files import Section, load
+
+CONNECT_S = 15.0
+"""Longest wait for a scheduler [s]."""
+FIRST_WORKER_S = 60.0
+"""Longest wait for its first worker [s]."""
+KINDS = {
+    "htcondor": "HTCondorCluster",
+    "local": "local.LocalCluster",
+    "lsf": "LSFCluster",
+    "moab": "MoabCluster",
+    "oar": "OARCluster",
+    "pbs": "PBSCluster",
+    "sge": "SGECluster",
+    "slurm": "SLURMCluster",
+}
+
+
+class ClusterFile(Section, frozen=True):
+    """A cluster whose workers are jobs of a batch system."""
+
+    kind: Annotated[
+        Literal["htcondor", "local", "lsf", "moab", "oar", "pbs", "sge", "slurm"],
+        Meta(description="the batch system; local runs the jobs on this machine"),
+    ]
+    jobs: Annotated[int, Meta(ge=1, le=10_000, description="number of jobs")] = 1
+    wait: Annotated[float, Meta(gt=0, description="longest wait for the first worker [s]")] = 3600.0
+    options: Annotated[
+        dict[str, Any],
+        Meta(description="of each job, as dask-jobqueue names them: cores, memory, queue, …"),
+    ] = field(default_factory=dict)
+
+
+def _client_class(purpose: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise MissingExtraError("distributed", "dask", purpose) from None
+    # What it logs about a lost connection is said in one line by this program.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)
+    return Client
+
+
+@contextmanager
+def client_at(where: str) -> Iterator[Any]:
+    """A client of a Dask scheduler whose workers have this version of rigwatch."""
+    client = _connected(_client_class("--on dask://"), where)
+    try:
+        _check_workers(client, where, FIRST_WORKER_S)
+        yield client
+    finally:
+        client.close(timeout=2)
+
+
+@contextmanager
+def client_of(file: Path) -> Iterator[Any]:
+    """A client of the cluster that a file declares; its jobs end with it.
+
+    Raises:
+        ConfigError: the file is wrong.
+        BatchError: the jobs cannot be submitted, or no worker comes.
+        MissingExtraError: dask-jobqueue is not installed.
+    """
+    asked = load(file, ClusterFile)
+    kind = _cluster_class(KINDS[asked.kind])
+    client_class = _client_class("--on cluster.toml")
+    try:
+        cluster = kind(**asked.options)
+    except (TypeError, ValueError, OSError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        raise BatchError(f"{file}: options: {reason}") from None
+    with cluster, client_class(cluster, set_as_default=False) as client:
+        cluster.scale(jobs=asked.jobs)
+        _check_workers(client, str(file), asked.wait)
+        yield client
+
+
+def _cluster_class(name: str) -> Any:
+    try:
+        import dask_jobqueue
+        import dask_jobqueue.local
+    except ImportError:
+        raise MissingExtraError("dask_jobqueue", "dask", "--on cluster.toml") from None
+    found: Any = dask_jobqueue
+    for part in name.split("."):
+        found = getattr(found, part)
+    return found
+
+
+def _connected(client: Any, where: str) -> Any:
+    try:
+        host, port = urlsplit(where).hostname, urlsplit(where).port
+    except ValueError:
+        host = port = None
+    if not host:
+        raise BatchError(f"--on: found {where!r}, expected dask://host:8786")
+    try:
+        return client(f"tcp://{host}:{port or 8786}", timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BatchError(f"{where}: no scheduler of this version answers: {reason}") from None
+
+
+def _check_workers(client: Any, where: str, wait: float) -> None:
+    """Raise if no worker comes, or one cannot load this version of rigwatch."""
+    try:
+        client.wait_for_workers(1, timeout=wait)
+        found = client.run(_version, on_error="return")
+    except TimeoutError:
+        raise BatchError(f"{where}: the scheduler has no worker, expected at least one") from None
+    for worker, version in sorted(found.items()):
+        if isinstance(version, Exception):
+            raise BatchError(f"{where}: worker {worker} cannot load rigwatch: {version}")
+        if version != __version__:
+            raise BatchError(
+                f"{where}: worker {worker} has rigwatch {version}, expected {__version__}"
+            )
+
+
+def _version() -> str:
+    return __version__

@@ -1,0 +1,64 @@
+"""`rigwatch fleet`: the state of many rigs at a glance, the worst first."""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigwatch.commands.common import check_folder, print_json
+
+if TYPE_CHECKING:
+    from rigwatch.fleet import RigState
+
+HELP = "show many rigs, the worst first: alarms, missing processes, losses, latency"
+EXAMPLE = """\
+  rigwatch fleet rigs/*.toml
+  rigwatch fleet rigs/*.toml --follow
+  rigwatch fleet rigs/*.toml --json
+  rigwatch fleet rigs/*.toml --page fleet.html --follow"""
+EXIT_UNWELL = 1
+_EVERY_S = 2.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    help_ = "configurations of the rigs, on one router or several"
+    parser.add_argument("config", type=Path, nargs="+", metavar="CONFIG", help=help_)
+    parser.add_argument("--follow", action="store_true", help="again every two seconds")
+    parser.add_argument(
+        "--timeout", type=float, default=3.0, metavar="S", help="longest wait for a rig (3)"
+    )
+    parser.add_argument("--page", type=Path, metavar="FILE.html", help="write a web page instead")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 if every rig runs without an alarm, else 1; with --follow until interrupted."""
+    from rigwatch.fleet import Fleet
+
+    check_folder(arguments.page)
+    fleet = Fleet(arguments.config, arguments.timeout)
+    try:
+        while True:
+            states = fleet.look()
+            _show(arguments, states)
+            if not arguments.follow:
+                return EXIT_UNWELL if any(state.rank for state in states) else 0
+            time.sleep(_EVERY_S)
+    finally:
+        fleet.close()
+
+
+def _show(arguments: argparse.Namespace, states: "list[RigState]") -> None:
+    from rigwatch.fleet import as_lines, as_page
+
+    if arguments.page:
+        from rigwatch.wire.host import replace_file
+
+        text = as_page(states, every_s=_EVERY_S * arguments.follow)
+        replace_file(arguments.page, text, durable=False)
+    if arguments.json:
+        print_json(states)
+    elif not arguments.page:
+        clear = "\x1b[2J\x1b[H" if arguments.follow and sys.stdout.isatty() else ""
+        print(clear + "\n".join(as_lines(states)), flush=True)

@@ -1,0 +1,11 @@
+"""The state of many rigs at a glance, the worst first.
+
+`Fleet` looks at the rigs of several configurations, on one router or on several, each in a thread
+of its own: a rig that does not answer delays none.
+"""
+
+from rigwatch.fleet.fleet import Fleet
+from rigwatch.fleet.rig_state import RigState
+from rigwatch.fleet.shown import as_lines, as_page
+
+__all__ = ["Fleet", "RigState", "as_lines", "as_page"]

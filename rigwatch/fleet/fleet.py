@@ -1,0 +1,112 @@
+"""Looks at many rigs at once."""
+
+import contextlib
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from rigwatch.fleet.rig_state import RigState, judged, unreachable
+from rigwatch.wire.bus import Bus, Subscription, ask_alarm_list, connect, unique_process
+from rigwatch.wire.errors import BusError, ConfigError
+from rigwatch.wire.messages import ALIVE_KEY, HEALTH, Health
+from rigwatch.wire.rig_config import RigConfig, load_rig
+
+MOST_AT_ONCE = 64
+"""Rigs that are asked at the same time."""
+_PROCESSES = ("monitor", "recorder", "witness")
+
+
+class Onlooker:
+    """One rig, as seen from outside.
+
+    Args:
+        path: its configuration.
+        config: the same, loaded.
+        timeout: longest wait for its router, and for an answer [s].
+    """
+
+    def __init__(self, path: Path, config: RigConfig, timeout: float) -> None:
+        self._path, self._config, self._timeout = path, config, timeout
+        self._bus: Bus | None = None
+        self._healths: Subscription | None = None
+        self._last: dict[str, Health] = {}
+
+    def look(self) -> RigState:
+        """The present state."""
+        rig, path = self._config.rig.id, str(self._path)
+        try:
+            bus = self._joined()
+        except BusError as error:
+            return unreachable(rig, path, str(error))
+        if not bus.connected():
+            return unreachable(rig, path, f"the router at {self._config.bus.router} is away")
+        there = set(bus.tokens(f"{ALIVE_KEY}/*", self._timeout))
+        missing = [name for name in self._expected() if f"{ALIVE_KEY}/{name}" not in there]
+        self._hear(wait="monitor" not in missing)
+        alarms = []
+        if "monitor" not in missing:
+            with contextlib.suppress(BusError):  # it went away in between: missing the next time
+                alarms = ask_alarm_list(bus, self._timeout)
+        return judged(rig, path, missing, alarms, self._last)
+
+    def _joined(self) -> Bus:
+        if self._bus is None:
+            self._bus = connect(self._config, unique_process("fleet"), self._timeout)
+            self._healths = self._bus.subscribe(HEALTH)
+        return self._bus
+
+    def _expected(self) -> list[str]:
+        """Processes that the configuration has."""
+        return ["daq", *(name for name in _PROCESSES if getattr(self._config, name) is not None)]
+
+    def _hear(self, *, wait: bool) -> None:
+        """Take the messages of health; the first time wait for one of the monitor."""
+        assert self._healths is not None
+        until = time.monotonic() + self._timeout
+        for health in self._healths.drain():
+            self._take(health)
+        while wait and "monitor" not in self._last and (left := until - time.monotonic()) > 0:
+            if (health := self._healths.get(timeout=left)) is not None:
+                self._take(health)
+
+    def _take(self, health: Health) -> None:
+        self._last[health.source.partition("/")[0]] = health
+
+    def close(self) -> None:
+        """Leave the rig's bus."""
+        if self._bus is not None:
+            self._bus.close()
+
+
+class Fleet:
+    """The rigs of several configurations.
+
+    Args:
+        paths: the configurations.
+        timeout: longest wait for a rig [s].
+
+    Raises:
+        ConfigError: a configuration is invalid, or two are of one rig on one router.
+    """
+
+    def __init__(self, paths: Sequence[Path], timeout: float) -> None:
+        loaded = [(path, load_rig(path)) for path in paths]
+        seen: dict[tuple[str, str], Path] = {}
+        for path, config in loaded:
+            other = seen.setdefault((config.bus.router, config.rig.id), path)
+            if other is not path:
+                raise ConfigError(path, "rig.id", f"that of {other}", "an id of its own")
+        self._rigs = [Onlooker(path, config, timeout) for path, config in loaded]
+        self._threads = ThreadPoolExecutor(min(MOST_AT_ONCE, max(1, len(paths))))
+
+    def look(self) -> list[RigState]:
+        """The present state of each rig, the worst first; those alike by name."""
+        states = list(self._threads.map(Onlooker.look, self._rigs))
+        return sorted(states, key=lambda state: (-state.rank, state.rig))
+
+    def close(self) -> None:
+        """Leave all buses."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        for rig in self._rigs:
+            rig.close()

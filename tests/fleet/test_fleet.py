@@ -1,0 +1,97 @@
+"""Many rigs at a glance: the worst first, and a rig that does not answer is one of them."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.fleet import Fleet, as_lines, as_page
+from rigwatch.fleet.rig_state import GONE, UNREACHABLE, judged
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.messages import Alarm, Health
+from rigwatch.wire.rig_config import load_rig
+from tests.bus.rig import TestRig, kill
+from tests.monitor_process.test_several import rig_file
+from tests.waiting import PATIENCE, eventually
+
+NAN = float("nan")
+
+
+def alarm(name: str, severity: str, state: str = "unacknowledged", at: int = 1) -> Alarm:
+    text = ("<rubs>", "stop & look")
+    return Alarm(name, state, severity, *text, "rig", 1, 0, at, NAN, NAN, NAN, True, "", 0)
+
+
+def test_what_is_worse_comes_first():
+    well = {"monitor": Health("monitor", 1, "running", "", {"lost_samples": 0.0})}
+    ill = {"daq": Health("daq/rig", 1, "reconnecting", "", {})}
+    info, error, seen = alarm("a", "info"), alarm("b", "error"), alarm("c", "error", "acknowledged")
+    cases = [
+        judged("1", "x", (), (), well),
+        judged("2", "x", (), (), ill),
+        judged("3", "x", (), (info,), well),
+        judged("4", "x", (), (info, seen), well),
+        judged("5", "x", (), (seen, error), well),
+        judged("6", "x", (), (alarm("d", "critical"),), well),
+        judged("7", "x", ("daq",), (), well),
+    ]
+    ranks = [case.rank for case in cases]
+    assert ranks == sorted(ranks)
+    assert len(set(ranks)) == len(ranks)
+    assert ranks[0] == 0
+    assert [case.state for case in cases[4:]] == ["b", "d", "daq not there"]
+
+
+def test_a_page_has_a_section_for_each_rig_and_escapes_what_rigs_say():
+    state = judged("a b", "my rig.toml", (), (alarm("dry_friction", "error"),), {})
+    page = as_page([state])
+    assert 'href="#rig-a%20b"' in page
+    assert 'id="rig-a%20b"' in page
+    assert "&lt;rubs&gt; stop &amp; look" in page
+    assert "rigwatch dashboard &#39;my rig.toml&#39;" in page
+
+
+@pytest.fixture
+def rigs(tmp_path: Path):
+    """A rig that runs, one whose daq is not there, and one without a router."""
+    with TestRig(tmp_path) as base:
+        base.router()
+        paths = [rig_file(tmp_path, name, base.listen) for name in ("runs", "stands")]
+        paths.append(rig_file(tmp_path, "away"))
+        monitor = base.start("-m", "rigwatch", "monitor", *map(str, paths[:2]))
+        base.publisher(1, "--wave", path=paths[0])
+        bus = base.bus("observer", load_rig(paths[1]))
+        eventually(lambda: "alive/monitor" in bus.tokens("alive/*"), "the monitor")
+        yield paths, monitor
+
+
+def test_the_fleet_is_seen_and_a_rig_that_goes_moves_up(rigs, tmp_path, capsys):
+    paths, monitor = rigs
+    fleet = Fleet(paths, timeout=5.0)
+    away, stands, runs = fleet.look()
+    fleet.close()
+    assert (away.rig, away.rank) == ("away", UNREACHABLE)
+    assert "no router answers" in away.state
+    assert (stands.rig, stands.rank, stands.missing) == ("stands", GONE, ("daq",))
+    assert runs.rig == "runs"
+    assert runs.rank < GONE
+    assert runs.figures["samples"] > 0
+    assert as_lines([away, stands, runs])[-1].startswith("3 rigs: ")
+    page = tmp_path / "fleet.html"
+    words = ["fleet", *map(str, paths[:2]), "--json", "--page", str(page)]
+    assert main(words) == 1
+    assert [one["rig"] for one in json.loads(capsys.readouterr().out)] == ["stands", "runs"]
+    assert "rig-runs" in page.read_text()
+    kill(monitor)
+    one = Fleet(paths[:1], timeout=PATIENCE)
+    eventually(lambda: one.look()[0].missing == ("monitor",), "the rig lacks its monitor")
+    one.close()
+
+
+def test_one_rig_named_twice_is_refused(tmp_path):
+    path = rig_file(tmp_path, "a")
+    twin = tmp_path / "twin.toml"
+    twin.write_text(path.read_text())
+    with pytest.raises(ConfigError, match=r"rig.id: found that of .*rig.toml"):
+        Fleet([path, twin], 1.0)

@@ -1,0 +1,168 @@
+"""Several rigs in one process: each as if alone, and one that fails or is away delays none."""
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from monitor.pipeline import RigMonitor
+from monitor.process.loop import suitable_model
+from monitor.process.several import Seat, run_several
+from rigwatch.wire.bus import Bus
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.delivery import SampleRing
+from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.messages import ESTIMATES, SAMPLES, EstimateBlock, concatenate
+from rigwatch.wire.rig_config import RigConfig, load_rig
+from tests.bus.publisher import wave
+from tests.bus.rig import TestRig, kill
+from tests.monitor_process.model import MODEL, monitor_section
+from tests.monitor_process.test_real_process import Judged
+from tests.waiting import PATIENCE, wait_until
+
+
+class Bench:
+    """Rigs on a bus in memory, and one seat for each; the router of r0 answers when it is let."""
+
+    def __init__(self, folder: Path, count: int) -> None:
+        self.network, self.said, self.held = MemoryNetwork(), [], threading.Event()
+        self.daqs = [self.network.bus(f"r{number}", "daq") for number in range(count)]
+        self.rings = [SampleRing(daq, 65536) for daq in self.daqs]
+        self.heard = [
+            self.network.bus(f"r{number}", "observer").subscribe(ESTIMATES)
+            for number in range(count)
+        ]
+        self.judged: list[list[EstimateBlock]] = [[] for _ in range(count)]
+        self.seats = [self.seat(rig_file(folder, f"r{number}")) for number in range(count)]
+
+    def seat(self, path: Path) -> Seat:
+        config = load_rig(path)
+        return Seat(path, config, suitable_model(config, path), self.said.append, self.join)
+
+    def join(self, config: RigConfig, process: str) -> Bus:
+        if config.rig.id == "r0":
+            self.held.wait(PATIENCE)
+        return self.network.bus(config.rig.id, process)
+
+    def send(self, number: int, first: int, count: int, size: int = 1) -> None:
+        for seq in range(first, first + count, size):
+            block = concatenate([wave(seq + at, 1, 1, 0) for at in range(size)])
+            self.rings[number].add(block)
+            self.daqs[number].publish(SAMPLES, block)
+
+    def last(self, number: int) -> int:
+        self.judged[number] += self.heard[number].drain()
+        return max((block.seq + len(block) - 1 for block in self.judged[number]), default=-1)
+
+    def join_all(self, numbers: range) -> None:
+        """Turn until the monitors of these rigs read: what is sent before is none of theirs."""
+
+        def done() -> bool:
+            for seat in self.seats:
+                seat.turn()
+            return all(self.seats[n].is_running for n in numbers)
+
+        assert wait_until(done, PATIENCE, 0.001)
+
+    def turn_until(self, numbers: range, seq: int) -> None:
+        def done() -> bool:
+            for seat in self.seats:
+                seat.turn()
+            return all(self.last(number) >= seq for number in numbers)
+
+        assert wait_until(done, PATIENCE, 0.001)
+
+
+def rig_file(folder: Path, name: str, port: int | None = None) -> Path:
+    (folder / name).mkdir()
+    rig = TestRig(folder / name, monitor_section(folder / name))
+    text = rig.path.read_text().replace('id = "bench"', f'id = "{name}"')
+    rig.path.write_text(text if port is None else text.replace(f":{rig.listen}", f":{port}"))
+    return rig.path
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path, 3)
+
+
+def _values(blocks: list[EstimateBlock]) -> dict[int, list[float]]:
+    found: dict[int, list[float]] = {}
+    for block in blocks:
+        for at in range(len(block)):
+            assert block.seq + at not in found
+            found[block.seq + at] = [column.values[at] for column in block.columns]
+    return found
+
+
+def test_each_rig_is_judged_as_if_alone_and_one_without_a_router_delays_none(bench):
+    bench.join_all(range(1, 3))
+    for first in range(0, 400, 40):
+        bench.send(1, first, 40)
+        bench.send(2, first, 40, size=8)
+        bench.turn_until(range(1, 3), first + 39)
+    alone = RigMonitor(MODEL)
+    single = (alone.update(wave(seq, 1, 1, 0)) for seq in range(400))
+    expected = _values([watched.estimates for watched in single if watched])
+    for number in (1, 2):
+        found = _values(bench.judged[number])
+        assert len(found) == 400
+        assert repr(found) == repr(expected)
+    assert bench.last(0) == -1
+    bench.held.set()
+    bench.join_all(range(1))
+    bench.send(0, 0, 40)
+    bench.turn_until(range(1), 39)
+
+
+def test_a_rig_that_fails_starts_anew_and_goes_on_where_it_was(bench, monkeypatch):
+    monkeypatch.setattr("monitor.process.several.FIRST_PAUSE", 0.01)
+    bench.join_all(range(1, 3))
+    bench.send(1, 0, 40)
+    bench.send(2, 0, 40)
+    bench.turn_until(range(1, 3), 39)
+    broken = bench.seats[1]
+    broken._pause = 0.01
+
+    def fail(_: object) -> None:
+        raise OSError("the disk is gone")
+
+    monkeypatch.setattr(broken._process, "take", fail)
+    bench.send(1, 40, 40)
+    bench.send(2, 40, 40)
+    bench.turn_until(range(1, 3), 79)
+    (said,) = bench.said
+    assert said.endswith("the disk is gone; starts anew in 0 s")
+    assert sorted(_values(bench.judged[1])) == list(range(80))
+    assert sum(seat.delivered for seat in bench.seats) >= 160
+
+
+def test_two_configurations_of_one_rig_or_one_journal_are_refused(tmp_path):
+    path = rig_file(tmp_path, "a")
+    twin, other = tmp_path / "twin.toml", tmp_path / "other.toml"
+    twin.write_text(path.read_text())
+    with pytest.raises(ConfigError, match=r"rig.id: found that of .*rig.toml"):
+        run_several([path, twin])
+    other.write_text(path.read_text().replace('id = "a"', 'id = "b"'))
+    with pytest.raises(ConfigError, match=r"monitor.journal: found that of .*rig.toml"):
+        run_several([path, other])
+
+
+def test_a_killed_process_of_several_rigs_leaves_no_sample_unjudged(tmp_path):
+    with TestRig(tmp_path) as base:
+        base.router()
+        paths = [rig_file(tmp_path, name, base.listen) for name in ("a", "b")]
+        dead = rig_file(tmp_path, "dead")
+        judged = [Judged(base.bus("observer", load_rig(path))) for path in paths]
+        words = ["-m", "rigwatch", "monitor", *map(str, [*paths, dead])]
+        process = base.start(*words)
+        for path in paths:
+            base.publisher(1, "--wave", path=path)
+        for one in judged:
+            one.reaches(1, 200)
+        kill(process)
+        at = [one.last(1) for one in judged]
+        base.start(*words)
+        for one, last in zip(judged, at, strict=True):
+            one.reaches(1, last + 200)
+            assert one.missing(1) == []
