@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from rigwatch.physics.engine.equations import Effect, Model
+from rigwatch.physics.engine.equations import Composite, Effect, EffectMap, Model
 from rigwatch.replay.cases import CaseFile
 from rigwatch.structures.model import Structure
 from rigwatch.wire.exchange import ImportMapping
@@ -34,6 +34,19 @@ FILES: tuple[tuple[str, str, type[Section]], ...] = (
         "--effect-file FILE` copies it into a study. Examples: `rigwatch/physics/effects/`, "
         "[own effects](workbench.md#own-effects).",
         Effect,
+    ),
+    (
+        "Composite",
+        "An effect that acts through another, `[composites.NAME]` in a file of effects. Example: "
+        "`rigwatch/physics/effects/composites.toml`, "
+        "[effects in series](workbench.md#effects-in-series).",
+        Composite,
+    ),
+    (
+        "Map",
+        "What lies between a force port and an effect, `[maps.NAME]` in a file of effects, as the "
+        "first part of a composite.",
+        EffectMap,
     ),
     (
         "Study",

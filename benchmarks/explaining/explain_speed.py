@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.explaining.hidden_effects import NOISE, excitation, explained, noisy
-from rigwatch.physics.engine.equations.effect import load_effects
+from rigwatch.physics.engine.equations.effect_files import load_effects
 from rigwatch.physics.engine.score.significance import corrected_p_values
 from rigwatch.workbench.compare.compare import comparison
 from rigwatch.workbench.compare.preparation import Bench, bench_of

@@ -38,7 +38,7 @@ from benchmarks.explaining.rig_hidden import (
     recorded,
     settings,
 )
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.compare.preparation import Bench, bench_of

@@ -24,7 +24,7 @@ from benchmarks.simulation.simulation_rivals import (
 )
 from benchmarks.simulation.simulation_task import Result, Simulator, Task
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, System, compose
 from rigwatch.wire.arrays import FloatArray

@@ -15,7 +15,7 @@ from monitor.diagnosis.background_ranking import WAIT
 from monitor.diagnosis.fault_candidates import LEVEL, Evidence, Suspect, suspects
 from monitor.pipeline.pipeline import Monitor
 from monitor.signals.conditions import DEPARTURE
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from sim_plant.effects import EFFECTS
 from sim_plant.scenario import Event
 from tools.benchmark_table import Row

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from scipy.signal import lsim
 
 from rigwatch.wire.arrays import FloatArray
 from sim_plant.specimens.specimen import between, sines
@@ -79,6 +80,19 @@ class SliderInAFork:
         return -side * self._force
 
 
+class InAFork:
+    """What a fork with play carries along: it moves only while a prong pushes it."""
+
+    def __init__(self, gap: float, law: Callable[[float, float], float]) -> None:
+        self._half, self._law, self._at = gap / 2, law, 0.0
+
+    def __call__(self, _t: float, x: float, _v: float, h: float) -> float:
+        """The force of what is carried; its law takes its motion in a step, and the step."""
+        before = self._at
+        self._at = min(max(before, x - self._half), x + self._half)
+        return self._law(self._at - before, h)
+
+
 class SecondMass:
     """A mass that hangs on the first by a spring and a damper."""
 
@@ -95,9 +109,17 @@ class SecondMass:
         return pull
 
 
+def _bumper(x: float) -> float:
+    """Rubber that is touched 6 cm from the middle."""
+    return -math.copysign(8e3 * max(abs(x) - 0.06, 0.0) ** 3, x)
+
+
 CONTACTS: dict[str, Callable[[], Contact]] = {
     "maxwell_slip": two_sliders,
     "slider_behind_gap": lambda: SliderInAFork(0.06, 0.6),
+    "viscous_behind_play": lambda: InAFork(0.06, lambda moved, h: -1.5 * moved / h),
+    "viscous_beyond_clearance": lambda: lambda t, x, v, h: -2.5 * v if abs(x) > 0.06 else 0.0,
+    "cubic_stiffness_beyond_clearance": lambda: lambda t, x, v, h: _bumper(x),
     "attached_mass": lambda: SecondMass(0.1, 11.0, 0.06),
     "stop_above": lambda: lambda t, x, v, h: -90.0 * (x - 0.09) if x > 0.09 else 0.0,
     "stop_below": lambda: lambda t, x, v, h: -90.0 * (x + 0.09) if x < -0.09 else 0.0,
@@ -144,8 +166,17 @@ def _played(read: FloatArray, _dt: float) -> FloatArray:
     return shown
 
 
+def _slow_and_late(read: FloatArray, dt: float) -> FloatArray:
+    """An accelerometer with an analogue filter, whose reading is sent 20 ms late."""
+    time, shown = dt * np.arange(len(read)), read.copy()
+    filtered = lsim(([1.0], [0.025, 1.0]), read[:, 1], time, read[0, 1] * 0.025)[1]
+    shown[:, 1] = np.interp(time - 0.02, time, filtered)
+    return shown
+
+
 SENSORS: dict[str, Callable[[FloatArray, float], FloatArray]] = {
     "hum": _hummed,
     "sensor_play": _played,
+    "delay_after_lag": _slow_and_late,
 }
 """What the sensors make of position and acceleration (n, 2), and time between samples [s]."""

@@ -18,6 +18,7 @@ HIDDEN: dict[str, Specimen] = {
             **{n: (f"{n}@drive",) for n in mass.DRIVES},
             "hum": ("hum@acceleration_sensor",),
             "sensor_play": ("sensor_play@position_sensor",),
+            "delay_after_lag": ("delay_after_lag@acceleration_sensor",),
         }),
         (_BLOCK, {n: (f"{n}@loss",) for n in heat_and_flow.LOSSES if n != "convection"}),
         (_VESSEL, {n: (f"{n}@outlet",) for n in heat_and_flow.OUTLETS}),

@@ -6,8 +6,8 @@ import scipy.signal
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.equations.dimension import describe, dimension
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
+from rigwatch.physics.engine.equations.expression_dimension import describe, dimension
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.quantities import spelt_out
 from rigwatch.physics.engine.equations.system import Placement, compose

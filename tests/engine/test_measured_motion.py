@@ -6,7 +6,7 @@ from msgspec.structs import replace
 from scipy.integrate import solve_ivp
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.measured_motion import (
     along_measured_motion,
     has_hidden_states,

@@ -5,7 +5,7 @@ import pytest
 
 from rigwatch.physics.engine.compile import kernel as native
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
 

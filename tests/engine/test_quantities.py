@@ -5,7 +5,7 @@ import pytest
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.measured_motion import (
     along_measured_motion,
     balanced_states,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.score.candidates import candidates, root_mean_square, sizes_at_port
 from rigwatch.physics.engine.score.ranking import Standing, cosines_with, freed, standings
 from rigwatch.physics.engine.score.score_test import Projector, Scores, best_of, score

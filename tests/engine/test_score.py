@@ -5,7 +5,7 @@ import pytest
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording, windows

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.equations.effect import Effect, EffectFile, EffectParameter
+from rigwatch.physics.engine.equations.effect import Effect, EffectParameter
+from rigwatch.physics.engine.equations.effect_files import EffectFile
 from rigwatch.physics.engine.equations.model import Model, Parameter, State
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording

@@ -13,7 +13,8 @@ from monitor.diagnosis.ranking_job import ask
 from monitor.model.model_file import RigModel, load_model
 from monitor.pipeline.pipeline import Monitor
 from monitor.pipeline.rig_monitor import RigMonitor
-from rigwatch.physics.engine.equations.effect import Effect, EffectParameter, library
+from rigwatch.physics.engine.equations.effect import Effect, EffectParameter
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.simulated import simulate
 from rigwatch.wire.messages.blocks import concatenate, pieces
 from rigwatch.wire.messages.message_types import Alarm, Event, SampleBlock

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose, signal_order
 from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import FloatArray

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rigwatch.commands import main
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.catalogue import effect_curves, listed, model_report, text_plot

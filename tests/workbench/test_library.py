@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.compare.preparation import bench_of
@@ -53,7 +53,7 @@ def test_every_effect_of_a_file_stands_in_one_file_alone() -> None:
         line
         for file in sorted(folder.glob("*.toml"))
         for line in file.read_text("utf-8").splitlines()
-        if line.startswith("[effects.")
+        if line.startswith(("[effects.", "[composites."))
     ]
 
     assert len(heads) == len(set(heads)) == len(library())

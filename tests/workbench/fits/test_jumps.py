@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.equations.effect import library
+from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.workbench.explain.explain import ranking

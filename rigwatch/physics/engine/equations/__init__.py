@@ -3,14 +3,16 @@
     model.toml + effects at ports ──compose──▶ System: states, parameters, derivatives, outputs
 
 `expression` parses, `dimension` checks units, `scope` holds the names that an equation may use,
-`plugins` finds the effects of other packages.
+`effect_files` reads effects, and `composite` puts one behind another.
 """
 
-from rigwatch.physics.engine.equations.effect import (
-    Effect,
-    EffectParameter,
+from rigwatch.physics.engine.equations.composite import Composite, EffectMap
+from rigwatch.physics.engine.equations.effect import Effect, EffectParameter
+from rigwatch.physics.engine.equations.effect_files import (
+    EffectFile,
     library,
     load_effects,
+    offered,
     parse_effects,
 )
 from rigwatch.physics.engine.equations.expression import FUNCTIONS, names_in, parse
@@ -39,7 +41,6 @@ from rigwatch.physics.engine.equations.model import (
     shipped_models,
 )
 from rigwatch.physics.engine.equations.model_check import check_model, check_variants, unused_ports
-from rigwatch.physics.engine.equations.plugins import offered
 from rigwatch.physics.engine.equations.quantities import spelt_out
 from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import (
@@ -65,7 +66,10 @@ __all__ = [
     "STEP",
     "TIME",
     "UNTIL",
+    "Composite",
     "Effect",
+    "EffectFile",
+    "EffectMap",
     "EffectParameter",
     "Hold",
     "Input",

@@ -12,9 +12,6 @@ immediately if the unit is fixed, by `Effect.at` if it refers to the port's.
 """
 
 from collections.abc import Mapping
-from functools import cache
-from importlib import resources
-from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
 import sympy
@@ -23,8 +20,8 @@ from msgspec.structs import replace
 
 from rigwatch.physics.engine.equations.expression import parse as parse_expression
 from rigwatch.physics.engine.equations.in_si import into_si
-from rigwatch.wire.errors import ConfigError, ModelError
-from rigwatch.wire.typed_files import Section, parse, read_text
+from rigwatch.wire.errors import ModelError
+from rigwatch.wire.typed_files import Section
 from rigwatch.wire.units import UnitError
 
 Text = Annotated[str, Meta(min_length=1)]
@@ -185,56 +182,3 @@ def _scaled(name: str, p: EffectParameter, sizes: Mapping[str, float]) -> Effect
     return replace(
         p, value=p.value * size, low=p.low * size, high=p.high * size, tried=tried, scale=""
     )
-
-
-class EffectFile(Section, frozen=True, kw_only=True):
-    """A file of effects."""
-
-    effects: dict[str, Effect]
-
-
-def usable(name: str, effect: Effect, file: Path | str) -> Effect:
-    """The effect, if its declaration is valid.
-
-    Raises:
-        ConfigError: it has no strength or more than one, or a state without an equation.
-    """
-    strengths = [key for key, p in effect.parameters.items() if p.role in ("strength", "switch")]
-    if len(strengths) != 1:
-        found = f"{len(strengths)} parameters with role strength or switch"
-        raise ConfigError(file, f"effects.{name}.parameters", found, "one")
-    for key, state in effect.states.items():
-        if bool(state.derivative) == bool(state.update):
-            found = "both" if state.derivative else "neither"
-            raise ConfigError(file, f"effects.{name}.states.{key}", found, "derivative or update")
-    return effect
-
-
-def load_effects(path: Path | str) -> dict[str, Effect]:
-    """The effects of the file at `path`, by name.
-
-    Raises:
-        ConfigError: the file is invalid.
-    """
-    return parse_effects(read_text(Path(path)), path)
-
-
-def parse_effects(text: str, file: Path | str) -> dict[str, Effect]:
-    """The effects in the text of a file, by name; `file` is named in errors.
-
-    Raises:
-        ConfigError: the text is invalid.
-    """
-    found = parse(text, EffectFile, file).effects
-    return {name: usable(name, effect, file) for name, effect in found.items()}
-
-
-@cache
-def library() -> dict[str, Effect]:
-    """The effects that ship with rigwatch, by name."""
-    found: dict[str, Effect] = {}
-    folder = resources.files("rigwatch.physics") / "effects"
-    for file in sorted(folder.iterdir(), key=lambda entry: entry.name):
-        if file.name.endswith(".toml"):
-            found |= parse(file.read_text("utf-8"), EffectFile, file.name).effects
-    return found

@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 
 import sympy
 
-from rigwatch.physics.engine.equations.dimension import (
+from rigwatch.physics.engine.equations.expression import parse
+from rigwatch.physics.engine.equations.expression_dimension import (
     GRAM,
     Dimension,
     describe,
     dimension,
+    dimension_of,
     names_gram,
 )
-from rigwatch.physics.engine.equations.expression import parse
-from rigwatch.physics.engine.equations.expression_dimension import dimension_of
 from rigwatch.wire.errors import ModelError
 
 
