@@ -30,6 +30,7 @@ _CLASSIFIERS = {
 }
 _TEXTS = {
     "3-Clause BSD License": "BSD-3-Clause",
+    "BSD 3-Clause": "BSD-3-Clause",
     "BSD 2-Clause License": "BSD-2-Clause",
     "Apache 2.0": "Apache-2.0",
 }

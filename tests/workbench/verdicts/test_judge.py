@@ -28,7 +28,7 @@ def leaving(squares: np.ndarray, outputs: int = 1) -> Fitted:
     """A fit that leaves these mean squares in the windows held out."""
     residuals = np.sqrt(squares)[:, None, None] * np.ones((1, 4, 1))
     unused: Any = None
-    model = SimpleNamespace(inputs=["u"], outputs=range(outputs))
+    model = SimpleNamespace(driving=lambda: ("u",), outputs=range(outputs))
     compiled: Any = SimpleNamespace(system=SimpleNamespace(model=model))
     fit = Fit(compiled, unused, unused, unused, residuals, np.ones(1), unused, unused)
     return Fitted((), fit, fit, 1, 1)
