@@ -24,7 +24,8 @@ _SLOW = 0.9
 _SLOW_OVER = 100
 _GARBAGE = 0.01
 _DRIFT_LIMITS: tuple[tuple[float, Severity], ...] = ((5000.0, "error"), (500.0, "warning"))
-_PLAUSIBLE_AFTER = 256
+_PLAUSIBLE_AFTER_S, _PLAUSIBLE_LEAST = 0.75, 64
+"""Time and fewest samples after which plausibility is judged: told within the first second."""
 _STATE_EVENTS: dict[str, tuple[Severity, str]] = {
     "reconnecting": ("error", "link_lost"),
     "garbage": ("error", "garbage"),
@@ -102,7 +103,10 @@ class Watch:
         self, now_ns: int, unix_ns: int, link: Link, counters: Mapping[str, float]
     ) -> list[Message]:
         """Events for what changed; health once a second and when the state changes."""
-        messages: list[Message] = [*self._failed_polls(unix_ns, link, counters)]
+        messages: list[Message] = [
+            *self._failed_polls(unix_ns, link, counters),
+            *self._implausible(unix_ns),
+        ]
         second_over = self._second_ns is None or now_ns - self._second_ns >= _SECOND
         if second_over:
             messages += self._second(now_ns, unix_ns, counters)
@@ -159,7 +163,7 @@ class Watch:
         self._update_rates(now_ns)
         self._garbage_text = self._garbage(counters)
         self._second_ns, self._before = now_ns, dict(counters)
-        return [*self._drift(unix_ns, counters), *self._implausible(unix_ns)]
+        return self._drift(unix_ns, counters)
 
     def _update_rates(self, now_ns: int) -> None:
         if self._second_ns is None or self._first_ns is None:
@@ -196,8 +200,9 @@ class Watch:
         return [Event(self._source, unix_ns, severity, "clock_drift", text)]
 
     def _implausible(self, unix_ns: int) -> list[Message]:
-        """Once, after the first second of samples: channels that are mostly out of range."""
-        if self._samples < _PLAUSIBLE_AFTER or self._outside.get("", 0):
+        """Once, in the first second of samples: channels that are mostly out of range."""
+        least = max(_PLAUSIBLE_LEAST, _PLAUSIBLE_AFTER_S * self._rate)
+        if self._outside.get("", 0) or self._samples < least:
             return []
         wrong = [name for name, count in self._outside.items() if count > self._samples // 2]
         self._outside[""] = 1

@@ -148,6 +148,7 @@ class MonitorProcess:
         ):
             self.say(self.rig.alarms.report(name, occasion, active=holds))
         self._announce_router(seen)
+        self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen)
 
@@ -159,6 +160,11 @@ class MonitorProcess:
             away, self._router_lost_at = time.monotonic() - self._router_lost_at, None
             text = f"the router was away for {away:.1f} s; messages from that time follow"
             self.bus.publish(EVENTS, Event("monitor", seen.t_ns, "warning", "ROUTER BACK", text))
+
+    def _announce_clock_step(self, seen: Seen) -> None:
+        if step := self._links.clock_step(seen):
+            text = f"the wall clock was set by {step / 1e9:+.1f} s"
+            self.bus.publish(EVENTS, Event("monitor", seen.t_ns, "warning", "CLOCK STEP", text))
 
     def say(self, announcements: Iterable[Announcement]) -> None:
         """Write changes to the journal, then list and publish them."""
@@ -258,9 +264,6 @@ class MonitorProcess:
         )
 
     def _tell_health(self, seen: Seen) -> None:
-        if step := self._links.clock_step(seen):
-            text = f"the wall clock was set by {step / 1e9:+.1f} s"
-            self.bus.publish(EVENTS, Event("monitor", seen.t_ns, "warning", "CLOCK STEP", text))
         stale = seen.silent_s > 1.0
         state = "unsuitable" if self._unsuitable else "stale" if stale else "running"
         text = self._unsuitable or ("no samples arrive" if stale else "")

@@ -205,6 +205,7 @@ class Field:
             f'[monitor]\nmodel = "{folder}/model.toml"\njournal = "{self.journal}"\n{extra}'
         )
         self.processes: dict[str, Popen[bytes]] = {}
+        self.started_ns: dict[str, int] = {}
         self.heard = Heard()
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
@@ -231,6 +232,7 @@ class Field:
             self.bus = self.rig.bus("observer")
             self.beside(self._listen)
         for command in commands:
+            self.started_ns[command] = time.time_ns()
             self.processes[command] = self.rig.start(
                 "-m", "rigwatch", command, str(path or self.rig.path)
             )

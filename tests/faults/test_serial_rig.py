@@ -1,5 +1,6 @@
 """Faults of a serial device and its sensors, on one running rig: daq and monitor as processes."""
 
+import contextlib
 import subprocess
 import sys
 import time
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 
 from rigwatch.wire.bus import ask_alarm_list
-from rigwatch.wire.messages import SAMPLES
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.messages import SAMPLES, Alarm
 from tests.bus.rig import ROOT
 from tests.faults.field import (
     AMPLITUDE,
@@ -134,14 +136,27 @@ def test_35_a_gap_in_the_samples(rig: Field, device: SerialDevice) -> None:
     assert short.last - short.first == 1
     armed = estimated(rig, boot, short.last + 1, short.last + 32, "armed")
     assert armed.all(), "predicted through"
+    assert rig.raised("gap", after_seq=short.first).seq == short.last + 1
+    residual = estimated(rig, boot, short.last + 1, short.last + 32, "residual")
+    before = estimated(rig, boot, short.first - 64, short.first - 1, "residual")
+    assert np.abs(residual).max() < 4.0 * np.abs(before).max(), "no filter has started anew"
     rig.cleared("gap")
-    since = len(rig.gaps)
-    device.faults.start("lose", 60)
-    long = rig.gap(since)
-    alarm = rig.raised("gap", after_seq=long.first)
-    assert alarm.seq == long.last + 1
-    armed = estimated(rig, boot, long.last + 1, long.last + 32, "armed")
-    assert not armed.any(), "the window starts anew"
+    for samples in (3, 60):
+        ready(rig, device)
+        since = len(rig.gaps)
+        device.faults.start("lose", samples)
+        long = rig.gap(since)
+        assert long.last - long.first + 1 == samples
+        alarm = rig.raised("gap", after_seq=long.first)
+        assert alarm.seq == long.last + 1
+        assert not estimated(rig, boot, long.first, long.last).size, "nothing is made up"
+        for column in ("armed", "observable"):
+            anew = estimated(rig, boot, long.last + 1, long.last + 7, column)
+            assert not anew.any(), "filters and window start anew"
+        assert not estimated(rig, boot, long.last + 1, long.last + 32, "armed").any()
+        for name in ("theta1", "theta2", "residual"):
+            assert np.isfinite(estimated(rig, boot, long.last + 1, long.last + 64, name)).all()
+        rig.cleared("gap")
 
 
 def ready(rig: Field, device: SerialDevice) -> None:
@@ -217,24 +232,46 @@ def test_15_a_gain_that_changes(rig: Field, device: SerialDevice) -> None:
     assert alarm.seq - first <= RATE
 
 
+class Standstill:
+    """From a turning point on, where the velocity is zero, some channels show only noise."""
+
+    def __init__(self, channels: slice) -> None:
+        self._channels, self._chance = channels, np.random.default_rng(3)
+        self.moved, self.stands = 0, False
+
+    def __call__(self, codes: np.ndarray) -> None:
+        self.stands = self.stands or abs(codes[0, POSITION]) >= AMPLITUDE - 1
+        if self.stands:
+            shape = codes[:, self._channels].shape
+            codes[:, self._channels] = self._chance.integers(-2, 3, shape)
+        else:
+            self.moved += 1
+
+
 def test_36_a_rig_that_stands_still(rig: Field, device: SerialDevice) -> None:
     ready(rig, device)
-    chance, stopped = np.random.default_rng(3), [False]
-
-    def still(codes: np.ndarray) -> None:
-        """From a turning point on, where the velocity is zero."""
-        stopped[0] = stopped[0] or abs(codes[0, POSITION]) >= AMPLITUDE - 1
-        if stopped[0]:
-            codes[:] = chance.integers(-2, 3, codes.shape)
-
+    still = Standstill(slice(None))
     first, boot = device.source.inject(still, 640).sent(), device.device.boot
-    still_from = first + round(RATE)
+    rig.judged(boot, first + 600)
+    still_from = first + still.moved + round(RATE)
     assert not estimated(rig, boot, still_from, first + 600, "observable").any()
     for name in ("theta1", "theta2", "theta1_high", "theta2_high"):
         frozen = estimated(rig, boot, still_from, first + 600, name)
         assert np.isfinite(frozen).all()
         assert (frozen == frozen[0]).all(), "frozen and bounded"
     rig.judged(boot, first + 700)
+
+
+def test_36_a_rig_that_is_driven_and_stands_still(rig: Field, device: SerialDevice) -> None:
+    ready(rig, device)
+    held = Standstill(slice(POSITION, None))
+    first, boot = device.source.inject(held, 640).sent(), device.device.boot
+    remark = rig.raised("not_observable", after_seq=first)
+    # The window, and the decay of the velocity's filter to the least velocity.
+    assert 0 <= remark.seq - (first + held.moved) <= 1.5 * RATE
+    assert estimated(rig, boot, remark.seq, remark.seq, "armed").tolist() == [1.0]
+    assert not estimated(rig, boot, remark.seq, remark.seq + 64, "observable").any()
+    rig.cleared("not_observable")
 
 
 def test_42_a_slow_reader(rig: Field, device: SerialDevice) -> None:
@@ -350,6 +387,19 @@ def command(*arguments: str) -> "subprocess.CompletedProcess[str]":
     )  # fmt: skip
 
 
+def standing(rig: Field) -> list[Alarm]:
+    """The list of a monitor that may just be starting: the first answer counts."""
+    found: list[list[Alarm]] = []
+
+    def answered() -> bool:
+        with contextlib.suppress(BusError):
+            found.append(ask_alarm_list(rig.bus))
+        return bool(found)
+
+    eventually(answered, "the list of alarms")
+    return found[0]
+
+
 def test_48_a_flood_an_acknowledgement_and_a_restart(rig: Field, device: SerialDevice) -> None:
     rig.renew_monitor(device.device)
     began = time.time_ns()
@@ -377,7 +427,7 @@ def test_48_a_flood_an_acknowledgement_and_a_restart(rig: Field, device: SerialD
     before = {alarm.name: alarm.state for alarm in ask_alarm_list(rig.bus)}
     rig.kill("monitor")
     rig.start("monitor")
-    after = {alarm.name: alarm.state for alarm in ask_alarm_list(rig.bus)}
+    after = {alarm.name: alarm.state for alarm in standing(rig)}
     latched = {"link", "sensor_stuck.acceleration", "sensor_saturated.position"}
     assert latched <= before.keys()
     assert {name: after[name] for name in latched} == {name: before[name] for name in latched}

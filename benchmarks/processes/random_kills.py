@@ -1,0 +1,207 @@
+"""Random kills and hangs of a supervised rig for two hours: nothing is missing without a report.
+
+    rigwatch up ─▶ router, plant, daq, monitor, recorder, witness
+         ▲ SIGKILL, or SIGSTOP and SIGCONT after 0.2 to 6 s, 1000 in two hours
+         └ this process ─▶ two listeners, an operator who acknowledges and resets
+
+The rig is that of the demonstration, whose faults come and go, so that there are alarms of the rig
+besides those of the kills. Afterwards the recording, the alarm journal and both listeners are
+compared (`random_kills_accounts.py`).
+"""
+
+import contextlib
+import os
+import random
+import shutil
+import signal
+import threading
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from benchmarks.processes.live_rig import LiveRig, live_rig
+from benchmarks.processes.random_kills_accounts import Account, heard_account, recorded_account
+from rigwatch.wire.bus import Bus, command_alarms, connect
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.messages import ALARMS, Alarm, AlarmCommand, Gap
+from tests.tooling.test_up import Rig as Up
+from tools.benchmark_table import Row
+
+VICTIMS = ("router", "daq", "monitor", "recorder", "witness")
+MEAN_PAUSE = 5.5
+"""Mean pause before a kill or hang [s]; with the hangs themselves, a thousand in two hours."""
+LISTENERS = ("listener-1", "listener-2")
+SETTLING = 45.0
+"""Time without kills at the end, so that what was missed can be fetched [s]."""
+FIRST = 60.0
+"""Longest start of all processes [s]."""
+
+
+@dataclass
+class Listener:
+    """A subscriber of alarms that lives for the whole run.
+
+    Attributes:
+        heard: alarms in order of arrival.
+        gaps: of alarms, as reported.
+    """
+
+    bus: Bus
+    heard: list[Alarm] = field(default_factory=list)
+    gaps: list[Gap] = field(default_factory=list)
+
+    def run(self, stop: threading.Event) -> None:
+        """Listen until `stop` is set."""
+        alarms = self.bus.listen(ALARMS)
+        while not stop.is_set():
+            alarm = alarms.get(timeout=0.1)
+            if alarm is not None:
+                self.heard.append(alarm)
+            self.gaps += [one for one in alarms.reports() if isinstance(one, Gap)]
+        self.heard += alarms.drain()
+
+
+@dataclass
+class Disturbance:
+    """What was done to the rig."""
+
+    kills: dict[str, int] = field(default_factory=lambda: dict.fromkeys(VICTIMS, 0))
+    hangs: dict[str, int] = field(default_factory=lambda: dict.fromkeys(VICTIMS, 0))
+    commands: int = 0
+    refused: int = 0
+
+    @property
+    def count(self) -> int:
+        """Kills and hangs together."""
+        return sum(self.kills.values()) + sum(self.hangs.values())
+
+    def __str__(self) -> str:
+        each = ", ".join(f"{name} {self.kills[name]}+{self.hangs[name]}" for name in VICTIMS)
+        return f"killed + stopped: {each}"
+
+
+def run(quick: bool) -> list[Row]:
+    """Two minutes, or as many as RIGWATCH_KILL_MINUTES says (default 120)."""
+    minutes = 2.0 if quick else float(os.environ.get("RIGWATCH_KILL_MINUTES", "120"))
+    with live_rig() as rig:
+        done, listeners, left = disturbed(rig, 60.0 * minutes)
+        journal = rig.folder / "alarms.jsonl"
+        accounts = [
+            heard_account(name, one.heard, one.gaps, journal)
+            for name, one in zip(LISTENERS, listeners, strict=True)
+        ]
+        accounts += recorded_account(rig.folder / "sessions", journal, [o.heard for o in listeners])
+        if kept := os.environ.get("RIGWATCH_KILL_FOLDER"):
+            shutil.copytree(rig.folder, kept, ignore=shutil.ignore_patterns("serial-line"))
+    return [_row(one, done, minutes) for one in accounts] + [_alive(left, done)]
+
+
+def _row(account: Account, done: Disturbance, minutes: float) -> Row:
+    return Row(
+        f"{done.count} random kills and hangs in {minutes:g} min: {account.what}",
+        f"{account.missing} silently missing",
+        "0",
+        "",
+        f"{account.note}; {done}",
+        passed=account.missing == 0 and account.total > 0,
+    )
+
+
+def _alive(left: list[str], done: Disturbance) -> Row:
+    text = "all run" if not left else f"{', '.join(left)} not"
+    note = f"{done.commands} commands of an operator, {done.refused} answered with a refusal"
+    return Row("the same: processes at the end", text, "all run", "", note, passed=not left)
+
+
+def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[Listener], list[str]]:
+    """Run and disturb the rig; the processes that do not run at the end."""
+    with rig.path.open("a") as file:
+        file.write("\n[witness]\n")
+    up, stop = Up(rig.path, "--without", "dashboard"), threading.Event()
+    try:
+        statuses = _Statuses(up)
+        statuses.wait(VICTIMS)
+        listeners = [Listener(connect(rig.config, name, FIRST)) for name in LISTENERS]
+        threads = [threading.Thread(target=one.run, args=(stop,)) for one in listeners]
+        for thread in threads:
+            thread.start()
+        done = Disturbance()
+        operator = threading.Thread(target=_operate, args=(rig, stop, done))
+        operator.start()
+        _disturb(statuses, done, seconds)
+        time.sleep(SETTLING)
+        stop.set()
+        operator.join()
+        for thread in threads:
+            thread.join()
+        left = [name for name in VICTIMS if not statuses.alive(name)]
+        for one in listeners:
+            one.bus.close()
+    finally:
+        stop.set()
+        up.end()
+    return done, listeners, left
+
+
+class _Statuses:
+    """The newest status of the supervisor, read in a thread."""
+
+    def __init__(self, up: Up) -> None:
+        self._up, self._newest = up, dict[str, Any]()
+        threading.Thread(target=self._follow, daemon=True).start()
+
+    def _follow(self) -> None:
+        with contextlib.suppress(AssertionError):
+            while True:
+                self._newest = self._up.wait_for("status", 120.0)["processes"]
+                self._up.events.clear()
+
+    def of(self, name: str) -> dict[str, Any]:
+        return dict(self._newest.get(name, {}))
+
+    def alive(self, name: str) -> bool:
+        """Whether the process of the newest status exists."""
+        pid = int(self.of(name).get("pid", 0))
+        return pid > 0 and Path(f"/proc/{pid}").exists()
+
+    def wait(self, names: tuple[str, ...]) -> None:
+        deadline = time.monotonic() + FIRST
+        while not all(self.alive(name) for name in names):
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"not all of {', '.join(names)} came up")
+            time.sleep(0.2)
+
+
+def _disturb(statuses: _Statuses, done: Disturbance, seconds: float) -> None:
+    chance, ends = random.Random(1), time.monotonic() + seconds
+    time.sleep(10.0)
+    while (left := ends - time.monotonic()) > 0:
+        time.sleep(min(left, chance.expovariate(1.0 / MEAN_PAUSE)))
+        name = chance.choice(VICTIMS)
+        if not statuses.alive(name):
+            continue
+        pid = int(statuses.of(name)["pid"])
+        with contextlib.suppress(ProcessLookupError):
+            if chance.random() < 0.6:
+                os.kill(pid, signal.SIGKILL)
+                done.kills[name] += 1
+            else:
+                os.kill(pid, signal.SIGSTOP)
+                done.hangs[name] += 1
+                time.sleep(chance.uniform(0.2, 6.0))
+                os.kill(pid, signal.SIGCONT)
+
+
+def _operate(rig: LiveRig, stop: threading.Event, done: Disturbance) -> None:
+    """Acknowledge and reset all alarms twice a minute."""
+    while not stop.wait(15.0):
+        for action in ("acknowledge", "reset"):
+            with contextlib.suppress(RigwatchError):
+                bus = connect(rig.config, "operator-desk", 3.0)
+                try:
+                    command = AlarmCommand("*", action, "benchmark", time.time_ns())
+                    done.refused += bool(command_alarms(bus, command)[1])
+                    done.commands += 1
+                finally:
+                    bus.close()
