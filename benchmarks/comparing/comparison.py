@@ -113,7 +113,7 @@ def _result(task: Task, user: str) -> tuple[float, str]:
     module = importlib.import_module(f"benchmarks.comparing.with_{tool}")
     if tool == "rigwatch":
         with tempfile.TemporaryDirectory() as folder:
-            error, named = module.found_by(coarse(task), Path(folder))
+            error, named = module.found_by(task, Path(folder))
         return error, named
     if tool == "sysidentpy":
         runs, named = module.found_by(task)

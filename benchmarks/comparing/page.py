@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.__main__ import machine
-from benchmarks.comparing.comparison import LIMIT, Cell, stored
+from benchmarks.comparing.comparison import Cell, stored
 from benchmarks.comparing.task import Task, tasks
 
 TARGET = Path(__file__).parents[2] / "docs" / "comparison.md"
@@ -26,7 +26,7 @@ NAMES = {
 }
 DONE = {
     "rigwatch": "a study of logs and a model file; `explain` and `add` while an effect is named"
-    " with confidence",
+    " with confidence; for EMPS first force from its motion, as its study is shipped",
     "SciPy": "the equation in Python, `solve_ivp` and `least_squares`, on growing parts of the"
     " recording",
     "CasADi": "Runge-Kutta steps mapped over the samples, multiple shooting with a Gauss-Newton"
@@ -54,8 +54,7 @@ find. *Lines*: of the program without imports and comments, or of model, study a
 """
 TAIL = """
 Errors are of free runs, in which errors add up; rigwatch judges effects over horizons
-([workbench](workbench.md)). SysIdentPy predicts samples of its decimated recording. Each cell has a
-limit of {limit:.0f} s. One run on {processor}, {cores} cores, Python {python}; other work kept the
+([workbench](workbench.md)). SysIdentPy predicts samples of its decimated recording. Measured on {processor}, {cores} cores, Python {python}; other work kept the
 machine busy (load {load}), so that times compare users with each other only.
 """
 
@@ -79,17 +78,21 @@ def table(task: Task, found: Sequence[Cell]) -> list[str]:
     return lines
 
 
+def write(found: Sequence[Cell], chosen: Sequence[Task]) -> None:
+    """Write the page of these results."""
+    done = "\n".join(f"| {user} | {what} |" for user, what in DONE.items())
+    lines = [HEAD.format(done=done).rstrip()]
+    for task in chosen:
+        lines += table(task, [cell for cell in found if cell.task == task.name])
+    TARGET.write_text("\n".join(lines) + "\n" + TAIL.format(**machine()), "utf-8")
+
+
 def main() -> int:
     """0 if the page is written."""
     with tempfile.TemporaryDirectory() as folder:
         place = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(folder) / "cells.jsonl"
         chosen = tasks()
-        found = stored(place, chosen)
-    done = "\n".join(f"| {user} | {what} |" for user, what in DONE.items())
-    lines = [HEAD.format(done=done).rstrip()]
-    for task in chosen:
-        lines += table(task, [cell for cell in found if cell.task == task.name])
-    TARGET.write_text("\n".join(lines) + "\n" + TAIL.format(limit=LIMIT, **machine()), "utf-8")
+        write(stored(place, chosen), chosen)
     return 0
 
 
