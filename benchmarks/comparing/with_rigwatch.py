@@ -47,7 +47,13 @@ def lines_written(task: Task) -> int:
     """Lines of the model, unless it is shipped, of the study and of commands."""
     own = 0 if task.name in SHIPPED else len(MODEL.strip().splitlines())
     keys = len(SHIPPED.get(task.name, OWN)[1].splitlines())
-    return own + 1 + keys + 2 * len((*task.train, *task.held_out)) + 2 * len(task.effects) + 2
+    recordings = 2 * len((*task.train, *task.held_out))
+    commands = 2 * len(task.effects) + 2
+    study = 1 + keys + recordings
+    if task.name == "EMPS":
+        derived = [x for x in "".join(DERIVED[1:]).splitlines() if x and not x.startswith("#")]
+        study += 1 + recordings + len(derived)
+    return own + study + commands
 
 
 def found_by(task: Task, folder: Path) -> tuple[float, str]:
