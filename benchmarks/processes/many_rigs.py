@@ -49,7 +49,7 @@ def row(count: int, seconds: float) -> Row:
         f"{core:.2f} % of a core and {memory:.1f} MB a rig",
         "p99 < 50 ms, nothing lost",
         "",
-        f"sample sent to estimate received: p50 {p50:.0f}, p99 {p99:.0f} ms; {lost} samples without "
+        f"sample sent to estimate received: p50 {p50:.0f}, p99 {p99:.0f} ms; {lost} without "
         f"an estimate; processor's time and memory of the whole process, divided; {seconds:.0f} s, "
         f"load {psutil.getloadavg()[0]:.0f} on {psutil.cpu_count()} cores",
         p99 < 50.0 and lost == 0,

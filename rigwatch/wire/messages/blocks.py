@@ -146,4 +146,15 @@ def unseen(block: B, next_seq: int | None) -> B | None:
 
 def owned(block: B) -> B:
     """A copy of the block with aligned and writable arrays."""
-    return _joined([block])
+    columns = columns_of(block)
+    # One array for all values: an array for each costs more than the copy.
+    values = np.array([column.values for column in columns])
+    copies = tuple(
+        Column(column.name, column.unit, row, column.quality.copy())
+        for column, row in zip(columns, values, strict=True)
+    )
+    t_ns = block.t_ns.copy()
+    if isinstance(block, SampleBlock):
+        device_us = block.device_us.copy()
+        return SampleBlock(block.device, block.boot, block.seq, device_us, t_ns, copies)
+    return EstimateBlock(block.device, block.boot, block.seq, t_ns, copies)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import (
@@ -207,16 +208,23 @@ class _Channel:
         self._sum, self._good = 0.0, 0
 
     def add(self, column: Column) -> None:
-        flags = column.quality if len(column.quality) else np.zeros(len(column.values), np.uint8)
-        for bit, name in quality.NAMES.items():
-            self._flags[name] += int(np.count_nonzero(flags & bit))
-        self._flags["good"] += int(np.count_nonzero(flags == quality.GOOD))
-        good = column.values[quality.valid(flags) & np.isfinite(column.values)]
+        usable = np.isfinite(column.values)
+        if np.count_nonzero(column.quality):  # most often there is no flag
+            self._count(column.quality)
+            usable &= quality.valid(column.quality)
+        else:
+            self._flags["good"] += len(usable)
+        good = column.values if usable.all() else column.values[usable]
         if len(good):
             self._figures.low = float(np.fmin(self._figures.low, good.min()))
             self._figures.high = float(np.fmax(self._figures.high, good.max()))
             self._sum += float(good.sum())
             self._good += len(good)
+
+    def _count(self, flags: NDArray[np.uint8]) -> None:
+        for bit, name in quality.NAMES.items():
+            self._flags[name] += int(np.count_nonzero(flags & bit))
+        self._flags["good"] += int(np.count_nonzero(flags == quality.GOOD))
 
     def result(self) -> ChannelSummary:
         self._figures.mean = self._sum / self._good if self._good else float("nan")
