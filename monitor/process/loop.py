@@ -325,11 +325,13 @@ def watch(process: MonitorProcess, stop: threading.Event) -> None:
     heartbeat.ready()
     looked = 0.0
     while not stop.is_set():
-        for item in process.reader.read(process.turn_s()):
+        items = process.reader.read(process.turn_s())
+        for item in items:
             process.take(item)
         process.keep_position()
-        if (now := time.monotonic()) - looked >= TURN:
-            looked = now
+        # While samples come, not after each of them; silence is looked at without delay.
+        if not items or time.monotonic() - looked >= TURN:
+            looked = time.monotonic()
             process.look_around()
         heartbeat.advance(process.reader.counters.delivered)
     heartbeat.stopping()
