@@ -46,18 +46,18 @@ def row(count: int, seconds: float) -> Row:
     core, memory, p50, p99, lost = found
     return Row(
         f"one monitor, {count} rig{'s' * (count > 1)} at {RATE} Hz",
-        f"{core:.2f} % of a core and {memory:.1f} MB a rig",
+        f"{core:.2f} % of a core a rig, {memory:.0f} MB in all",
         "p99 < 50 ms, nothing lost",
         "",
         f"sample sent to estimate received: p50 {p50:.0f}, p99 {p99:.0f} ms; {lost} without "
-        f"an estimate; processor's time and memory of the whole process, divided; {seconds:.0f} s, "
+        f"an estimate; processor's time of the whole process, divided; {seconds:.0f} s, "
         f"load {psutil.getloadavg()[0]:.0f} on {psutil.cpu_count()} cores",
         p99 < 50.0 and lost == 0,
     )
 
 
 def measured(folder: Path, count: int, seconds: float) -> tuple[float, float, float, float, int]:
-    """Share of a core [%] and memory [MB] of a rig, latencies [ms], samples without estimate."""
+    """Share of a core of a rig [%], memory of all [MB], latencies [ms], samples without estimate."""
     paths = rig_files(folder, count)
     with started(paths) as (monitor, source):
         buses = [connect(load_rig(path), "subscriber", 60.0) for path in paths]
@@ -84,7 +84,7 @@ def measured(folder: Path, count: int, seconds: float) -> tuple[float, float, fl
         before, began = _cpu(monitor), time.monotonic()
         _for(seconds, lambda: take(counted=True))
         share = 100 * (_cpu(monitor) - before) / (time.monotonic() - began) / count
-        memory = psutil.Process(monitor.pid).memory_info().rss / 1e6 / count
+        memory = psutil.Process(monitor.pid).memory_info().rss / 1e6
         assert source.poll() is None
         for bus in buses:
             bus.close()

@@ -52,7 +52,7 @@ class Explainer:
         """
         if self._judged and self._judged[-1][0].boot != block.boot:
             self._judged.clear()
-        self._judged.append((block, samples))
+        self._judged.append((_needed(block), samples))
         rate, alarm = self._model().sample_rate, self._wanted
         while self._judged[0][0].seq < block.seq - KEPT * rate:
             self._judged.popleft()
@@ -104,6 +104,13 @@ class Explainer:
         at = int(judged[-1][0].t_ns[-1])
         event = Event("monitor", at, alarm.severity, PROBABLY_MISSING, f"{alarm.name}: {text}")
         self._results.put((alarm, event, text))
+
+
+def _needed(block: EstimateBlock) -> EstimateBlock:
+    """The estimates that a ranking uses: all of them take several megabytes."""
+    columns = (column for column in block.columns if column.name == "change")
+    kept = tuple(replace(column, values=column.values.copy()) for column in columns)
+    return replace(block, columns=kept)
 
 
 def _arrays(judged: Sequence[Judged], channels: Sequence[str]) -> tuple[FloatArray, FloatArray]:
