@@ -57,7 +57,7 @@ def row(count: int, seconds: float) -> Row:
 
 
 def measured(folder: Path, count: int, seconds: float) -> tuple[float, float, float, float, int]:
-    """Share of a core of a rig [%], memory of all [MB], latencies [ms], samples without estimate."""
+    """Share of a core of a rig [%], memory of all [MB], latencies [ms], lost samples."""
     paths = rig_files(folder, count)
     with started(paths) as (monitor, source):
         buses = [connect(load_rig(path), "subscriber", 60.0) for path in paths]
