@@ -30,7 +30,10 @@ export class Charts {
     this.plots = {};
     this.places = places;
     this.asked = {};
-    this.width = 1000;
+    this.found = {}; // answers that the next frame takes
+    this.due = new Set();
+    this.frame = null;
+    this.loaded = 0; // width that was loaded for [px]
     this.colours();
     new ResizeObserver(() => this.fit()).observe(places.signals);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.rebuild());
@@ -57,7 +60,8 @@ export class Charts {
     this.asked[chart]?.abort();
     const asked = (this.asked[chart] = new AbortController());
     const query = new URLSearchParams(this.query);
-    const width = Math.max(200, Math.round(this.places[chart].clientWidth - MARGIN));
+    this.loaded = this.places[chart].clientWidth;
+    const width = Math.max(200, Math.round(this.loaded - MARGIN));
     query.set("chart", chart);
     query.set("width", this.span ? 2 * width : width);
     if (this.span) {
@@ -69,25 +73,50 @@ export class Charts {
     if (chart === "residual" && this.previewed) for (const [k, v] of Object.entries(this.previewed)) query.set(k, v);
     const path = this.query.get("path");
     query.delete("path");
-    try { this.draw(chart, await signals(`${path}?${query}`, asked.signal)); } catch (error) {
+    try { this.found[chart] = await signals(`${path}?${query}`, asked.signal); } catch (error) {
       if (error.name !== "AbortError") throw error;
+      return;
+    }
+    this.reach(this.found[chart].ends);
+    await this.soon(chart);
+  }
+
+  /** Draws charts at the next frame: once for all that has changed by then. */
+  soon(...charts) {
+    for (const chart of charts) this.due.add(chart);
+    this.frame ??= new Promise((done) => {
+      requestAnimationFrame(() => { this.frame = null; this.flush(); done(); });
+    });
+    return this.frame;
+  }
+
+  flush() {
+    const due = [...this.due];
+    this.due.clear();
+    for (const chart of due) {
+      const found = this.found[chart];
+      delete this.found[chart];
+      if (found) this.draw(chart, found);
+      else if (this.plots[chart]) this.place(chart);
     }
   }
 
   draw(chart, found) {
     const [first, ...rest] = found.lines;
     const same = rest.every((line) => line.count === first.count && line.x[0] === first.x[0] && line.x[line.count - 1] === first.x[first.count - 1]);
-    const data = same ? [first.x, ...found.lines.map((line) => line.y)] : uPlot.join(found.lines.map((line) => [line.x, line.y]));
-    this.reach(found.ends);
-    const names = found.lines.map((line) => line.name).join();
-    if (!this.plots[chart] || this.names[chart] !== names) {
+    const [x, ...values] = same ? [first.x, ...found.lines.map((line) => line.y)] : uPlot.join(found.lines.map((line) => [line.x, line.y]));
+    const names = found.lines.map((line) => line.name);
+    if (!this.plots[chart] || !names.every((name) => this.names[chart].includes(name))) {
       this.plots[chart]?.destroy();
       this.names[chart] = names;
-      this.plots[chart] = this.make(chart, found.lines.map((line) => line.name), data);
+      this.plots[chart] = this.make(chart, names, [x, ...values]);
+      this.place(chart);
     } else {
-      this.plots[chart].setData(data, false);
+      // A line that is not there now keeps its place, hidden: making a chart anew takes longer.
+      const blank = new Array(x.length).fill(null);
+      const lines = this.names[chart].map((name) => values[names.indexOf(name)] ?? blank);
+      this.place(chart, [x, ...lines], this.names[chart].map((name) => names.includes(name)));
     }
-    this.place(chart);
     this.told("drawn", chart);
   }
 
@@ -97,15 +126,19 @@ export class Charts {
     this.other = false;
     this.ends = [Math.min(first, before[0]), Math.max(last, before[1])];
     if (this.span || (this.ends[0] === before[0] && this.ends[1] === before[1])) return;
-    for (const chart of Object.keys(this.plots)) this.place(chart);
+    this.soon(...Object.keys(this.plots));
   }
 
   whole() { return this.ends ?? [0, 1]; }
 
-  place(chart) {
+  /** Sets a chart's span, and its data and which lines are there if they are given. */
+  place(chart, data = null, shown = []) {
     const [from, to] = this.span ?? this.whole();
-    this.plots[chart].batch(() => {
-      this.plots[chart].setScale("x", { min: from, max: to });
+    const plot = this.plots[chart];
+    plot.batch(() => {
+      if (data) plot.setData(data, false);
+      shown.forEach((show, k) => { if (plot.series[k + 1].show !== show) plot.setSeries(k + 1, { show }); });
+      plot.setScale("x", { min: from, max: to });
     });
   }
 
@@ -120,7 +153,7 @@ export class Charts {
       // A span without samples keeps its axis, so that the charts stay below one another.
       scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => (low === null ? [-1, 1] : uPlot.rangeNum(low, high, 0.1, true)) } },
       axes: [
-        { ...axis, show: true, size: last ? 26 : 8, label: last ? "time [s]" : undefined, labelSize: 13, labelFont: "11px system-ui", values: last ? undefined : (_, ticks) => ticks.map(() => "") },
+        { ...axis, show: true, size: last ? 30 : 8, label: last ? "time [s]" : undefined, labelSize: 13, labelFont: "11px system-ui", values: last ? undefined : (_, ticks) => ticks.map(() => "") },
         { ...axis, size: MARGIN, space: 18, label: `${last ? "residual" : this.query.get("channel")} [${this.unit}]`, labelSize: 16, labelFont: "11px system-ui", values: (_, ticks) => ticks.map(label) },
       ],
       series: [{}, ...names.map((name) => ({
@@ -172,7 +205,7 @@ export class Charts {
   point(plot, names) {
     const at = plot.cursor.idx;
     if (at === null || at === undefined) return;
-    this.told("point", [`t ${label(plot.data[0][at])} s`, ...names.map((name, k) => `${name} ${label(plot.data[k + 1][at])}`)].join("   "));
+    this.told("point", [`t ${label(plot.data[0][at])} s`, ...names.flatMap((name, k) => (plot.series[k + 1].show ? [`${name} ${label(plot.data[k + 1][at])}`] : []))].join("   "));
   }
 
   wheel(plot) {
@@ -192,7 +225,7 @@ export class Charts {
       span = width >= last - first || width <= 0 ? null : [from, from + width];
     }
     this.span = span;
-    for (const chart of Object.keys(this.plots)) this.place(chart);
+    this.soon(...Object.keys(this.plots));
     this.told("span", span);
     this.loadSoon(EVERY);
   }
@@ -220,12 +253,13 @@ export class Charts {
     this.look([from + by, to + by]);
   }
 
+  /** A browser tells a size also when it begins to look: what is loaded for it is not loaded again. */
   fit() {
     for (const [chart, plot] of Object.entries(this.plots)) {
-      const box = this.places[chart];
-      plot.setSize({ width: box.clientWidth, height: box.clientHeight });
+      const { clientWidth: width, clientHeight: height } = this.places[chart];
+      if (plot.width !== width || plot.height !== height) plot.setSize({ width, height });
     }
-    this.loadSoon(120);
+    if (this.loaded && this.loaded !== this.places.signals.clientWidth) this.loadSoon(120);
   }
 
   /** Those of areas, looked up once: a look-up makes the browser compute its styles. */

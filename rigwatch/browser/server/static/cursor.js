@@ -21,7 +21,7 @@ export function cursor(box, plot, told, { plain = false } = {}) {
     const step = Math.max(1, Math.round((last - first) / 200)) * by;
     at = at === null || at < first || at > last ? (by > 0 ? first : last) : Math.min(Math.max(at + step, first), last);
     chart.setCursor({ left: chart.valToPos(x[at], "x"), top: chart.over.clientHeight / 2 });
-    const words = lines.map((line, k) => `${chart.series[k + 1].label} ${label(line[at])}`);
+    const words = lines.flatMap((line, k) => (chart.series[k + 1].show ? [`${chart.series[k + 1].label} ${label(line[at])}`] : []));
     told(`t ${label(x[at])} s   ${words.join("   ")}`);
   });
 }

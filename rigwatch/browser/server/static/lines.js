@@ -13,16 +13,19 @@ export function paths(plot, series, first, last) {
 /** Hook `drawSeries`: the columns of a dense line, each joined to the one before it. */
 export function columns(plot, index) {
   const series = plot.series[index];
-  if (!series.dense) return;
+  if (!series.dense || !series.show) return;
   const { ctx, bbox } = plot;
   ctx.save();
   ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
   ctx.fillStyle = series.stroke(plot, index);
-  const thick = Math.max(series.width * uPlot.pxRatio, 1);
-  const wide = Math.max(thick / 2, 1);
+  // Whole pixels: a software canvas takes several times as long over edges that it has to blend.
+  const thick = Math.max(Math.round(series.width * uPlot.pxRatio), 1);
+  const wide = Math.max(Math.round(thick / 2), 1);
   const [on, off] = (series.dash ?? [1, 0]).map((length) => length * uPlot.pxRatio);
   each(plot, index, (at, low, high) => {
-    if ((at - bbox.left) % (on + off) < on) ctx.fillRect(at, high - thick / 2, wide, low - high + thick);
+    if (off && (at - bbox.left) % (on + off) >= on) return;
+    const top = Math.round(high - thick / 2);
+    ctx.fillRect(at, top, wide, Math.round(low - high) + thick);
   });
   ctx.restore();
 }

@@ -136,6 +136,7 @@ async function take(name, given) {
 async function list() {
   recordings = await get("/api/recordings");
   $("no-recordings").hidden = recordings.length > 0;
+  $("spans").hidden = !recordings.length;
   for (const select of document.querySelectorAll("#parts select.recording")) options(select, select.value);
 }
 

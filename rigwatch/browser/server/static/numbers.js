@@ -18,11 +18,13 @@ function row(words, tag, body) {
 function table(plot, unit) {
   const made = document.createElement("table");
   const { min, max } = plot.scales.x;
-  const [x, ...lines] = plot.data;
+  const shown = plot.series.slice(1).filter((one) => one.show);
+  const x = plot.data[0];
+  const lines = plot.data.slice(1).filter((_, k) => plot.series[k + 1].show);
   const within = [...x.keys()].filter((k) => x[k] >= min && x[k] <= max);
   const every = Math.max(1, Math.ceil(within.length / MOST));
-  made.createCaption().textContent = `${plot.series.slice(1).map((one) => one.label).join(" and ")} [${unit}]${every > 1 ? `, every ${every}th of the ${within.length} points drawn; all samples: Export, CSV` : ""}`;
-  row(["time [s]", ...plot.series.slice(1).map((one) => one.label)], "th", made.createTHead());
+  made.createCaption().textContent = `${shown.map((one) => one.label).join(" and ")} [${unit}]${every > 1 ? `, every ${every}th of the ${within.length} points drawn; all samples: Export, CSV` : ""}`;
+  row(["time [s]", ...shown.map((one) => one.label)], "th", made.createTHead());
   const body = made.createTBody();
   for (let k = 0; k < within.length; k += every) row([label(x[within[k]]), ...lines.map((line) => label(line[within[k]]))], "td", body);
   return made;

@@ -12,6 +12,8 @@ let paused = false;
 let status = null;
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const plain = (words) => words.replaceAll("_", " ");
+const ESTIMATES = { theta1: "Coulomb θ1", theta2: "viscous θ2" };
+const named = (name) => ESTIMATES[name] ?? plain(name);
 
 function element(tag, text, attributes = {}, ...children) {
   const made = document.createElement(tag);
@@ -70,7 +72,7 @@ function rms(values) {
 
 function make(kind, name, data) {
   if (!Object.keys(charts).length) { $("live-charts").replaceChildren(); }
-  const words = `${plain(name)} [${units[name] ?? ""}]`;
+  const words = units[name] ? `${named(name)} [${units[name]}]` : named(name);
   const value = element("b", "", { class: "value", "data-signal": name });
   const box = element("div", "", { class: "live", role: "img", tabindex: "0", "aria-label": `${words} over the last seconds; arrow keys read its points` });
   $("live-charts").append(element("h3", `${words} `, {}, value), box);
@@ -78,7 +80,7 @@ function make(kind, name, data) {
   const plot = new uPlot({
     width: box.clientWidth, height: 124, legend: { show: false }, cursor: { y: false },
     scales: { x: { time: false, range: () => [-seconds, 0] } },
-    axes: [{ ...axis, size: 30 }, { ...axis, size: 60 }],
+    axes: [{ ...axis, size: 30 }, { ...axis, size: 60, space: 18 }],
     series: [{}, { label: plain(name), stroke: colour(kind === "samples" ? "measured" : "rest"), width: 1.3, points: { show: false } }],
   }, data, box);
   cursor(box, () => plot, (text) => { $("readout").textContent = text; say(text); }, { plain: true });
@@ -90,7 +92,7 @@ function make(kind, name, data) {
 function numbers(name, values) {
   const body = $("numbers").tBodies[0];
   const id = `number-${name}`;
-  const row = $(id) ?? body.appendChild(element("tr", "", { id }, element("th", plain(name), { scope: "row" }), ...[0, 1, 2].map(() => element("td", "", { class: "num" })), element("td", units[name] ?? "")));
+  const row = $(id) ?? body.appendChild(element("tr", "", { id }, element("th", named(name), { scope: "row" }), ...[0, 1, 2].map(() => element("td", "", { class: "num" })), element("td", units[name] ?? "")));
   const real = values.filter((value) => value !== null);
   [values.at(-1), Math.min(...real), Math.max(...real)].forEach((value, k) => { row.cells[k + 1].textContent = real.length ? label(value) : "–"; });
 }
@@ -137,8 +139,8 @@ function alarm(one) {
   const tell = (action) => () => post("/api/rig/alarm", { name: one.name, action });
   if (one.state === "unacknowledged" || one.state === "cleared_unacknowledged") acts.append(button("Acknowledge", tell("acknowledge"), { "data-act": "acknowledge" }));
   if (one.state !== "normal") acts.append(button("Reset", tell("reset"), { "data-act": "reset" }));
-  if (one.seq >= 0) {
-    acts.append(button("Open as a study", () => openStudy(one.name), { class: "primary", "data-act": "study" }));
+  if (one.seq >= 0 && one.severity !== "info") {
+    acts.append(button("Open as a study", () => openStudy(one.name), { class: one.state === "normal" ? "" : "primary", "data-act": "study" }));
   }
   item.append(acts);
   return item;
@@ -209,6 +211,11 @@ $("pause").addEventListener("click", () => pause(!paused));
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || !keysOn() || event.target.closest("input, select, textarea")) return;
   if (event.key === "?") showHelp();
+});
+/** Charts are made anew in the colours of the page. */
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  for (const [name, { plot }] of Object.entries(charts)) { plot.destroy(); delete charts[name]; }
+  draw();
 });
 addEventListener("resize", () => { for (const { plot, box } of Object.values(charts)) plot.setSize({ width: box.clientWidth, height: 124 }); });
 addEventListener("load", () => { open(); history(); });

@@ -14,7 +14,7 @@ let job = null;
 const over = new Set();
 let asked = 0;
 let wanted = null;
-const HOVER = 60;
+const HOVER = 20; // a pointer that only crosses a row does not choose it [ms]
 let chosen = null;
 let place = null;
 let refreshing = null;
@@ -134,7 +134,7 @@ function replace(part, html) {
   const focused = part.contains(document.activeElement) ? selector(document.activeElement) : null;
   const tops = [part, ...part.querySelectorAll(".scroll")].map((box) => box.scrollTop);
   part.innerHTML = html;
-  [part, ...part.querySelectorAll(".scroll")].forEach((box, k) => { box.scrollTop = tops[k] ?? 0; });
+  [part, ...part.querySelectorAll(".scroll")].forEach((box, k) => { if (tops[k]) box.scrollTop = tops[k]; });
   if (focused) part.querySelector(focused)?.focus({ preventScroll: true });
   exportable(part);
 }
@@ -203,10 +203,10 @@ async function choose(label) {
     one.setAttribute("aria-selected", on);
     one.tabIndex = on ? 0 : -1;
   }
+  const drawn = attempt(() => charts.preview(label ? { preview: label } : null));
   legend();
   exports();
-  if (!label) { await charts.preview(null); return; }
-  attempt(() => charts.preview({ preview: label }));
+  if (!label) { await drawn; return; }
   const query = new URLSearchParams({ label });
   if (!state.latest) query.set("step", state.step);
   const found = await attempt(() => get(`/api/candidate/${path}?${query}`));
