@@ -113,8 +113,7 @@ export class Charts {
       this.place(chart);
     } else {
       // A line that is not there now keeps its place, hidden: making a chart anew takes longer.
-      const blank = new Array(x.length).fill(null);
-      const lines = this.names[chart].map((name) => values[names.indexOf(name)] ?? blank);
+      const lines = this.names[chart].map((name) => values[names.indexOf(name)] ?? new Array(x.length).fill(null));
       this.place(chart, [x, ...lines], this.names[chart].map((name) => names.includes(name)));
     }
     this.told("drawn", chart);
@@ -154,7 +153,7 @@ export class Charts {
       scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => (low === null ? [-1, 1] : uPlot.rangeNum(low, high, 0.1, true)) } },
       axes: [
         { ...axis, show: true, size: last ? 30 : 8, label: last ? "time [s]" : undefined, labelSize: 13, labelFont: "11px system-ui", values: last ? undefined : (_, ticks) => ticks.map(() => "") },
-        { ...axis, size: MARGIN, space: 18, label: `${last ? "residual" : this.query.get("channel")} [${this.unit}]`, labelSize: 16, labelFont: "11px system-ui", values: (_, ticks) => ticks.map(label) },
+        { ...axis, size: MARGIN, space: 14, label: `${last ? "residual" : this.query.get("channel")} [${this.unit}]`, labelSize: 16, labelFont: "11px system-ui", values: (_, ticks) => ticks.map(label) },
       ],
       series: [{}, ...names.map((name) => ({
         label: name, spanGaps: false, points: { show: false }, paths, width: STYLES[name].width,

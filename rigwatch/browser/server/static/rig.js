@@ -130,7 +130,7 @@ function alarms(found) {
 
 function alarm(one) {
   const item = element("article", "", { class: `alarm ${one.state}`, "data-alarm": one.name, "data-state": one.state });
-  item.append(element("h3", plain(one.name)), element("p", `${one.severity}, ${plain(one.state)}, since ${since(one.t_ns)}${one.first_out ? ", the first" : ""}${one.user ? `, by ${one.user}` : ""}`, { class: "note" }));
+  item.append(element("h3", plain(one.name)), element("p", `${one.severity}, ${one.state === "normal" ? "over" : plain(one.state)}, since ${since(one.t_ns)}${one.first_out ? ", the first" : ""}${one.user ? `, by ${one.user}` : ""}`, { class: "note" }));
   const [what, probable] = one.cause.split("; probably missing: ");
   item.append(element("p", what));
   if (probable) item.append(element("p", `probably missing: ${probable}`, { class: "probable" }));
