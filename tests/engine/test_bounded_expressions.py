@@ -50,3 +50,9 @@ def test_usual_powers_and_sums_stay() -> None:
     assert parse(" + ".join(f"{k}*x" for k in range(1, 300)), X, "good").has(X["x"])
     assert parse("tanh(x+" * 20 + "x" + ")" * 20, X, "good").diff(X["x"]).has(X["x"])
     assert parse(" + ".join(f"{k}*x**{k % 5}" for k in range(1, 150)), X, "good").has(X["x"])
+
+
+def test_pythons_remarks_on_style_reach_nobody(recwarn: pytest.WarningsRecorder) -> None:
+    with pytest.raises(ModelError):
+        parse("2and x", X, "sent")
+    assert not recwarn.list

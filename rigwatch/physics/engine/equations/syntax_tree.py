@@ -1,6 +1,7 @@
 """Python's syntax tree of a user expression, with bounded length and depth."""
 
 import ast
+import warnings
 
 from rigwatch.wire.errors import ModelError
 
@@ -16,7 +17,10 @@ def syntax_tree(text: str, where: str) -> ast.expr:
         found = f"found {len(text)} characters"
         raise ModelError(f"{where}: {found}, expected an expression of at most {LONGEST}")
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
+        with warnings.catch_warnings():
+            # Python's remarks on style, such as "2and x", belong to its programs only.
+            warnings.simplefilter("ignore", SyntaxWarning)
+            tree = ast.parse(text.strip(), mode="eval").body
     except SyntaxError as error:
         raise ModelError(
             f"{where}: found {quoted(text)}, which breaks off at character {error.offset}"

@@ -1,0 +1,154 @@
+"""Malformed input for an hour: every target refuses it by one of its own errors, and in time.
+
+Input is mutated from valid examples: bits, bytes, spans cut, doubled or moved, numbers and brackets
+put in. A crash is any exception that is not a `RigwatchError`; a hang is above two seconds of the
+processor's time.
+"""
+
+import os
+import random
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import sympy
+
+from rigwatch.physics.engine.equations.expression import parse as parse_expression
+from rigwatch.wire.device.frame import Frame, FrameDecoder
+from rigwatch.wire.device.frame import encode as encode_frame
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.messages import TOPICS, Column, SampleBlock, decode, encode
+from rigwatch.wire.rig_config import RigConfig
+from rigwatch.wire.session import SessionWriter, open_session, run_info
+from rigwatch.wire.typed_files import find_config, parse
+from tools.benchmark_table import Row
+
+LONGEST_S = 2.0
+TOKENS = (
+    b"9" * 400, b"[" * 60, b"(" * 60, b"\x00", b"\xff\xff\xff\xff", b"nan", b"1e999", b"-", b"**",
+    b"\n", b'"', b"=", b"\xc3", b"{", b"0x", b"'''",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader of input and valid examples of it."""
+
+    read: Callable[[bytes], object]
+    examples: tuple[bytes, ...]
+
+
+def run(quick: bool) -> list[Row]:
+    """Ten seconds for each target, or an hour in all."""
+    minutes = float(os.environ.get("RIGWATCH_FUZZ_MINUTES", "60"))
+    with TemporaryDirectory() as folder:
+        targets = _targets(Path(folder))
+        seconds = 10.0 if quick else 60.0 * minutes / len(targets)
+        return [_row(name, target, seconds) for name, target in targets.items()]
+
+
+def _row(name: str, target: Target, seconds: float) -> Row:
+    chance, count, slowest = random.Random(name), 0, 0.0
+    crashes: dict[str, bytes] = {}
+    ends = time.monotonic() + seconds
+    while time.monotonic() < ends:
+        data, began = mutated(chance, target.examples), time.process_time()
+        try:
+            target.read(data)
+        except RigwatchError:
+            pass
+        except Exception as error:
+            crashes.setdefault(f"{type(error).__name__}: {error}"[:100], data)
+        slowest = max(slowest, time.process_time() - began)
+        count += 1
+    examples = "; ".join(f"{what} by {data[:60]!r}" for what, data in list(crashes.items())[:3])
+    return Row(
+        f"malformed input, {name}",
+        f"{len(crashes)} crashes, slowest {slowest:.2f} s",
+        f"0, {LONGEST_S:g} s",
+        "",
+        f"{count} inputs in {seconds:.0f} s {examples}",
+        passed=not crashes and slowest <= LONGEST_S,
+    )
+
+
+def mutated(chance: random.Random, examples: tuple[bytes, ...]) -> bytes:
+    """An example with one to eight mutations."""
+    data = bytearray(chance.choice(examples))
+    for _ in range(chance.randint(1, 8)):
+        at, kind = chance.randrange(len(data) + 1), chance.randrange(6)
+        end = min(len(data), at + chance.randint(1, 64))
+        if kind == 0 and at < len(data):
+            data[at] ^= 1 << chance.randrange(8)
+        elif kind == 1:
+            del data[at:end]
+        elif kind == 2:
+            data[at:at] = data[at:end] * chance.randint(1, 20)
+        elif kind == 3:
+            data[at:at] = chance.choice(TOKENS)
+        elif kind == 4:
+            data[at:at] = chance.choice(examples)[: chance.randint(1, 200)]
+        else:
+            data[at:end] = chance.randbytes(end - at)
+    return bytes(data)
+
+
+def _targets(folder: Path) -> dict[str, Target]:
+    session = folder / "fuzzed.mcap"
+    return {
+        "frames of a device": Target(lambda d: FrameDecoder().feed(d), _frames()),
+        "messages of the bus": Target(_decode_all, _messages()),
+        "sessions": Target(lambda d: _read_session(session, d), (_session(folder),)),
+        "configuration": Target(
+            lambda d: parse(d.decode(errors="replace"), RigConfig, "fuzzed.toml"),
+            (find_config("demo.toml").read_bytes(),),
+        ),
+        "expressions": Target(
+            lambda d: parse_expression(d.decode(errors="replace"), _NAMES, "fuzzed"),
+            (b"F*tanh(v/0.001) + c*v", b"x**3 + 2**10*x - 1e-3*x**0.5", b"k*x*abs(x)/(1 + x**2)"),
+        ),
+    }
+
+
+_NAMES = {name: sympy.Symbol(name, real=True) for name in ("F", "v", "c", "x", "k")}
+
+
+def _frames() -> tuple[bytes, ...]:
+    return (b"".join(encode_frame(Frame(7, n, 3906 * n, (n, 2 * n, -n))) for n in range(8)),)
+
+
+def _block(first: int) -> SampleBlock:
+    index = np.arange(first, first + 32)
+    values = np.random.default_rng(first).normal(size=32)
+    column = Column("voltage", "V", values, np.zeros(32, np.uint8))
+    return SampleBlock("rig", 7, first, index * 3906, 10**18 + index * 3906250, (column,))
+
+
+def _messages() -> tuple[bytes, ...]:
+    return encode(_block(0)), encode(run_info("bench", 256.0))
+
+
+def _decode_all(data: bytes) -> None:
+    for line in TOPICS:
+        try:
+            decode(line.message, data)
+        except RigwatchError:
+            continue
+
+
+def _session(folder: Path) -> bytes:
+    path = folder / "intact.mcap"
+    with SessionWriter(path, run_info("bench", 256.0, t_ns=1), sync=False) as writer:
+        for first in range(0, 256, 32):
+            writer.write(_block(first))
+            writer.flush()
+    return path.read_bytes()
+
+
+def _read_session(path: Path, data: bytes) -> None:
+    path.write_bytes(data)
+    for block in open_session(path).samples():
+        assert len(block.t_ns) == len(block)
