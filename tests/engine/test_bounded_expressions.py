@@ -22,6 +22,8 @@ BOMBS = {
     "functions within functions": "tanh(x+" * 60 + "x" + ")" * 60,
     "no value": "x/0",
     "infinity": "x*1e999",
+    "a comparison with infinity": "x*1e999*0 > 1",
+    "arithmetic with a comparison": "tanh(x/0 > 1) + x",
     "an integer of 5000 digits": "9" * 5000,
     "many terms": "+".join(["x"] * 9000),
 }

@@ -72,6 +72,9 @@ def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) ->
         value = sympy.sympify(_Reader(dict(names), where).value(syntax_tree(text, where)))
     except RecursionError:
         raise ModelError(f"{where}: found {quoted(text)}, which is too deep") from None
+    except (TypeError, AttributeError):
+        # SymPy's answer to arithmetic with a comparison, or to one with infinity.
+        raise ModelError(f"{where}: found {quoted(text)}, which cannot be computed") from None
     if value.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
         raise ModelError(f"{where}: found {quoted(text)}, which has no finite value")
     return value
