@@ -55,11 +55,8 @@ find. *Lines*: of the program without imports and comments, or of model, study a
 TAIL = """
 Errors are of free runs, in which errors add up; rigwatch judges effects over horizons
 ([workbench](workbench.md)). SysIdentPy predicts samples of its decimated recording. EMPS is
-sampled far faster than it moves; SciPy, CasADi and pysindy get every tenth sample of it. With all
-of them CasADi, physics known, takes 20 times as long and comes to about rigwatch's error. Measured
-on
-{processor}, {cores} cores, Python {python}, {date}; other work kept the machine busy (load {load}),
-so that times compare users with each other only.
+sampled far faster than it moves: SciPy, pysindy and rigwatch's last fit get every tenth sample of
+it, CasADi all. Measured on {processor}, {cores} cores, Python {python}, {date}, at load {load}.
 """
 
 

@@ -100,12 +100,13 @@ def coarse(task: Task) -> Task:
 def _simulated() -> Task:
     """The oscillator of the hidden effects, with dry friction that changes its output by 5 %."""
     lines = np.arange(0.2, 6.0, 0.2)
-    parts = []
-    for seed in (4, 5):
-        force = multisine(lines, 3.0, seed=seed)
-        hidden = Hidden("coulomb", strength_for("coulomb", force, 0.05))
-        noise = 2e-3 * size_of(force)
-        parts.append(Part(force, oscillate(force, (hidden,), noise, seed)[:, 0]))
+    forces = [multisine(lines, 3.0, seed=seed) for seed in (4, 5)]
+    hidden = Hidden("coulomb", strength_for("coulomb", forces[0], 0.05))
+    noise = 2e-3 * size_of(forces[0])
+    parts = [
+        Part(force, oscillate(force, (hidden,), noise, seed)[:, 0])
+        for seed, force in zip((4, 5), forces, strict=True)
+    ]
     return Task(
         "simulated oscillator", "m", ("mm", 1e3), 1 / RATE, (parts[0],), (parts[1],),
         (1 / MASS * 0.8, DAMPING / MASS * 1.5, STIFFNESS / MASS * 0.9),
