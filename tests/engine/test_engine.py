@@ -79,8 +79,8 @@ def test_sensitivities_agree_with_finite_differences(name):
     system, u = compiled.system, excitation(samples=80)
     strength = f"{port}_{name}_{effect.strength}"
     given = {strength: 0.4} if effect.parameters[effect.strength].role == "strength" else {}
-    if name in ("lag", "delay"):
-        given = {strength: 2 * DT}
+    if effect.family == "late signal":
+        given |= {f"{port}_{name}_{p}": 2 * DT for p in effect.parameters if p.endswith("tau")}
     base = compiled.vector({**TRUE, **given})
     initial = np.full((1, len(system.states)), 0.013)
 

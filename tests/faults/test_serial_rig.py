@@ -270,7 +270,9 @@ def test_36_a_rig_that_is_driven_and_stands_still(rig: Field, device: SerialDevi
     # The window, and the decay of the velocity's filter to the least velocity.
     assert 0 <= remark.seq - (first + held.moved) <= 1.5 * RATE
     assert estimated(rig, boot, remark.seq, remark.seq, "armed").tolist() == [1.0]
-    assert not estimated(rig, boot, remark.seq, remark.seq + 64, "observable").any()
+    # At first the noise may lift the velocity above its least value for some samples again.
+    rig.judged(boot, first + 640)
+    assert not estimated(rig, boot, first + 560, first + 630, "observable").any()
     rig.cleared("not_observable")
 
 
