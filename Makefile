@@ -25,7 +25,7 @@ VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
 BROWSER_PACKAGES := chromium chromium-driver
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test sbom docs demo bench lint unit again demo-headless mutate lock viewer-packages clean
+.PHONY: help setup test sbom docs demo bench lint unit again nightly demo-headless mutate lock viewer-packages clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -61,6 +61,9 @@ unit: $(STAMPS)/dev viewer-packages
 # fails twice, the second time alone, fails; the first failure remains printed above.
 again: $(STAMPS)/dev
 	@pytest --last-failed --last-failed-no-failures none --maxfail 5 $(TESTS)
+
+nightly: $(STAMPS)/dev  ## the tests that take too long for every change
+	@pytest -m nightly $(TESTS)
 
 bench: $(STAMPS)/bench  ## run the benchmarks (BENCH names some) and write docs/benchmarks.md
 	@python -m benchmarks --page $(BENCH)

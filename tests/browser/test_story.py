@@ -123,6 +123,7 @@ def tab_to(page: Page, css: str) -> None:
     raise AssertionError(f"the tab key does not come to {css}")
 
 
+@pytest.mark.nightly
 def test_the_story_by_keyboard_alone(page: Page, root: Path, told: Told) -> None:
     for name in FILES:
         (root / "recordings" / f"{name}.mcap").unlink(missing_ok=True)

@@ -211,13 +211,13 @@ BACK_WITHIN = 1.5
 
 
 def the_gap_is_exact(rig: ModbusRig, first: int, since: int) -> int:
-    """From `first` on, what was reported lost is what did not come; the number of lost samples."""
+    """What was reported lost is what did not come, from `first` or the loss on; its number."""
     rig.judged(rig.device.boot, rig.device.next_seq)
     here = {b.seq + i for b in list(rig.samples) for i in range(len(b))}
     last = max(here)
     told = [n for g in rig.gaps[since:] if g.reporter == "daq/rig"
             for n in range(g.first, g.last + 1)]  # fmt: skip
-    missing = [n for n in range(first, last) if n not in here]
+    missing = [n for n in range(min([first, *told]), last) if n not in here]
     assert sorted(told) == missing
     return len(missing)
 

@@ -51,6 +51,7 @@ def at_rig(page: Page, model: Path, study: Study) -> Iterator[Page]:
         assert found.errors() == []
         assert found.requests() <= {served.address}
         page.enter()
+        assert page.requests() <= {served.address, page.served.address}
     finally:
         served.end()
     assert not [line for line in served.said if "Traceback" in line], "".join(served.said)

@@ -61,7 +61,7 @@ def seen(page: Page) -> None:
     assert page.violations(dark=True) == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_from_the_alarm_to_a_residual_that_falls(shell: Shell, page: Page) -> None:
     page.open("/rig")
     page.until(lambda: "no router answers" in page.text("#absent-why"), "the rig is absent")

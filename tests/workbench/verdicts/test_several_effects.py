@@ -32,6 +32,7 @@ def rows(three):
     return rank(three.study, three.data, three.base, three.floor)
 
 
+@pytest.mark.nightly
 def test_one_of_three_hidden_effects_is_named_with_another(three, rows):
     alone = judge(three.base, rows, three.floor)
     assert alone.word == "unknown_effect"
