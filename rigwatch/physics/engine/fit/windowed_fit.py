@@ -182,12 +182,15 @@ def _smallest_error(
 
 
 def _deviations(residual: FloatArray, jacobian: FloatArray, theta: FloatArray) -> FloatArray:
-    """Each parameter's standard deviation given the others; its size if it has no influence."""
+    """Each parameter's standard deviation given the others.
+
+    Its size if it has no influence, or if nothing is left to explain.
+    """
     slope = np.sqrt(np.sum(jacobian**2, axis=0))
     noise = np.sqrt(np.mean(residual**2))
     # A parameter that starts at zero has no size; only its standard deviation is used.
     size = np.where(theta != 0, np.abs(theta), np.inf)
-    told = slope > noise / (1e6 * size)
+    told = (slope > noise / (1e6 * size)) & (noise > 0)
     return np.where(told, noise / np.where(slope > 0, slope, 1.0), np.where(theta != 0, size, 1.0))
 
 
