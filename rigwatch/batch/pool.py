@@ -10,6 +10,8 @@ from rigwatch.batch.executors import Here, Maker
 from rigwatch.wire.errors import BatchError
 
 _COUNT_AGAIN_S = 5.0
+_PAUSES = (0.05, 0.2, 1.0)
+"""Waits before a process is started again that could not be started [s]."""
 
 
 class Pool:
@@ -51,10 +53,12 @@ class Pool:
             except BrokenExecutor:
                 self.renew(self.generation)
             except OSError:
-                # A pool that breaks while it starts a process fails so once, and is broken then.
-                failed += 1
-                if failed > 1:
+                # A pool that breaks while it starts a process fails so, and is broken then; the
+                # process that starts the others may have died with it, and is missed later.
+                if failed == len(_PAUSES):
                     raise
+                time.sleep(_PAUSES[failed])
+                failed += 1
 
     def check(self) -> None:
         """Replace an executor that broke without a word.

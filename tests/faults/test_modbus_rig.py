@@ -135,7 +135,8 @@ def noticed(rig: ModbusRig, edit: Edit, replies: int, text: str) -> None:
 
     first, before = rig.device.next_seq, rig.health("daq").counters["failed_polls"]
     least_of(disturb, TIMEOUT + 1.0 / POLLS, lambda: None)
-    assert rig.health("daq").counters["failed_polls"] > before
+    told = rig.health_after("daq", time.time_ns())
+    assert told.counters["failed_polls"] > before
     rig.every_sample_is_right(first)
 
 
