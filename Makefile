@@ -55,12 +55,12 @@ demo-headless: $(STAMPS)/run
 unit: $(STAMPS)/dev viewer-packages
 	@if [ "$${CI:-}" = true ] && [ ! -d "$${RIGWATCH_DATA:-}" ]; then \
 		echo "test: RIGWATCH_DATA names no folder with the measured data sets" >&2; exit 1; fi
-	@pytest -n $(WORKERS) --dist loadgroup $(TESTS) || $(MAKE) --no-print-directory again
+	@pytest -n $(WORKERS) --dist loadgroup --cache-clear $(TESTS) || $(MAKE) --no-print-directory again
 
 # Real processes, lines and browsers beside each other on a busy machine may miss a moment. What
 # fails twice, the second time alone, fails; the first failure remains printed above.
 again: $(STAMPS)/dev
-	@pytest --last-failed --last-failed-no-failures none --maxfail 5 $(TESTS)
+	@python -m tools.failed_tests > .pytest_cache/failed && pytest --maxfail 5 @.pytest_cache/failed
 
 nightly: $(STAMPS)/dev  ## the tests that take too long for every change
 	@pytest -m nightly $(TESTS)

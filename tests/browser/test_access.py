@@ -111,10 +111,12 @@ def test_a_long_request_is_bounded(served: Served) -> None:
 
 @pytest.mark.parametrize("begin", ["/etc/passwd", "model:../../etc/passwd", "model:a.toml"])
 def test_a_study_begins_with_what_ships_alone(served: Served, begin: str) -> None:
-    (served.folder / "empty.mcap").write_bytes(b"")
-    spans = [{"use": use, "session": "empty.mcap"} for use in ("train", "held_out")]
+    recording = served.folder / "empty.mcap"
+    recording.write_bytes(b"")
+    spans = [{"use": use, "session": recording.name} for use in ("train", "held_out")]
     body = json.dumps({"name": "stolen", "begin": begin, "spans": spans}).encode()
     status, text = ask(served, "/api/new", "POST", body=body)
+    recording.unlink()
     assert (status, "expected one of" in text) == (409, True)
     assert not (served.folder / "stolen").exists()
 

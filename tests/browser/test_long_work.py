@@ -62,7 +62,7 @@ async def done(desk: Desk, task: str, **arguments: object) -> str:
 
 def test_progress_is_received_and_a_second_task_is_refused_meanwhile(desk: Desk) -> None:
     async def story() -> None:
-        queue = desk.listen()
+        queue = desk.listeners.listen()
         desk.ask("explain", {})
         with pytest.raises(BusyError, match="busy with explain"):
             desk.ask("undo", {})
@@ -137,7 +137,7 @@ def test_a_change_elsewhere_is_told_to_who_looks(desk: Desk) -> None:
     async def story() -> None:
         desks = Desks()
         watched = desks.of(desk.folder)
-        queue = watched.listen()
+        queue = watched.listeners.listen()
         stat = (desk.folder / FILE).stat
 
         watching = asyncio.create_task(desks.watch(lambda _: stat().st_mtime_ns, 0.01))

@@ -341,8 +341,10 @@ class Field:
         )
 
     def cleared(self, name: str) -> None:
-        """Wait until the condition of an alarm has gone."""
-        eventually(lambda: not self.journalled(name)[-1].active, f"{name} has gone")
+        """Wait until an alarm is not active, with or without having been."""
+        eventually(
+            lambda: not any(one.active for one in self.journalled(name)[-1:]), f"{name} has gone"
+        )
 
     def judged(self, boot: int, seq: int) -> None:
         """Wait until the monitor has estimated a sample."""

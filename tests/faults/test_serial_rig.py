@@ -160,7 +160,7 @@ def test_35_a_gap_in_the_samples(rig: Field, device: SerialDevice) -> None:
 
 
 def ready(rig: Field, device: SerialDevice) -> None:
-    """The monitor has its reference again."""
+    """The monitor has its reference again, and no gap stands: gaps of a minute are one alarm."""
     boot = device.device.boot
 
     def armed() -> bool:
@@ -168,6 +168,7 @@ def ready(rig: Field, device: SerialDevice) -> None:
         return last.boot == boot and last.column("armed").values[-1] == 1.0
 
     eventually(armed, "armed")
+    rig.cleared("gap")
 
 
 def test_13_a_signal_at_its_rail(rig: Field, device: SerialDevice) -> None:

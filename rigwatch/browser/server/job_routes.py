@@ -82,7 +82,7 @@ async def events(request: Request) -> Response:
 
 
 async def _events(desk: Desk) -> AsyncIterator[bytes]:
-    queue = desk.listen()
+    queue = desk.listeners.listen()
     try:
         what, job = "job", desk.job
         while True:
@@ -93,7 +93,7 @@ async def _events(desk: Desk) -> AsyncIterator[bytes]:
             except TimeoutError:
                 what = "still"
     finally:
-        desk.leave(queue)
+        desk.listeners.leave(queue)
 
 
 ROUTES = [

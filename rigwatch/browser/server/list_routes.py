@@ -2,7 +2,8 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import msgspec
 from starlette.concurrency import run_in_threadpool
@@ -14,9 +15,11 @@ from rigwatch.browser.recordings import stories
 from rigwatch.browser.server.context import Context, context_of
 from rigwatch.browser.server.study_routes import job_data
 from rigwatch.browser.views import listed, render, stamp, study_folders
+from rigwatch.browser.work import Job
 
+Change = TypeVar("Change")
 EVERY = 0.5
-"""Time between looks at the tasks and at the files [s]."""
+"""Time between looks at the files [s]; a change of a task is told at once."""
 
 
 async def studies_page(request: Request) -> Response:
@@ -51,22 +54,44 @@ async def studies_events(request: Request) -> Response:
 
 
 async def _events(context: Context) -> AsyncIterator[bytes]:
-    running, shown = b"", await run_in_threadpool(_shown, context)
-    while True:
-        now = await run_in_threadpool(_shown, context)
-        if now != shown:
-            yield b"event: studies\ndata: {}\n\n"
-        jobs = msgspec.json.encode(_running(context))
-        changed = jobs != running
-        yield b"event: jobs\ndata: " + jobs + b"\n\n" if changed else b": still here\n\n"
-        running, shown = jobs, now
-        await asyncio.sleep(EVERY)
+    queue = context.desks.listeners.listen()
+    try:
+        shown = await run_in_threadpool(_shown, context)
+        while True:
+            active = _active(context)
+            yield _jobs(context, active)
+            async for folder, job in _within(queue, EVERY):
+                active = {path: other for path, other in active.items() if path != folder}
+                active |= {folder: job} if job.active else {}
+                yield _jobs(context, active)
+            now = await run_in_threadpool(_shown, context)
+            if now != shown:
+                yield b"event: studies\ndata: {}\n\n"
+            shown = now
+    finally:
+        context.desks.listeners.leave(queue)
 
 
-def _running(context: Context) -> dict[str, dict[str, Any] | None]:
-    """The active jobs by the name of their study."""
-    found = context.desks.jobs().items()
-    return {context.places.relative(path): job_data(job) for path, job in found if job.active}
+async def _within(queue: asyncio.Queue[Change], seconds: float) -> AsyncIterator[Change]:
+    """What a queue brings within a time [s]."""
+    clock = asyncio.get_running_loop().time
+    until = clock() + seconds
+    while (left := until - clock()) > 0.0:
+        try:
+            change = await asyncio.wait_for(queue.get(), left)
+        except TimeoutError:
+            return
+        yield change
+
+
+def _active(context: Context) -> dict[Path, Job]:
+    return {path: job for path, job in context.desks.jobs().items() if job.active}
+
+
+def _jobs(context: Context, active: dict[Path, Job]) -> bytes:
+    """The event of the active jobs, by the name of their study."""
+    plain = {context.places.relative(path): job_data(job) for path, job in active.items()}
+    return b"event: jobs\ndata: " + msgspec.json.encode(plain) + b"\n\n"
 
 
 def _shown(context: Context) -> object:

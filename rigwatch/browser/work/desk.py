@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.forkserver import ensure_running
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from rigwatch.browser.work.worker import work
 from rigwatch.wire.errors import RigwatchError
@@ -57,8 +57,35 @@ class Job:
         return self.state in ("waiting", "running")
 
 
+Change = TypeVar("Change")
 Told = tuple[str, Job | None]
 """Kind of change, and a copy of the job at that time."""
+
+
+@dataclass(eq=False)
+class Listeners(Generic[Change]):
+    """Pages that hear of changes, each with a queue; false if there are none."""
+
+    _queues: set[asyncio.Queue[Change]] = field(default_factory=set)
+
+    def __bool__(self) -> bool:
+        return bool(self._queues)
+
+    def listen(self) -> asyncio.Queue[Change]:
+        """A queue of all changes from now on."""
+        queue: asyncio.Queue[Change] = asyncio.Queue(MOST_WAITING)
+        self._queues.add(queue)
+        return queue
+
+    def leave(self, queue: asyncio.Queue[Change]) -> None:
+        """Remove a queue."""
+        self._queues.discard(queue)
+
+    def tell(self, change: Change) -> None:
+        """Notify all listeners; a full queue misses the change but gets the next one."""
+        for queue in self._queues:
+            with suppress(asyncio.QueueFull):
+                queue.put_nowait(change)
 
 
 @dataclass(eq=False)
@@ -67,13 +94,16 @@ class Desk:
 
     Attributes:
         folder: the study's.
+        everyone: hears of the jobs of all studies.
         job: the running job, or the last one; None before the first.
+        listeners: hear "job" with the job, or "study" if the study's files or results changed.
     """
 
     folder: Path
+    everyone: Listeners[tuple[Path, Job]] = field(default_factory=Listeners)
     job: Job | None = None
+    listeners: Listeners[Told] = field(default_factory=Listeners)
     _queue: list[Job] = field(default_factory=list)
-    _listeners: set[asyncio.Queue[Told]] = field(default_factory=set)
     _process: BaseProcess | None = None
     _pipe: Connection | None = None
     _number: int = 0
@@ -128,26 +158,11 @@ class Desk:
         """Whether its process is running."""
         return self._process is not None
 
-    def listen(self) -> asyncio.Queue[Told]:
-        """A queue of changes: "job" with the job, or "study" if its files or results changed."""
-        queue: asyncio.Queue[Told] = asyncio.Queue(MOST_WAITING)
-        self._listeners.add(queue)
-        return queue
-
-    def leave(self, queue: asyncio.Queue[Told]) -> None:
-        """Remove a queue."""
-        self._listeners.discard(queue)
-
-    @property
-    def watched(self) -> bool:
-        """Whether there is any listener."""
-        return bool(self._listeners)
-
     def tell(self, what: str) -> None:
-        """Notify all listeners; a full queue misses the change but gets the next one."""
-        for queue in self._listeners:
-            with suppress(asyncio.QueueFull):
-                queue.put_nowait((what, self.job))
+        """Notify all listeners of a change, "job" or "study"."""
+        self.listeners.tell((what, self.job))
+        if what == "job" and self.job is not None:
+            self.everyone.tell((self.folder, self.job))
 
     def _next(self) -> None:
         if self._queue and not (self.job and self.job.active):
@@ -212,13 +227,18 @@ class Desk:
 
 @dataclass(eq=False)
 class Desks:
-    """The desks of all studies, by folder."""
+    """The desks of all studies, by folder.
 
+    Attributes:
+        listeners: hear of each change of a job, with the study's folder.
+    """
+
+    listeners: Listeners[tuple[Path, Job]] = field(default_factory=Listeners)
     _desks: dict[Path, Desk] = field(default_factory=dict)
 
     def of(self, folder: Path) -> Desk:
         """The desk of a study; idle processes of others are ended to make room."""
-        desk = self._desks.pop(folder, None) or Desk(folder)
+        desk = self._desks.pop(folder, None) or Desk(folder, self.listeners)
         self._desks[folder] = desk
         alive = [other for other in self._desks.values() if other.alive and not other.at_work]
         for other in alive[: max(len(alive) - MOST_PROCESSES, 0)]:
@@ -240,7 +260,7 @@ class Desks:
         seen: dict[Path, object] = {}
         while True:
             for folder, desk in list(self._desks.items()):
-                if desk.watched:
+                if desk.listeners:
                     now = state(folder)
                     if seen.setdefault(folder, now) != now:
                         seen[folder] = now
