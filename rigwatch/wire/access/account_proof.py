@@ -7,15 +7,10 @@ runs of the receivers, nonce and time.
 import contextlib
 import hashlib
 import hmac
-import secrets
-import threading
-import time
-
-import msgspec
 
 from rigwatch.wire.access.account_secret import own_secret, read_secret, secret_file
-from rigwatch.wire.access.replays import Replays
-from rigwatch.wire.access.statement import Proof, read_proof, statement
+from rigwatch.wire.access.replays import CommandRun
+from rigwatch.wire.access.statement import Proof, new_proof, read_proof, statement
 from rigwatch.wire.errors import KeysError
 from rigwatch.wire.rig_config import SecuritySection
 
@@ -37,8 +32,8 @@ class AccountSigner:
             KeysError: the secret cannot be read.
         """
         secret = read_secret(secret_file(self._security))
-        proof = Proof("", runs, secrets.token_hex(16), time.time_ns())
-        return msgspec.structs.replace(proof, signature=_code(secret, rig, proof, said)).to_text()
+        proof = new_proof("", runs)
+        return proof.signed(_code(secret, rig, proof, said)).to_text()
 
 
 class AccountVerifier:
@@ -58,9 +53,9 @@ class AccountVerifier:
     proves_user = False
 
     def __init__(self, security: SecuritySection, rig: str) -> None:
-        self.run = secrets.token_hex(16)
         self._security, self._rig = security, rig
-        self._replays, self._lock = Replays(), threading.Lock()
+        self._commands = CommandRun()
+        self.run = self._commands.run
         with contextlib.suppress(KeysError):
             own_secret(secret_file(security))
 
@@ -74,11 +69,7 @@ class AccountVerifier:
         code = _code(own_secret(secret_file(self._security)), self._rig, proof, said)
         if not hmac.compare_digest(code.encode(), proof.signature.encode("utf-8", "replace")):
             raise KeysError("it is not signed with the secret of the account that runs the rig")
-        if self.run not in proof.runs:
-            raise KeysError("it is signed for another run of this process")
-        with self._lock:
-            if not self._replays.is_new(proof.nonce, proof.t_ns):
-                raise KeysError("it was received before")
+        self._commands.check(proof)
 
 
 def _code(secret: bytes, rig: str, proof: Proof, said: tuple[str, ...]) -> str:

@@ -1,14 +1,10 @@
 """Signs commands with an operator's private key."""
 
-import secrets
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
-
 from rigwatch.wire.access.register import key_files
-from rigwatch.wire.access.statement import Proof, statement
+from rigwatch.wire.access.statement import new_proof, statement
 from rigwatch.wire.errors import KeysError
 
 
@@ -48,6 +44,6 @@ class Signer:
             raise KeysError(f"{private}: key of the operator cannot be read: {reason}") from None
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise KeysError(f"{private}: found a key of another kind, expected ECDSA P-256")
-        proof = Proof(certificate, runs, secrets.token_hex(16), time.time_ns())
+        proof = new_proof(certificate, runs)
         signature = key.sign(statement(rig, proof, said), ec.ECDSA(hashes.SHA256()))
-        return msgspec.structs.replace(proof, signature=signature.hex()).to_text()
+        return proof.signed(signature.hex()).to_text()

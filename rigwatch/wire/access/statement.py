@@ -8,6 +8,9 @@ The signed bytes are the parts of the statement, each preceded by its length, so
 statements have the same bytes.
 """
 
+import secrets
+import time
+
 import msgspec
 
 from rigwatch.wire.errors import KeysError
@@ -35,9 +38,18 @@ class Proof(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     t_ns: int
     signature: str = ""
 
+    def signed(self, signature: str) -> "Proof":
+        """The proof with its signature."""
+        return msgspec.structs.replace(self, signature=signature)
+
     def to_text(self) -> str:
         """The proof as sent."""
         return msgspec.json.encode(self).decode()
+
+
+def new_proof(certificate: str, runs: tuple[str, ...]) -> Proof:
+    """A proof to be signed now."""
+    return Proof(certificate, runs, secrets.token_hex(16), time.time_ns())
 
 
 def statement(rig: str, proof: Proof, said: tuple[str, ...]) -> bytes:

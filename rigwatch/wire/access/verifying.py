@@ -1,13 +1,11 @@
 """Verifies that a command comes from the operator it names."""
 
-import secrets
-import threading
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.wire.access.register import Issued, authority_file, read_register
-from rigwatch.wire.access.replays import Replays
+from rigwatch.wire.access.replays import CommandRun
 from rigwatch.wire.access.statement import Proof, read_proof, statement
 from rigwatch.wire.errors import KeysError
 
@@ -34,10 +32,9 @@ class Verifier:
     proves_user = True
 
     def __init__(self, folder: Path, rig: str) -> None:
-        self.run = secrets.token_hex(16)
         self._folder, self._rig = folder, rig
-        self._replays: dict[str, Replays] = {}
-        self._lock = threading.Lock()
+        self._commands = CommandRun()
+        self.run = self._commands.run
 
     def check(self, user: str, text: str, said: tuple[str, ...]) -> None:
         """Verify a command.
@@ -57,12 +54,7 @@ class Verifier:
         if issued.name != user:
             raise KeysError(f"it is signed by {issued.name}, expected {user}")
         _check_signature(certificate, proof, statement(self._rig, proof, said))
-        if self.run not in proof.runs:
-            raise KeysError("it is signed for another run of this process")
-        with self._lock:
-            seen = self._replays.setdefault(issued.common_name, Replays())
-            if not seen.is_new(proof.nonce, proof.t_ns):
-                raise KeysError("it was received before")
+        self._commands.check(proof, issued.common_name)
 
     def _check_issuer(self, certificate: "x509.Certificate") -> None:
         from cryptography import x509
