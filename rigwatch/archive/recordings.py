@@ -57,18 +57,13 @@ def _is_pattern(text: str) -> bool:
     return any(mark in text for mark in "*?[")
 
 
-def _split(address: str) -> tuple[str, str]:
-    head, _, name = address.rstrip("/").rpartition("/")
-    return head, name
-
-
 def _entry(address: str) -> tuple[Store, Entry]:
     """The store above a session, and its files.
 
     Raises:
         ArchiveError: there is none.
     """
-    head, name = _split(address)
+    head, _, name = address.rstrip("/").rpartition("/")
     store = Store(head)
     files = tuple(file for file in store.listed(name) if file.name.endswith(SUFFIX))
     if not files:

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.effect_files import library
-from rigwatch.physics.engine.equations.expression_dimension import describe, dimension
+from rigwatch.physics.engine.equations.expression_dimension import dimension
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.quantities import spelt_out
 from rigwatch.physics.engine.equations.system import Placement, compose
@@ -16,6 +16,7 @@ from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
 from rigwatch.physics.engine.score.compatibility import suits
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.typed_files.loading import parse
+from rigwatch.wire.units import describe
 
 MASS_SPRING_DAMPER = shipped_models()["mass-spring-damper"]
 DT = 1 / 256

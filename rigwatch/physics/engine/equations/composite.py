@@ -26,6 +26,7 @@ from rigwatch.physics.engine.equations.effect import (
     EffectState,
     Text,
 )
+from rigwatch.physics.engine.equations.expression import renamed
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.typed_files import Section
 
@@ -113,7 +114,7 @@ def _behind(own: Composite, first: EffectMap, then: Effect, where: str, file: ob
             str(file), f"{where}.then", f"{own.then} of kind {then.port}", "one of kind force"
         )
     ours, theirs = _names(own, first, then)
-    seen = {name: f"({_renamed(text, ours)})" for name, text in first.variables.items()}
+    seen = {name: f"({renamed(text, ours)})" for name, text in first.variables.items()}
     if unseen := _variables(then) - set(seen):
         raise ConfigError(
             str(file), f"{where}.first", f"no {min(unseen)} in {own.first}, which {own.then} uses",
@@ -122,8 +123,8 @@ def _behind(own: Composite, first: EffectMap, then: Effect, where: str, file: ob
     return _effect(
         own,
         then,
-        expression=_renamed(then.expression, theirs | seen),
-        direction=_renamed(then.direction, theirs | seen),
+        expression=renamed(then.expression, theirs | seen),
+        direction=renamed(then.direction, theirs | seen),
         parameters=_taken(first.parameters, ours) | _taken(then.parameters, theirs),
         states=_states(first.states, ours) | _states(then.states, theirs | seen),
     )
@@ -140,8 +141,8 @@ def _in_series(own: Composite, first: Effect, then: Effect, where: str, file: ob
             str(file), f"{where}.then", f"{own.then}, which uses {min(timed)}", "one without"
         )
     ours, theirs = _names(own, first, then)
-    leaves = {"u": f"({_renamed(first.expression, ours)})"}
-    after = _renamed(then.expression, theirs | leaves)
+    leaves = {"u": f"({renamed(first.expression, ours)})"}
+    after = renamed(then.expression, theirs | leaves)
     port = first if first.port != "signal" else then
     return _effect(
         own,
@@ -183,11 +184,6 @@ def _names(
     )
 
 
-def _renamed(text: str, names: Mapping[str, str]) -> str:
-    """An expression with names replaced, all at once."""
-    return re.sub(r"\b[A-Za-z_]\w*", lambda found: names.get(found[0], found[0]), text)
-
-
 def _taken(
     parameters: Mapping[str, EffectParameter], names: Mapping[str, str]
 ) -> dict[str, EffectParameter]:
@@ -208,7 +204,7 @@ def _shapes(parameters: Mapping[str, EffectParameter]) -> dict[str, EffectParame
 
 def _states(states: Mapping[str, EffectState], names: Mapping[str, str]) -> dict[str, EffectState]:
     return {
-        names[name]: replace(state, derivative=_renamed(state.derivative, names))
+        names[name]: replace(state, derivative=renamed(state.derivative, names))
         for name, state in states.items()
     }
 

@@ -6,6 +6,7 @@ selects. No other Python is accepted, so an equation file cannot execute code.
 
 import ast
 import difflib
+import re
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
@@ -87,6 +88,11 @@ def check_size(text: str, where: str) -> None:
         ModelError: it is, or it does not parse.
     """
     syntax_tree(text, where)
+
+
+def renamed(text: str, names: Mapping[str, str]) -> str:
+    """An expression with names replaced by others, or by expressions, all at once."""
+    return re.sub(r"\b[A-Za-z_]\w*", lambda name: names.get(name[0], name[0]), text)
 
 
 def names_in(text: str, where: str) -> frozenset[str]:

@@ -10,27 +10,7 @@ from fractions import Fraction
 
 from rigwatch.physics.engine.equations.syntax_tree import quoted, syntax_tree
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.units import (
-    GRAM,
-    NONE,
-    Dimension,
-    UnitError,
-    describe,
-    names_gram,
-    times,
-    unit_of,
-)
-
-__all__ = [
-    "GRAM",
-    "NONE",
-    "Dimension",
-    "describe",
-    "dimension",
-    "dimension_of",
-    "names_gram",
-    "times",
-]
+from rigwatch.wire.units import NONE, Dimension, UnitError, describe, times, unit_of
 
 _SAME_UNIT = {"max", "min", "abs"}
 

@@ -14,7 +14,7 @@ from graphlib import CycleError, TopologicalSorter
 
 from msgspec.structs import replace
 
-from rigwatch.physics.engine.equations.expression import check_size, names_in
+from rigwatch.physics.engine.equations.expression import check_size, names_in, renamed
 from rigwatch.physics.engine.equations.model import Model
 from rigwatch.physics.engine.equations.syntax_tree import LONGEST
 from rigwatch.wire.errors import ModelError
@@ -80,6 +80,6 @@ def _spelt(text: str, texts: Mapping[str, str], where: str) -> str:
             f"{where}: found {length} characters once its quantities are spelt out,"
             f" expected at most {LONGEST}"
         )
-    spelt = re.sub(r"\b[A-Za-z_]\w*", lambda word: texts.get(word[0], word[0]), text)
+    spelt = renamed(text, texts)
     check_size(spelt, where)
     return spelt

@@ -7,15 +7,9 @@ from dataclasses import dataclass, field
 import sympy
 
 from rigwatch.physics.engine.equations.expression import parse
-from rigwatch.physics.engine.equations.expression_dimension import (
-    GRAM,
-    Dimension,
-    describe,
-    dimension,
-    dimension_of,
-    names_gram,
-)
+from rigwatch.physics.engine.equations.expression_dimension import dimension, dimension_of
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.units import GRAM, Dimension, describe, names_gram
 
 
 def symbol(name: str) -> sympy.Symbol:
