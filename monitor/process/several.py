@@ -25,7 +25,7 @@ from monitor.process.loop import (
 )
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.delivery import Item
-from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.errors import one_line
 from rigwatch.wire.host import (
     MONITOR,
     Heartbeat,
@@ -34,7 +34,8 @@ from rigwatch.wire.host import (
     set_at_signal,
 )
 from rigwatch.wire.messages import SampleBlock, pieces
-from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.rig_config import RigConfig
+from rigwatch.wire.several_rigs import check_own, load_rigs
 
 TURN = 0.025
 """Time from one turn to the next: samples wait for half of it on average [s]."""
@@ -113,7 +114,7 @@ class Seat:
         try:
             self._joined.put(self._join(self._config, "monitor"))
         except Exception as error:  # said, and tried again, in the loop's thread
-            self._say(f"{self._path}: {_line(error)}")
+            self._say(f"{self._path}: {one_line(error)}")
             self._again_at = time.monotonic() + LONGEST_PAUSE
 
     def _start(self) -> None:
@@ -134,7 +135,7 @@ class Seat:
         self._wait(error)
 
     def _wait(self, error: Exception) -> None:
-        self._say(f"{self._path}: {_line(error)}; starts anew in {self._pause:.0f} s")
+        self._say(f"{self._path}: {one_line(error)}; starts anew in {self._pause:.0f} s")
         self._again_at = time.monotonic() + self._pause
         self._pause = min(2 * self._pause, LONGEST_PAUSE)
 
@@ -147,7 +148,7 @@ class Seat:
         try:
             process.close()
         except Exception as error:  # the bus is left in any case
-            self._say(f"{self._path}: {_line(error)}")
+            self._say(f"{self._path}: {one_line(error)}")
         finally:
             process.bus.close()
 
@@ -158,10 +159,6 @@ def _divided(items: Iterable[Item]) -> Iterable[Item]:
             yield from pieces(item, LONGEST_BLOCK)
         else:
             yield item
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
 
 
 def take_turns(seats: list[Seat], stop: threading.Event, heartbeat: Heartbeat) -> None:
@@ -181,8 +178,8 @@ def run_several(paths: list[Path]) -> int:
         RigwatchError: a configuration or model is invalid, or two are of one rig or one journal.
     """
     stop = set_at_signal()
-    loaded = [(path, load_rig(path)) for path in paths]
-    _check_apart(loaded)
+    loaded = load_rigs(paths)
+    check_own("monitor.journal", _journals(loaded))
     models = [prepared(config, path) for path, config in loaded]
     raise_priority(MONITOR)
     heartbeat = Heartbeat("monitor")
@@ -196,14 +193,7 @@ def run_several(paths: list[Path]) -> int:
     return 0
 
 
-def _check_apart(loaded: list[tuple[Path, RigConfig]]) -> None:
-    """Raise if two configurations are of one rig, or write one journal."""
-    seen: dict[tuple[str, str], Path] = {}
+def _journals(loaded: list[tuple[Path, RigConfig]]) -> Iterable[tuple[Path, str]]:
     for path, config in loaded:
-        journal = monitor_section(config, path).journal
-        marks = [("rig.id", f"{config.bus.router} {config.rig.id}")]
-        marks += [("monitor.journal", str(Path(journal).resolve()))] if journal else []
-        for key, value in marks:
-            other = seen.setdefault((key, value), path)
-            if other is not path:
-                raise ConfigError(path, key, f"that of {other}", "one of its own")
+        if journal := monitor_section(config, path).journal:
+            yield path, str(Path(journal).resolve())

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 from uuid import uuid4
 
-from rigwatch.wire.errors import ArchiveError, MissingExtraError
+from rigwatch.wire.errors import ArchiveError, MissingExtraError, one_line, reason_of
 
 T = TypeVar("T")
 ATTEMPTS = 5
@@ -97,7 +97,7 @@ class Store:
         try:
             there = self._again(lambda: self.files.exists(self.root), self.root)
         except OSError as error:
-            raise ArchiveError(f"{self.url}: {_reason(error)}") from None
+            raise ArchiveError(f"{self.url}: {reason_of(error)}") from None
         if not there:
             raise ArchiveError(f"{self.url}: no such folder, expected an archive of sessions")
 
@@ -130,7 +130,7 @@ class Store:
             temporary.replace(target)
         except OSError as error:
             temporary.unlink(missing_ok=True)
-            raise ArchiveError(f"{target}: cannot be written: {_reason(error)}") from None
+            raise ArchiveError(f"{target}: cannot be written: {reason_of(error)}") from None
 
     def remove(self, name: str) -> None:
         """Remove a file, if it is there, and its folder if that is empty then."""
@@ -151,10 +151,10 @@ class Store:
                 raise
             except OSError as error:
                 if attempt == ATTEMPTS - 1 or self.is_local:
-                    raise ArchiveError(f"{self.url}: {what}: {_reason(error)}") from None
+                    raise ArchiveError(f"{self.url}: {what}: {reason_of(error)}") from None
                 time.sleep(FIRST_PAUSE_S * 2**attempt)
             except Exception as error:  # every file system has errors of its own
-                reason = " ".join(str(error).split())
+                reason = one_line(error)
                 raise ArchiveError(f"{self.url}: {type(error).__name__}: {reason}") from None
         raise AssertionError("the last attempt returns or raises")
 
@@ -162,10 +162,6 @@ class Store:
 def _stored(name: str, about: dict[str, Any]) -> Stored:
     stamp = about.get("ETag") or about.get("etag") or about.get("md5Hash") or about.get("mtime")
     return Stored(name, int(about.get("size") or 0), str(stamp or about.get("LastModified", "")))
-
-
-def _reason(error: OSError) -> str:
-    return " ".join(str(error.strerror or error).split()) or type(error).__name__
 
 
 def _fsspec() -> Any:

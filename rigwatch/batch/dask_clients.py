@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from msgspec import Meta, field
 
 from rigwatch.version import __version__
-from rigwatch.wire.errors import BatchError, MissingExtraError
+from rigwatch.wire.errors import BatchError, MissingExtraError, one_line
 from rigwatch.wire.typed_files import Section, load
 
 CONNECT_S = 15.0
@@ -83,8 +83,7 @@ def client_of(file: Path) -> Iterator[Any]:
     try:
         cluster = kind(**asked.options)
     except (TypeError, ValueError, OSError, RuntimeError) as error:
-        reason = " ".join(str(error).split())
-        raise BatchError(f"{file}: options: {reason}") from None
+        raise BatchError(f"{file}: options: {one_line(error)}") from None
     with cluster, client_class(cluster, set_as_default=False) as client:
         cluster.scale(jobs=asked.jobs)
         _check_workers(client, str(file), asked.wait)
@@ -113,8 +112,9 @@ def _connected(client: Any, where: str) -> Any:
     try:
         return client(f"tcp://{host}:{port or 8786}", timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise BatchError(f"{where}: no scheduler of this version answers: {reason}") from None
+        raise BatchError(
+            f"{where}: no scheduler of this version answers: {one_line(error)}"
+        ) from None
 
 
 def _check_workers(client: Any, where: str, wait: float) -> None:

@@ -16,7 +16,7 @@ from uuid import uuid4
 
 from rigwatch.batch.job import WORKER_DIED, Outcome
 from rigwatch.batch.pool import Pool
-from rigwatch.wire.errors import BatchError
+from rigwatch.wire.errors import BatchError, one_line
 
 TASK_S = 0.3
 """Intended length of a task: far longer than it takes to hand it over [s]."""
@@ -140,8 +140,8 @@ class Drive:
         if len(task.units) > 1:
             self._again.extend(task.units)
             return
-        text = " ".join(str(error).split())
-        yield Outcome(task.units[0], "", b"", type(error).__name__, f"{task.units[0]}: {text}")
+        text = f"{task.units[0]}: {one_line(error)}"
+        yield Outcome(task.units[0], "", b"", type(error).__name__, text)
 
 
 def _dead(unit: str) -> Outcome:

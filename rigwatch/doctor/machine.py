@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rigwatch.doctor.finding import Finding, judged
+from rigwatch.wire.errors import one_line
 
 OLDEST, NEWEST = (3, 11), (3, 13)
 LOW_DISK, NO_DISK = 0.10, 0.02
@@ -78,7 +79,7 @@ def check_kernels() -> Finding:
     except Exception as error:
         # Any failure inside the compiler becomes one line for the user.
         remedy = "set NUMBA_CACHE_DIR to a folder you may write to, or install numba again"
-        return Finding(what, "fail", " ".join(str(error).split())[:200], remedy)
+        return Finding(what, "fail", one_line(error)[:200], remedy)
     cache = Path(str(add_one.stats.cache_path))
     text = f"compiled in {time.perf_counter() - started:.1f} s, kept in {cache}"
     good = result == 2.0 and os.access(cache, os.W_OK)

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from rigwatch.fleet.rig_state import RigState, judged, unreachable
 from rigwatch.wire.bus import Bus, Subscription, ask_alarm_list, connect, unique_process
-from rigwatch.wire.errors import BusError, ConfigError
+from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import ALIVE_KEY, HEALTH, Health
-from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.rig_config import RigConfig
+from rigwatch.wire.several_rigs import load_rigs
 
 MOST_AT_ONCE = 64
 """Rigs that are asked at the same time."""
@@ -91,13 +92,7 @@ class Fleet:
     """
 
     def __init__(self, paths: Sequence[Path], timeout: float) -> None:
-        loaded = [(path, load_rig(path)) for path in paths]
-        seen: dict[tuple[str, str], Path] = {}
-        for path, config in loaded:
-            other = seen.setdefault((config.bus.router, config.rig.id), path)
-            if other is not path:
-                raise ConfigError(path, "rig.id", f"that of {other}", "an id of its own")
-        self._rigs = [Onlooker(path, config, timeout) for path, config in loaded]
+        self._rigs = [Onlooker(path, config, timeout) for path, config in load_rigs(paths)]
         self._threads = ThreadPoolExecutor(min(MOST_AT_ONCE, max(1, len(paths))))
 
     def look(self) -> list[RigState]:

@@ -17,7 +17,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from rigwatch.wire.access import REGISTER, ROLES, Issued, Register, authority_file, key_files
-from rigwatch.wire.errors import KeysError
+from rigwatch.wire.errors import KeysError, reason_of
 from rigwatch.wire.host import replace_file
 
 AUTHORITY_KEY = "authority.key"
@@ -41,8 +41,8 @@ class Authority:
             self._certificate = x509.load_pem_x509_certificate(authority_file(folder).read_bytes())
             key = serialization.load_pem_private_key((folder / AUTHORITY_KEY).read_bytes(), None)
         except (OSError, ValueError, msgspec.MsgspecError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise KeysError(f"{folder}: no authority here: {reason}; `rigwatch keys new`") from None
+            why = reason_of(error)
+            raise KeysError(f"{folder}: no authority here: {why}; `rigwatch keys new`") from None
         assert isinstance(key, ec.EllipticCurvePrivateKey)
         self._key = key
 

@@ -26,6 +26,16 @@ class RigwatchError(Exception):
     """Base of all errors whose message is one plain line for the user."""
 
 
+def one_line(error: BaseException) -> str:
+    """What an error of another library says, on one line; its kind if it says nothing."""
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def reason_of(error: BaseException) -> str:
+    """Why, without the file, where the caller's sentence names it."""
+    return getattr(error, "strerror", None) or one_line(error)
+
+
 class ConfigError(RigwatchError):
     """A configuration, scenario or model file is wrong.
 

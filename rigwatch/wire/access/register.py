@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from rigwatch.wire.errors import KeysError
+from rigwatch.wire.errors import KeysError, reason_of
 
 REGISTER = "register.json"
 ROLES = ("router", "device", "daq", "monitor", "recorder", "witness", "dashboard", "operator")
@@ -46,8 +46,7 @@ def read_register(folder: Path) -> Register:
     try:
         return msgspec.json.decode(path.read_bytes(), type=Register)
     except (OSError, ValueError, RecursionError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise KeysError(f"{path}: register cannot be read: {reason}") from None
+        raise KeysError(f"{path}: register cannot be read: {reason_of(error)}") from None
 
 
 def authority_file(folder: Path) -> Path:

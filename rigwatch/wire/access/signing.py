@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rigwatch.wire.access.register import key_files
 from rigwatch.wire.access.statement import new_proof, statement
-from rigwatch.wire.errors import KeysError
+from rigwatch.wire.errors import KeysError, reason_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +40,8 @@ class Signer:
             certificate = public.read_text(encoding="ascii")
             key = serialization.load_pem_private_key(private.read_bytes(), None)
         except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise KeysError(f"{private}: key of the operator cannot be read: {reason}") from None
+            why = reason_of(error)
+            raise KeysError(f"{private}: key of the operator cannot be read: {why}") from None
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise KeysError(f"{private}: found a key of another kind, expected ECDSA P-256")
         proof = new_proof(certificate, runs)

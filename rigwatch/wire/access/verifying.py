@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rigwatch.wire.access.register import Issued, authority_file, read_register
 from rigwatch.wire.access.replays import CommandRun
 from rigwatch.wire.access.statement import Proof, read_proof, statement
-from rigwatch.wire.errors import KeysError
+from rigwatch.wire.errors import KeysError, reason_of
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -64,8 +64,7 @@ class Verifier:
         try:
             authority = x509.load_pem_x509_certificate(path.read_bytes())
         except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise KeysError(f"{path}: cannot be read: {reason}") from None
+            raise KeysError(f"{path}: cannot be read: {reason_of(error)}") from None
         try:
             certificate.verify_directly_issued_by(authority)
         except (InvalidSignature, ValueError, TypeError):
