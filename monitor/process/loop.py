@@ -331,11 +331,12 @@ def watch(process: MonitorProcess, stop: threading.Event) -> None:
         items = process.reader.read(process.turn_s())
         for item in items:
             process.take(item)
-        process.keep_position()
         # While samples come, not after each of them; silence is looked at without delay.
         if not items or time.monotonic() - looked >= TURN:
             looked = time.monotonic()
             process.look_around()
+        else:
+            process.keep_position()
         heartbeat.advance(process.reader.counters.delivered)
     heartbeat.stopping()
 

@@ -22,7 +22,7 @@ from rigwatch.wire.errors import BusError, KeysError
 from rigwatch.wire.messages import COMMANDS, EVENTS, HEALTH, AlarmCommand
 from rigwatch.wire.rig_config import SecuritySection, load_rig
 from tests.access.secured_rig import make_keys
-from tests.bus.rig import ROOT, TestRig, kill
+from tests.bus.rig import ROOT, TestRig, kill, rigwatch
 from tests.monitor_process.model import monitor_section
 from tests.waiting import PATIENCE, eventually
 
@@ -145,13 +145,6 @@ def standing(bus: Bus) -> dict[str, str] | None:
         return {alarm.name: alarm.state for alarm in ask_alarm_list(bus)}
     except BusError:
         return None
-
-
-def rigwatch(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-m", "rigwatch", *arguments],
-        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False,
-    )  # fmt: skip
 
 
 def refused_count(bus: Bus) -> float:

@@ -1,8 +1,6 @@
 """On a rig with keys, commands act only in the name of the operator who signs them."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +12,7 @@ from rigwatch.wire.bus.model_change import ModelRequest
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import COMMANDS, ESTIMATES, EVENTS, HEALTH, Alarm, AlarmCommand
 from tests.access.secured_rig import SecuredRig, make_keys
-from tests.bus.rig import ROOT, kill
+from tests.bus.rig import kill, rigwatch
 from tests.monitor_process.model import monitor_section
 from tests.waiting import PATIENCE, eventually
 
@@ -34,13 +32,6 @@ def rig(tmp_path: Path) -> Iterator[SecuredRig]:
     with SecuredRig(tmp_path, keys, section) as made:
         made.router()
         yield made
-
-
-def rigwatch(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-m", "rigwatch", *arguments],
-        cwd=ROOT, capture_output=True, text=True, timeout=2 * PATIENCE, check=False,
-    )  # fmt: skip
 
 
 def standing(bus: Bus) -> dict[str, str]:

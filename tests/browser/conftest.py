@@ -5,25 +5,19 @@ from pathlib import Path
 
 import pytest
 
-from tests.browser.page import Page, Served, browser
+from tests.browser.page import Page, Served, browser, looking, serving
 
 
 @pytest.fixture(scope="session")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    found = Served(tmp_path_factory.mktemp("workbench"), "--most-upload", "8")
-    yield found
-    found.end()
-    assert not [line for line in found.said if "Traceback" in line], "".join(found.said)
+    with serving(tmp_path_factory.mktemp("workbench"), "--most-upload", "8") as found:
+        yield found
 
 
 @pytest.fixture(scope="session")
 def page(served: Served) -> Iterator[Page]:
-    with browser() as driver:
-        found = Page(driver, served)
-        found.enter()
+    with browser() as driver, looking(driver, served) as found:
         yield found
-        assert found.errors() == []
-        assert found.requests() <= {served.address}
 
 
 @pytest.fixture

@@ -227,3 +227,24 @@ def _is_missing_page(message: str) -> bool:
     address, _, text = message.partition(" - ")
     missing = "status of 404" in text
     return missing and not urlsplit(address).path.startswith(("/static", "/api"))
+
+
+@contextmanager
+def serving(folder: Path, *arguments: str, cwd: Path | None = None) -> Iterator[Served]:
+    """A server that ends with the test, and says no traceback until then."""
+    served = Served(folder, *arguments, cwd=cwd)
+    try:
+        yield served
+    finally:
+        served.end()
+    assert not [line for line in served.said if "Traceback" in line], "".join(served.said)
+
+
+@contextmanager
+def looking(driver: webdriver.Chrome, served: Served) -> Iterator[Page]:
+    """The browser at a server: in the end no page has failed or asked for anything elsewhere."""
+    page = Page(driver, served)
+    page.enter()
+    yield page
+    assert page.errors() == []
+    assert page.requests() <= {served.address}

@@ -47,6 +47,14 @@ port = "/dev/null"
 """
 
 
+def rigwatch(*arguments: str) -> "subprocess.CompletedProcess[str]":
+    """A command as a user types it, once it has ended."""
+    return subprocess.run(
+        [sys.executable, "-m", "rigwatch", *arguments],
+        cwd=ROOT, capture_output=True, text=True, timeout=2 * PATIENCE, check=False,
+    )  # fmt: skip
+
+
 def free_port() -> int:
     """A TCP port that nobody has now."""
     with socket.socket() as probe:

@@ -13,7 +13,7 @@ import pytest
 from rigwatch.wire.messages import SAMPLES
 from rigwatch.wire.session import SessionWriter, open_session, run_info
 from tests.bus.publisher import wave
-from tests.bus.rig import ROOT
+from tests.bus.rig import ROOT, rigwatch
 from tests.faults.field import RATE, Field, numbers
 from tests.waiting import PATIENCE
 
@@ -68,13 +68,6 @@ def test_45_a_recorder_that_is_killed(rig: RecordedRig) -> None:
     kept = recorded(only_session(rig))
     assert kept == list(range(kept[0], kept[-1] + 1))
     assert newest - kept[-1] <= RATE, "a second at most"
-
-
-def rigwatch(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-m", "rigwatch", *arguments],
-        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False,
-    )  # fmt: skip
 
 
 def test_47_a_damaged_session(tmp_path: Path) -> None:

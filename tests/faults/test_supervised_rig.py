@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +12,7 @@ import pytest
 from rigwatch.wire.bus import ask_alarm_list
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.session import open_session
-from tests.bus.rig import ROOT
+from tests.bus.rig import rigwatch
 from tests.faults.field import Field, SerialDevice, least_of, numbers
 from tests.tooling.test_up import Rig as Up
 from tests.waiting import PATIENCE, eventually
@@ -167,10 +165,7 @@ def test_44_a_configuration_that_is_wrong_or_changes(rig: SupervisedRig) -> None
     assert rig.pid("monitor") == before, "all runs on"
     path = rig.folder / "wrong.toml"
     path.write_text(wrong)
-    refused = subprocess.run(
-        [sys.executable, "-m", "rigwatch", "daq", str(path)],
-        cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False,
-    )  # fmt: skip
+    refused = rigwatch("daq", str(path))
     assert refused.returncode == 2
     assert f"wrong.toml:{line}: " in refused.stderr
     other = good + "[monitor.alarms.sensor_spike]\nenabled = false\n"

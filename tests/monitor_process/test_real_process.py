@@ -2,8 +2,6 @@
 
 import json
 import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +11,7 @@ import pytest
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.messages.message_types import EstimateBlock
 from rigwatch.wire.messages.topics import ESTIMATES
-from tests.bus.rig import ROOT, TestRig, kill, stopped
+from tests.bus.rig import TestRig, kill, rigwatch, stopped
 from tests.monitor_process.model import monitor_section
 from tests.waiting import PATIENCE, eventually
 
@@ -47,17 +45,6 @@ class Judged:
 def rig(tmp_path: Path) -> Iterator[TestRig]:
     with TestRig(tmp_path, monitor_section(tmp_path)) as made:
         yield made
-
-
-def rigwatch(*arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, "-m", "rigwatch", *arguments],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=2 * PATIENCE,
-        check=False,
-    )
 
 
 def test_a_killed_or_frozen_monitor_judges_every_sample_and_keeps_its_alarms(rig: TestRig) -> None:

@@ -25,7 +25,7 @@ def divided(
         tables: the held-out recordings.
         horizon: samples of a window; a model with states is told over whole windows.
     """
-    moving = [n for n, p in study.model.parameters.items() if p.per_recording and p.fixed]
+    moving = [n for n, p in study.model.parameters.items() if p.is_told]
     spans = study.file.held_out
     if not moving:
         return list(tables), [], []

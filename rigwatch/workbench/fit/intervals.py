@@ -112,7 +112,7 @@ def values(fitted: Fit, added_variances: Mapping[str, float] | None = None) -> d
     for name, value in fitted.values().items():
         interval = (value - spread[name], value + spread[name]) if name in spread else None
         parameter = system.parameters[name]
-        told = TOLD if parameter.per_recording and parameter.fixed else ""
+        told = TOLD if parameter.is_told else ""
         found[name] = Value(value, parameter.unit, interval, notes.get(name, told))
     return found
 

@@ -10,7 +10,7 @@ from rigwatch.wire.session import SessionWriter, run_info
 from rigwatch.workbench.steps.change import add
 from rigwatch.workbench.study import lines, open_study
 from rigwatch.workbench.study.study import Study
-from tests.browser.page import Page, Served
+from tests.browser.page import Page, looking, serving
 from tests.report.drive import MODEL, RATE, block, make_study
 from tests.report.test_promote import RIG
 
@@ -43,18 +43,11 @@ def at_rig(page: Page, model: Path, study: Study) -> Iterator[Page]:
     """The browser at a server of its own."""
     assert page.errors() == []
     assert page.requests() <= {page.served.address}
-    served = Served(study.folder.parent, "--rig", str(model.parent / "rig.toml"))
-    try:
-        found = Page(page.driver, served)
-        found.enter()
-        yield found
-        assert found.errors() == []
-        assert found.requests() <= {served.address}
+    with serving(study.folder.parent, "--rig", str(model.parent / "rig.toml")) as served:
+        with looking(page.driver, served) as found:
+            yield found
         page.enter()
         assert page.requests() <= {served.address, page.served.address}
-    finally:
-        served.end()
-    assert not [line for line in served.said if "Traceback" in line], "".join(served.said)
 
 
 def test_rehearsed_promoted_and_rolled_back(at_rig: Page, model: Path, study: Study) -> None:

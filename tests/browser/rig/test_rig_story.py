@@ -9,7 +9,7 @@ import pytest
 from rigwatch.browser.rig.live_view import LiveView
 from rigwatch.browser.rig.promotions import can_roll_back, promotions
 from rigwatch.wire.messages.message_types import Health
-from tests.browser.page import Page, Served, browser
+from tests.browser.page import Page, browser, looking, serving
 from tests.bus.rig import ROOT
 from tests.workbench.rigs.test_rig_story import Shell, Watched
 
@@ -29,17 +29,13 @@ def shell(tmp_path: Path) -> Iterator[Shell]:
 def page(shell: Shell) -> Iterator[Page]:
     studies = shell.folder / "studies"
     studies.mkdir()
-    served = Served(studies, "--rig", str(shell.config), cwd=shell.folder)
-    try:
-        with browser() as driver:
-            found = Page(driver, served)
-            found.enter()
-            yield found
-            assert found.errors() == []
-            assert found.requests() <= {served.address}
-    finally:
-        served.end()
-    assert not [line for line in served.said if "Traceback" in line], "".join(served.said)
+    arguments = ("--rig", str(shell.config))
+    with (
+        serving(studies, *arguments, cwd=shell.folder) as served,
+        browser() as driver,
+        looking(driver, served) as found,
+    ):
+        yield found
 
 
 def residual(page: Page) -> float:

@@ -97,6 +97,11 @@ class Parameter(Section, frozen=True, kw_only=True):
     meaning: Annotated[str, Meta(description="what it is, in words")] = ""
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
+    @property
+    def is_told(self) -> bool:
+        """Whether the study gives its value for each recording."""
+        return self.per_recording and self.fixed
+
     def __post_init__(self) -> None:
         if math.isnan(self.value):
             if self.fixed:

@@ -31,7 +31,7 @@ def with_told(
     Raises:
         ModelError: the simulation diverges.
     """
-    told = [n for n, p in model.parameters.items() if p.per_recording and p.fixed]
+    told = [n for n, p in model.parameters.items() if p.is_told]
     if telling is None or not told:
         return found
     system = found.compiled.system
