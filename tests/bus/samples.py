@@ -3,7 +3,7 @@
 import numpy as np
 
 from rigwatch.wire.messages.message_types import Column, Gap, SampleBlock
-from rigwatch.wire.ordering.sample_order import Loss
+from rigwatch.wire.ordering.outcomes import Loss
 
 PERIOD_NS = 3_906_250
 

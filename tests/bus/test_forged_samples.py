@@ -8,14 +8,9 @@ from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.delivery.ring import SampleRing
 from rigwatch.wire.delivery.sample_reader import SampleReader
 from rigwatch.wire.messages import SAMPLES, Event, SampleBlock
+from rigwatch.wire.ordering.outcomes import FORGED, POSITION_WRONG, Loss
 from rigwatch.wire.ordering.ownership import Owners
-from rigwatch.wire.ordering.sample_order import (
-    FORGED,
-    POSITION_WRONG,
-    SUSPECT,
-    Loss,
-    SampleOrder,
-)
+from rigwatch.wire.ordering.sample_order import SUSPECT, SampleOrder
 from tests.bus.samples import block
 from tests.bus.test_sample_order import Bench
 from tests.waiting import wait_until

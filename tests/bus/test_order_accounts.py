@@ -3,16 +3,8 @@
 import pytest
 
 from rigwatch.wire.ordering import OPEN, UNKNOWN, Ask, Numbered, RingReply
-from rigwatch.wire.ordering.sample_order import (
-    FORGED,
-    LARGEST_SEQ,
-    POSITION_WRONG,
-    SUSPECT,
-    TRIES,
-    Loss,
-    Remark,
-    SampleOrder,
-)
+from rigwatch.wire.ordering.outcomes import FORGED, POSITION_WRONG, Loss, Remark
+from rigwatch.wire.ordering.sample_order import LARGEST_SEQ, SUSPECT, TRIES, SampleOrder
 from tests.bus.samples import block
 from tests.bus.test_sample_order import Bench
 

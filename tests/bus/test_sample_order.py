@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from rigwatch.wire.delivery.ring import RingStore
 from rigwatch.wire.messages.message_types import SampleBlock
+from rigwatch.wire.ordering.outcomes import Loss, Outcome, Remark
 from rigwatch.wire.ordering.ring_protocol import OPEN, Ask, RingReply
-from rigwatch.wire.ordering.sample_order import TRIES, Loss, Outcome, Remark, SampleOrder
+from rigwatch.wire.ordering.sample_order import TRIES, SampleOrder
 from tests.bus.samples import Ledger, block
 
 

@@ -1,23 +1,23 @@
 """Delivery logic without clock or bus: order, losses, and arbitration between sources.
 
-`sample_order` orders received samples and reports losses, `source_arbitration` decides which of
-several sources has control, `ownership` which process may send for it, and `ring_protocol` defines
-a reader's queries to a ring. Samples and numbered messages use the same logic.
+`sample_order` orders received samples and reports losses (`outcomes`), `stream` keeps those of one
+boot until their turn, `source_arbitration` decides which of several sources has control,
+`ownership` which process may send for it, and `ring_protocol` defines a reader's queries to a ring.
+Samples and numbered messages use the same logic.
 """
 
 from rigwatch.wire.ordering.numbered import Numbered
-from rigwatch.wire.ordering.ownership import Owners
-from rigwatch.wire.ordering.ring_protocol import OPEN, UNKNOWN, Ask, RingReply
-from rigwatch.wire.ordering.sample_order import (
+from rigwatch.wire.ordering.outcomes import (
     FORGED,
-    LARGEST_SEQ,
     POSITION_WRONG,
     Counters,
     Loss,
     Outcome,
     Remark,
-    SampleOrder,
 )
+from rigwatch.wire.ordering.ownership import Owners
+from rigwatch.wire.ordering.ring_protocol import OPEN, UNKNOWN, Ask, RingReply
+from rigwatch.wire.ordering.sample_order import LARGEST_SEQ, SampleOrder
 
 __all__ = [
     "FORGED",

@@ -13,13 +13,19 @@ order is output in the same call; only blocks behind a gap wait.
 """
 
 from collections import deque
-from dataclasses import dataclass
-from typing import Generic, TypeAlias
+from typing import Generic
 
-from rigwatch.wire.messages import Severity, cut, unseen
-from rigwatch.wire.ordering.numbered import Numbered
+from rigwatch.wire.ordering.outcomes import (
+    FORGED,
+    POSITION_WRONG,
+    Counters,
+    Loss,
+    Outcome,
+    Remark,
+)
 from rigwatch.wire.ordering.ring_protocol import OPEN, UNKNOWN, Ask, RingReply, S
 from rigwatch.wire.ordering.source_arbitration import Sources
+from rigwatch.wire.ordering.stream import Stream, from_number, up_to_number
 
 LARGEST_SEQ = 2**53
 """Largest plausible sample number; larger ones are invalid."""
@@ -27,86 +33,6 @@ SUSPECT = 256
 """Number of old samples after which the ring is queried whether the reader's position is wrong."""
 TRIES = 5
 """Number of unanswered queries, while newer samples arrive, before a gap is given up."""
-
-
-@dataclass(frozen=True, slots=True)
-class Loss:
-    """Samples `first` to `last` of a boot are lost; if `last` < `first`, the number is unknown."""
-
-    boot: int
-    first: int
-    last: int
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Remark:
-    """An entry for the log."""
-
-    severity: Severity
-    code: str
-    text: str
-
-
-FORGED = "FORGED SAMPLES"
-"""Code of the remark that samples arrived which the source never sent."""
-POSITION_WRONG = "POSITION SET ASIDE"
-"""Code of the remark that the resume position was beyond the newest sample of the source."""
-Outcome: TypeAlias = S | Loss | Ask | Remark
-
-
-@dataclass(slots=True)
-class Counters:
-    """Counts of samples so far.
-
-    Attributes:
-        delivered: samples delivered, including recovered ones.
-        recovered: samples recovered from the ring.
-        lost: samples known to be lost.
-        duplicates: samples dropped because they were already delivered or given up.
-        foreign: samples dropped because their source has no control.
-    """
-
-    delivered: int = 0
-    recovered: int = 0
-    lost: int = 0
-    duplicates: int = 0
-    foreign: int = 0
-
-
-class Stream(Generic[S]):
-    """The samples of one boot: the next number, and blocks waiting for earlier ones.
-
-    Attributes:
-        next: number of the next sample.
-        promised_from: a missing sample before this one is not a loss, as it was optional.
-        ended: another boot has control; only the end of this one is still queried.
-    """
-
-    def __init__(self, boot: int, next_seq: int, promised_from: int = 0) -> None:
-        self.boot = boot
-        self.next = next_seq
-        self.promised_from = promised_from
-        self.ended = False
-        self.waiting: dict[int, S] = {}
-        self.samples_waiting = 0
-
-    def hold(self, block: S) -> None:
-        """Store a block until its turn; of two with the same start the longer."""
-        known = self.waiting.get(block.seq)
-        if known is None or len(known) < len(block):
-            self.samples_waiting += len(block) - (len(known) if known else 0)
-            self.waiting[block.seq] = block
-
-    def first_waiting(self) -> int:
-        """The lowest number among the waiting blocks; OPEN if there are none."""
-        return min(self.waiting, default=OPEN)
-
-    def take(self) -> S:
-        """Remove and return the waiting block with the lowest number."""
-        block = self.waiting.pop(min(self.waiting))
-        self.samples_waiting -= len(block)
-        return block
 
 
 class SampleOrder(Generic[S]):
@@ -256,7 +182,7 @@ class SampleOrder(Generic[S]):
     # ---- order within the sources in line -----------------------------------------------
 
     def _store(self, stream: Stream[S], block: S) -> None:
-        fresh = _rest(block, stream.next)
+        fresh = from_number(block, stream.next)
         self.counters.duplicates += len(block) - (len(fresh) if fresh else 0)
         self._stale = 0 if fresh else self._stale + len(block)
         if fresh is None:
@@ -275,7 +201,7 @@ class SampleOrder(Generic[S]):
             self._ask(Ask(front.boot, front.next, OPEN))
 
     def _deliver(self, stream: Stream[S], block: S) -> None:
-        fresh = _rest(block, stream.next)
+        fresh = from_number(block, stream.next)
         if fresh is not None:
             stream.next = fresh.seq + len(fresh)
             self.counters.delivered += len(fresh)
@@ -370,7 +296,7 @@ class SampleOrder(Generic[S]):
 
     def _take_recovered(self, front: Stream[S], block: S, last: int) -> None:
         if block.seq <= min(front.next, last):
-            self._deliver(front, _up_to(block, last))
+            self._deliver(front, up_to_number(block, last))
 
     def _progressed(self, ask: Ask, front: Stream[S]) -> bool:
         return front.next > ask.first or bool(front.waiting)
@@ -409,17 +335,3 @@ class SampleOrder(Generic[S]):
     def _leave(self, front: Stream[S]) -> None:
         self._settled_boots[front.boot] = front.next
         self._line.popleft()
-
-
-def _rest(block: S, next_seq: int) -> S | None:
-    """The part of a block from `next_seq` on, None if there is none."""
-    if isinstance(block, Numbered):
-        return block if block.seq >= next_seq else None
-    return unseen(block, next_seq)
-
-
-def _up_to(block: S, last: int) -> S:
-    """The part of a block up to `last`, which is not before its first sample."""
-    if isinstance(block, Numbered):
-        return block
-    return cut(block, 0, min(len(block), last + 1 - block.seq))
