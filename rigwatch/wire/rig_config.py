@@ -4,13 +4,14 @@ Each process has its section. `load_rig` reads the file; `configs/demo.toml` is 
 sections. The descriptions of the keys are the source of `docs/configuration.md`.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.typed_files import Section, load
+from rigwatch.wire.typed_files import Section, holder, load_layered, whole_text
 
 Text = Annotated[str, Meta(min_length=1)]
 Positive = Annotated[float, Meta(gt=0)]
@@ -288,6 +289,13 @@ class RigConfig(Section, frozen=True):
     rig: Annotated[RigSection, Meta(description="what is watched")]
     channels: Annotated[tuple[ChannelSection, ...], Meta(min_length=1, description="channels")]
     daq: Annotated[DaqSection, Meta(description="data acquisition")]
+    base: Annotated[
+        str,
+        Meta(
+            description="a file whose keys hold where this one has none, relative to this file; "
+            "tables are merged key by key, channels by name"
+        ),
+    ] = ""
     bus: Annotated[BusSection, Meta(description="the bus")] = field(default_factory=BusSection)
     plant: Annotated[PlantSection | None, Meta(description="the simulated rig")] = None
     monitor: Annotated[MonitorSection | None, Meta(description="the monitor")] = None
@@ -296,17 +304,46 @@ class RigConfig(Section, frozen=True):
     dashboard: Annotated[DashboardSection | None, Meta(description="the dashboard")] = None
 
 
+_KIND = "adapter"
+"""Key of the sections that replace one another as a whole: devices."""
+
+
 def load_rig(path: Path | str) -> RigConfig:
     """The configuration at `path`; relative paths in it stay relative to the working folder.
 
     Raises:
         ConfigError: the file is invalid, or two channels have the same name.
     """
-    config = load(path, RigConfig)
+    config = load_layered(path, RigConfig, _KIND)
     names = [channel.name for channel in config.channels]
     if len(set(names)) < len(names):
-        raise ConfigError(path, "channels", f"the names {', '.join(names)}", "different names")
+        file = holder(path, "channels")
+        raise ConfigError(file, "channels", f"the names {', '.join(names)}", "different names")
     return config
+
+
+def rig_text(path: Path | str) -> str:
+    """The text of the configuration at `path`; with a base, the text of both together.
+
+    Raises:
+        ConfigError: a file cannot be read.
+    """
+    return whole_text(path, _KIND)
+
+
+def load_rigs(paths: Iterable[Path]) -> list[tuple[Path, RigConfig]]:
+    """The configurations of several rigs, each with its path.
+
+    Raises:
+        ConfigError: a file is invalid, or two are of one rig on one router.
+    """
+    loaded = [(path, load_rig(path)) for path in paths]
+    seen: dict[tuple[str, str], Path] = {}
+    for path, config in loaded:
+        other = seen.setdefault((config.bus.router, config.rig.id), path)
+        if other is not path:
+            raise ConfigError(path, "rig.id", f"that of {other}", "an id of its own")
+    return loaded
 
 
 def section_or_error(config: RigConfig, name: str, path: Path | str) -> Section:
