@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from rigwatch.browser.server.access import COOKIE, Access, hosts_of
+from rigwatch.browser.server.access import Access, cookie_name, hosts_of
 from rigwatch.browser.server.places import PlaceError, Places
 from rigwatch.browser.server.serving import Options, serve
 from rigwatch.wire.errors import RigwatchError
-from tests.browser.page import Served
+from tests.browser.page import Page, Served, looking, serving
 
 pytestmark = pytest.mark.xdist_group("browser")
 
@@ -24,7 +24,7 @@ def ask(
     host = served.address.removeprefix("http://")
     given = {"Host": host, "Origin": served.address}
     if token:
-        given["Cookie"] = f"{COOKIE}={served.token}"
+        given["Cookie"] = f"{cookie_name(host)}={served.token}"
     given |= {name.replace("_", "-"): value for name, value in headers.items()}
     line = http.client.HTTPConnection(host, timeout=60)
     try:
@@ -42,7 +42,7 @@ REFUSED = {
     "Origin of another port": ("/api/story/emps", "POST", {"Origin": "http://127.0.0.1:1"}, 403),
     "no Origin": ("/api/story/emps", "POST", {"Origin": ""}, 403),
     "Origin null": ("/api/story/emps", "POST", {"Origin": "null"}, 403),
-    "wrong token": ("/", "GET", {"Cookie": f"{COOKIE}=guess"}, 403),
+    "wrong token": ("/", "GET", {"Cookie": "", "Authorization": "Bearer guess"}, 403),
     "dots": ("/api/parts/..%2f..%2fetc", "GET", {}, 404),
     "more dots": ("/api/recording/../../../etc/passwd", "GET", {}, 404),
     "an absolute path": ("/api/recording//etc/passwd", "GET", {}, 404),
@@ -84,6 +84,17 @@ def test_the_address_brings_the_token_once_and_leaves_it_out_of_what_others_see(
     assert answer.headers["referrer-policy"] == "no-referrer"
 
 
+def test_two_servers_of_one_machine_do_not_log_each_other_out(page: Page, root: Path) -> None:
+    page.open("/")
+    page.find("h1, h2")
+    assert page.requests() <= {page.served.address}
+    with serving(root) as other, looking(page.driver, other) as there:
+        there.open("/")
+        there.find("h1, h2")
+    page.open("/")
+    page.until(lambda: "no token" not in page.text("body"), "still logged in")
+
+
 def test_a_file_that_is_too_long_is_refused_and_leaves_nothing(served: Served) -> None:
     before = sorted(served.folder.rglob("*"))
     whole = ask(served, "/api/upload/long.csv", "PUT", Content_Length=str(1 << 30))
@@ -91,7 +102,7 @@ def test_a_file_that_is_too_long_is_refused_and_leaves_nothing(served: Served) -
     # Without a length, in parts: it is counted as it comes.
     host = served.address.removeprefix("http://")
     line = http.client.HTTPConnection(host, timeout=60)
-    cookie = {"Cookie": f"{COOKIE}={served.token}", "Origin": served.address}
+    cookie = {"Cookie": f"{cookie_name(host)}={served.token}", "Origin": served.address}
     parts = (b"1,2\n" * 65536 for _ in range(64))
     try:
         line.request("PUT", "/api/upload/long.csv", parts, cookie, encode_chunked=True)

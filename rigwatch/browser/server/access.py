@@ -14,7 +14,6 @@ from starlette.datastructures import Headers, MutableHeaders, QueryParams
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-COOKIE = "rigwatch"
 POLICY = {
     "content-security-policy": "default-src 'self'; img-src 'self' data:; frame-ancestors 'none';"
     " base-uri 'none'; form-action 'self'; object-src 'none'",
@@ -91,16 +90,25 @@ class Guard:
             return PlainTextResponse(f"rigwatch: {refused[1]}\n", refused[0])
         if given and scope["method"] == "GET":
             answer = RedirectResponse(scope["path"], 303)
-            answer.set_cookie(
-                COOKIE, given, httponly=True, samesite="strict", secure=self._access.secure
-            )
+            name, secure = cookie_name(headers.get("host", "")), self._access.secure
+            answer.set_cookie(name, given, httponly=True, samesite="strict", secure=secure)
             return answer
         return None
 
 
+def cookie_name(host: str) -> str:
+    """Name of the cookie with the token: browsers keep one jar for all ports of a machine.
+
+    Args:
+        host: of the request, with its port.
+    """
+    port = host.rpartition(":")[2]
+    return f"rigwatch-{port}" if port.isdecimal() else "rigwatch"
+
+
 def _cookie(headers: Headers) -> str:
     try:
-        found = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+        found = SimpleCookie(headers.get("cookie", "")).get(cookie_name(headers.get("host", "")))
     except CookieError:
         return ""
     return found.value if found else ""

@@ -1,5 +1,6 @@
 """Shared by the routes: folders, study processes, and responses of one form."""
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import wraps
@@ -27,12 +28,14 @@ class Context:
         desks: the studies' processes.
         rig: configuration of a rig, None without one.
         most_upload: largest upload of a recording [bytes].
+        stopping: set when the server is about to stop.
     """
 
     places: Places
     desks: Desks = field(default_factory=Desks)
     rig: Path | None = None
     most_upload: int = 1 << 30
+    stopping: asyncio.Event = field(default_factory=asyncio.Event)
 
     def desk(self, request: Request) -> Desk:
         """The desk of the study named in a request.

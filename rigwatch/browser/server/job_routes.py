@@ -1,15 +1,16 @@
 """Routes for long tasks: start, progress by server-sent events, cancel."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 
 import msgspec
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import Response, StreamingResponse
+from starlette.responses import Response
 from starlette.routing import Route
 
 from rigwatch.browser.server.context import answer, body_of, context_of, told
+from rigwatch.browser.server.event_streams import event, event_stream
 from rigwatch.browser.server.study_routes import job_data
 from rigwatch.browser.work import Desk
 from rigwatch.wire.errors import RigwatchError
@@ -77,17 +78,15 @@ async def cancel(request: Request) -> Response:
 async def events(request: Request) -> Response:
     """Server-sent events of a study."""
     desk = context_of(request).desk(request)
-    headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
-    return StreamingResponse(_events(desk), media_type="text/event-stream", headers=headers)
+    return event_stream(request, _events(desk))
 
 
-async def _events(desk: Desk) -> AsyncIterator[bytes]:
+async def _events(desk: Desk) -> AsyncGenerator[bytes, None]:
     queue = desk.listeners.listen()
     try:
         what, job = "job", desk.job
         while True:
-            body = msgspec.json.encode(job_data(job)).decode() if what == "job" else "{}"
-            yield f"event: {what}\ndata: {body}\n\n".encode()
+            yield event(what, msgspec.json.encode(job_data(job)) if what == "job" else b"{}")
             try:
                 what, job = await asyncio.wait_for(queue.get(), HEARTBEAT)
             except TimeoutError:

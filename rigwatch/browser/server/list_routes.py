@@ -1,18 +1,19 @@
 """Routes of the list of studies: page, table, and events as tasks go on and studies change."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, Response, StreamingResponse
+from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 
 from rigwatch.browser.recordings import stories
 from rigwatch.browser.server.context import Context, context_of
+from rigwatch.browser.server.event_streams import event, event_stream
 from rigwatch.browser.server.study_routes import job_data
 from rigwatch.browser.views import listed, render, stamp, study_folders
 from rigwatch.browser.work import Job
@@ -48,12 +49,10 @@ def _table(context: Context) -> dict[str, Any]:
 
 async def studies_events(request: Request) -> Response:
     """Server-sent events: "jobs" as tasks go on, "studies" if the table changes."""
-    headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
-    events = _events(context_of(request))
-    return StreamingResponse(events, media_type="text/event-stream", headers=headers)
+    return event_stream(request, _events(context_of(request)))
 
 
-async def _events(context: Context) -> AsyncIterator[bytes]:
+async def _events(context: Context) -> AsyncGenerator[bytes, None]:
     queue = context.desks.listeners.listen()
     try:
         shown = await run_in_threadpool(_shown, context)
@@ -66,7 +65,7 @@ async def _events(context: Context) -> AsyncIterator[bytes]:
                 yield _jobs(context, active)
             now = await run_in_threadpool(_shown, context)
             if now != shown:
-                yield b"event: studies\ndata: {}\n\n"
+                yield event("studies")
             shown = now
     finally:
         context.desks.listeners.leave(queue)
@@ -91,7 +90,7 @@ def _active(context: Context) -> dict[Path, Job]:
 def _jobs(context: Context, active: dict[Path, Job]) -> bytes:
     """The event of the active jobs, by the name of their study."""
     plain = {context.places.relative(path): job_data(job) for path, job in active.items()}
-    return b"event: jobs\ndata: " + msgspec.json.encode(plain) + b"\n\n"
+    return event("jobs", msgspec.json.encode(plain))
 
 
 def _shown(context: Context) -> object:

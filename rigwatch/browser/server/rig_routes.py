@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import msgspec
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, Response, StreamingResponse
+from starlette.responses import HTMLResponse, Response
 from starlette.routing import Route
 
 from rigwatch.browser.rig import (
@@ -22,6 +22,7 @@ from rigwatch.browser.rig import (
     study_of_alarm,
 )
 from rigwatch.browser.server.context import answer, body_of, context_of, told
+from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
 from rigwatch.browser.server.places import PlaceError
 from rigwatch.browser.views import listed, render
 from rigwatch.browser.work import as_plain
@@ -74,24 +75,22 @@ async def rig_now(request: Request) -> Response:
 
 async def rig_events(request: Request) -> Response:
     """Server-sent events: new signals a few times a second, alarms and states when they change."""
-    headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
-    events = _events(_link(request))
-    return StreamingResponse(events, media_type="text/event-stream", headers=headers)
+    return event_stream(request, _events(_link(request)))
 
 
-async def _events(link: RigLink) -> AsyncIterator[bytes]:
+async def _events(link: RigLink) -> AsyncGenerator[bytes, None]:
     since, told = 0, b""
     while True:
         status = msgspec.json.encode(as_plain(link.status()))
         if status != told:
             told = status
-            yield b"event: status\ndata: " + status + b"\n\n"
+            yield event("status", status)
         newest, signals = link.signals(since)
         if newest != since:
             since = newest
-            yield b"event: signals\ndata: " + msgspec.json.encode(signals) + b"\n\n"
+            yield event("signals", msgspec.json.encode(signals))
         else:
-            yield b": still here\n\n"
+            yield STILL_HERE
         await asyncio.sleep(EVERY)
 
 

@@ -1,5 +1,6 @@
 """Runs the server: on loopback only, unless a secure connection to another address is set up."""
 
+import asyncio
 import contextlib
 import socket
 from collections.abc import Callable
@@ -41,6 +42,19 @@ class Options:
     most_upload: int = 1 << 30
 
 
+class _Server(uvicorn.Server):
+    """One that ends its event streams first: pages that are open would keep it from stopping."""
+
+    def __init__(self, config: uvicorn.Config, stopping: asyncio.Event) -> None:
+        super().__init__(config)
+        self._stopping = stopping
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop."""
+        self._stopping.set()
+        await super().shutdown(sockets)
+
+
 def serve(options: Options, ready: Callable[[str], None]) -> None:
     """Serve until interrupted; `ready` is called with the address to open.
 
@@ -66,7 +80,7 @@ def serve(options: Options, ready: Callable[[str], None]) -> None:
     where = options.behind_proxy[0] if options.behind_proxy else f"{_shown(options)}:{port}"
     ready(f"{'https' if secure else 'http'}://{where}/?token={access.token}")
     with contextlib.suppress(KeyboardInterrupt):
-        uvicorn.Server(config).run(sockets=[listening])
+        _Server(config, context.stopping).run(sockets=[listening])
 
 
 def _check(options: Options) -> None:

@@ -43,11 +43,12 @@ def at_rig(page: Page, model: Path, study: Study) -> Iterator[Page]:
     """The browser at a server of its own."""
     assert page.errors() == []
     assert page.requests() <= {page.served.address}
-    with serving(study.folder.parent, "--rig", str(model.parent / "rig.toml")) as served:
-        with looking(page.driver, served) as found:
-            yield found
-        page.enter()
-        assert page.requests() <= {served.address, page.served.address}
+    arguments = ("--rig", str(model.parent / "rig.toml"))
+    with (
+        serving(study.folder.parent, *arguments) as served,
+        looking(page.driver, served) as found,
+    ):
+        yield found
 
 
 def test_rehearsed_promoted_and_rolled_back(at_rig: Page, model: Path, study: Study) -> None:
