@@ -1,6 +1,6 @@
-"""Uncertainty contributions that no single recording shows: those of the healthy recording.
+"""Uncertainty contributions beyond the scatter of a recording: healthy recording, model error.
 
-These contributions bias a fit equally along a whole recording. First, the parameters kept from the
+They bias a fit equally along a whole recording. First, the parameters kept from the
 healthy recording, and those known to a stated deviation (for example a mass), are uncertain. With S
 their covariance, and J_θ and J_κ the derivatives of the residual by the fitted and the kept
 parameters,
@@ -8,9 +8,14 @@ parameters,
     Cov θ ← Cov θ + A·S·Aᵀ,   A = -J_θ⁺·J_κ
 
 Second, model error mimics a little of every effect. The apparent strength of an effect on a healthy
-recording is used as a standard deviation of its strength. Third, along the measured motion the
-model's response to an effect is itself in error by a share of it. The contributions are independent
-and add in quadrature (JCGM 100:2008 (GUM), 5.1).
+recording is used as a standard deviation of its strength.
+
+Along the measured motion, where model error exceeds noise, there are three more. The model's
+response to an effect is itself in error by a share of it. A residual that repeats with the
+excitation is counted once, and not once per period. And a law that is not the machine's gives one
+strength for slow and another for fast motion (`regimes.py`); what the base model leaves on the
+healthy recording also varies so, but averages out over the regimes. The contributions are
+independent and add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
 import dataclasses
@@ -19,11 +24,12 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Placement, compose
-from rigwatch.physics.engine.fit import evaluate
+from rigwatch.physics.engine.fit import Fit, evaluate
 from rigwatch.physics.engine.score import Candidate
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit import Fitted, with_kept_free
+from rigwatch.workbench.compare.regimes import REGIMES, variances_between_regimes
+from rigwatch.workbench.data import Data, repeat_along_motion
+from rigwatch.workbench.fit import Fitted, block_numbers, covariance, with_kept_free
 from rigwatch.workbench.ranking import score_all
 from rigwatch.workbench.study import Kept, Study
 
@@ -38,24 +44,57 @@ Dead bands and saturations of drawn rigs, whose equations differ from the model'
 def added_variances(
     study: Study, data: Data, bare: Fitted | None, fitted: Fitted
 ) -> dict[str, float]:
-    """Variances to add to those of the parameters, by name; none without kept parameters.
+    """Variances to add to those of the parameters, by name.
 
     Args:
         study, data: as fitted.
         bare: the model alone, fitted to the healthy recording.
         fitted: the model with some effects.
     """
-    healthy = data.of_healthy
-    if study.kept is None or bare is None or healthy is None or not fitted.compiled.system.free:
+    if not fitted.compiled.system.free:
         return {}
-    found = _variances(study, study.kept, data, fitted)
+    found = _of_motion(data, bare, fitted) if data.along_motion else {}
+    healthy = data.of_healthy
+    if study.kept is None or bare is None or healthy is None:
+        return found
+    for name, variance in _variances(study, study.kept, data, fitted).items():
+        found[name] = found.get(name, 0.0) + variance
     for placement in fitted.placements:
         name = placement.prefix + placement.effect.strength
         if name in found:
             found[name] += apparent_strength(healthy, bare, placement, fitted) ** 2
-        if data.along_motion:
-            _add_response_error(found, placement, fitted)
     return found
+
+
+def _of_motion(data: Data, bare: Fitted | None, fitted: Fitted) -> dict[str, float]:
+    """Variances of the fitted parameters due to model error along the measured motion."""
+    train = fitted.train
+    repeat = repeat_along_motion(data)
+    counted_once, by_time = (np.diag(covariance(train, each)[0]) for each in (repeat, 0))
+    variances = np.maximum(counted_once - by_time, 0.0)
+    variances += _between_regimes(data, bare, fitted)
+    found = dict(zip(fitted.compiled.system.free, variances.tolist(), strict=True))
+    for placement in fitted.placements:
+        _add_response_error(found, placement, fitted)
+    return found
+
+
+def _between_regimes(data: Data, bare: Fitted | None, fitted: Fitted) -> FloatArray:
+    """Variances of the free parameters between regimes, less what healthy motion shows, (m,)."""
+    found = _regimes_of(fitted.train, data)
+    healthy = data.of_healthy
+    if bare is None or healthy is None:
+        return found
+    steps = fitted.horizon, fitted.substeps, bare.train.initial
+    along = evaluate(fitted.train, healthy.train, *steps)
+    mimicked = _regimes_of(dataclasses.replace(along, error=bare.train.error), healthy)
+    shared = np.minimum(found, mimicked)
+    return np.asarray(found - shared + shared / REGIMES)
+
+
+def _regimes_of(train: Fit, data: Data) -> FloatArray:
+    block = block_numbers(train, repeat_along_motion(data))
+    return variances_between_regimes(train, data.train, block)
 
 
 def _add_response_error(found: dict[str, float], placement: Placement, fitted: Fitted) -> None:

@@ -16,6 +16,7 @@ from rigwatch.workbench.data.proposals import (
     proposed_split,
 )
 from rigwatch.workbench.data.recorded_columns import read_columns
+from rigwatch.workbench.data.repeats import repeat_along_motion, repeat_of
 from rigwatch.workbench.data.signal_scales import port_sizes
 from rigwatch.workbench.data.signals import Data, MotionSensor, parameters_of, prepare
 
@@ -38,4 +39,6 @@ __all__ = [
     "proposed_split",
     "quiet_scale",
     "read_columns",
+    "repeat_along_motion",
+    "repeat_of",
 ]

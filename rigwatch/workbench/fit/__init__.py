@@ -24,6 +24,7 @@ from rigwatch.workbench.fit.input_hold import held_as, with_hold
 from rigwatch.workbench.fit.intervals import (
     Value,
     as_written,
+    block_numbers,
     covariance,
     interval_with_held,
     shown,
@@ -36,6 +37,7 @@ __all__ = [
     "Value",
     "as_written",
     "block_differences",
+    "block_numbers",
     "continued_train_error",
     "covariance",
     "eigenvalues",

@@ -16,7 +16,7 @@ from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Model, Parameter, compose
 from rigwatch.physics.engine.fit import evaluate
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.data import Data
+from rigwatch.workbench.data import Data, repeat_along_motion
 from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.fit.fitted_model import fit_model
 from rigwatch.workbench.fit.intervals import covariance
@@ -50,7 +50,8 @@ def with_healthy_parameters(study: Study, data: Data, scale: FloatArray | None =
     loose = replace(study, model=with_kept_free(study.model))
     found = fit_model(loose, healthy, (), study.file.start, scale, multi_start=True)
     places = [found.compiled.system.free.index(name) for name in kept]
-    uncertain = covariance(found.train)[0][np.ix_(places, places)]
+    repeat = repeat_along_motion(healthy)
+    uncertain = covariance(found.train, repeat)[0][np.ix_(places, places)]
     fitted = Kept(tuple(kept), uncertain, found.convergence)
     return replace(
         study,

@@ -16,7 +16,7 @@ from msgspec import structs
 
 from rigwatch.physics.engine.equations import Model, has_hidden_states
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, along_motion
+from rigwatch.workbench.data import Data, along_motion, repeat_of
 from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.fit.healthy_parameters import with_known
 from rigwatch.workbench.fit.intervals import covariance
@@ -65,7 +65,8 @@ def with_healthy_remainder(study: Study, data: Data) -> tuple[Study, Data]:
     study = replace(study, file=structs.replace(study.file, substeps=SUBSTEPS))
     found = learn_terms(study, healthy, driven.horizon)
     kept = tuple(found.fitted.compiled.system.free)
-    kept_parameters = Kept(kept, covariance(found.fitted.train)[0], found.fitted.convergence)
+    uncertain = covariance(found.fitted.train, repeat_of(healthy))[0]
+    kept_parameters = Kept(kept, uncertain, found.fitted.convergence)
     alone = replace(driven, train=healthy, held_out=healthy, healthy=None)
     kept_parameters = with_known(kept_parameters, alone, found.fitted)
     # The start values have been used; they must not overwrite the learned parameters.

@@ -19,13 +19,15 @@ from scipy.stats import t as student
 
 from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit import Fit
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.units import unit_of
 from rigwatch.workbench.fit.fitted import blocks
 
 CONFIDENCE = 0.95
 ENOUGH = 12
 """Number of windows above which each is a block of its own."""
+PHASES = 20
+"""Number of parts of one repetition, each a block."""
 TOLD = "told by the first samples of a held-out recording"
 TIED = 0.98
 """Correlation above which two parameters count as tied."""
@@ -68,22 +70,46 @@ def as_written(found: Mapping[str, Value], system: System) -> dict[str, Value]:
     return {n: value.shown_in(units[n]) if units[n] else value for n, value in found.items()}
 
 
-def covariance(fitted: Fit) -> tuple[FloatArray, int]:
-    """Covariance of the free parameters, shape (m, m), and degrees of freedom."""
+def covariance(fitted: Fit, repeat: int = 0) -> tuple[FloatArray, int]:
+    """Covariance of the free parameters, shape (m, m), and degrees of freedom.
+
+    Args:
+        fitted: the fit.
+        repeat: samples after which the excitation repeats or inverts, 0 if it does not.
+    """
     m = fitted.jacobian.shape[-1]
-    whole = fitted.jacobian.reshape(-1, m)
+    whole, error = fitted.jacobian.reshape(-1, m), fitted.error.reshape(-1)
     # Columns are scaled to equal norm, so that small ones are not truncated as rank-deficient.
     size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
-    normal = (whole / size).T @ (whole / size)
-    pairs = zip(_window_blocks(fitted.jacobian / size), _window_blocks(fitted.error), strict=True)
-    moved = np.array([_moved(normal, j, r) for j, r in pairs]) / size
-    count = len(moved)
+    whole = whole / size
+    number = block_numbers(fitted, repeat)
+    count = int(number.max()) + 1
+    parts = [np.flatnonzero(number == block) for block in range(count)]
+    normal = whole.T @ whole
+    moved = np.array([_moved(normal, whole[rows], error[rows]) for rows in parts]) / size
     return np.asarray(moved.T @ moved * ((count - 1) / count)), max(count - m, 1)
 
 
-def _window_blocks(windowed: FloatArray) -> list[FloatArray]:
-    """Windows as blocks if there are enough, as parts of a window share its initial state."""
-    return list(windowed) if len(windowed) >= ENOUGH else blocks(windowed)
+def block_numbers(fitted: Fit, repeat: int = 0) -> IntArray:
+    """Number of the block that each row of the flattened error belongs to, shape (rows,).
+
+    Windows are blocks if there are enough, as parts of a window share its initial state; few are
+    divided. If the excitation repeats, what a wrong model leaves repeats with it, and all samples
+    of the same part of a repetition are one block.
+
+    Args:
+        fitted: the fit.
+        repeat: samples after which the excitation repeats or inverts, 0 if it does not.
+    """
+    count, rows = fitted.error.shape
+    samples = fitted.error.size // len(fitted.scale)
+    if 0 < repeat < samples:
+        phase = np.arange(samples) % repeat
+        return np.repeat(phase * min(PHASES, repeat) // repeat, len(fitted.scale))
+    if count >= ENOUGH:
+        return np.repeat(np.arange(count), rows)
+    lengths = [len(block) for block in blocks(fitted.error)]
+    return np.repeat(np.arange(len(lengths)), lengths)
 
 
 def _moved(normal: FloatArray, jacobian: FloatArray, error: FloatArray) -> FloatArray:
