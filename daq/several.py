@@ -24,7 +24,8 @@ from rigwatch.wire.host import (
     set_at_hangup,
     set_at_signal,
 )
-from rigwatch.wire.rig_config import check_rigs, load_rig
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.several_rigs import check_rigs
 from rigwatch.wire.typed_files import Section
 
 TURN = 0.0125

@@ -10,7 +10,8 @@ from pathlib import Path
 from rigwatch.recorder.process import PROCESS, describe_run, record
 from rigwatch.wire.bus import joined
 from rigwatch.wire.host import Heartbeat, Part, RigPulse, Work, run_side_by_side, set_at_hangup
-from rigwatch.wire.rig_config import check_rigs, load_rig, rig_text
+from rigwatch.wire.rig_config import load_rig, rig_text
+from rigwatch.wire.several_rigs import check_rigs
 
 
 def work_of(path: Path, notes: str, folders: dict[Path, Path]) -> Work:

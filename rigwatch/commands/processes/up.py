@@ -19,7 +19,8 @@ from rigwatch.supervisor import (
 )
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import Heartbeat, endpoint_address, is_free
-from rigwatch.wire.rig_config import RigConfig, check_rigs, load_rig, load_rigs
+from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.several_rigs import check_rigs, load_rigs
 
 HELP = "start and supervise all processes of one or several rigs"
 EXAMPLE = """  rigwatch up configs/demo.toml
