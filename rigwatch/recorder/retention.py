@@ -55,17 +55,20 @@ class Retention:
         removed = [one for one in self.expired(t_ns / 1e9, current) if _remove(one.path)]
         if not removed:
             return []
+        for one in removed:
+            self._alarms.pop(one.path, None)
         size = sum(one.size for one in removed) / 1e6
         text = f"{len(removed)} segment(s) removed, {size:.1f} MB: older or larger than configured"
         return [Event("recorder", t_ns, "info", "RECORDING_EXPIRED", text)]
 
     def expired(self, now_s: float, current: Path) -> list[Segment]:
         """Segments to be removed, oldest first, those without alarms before those with alarms."""
-        return expired(self._segments(current), self._settings, now_s)
+        newest = _newest(current)
+        kept = _size(newest) if newest else 0
+        return expired(self._segments(newest), self._settings, now_s, kept)
 
-    def _segments(self, current: Path) -> Iterator[Segment]:
+    def _segments(self, newest: Path | None) -> Iterator[Segment]:
         root = Path(self._settings.folder)
-        newest = max(current.glob(f"*{SUFFIX}"), default=None)
         for path in root.glob(f"{self._rig}-*Z*/*{SUFFIX}"):
             if path == newest:
                 continue
@@ -92,3 +95,15 @@ def _remove(path: Path) -> bool:
     except OSError:
         return not path.exists()
     return True
+
+
+def _newest(current: Path) -> Path | None:
+    """The segment that is being written."""
+    return max(current.glob(f"*{SUFFIX}"), default=None)
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0

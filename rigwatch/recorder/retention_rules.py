@@ -25,17 +25,20 @@ class Recording(Protocol):
 R = TypeVar("R", bound=Recording)
 
 
-def expired(recordings: Iterable[R], rules: RecorderSection, now_s: float) -> list[R]:
+def expired(
+    recordings: Iterable[R], rules: RecorderSection, now_s: float, kept: int = 0
+) -> list[R]:
     """Recordings to be removed, oldest first, those without alarms before those with alarms.
 
     Args:
         recordings: of one rig, without the one that is being written.
         rules: `keep_days`, `keep_alarm_days` and `keep_gigabytes`; 0 disables a limit.
         now_s: Unix time [s].
+        kept: size of what is being written, which is kept and counts [bytes].
     """
     found = sorted(recordings, key=lambda one: (one.alarms, one.ended))
     old = [one for one in found if _is_old(one, rules, now_s)]
-    excess = sum(one.size for one in found) - sum(one.size for one in old)
+    excess = kept + sum(one.size for one in found) - sum(one.size for one in old)
     limit = rules.keep_gigabytes * GIGABYTE
     gone = set(map(id, old))
     for one in found:

@@ -84,7 +84,7 @@ def test_above_the_size_limit_the_oldest_go_and_those_with_alarms_last(tmp_path:
     sizes = [
         segment(current, n, age_days=20 - n, alarm=n in (1, 3)).stat().st_size for n in range(1, 8)
     ]
-    limit = (sum(sizes[:1]) + sizes[2] + sizes[5]) / 1e9
+    limit = (sizes[0] + sizes[2] + sizes[5] + sizes[6]) / 1e9
     rules(tmp_path, keep_gigabytes=limit * 1.001).update(0.0, int(NOW * 1e9), current)
     assert {path.stem for path in current.glob("*.mcap")} == {
         "000001", "000003", "000006", "000007"
@@ -97,3 +97,11 @@ def test_without_limits_nothing_is_removed(tmp_path: Path) -> None:
     segment(current, 2, age_days=1)
     assert rules(tmp_path).update(0.0, int(NOW * 1e9), current) == []
     assert len(left(tmp_path)) == 2
+
+
+def test_the_segment_being_written_counts_for_the_size(tmp_path: Path) -> None:
+    current = tmp_path / "bench-20260301T000000Z"
+    sizes = [segment(current, number, age_days=5 - number).stat().st_size for number in (1, 2, 3)]
+    two = (sizes[1] + sizes[2] + sizes[0] // 2) / 1e9
+    assert rules(tmp_path, keep_gigabytes=two).update(0.0, int(NOW * 1e9), current)
+    assert left(tmp_path) == {f"{current.name}/{number:06d}" for number in (2, 3)}

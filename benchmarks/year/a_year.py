@@ -1,0 +1,198 @@
+"""A year in an hour: a supervised rig by a fast clock, with a planned year of sessions.
+
+    rigwatch up ─▶ router, plant, daq, monitor, recorder, witness ─┐ all by `fast_clock.c`
+    control room: a listener and operator ─────────────────────────┘
+         ▲ this process: the clock, the plan, faults, kills; memory and disk after each session
+
+A thousand sessions of 30 s spread over the year, at eight times the machine's pace; between two
+of them the rig is switched off and the machine sleeps for hours, so that Unix time steps. Midnight,
+both changes of daylight saving time, a leap second and the turn of the year lie within sessions.
+The recording may use a fifth of what the year needs. The journal is that of earlier years.
+"""
+
+import os
+import shutil
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+from benchmarks.processes.live_rig import LiveRig, live_rig
+from benchmarks.year import account
+from benchmarks.year.account import Reason, journal_of_years
+from benchmarks.year.calendar import AT_S, FOR_S, RUNNING_S, SESSIONS, Session, year
+from benchmarks.year.resources import Memory, folder_bytes
+from benchmarks.year.rig_of_the_year import PROCESSES, RigOfTheYear
+from tools.benchmark_table import Row
+
+RATE = 8.0
+SESSION_BYTES, PART, SMALLEST = 6e5, 5.0, 2e6
+"""Size of a session, part of the year's that the recording may use, and its least [bytes]."""
+BETWEEN_CHECKS = 2 * SESSION_BYTES
+"""What is recorded between two looks at the size [bytes]."""
+DAYS, ALARM_DAYS = 60.0, 120.0
+MEMORY_PERCENT = 2.0
+IN_MEMORY = Path("/dev/shm")
+"""Where the disk does not set the pace: it is no faster than usual."""
+OFF_S = 2.0
+"""Time from switching the rig off to the machine's sleep [s]."""
+
+
+class Year:
+    """One run: what was planned to happen is noted as reasons of alarms."""
+
+    def __init__(self, rig: RigOfTheYear) -> None:
+        self.rig, self.clock = rig, rig.clock
+        self.reasons: list[Reason] = []
+        self.memory, self.largest = Memory(), 0
+        self.gone: list[str] = []
+        self._off_since = self.clock.wall_ns()
+
+    def run(self, session: Session) -> None:
+        """From the jump to its beginning until it is switched off."""
+        self._switch_on(session)
+        self.clock.wait(AT_S)
+        if session.leap:
+            self.clock.step_wall(-1.0)
+        if session.fault or session.killed:
+            self._happen(session)
+        self.clock.wait(RUNNING_S - AT_S - FOR_S)
+        self.rig.operate("acknowledge", "reset")
+        self._look(session)
+        self._off_since = self.clock.wall_ns()
+        self.rig.ask("fault unplug")
+        self.clock.wait(OFF_S)
+
+    def end(self) -> None:
+        """The rig stays switched off."""
+        off = self._off_since, self.clock.wall_ns()
+        self.reasons.append(Reason(-1, "switched off", *off, account.LINK))
+
+    def _switch_on(self, session: Session) -> None:
+        self.clock.step_wall(max(0.0, session.begin - self.clock.wall_ns() * 1e-9))
+        self.rig.ask("heal")
+        self.rig.ask("restart")
+        self.clock.wait(60.0, lambda: self.rig.lag_s() < 0.5)
+        off = self._off_since, self.clock.wall_ns()
+        self.reasons.append(Reason(session.index, "switched off", *off, account.LINK))
+        self.clock.wait(5.0)
+        self.rig.operate("acknowledge", "reset")
+
+    def _happen(self, session: Session) -> None:
+        begin = self.clock.wall_ns()
+        fault = session.fault
+        if fault is None:
+            self.rig.kill(session.killed)
+            self.clock.wait(5.0)
+            if not self.rig.recovered():
+                self.gone.append(f"{session.killed} of session {session.index}")
+            reason = Reason(
+                session.index, session.note, begin, 0, account.KILL, _told(session.killed)
+            )
+        else:
+            self.rig.ask(fault.begin)
+            self.clock.wait(FOR_S)
+            self.rig.ask(fault.end)
+            names = (*fault.told, *fault.also)
+            reason = Reason(session.index, session.note, begin, 0, names, fault.told)
+        self.reasons.append(replace(reason, end_ns=self.clock.wall_ns()))
+
+    def _look(self, session: Session) -> None:
+        self.memory.look({name: self.rig.pid(name) for name in PROCESSES})
+        self.largest = max(self.largest, folder_bytes(self.rig.rig.folder / "sessions"))
+        if session.index % 10 == 0:
+            print(f"session {session.index}: {self.largest / 1e6:.1f} MB", file=sys.stderr)
+
+
+def _told(name: str) -> tuple[str, ...]:
+    return ("monitor_stale",) if name == "monitor" else ()
+
+
+def run(quick: bool) -> list[Row]:
+    """Eight sessions, or as many as RIGWATCH_YEAR_SESSIONS says (default 1000, about an hour)."""
+    count = 8 if quick else int(os.environ.get("RIGWATCH_YEAR_SESSIONS", str(SESSIONS)))
+    if IN_MEMORY.is_dir():
+        os.environ["TMPDIR"] = tempfile.tempdir = str(IN_MEMORY)
+    with live_rig() as rig:
+        limit = max(SMALLEST, count * SESSION_BYTES / PART)
+        _configure(rig, limit)
+        journal_of_years(rig.folder / "alarms.jsonl")
+        with RigOfTheYear(rig, RATE) as processes:
+            done = Year(processes)
+            for session in year(count):
+                done.run(session)
+            done.end()
+            rows = _rows(done, f"a year, {count} sessions", limit)
+        if kept := os.environ.get("RIGWATCH_YEAR_FOLDER"):
+            shutil.copytree(rig.folder, kept, ignore=shutil.ignore_patterns("serial-line"))
+    return rows
+
+
+def _configure(rig: LiveRig, limit: float) -> None:
+    text = rig.path.read_text(encoding="utf-8")
+    text = text.replace("scenarios/demo.toml", "scenarios/friction_free_day.toml")
+    settings = {
+        "segment": RUNNING_S,
+        "keep_gigabytes": limit / 1e9,
+        "keep_days": DAYS,
+        "keep_alarm_days": ALARM_DAYS,
+    }
+    for key, value in settings.items():
+        text = _with(text, key, value)
+    rig.path.write_text(text + "\n[witness]\n", encoding="utf-8")
+
+
+def _with(text: str, key: str, value: float) -> str:
+    kept = [line for line in text.splitlines() if not line.startswith(f"{key} =")]
+    at = kept.index("[recorder]") + 1
+    return "\n".join([*kept[:at], f"{key} = {value}", *kept[at:]])
+
+
+def _rows(done: Year, what: str, limit: float) -> list[Row]:
+    alarms = account.raised(done.rig.alarms())
+    false = account.without_reason(alarms, done.reasons)
+    faults = [reason for reason in done.reasons if reason.told]
+    untold = account.untold(alarms, faults)
+    unwritten, rotated = account.missing_in_journal(alarms, done.rig.rig.folder / "alarms.jsonl")
+    most = limit + BETWEEN_CHECKS
+    return [
+        Row(f"{what}: alarms without a reason", f"{len(false)}", "0", "",
+            f"{len(alarms)} alarms; {_examples(false)}", passed=not false),
+        Row(f"{what}: faults told", f"{len(faults) - len(untold)} of {len(faults)}", "all", "",
+            "; ".join(f"{u.what} of session {u.session}" for u in untold[:5]), passed=not untold),
+        *[_memory_row(what, done, name) for name in PROCESSES],
+        Row(f"{what}: disk", f"{done.largest / 1e6:.1f} MB", f"{most / 1e6:.1f} MB", "",
+            f"limit {limit / 1e6:.1f} MB, looked at once a minute; the clock stood "
+            f"{done.clock.stood_s:.0f} s", passed=done.largest <= most),
+        Row(f"{what}: alarms missing in the journal", f"{unwritten}", "0", "",
+            f"rotated {rotated} times", passed=unwritten == 0 and rotated > 0),
+        _alive(what, done),
+    ]  # fmt: skip
+
+
+def _memory_row(what: str, done: Year, name: str) -> Row:
+    growth, at_end, looks = done.memory.growth(name)
+    year_percent = growth * len(done.memory.seen[name]) / max(1, looks)
+    return Row(
+        f"{what}: memory of {name}",
+        f"{year_percent:+.2f} % a year",
+        f"{MEMORY_PERCENT:g} %",
+        "",
+        f"{growth:+.2f} % over {looks} sessions, {at_end:.1f} MB at the end",
+        passed=year_percent <= MEMORY_PERCENT,
+    )
+
+
+def _alive(what: str, done: Year) -> Row:
+    planned = sum(reason.what.endswith("killed") for reason in done.reasons)
+    endings = [one for one in done.rig.endings if one["event"] == "ended"]
+    left = [name for name in PROCESSES if not done.rig.alive(name)]
+    note = "; ".join(
+        [*done.gone, *left, *(f"{e['process']} {e['text']}" for e in endings[planned:][:4])]
+    )
+    return Row(f"{what}: processes that ended by themselves", f"{len(endings) - planned}", "0", "",
+               note, passed=len(endings) == planned and not left and not done.gone)  # fmt: skip
+
+
+def _examples(alarms: list[dict[str, object]]) -> str:
+    return "; ".join(f"{a['name']} at {a['t']}: {a['text']}"[:80] for a in alarms[:6])

@@ -1,0 +1,58 @@
+"""Memory of processes and size of a folder over a year."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+
+def memory_kb(pid: int) -> float:
+    """Anonymous resident memory of a process [kB], NaN if it has ended."""
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text(encoding="ascii").splitlines()
+    except OSError:
+        return float("nan")
+    found = [line.split()[1] for line in lines if line.startswith("RssAnon")]
+    return float(found[0]) if found else float("nan")
+
+
+def folder_bytes(folder: Path) -> int:
+    """Size of all files in a folder [bytes]."""
+    total = 0
+    for path in folder.rglob("*"):
+        try:
+            total += path.stat().st_size if path.is_file() else 0
+        except OSError:
+            continue  # removed meanwhile
+    return total
+
+
+@dataclass
+class Memory:
+    """Memory of processes, by name, after each session: (pid, kB)."""
+
+    seen: dict[str, list[tuple[int, float]]] = field(default_factory=dict)
+
+    def look(self, pids: Mapping[str, int]) -> None:
+        """Note the memory of each process."""
+        for name, pid in pids.items():
+            self.seen.setdefault(name, []).append((pid, memory_kb(pid)))
+
+    def growth(self, name: str, share: float = 0.5) -> tuple[float, float, int]:
+        """Growth of the last process of that name over the last `share` of all looks.
+
+        Returns:
+            growth [%] by a straight line over those looks, memory at their end [MB], their number.
+        """
+        looks = self.seen[name]
+        late = _of_last(looks[int(len(looks) * (1.0 - share)) :])
+        if len(late) < 4:
+            return float("nan"), late[-1] / 1e3 if late else float("nan"), len(late)
+        slope, level = np.polyfit(np.arange(len(late)), late, 1)
+        return 100.0 * slope * len(late) / level, late[-1] / 1e3, len(late)
+
+
+def _of_last(looks: Iterable[tuple[int, float]]) -> list[float]:
+    found = list(looks)
+    return [kb for pid, kb in found if pid == found[-1][0]]
