@@ -16,12 +16,35 @@ from daq.supervisor import Supervisor
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.host import DAQ, Heartbeat, prepare_for_real_time, raise_priority, set_at_signal
+from rigwatch.wire.host import (
+    DAQ,
+    Heartbeat,
+    Pulse,
+    prepare_for_real_time,
+    raise_priority,
+    set_at_signal,
+)
 from rigwatch.wire.rig_config import RigConfig, load_rig
 
 
-def acquire(config: RigConfig, adapter: Adapter, bus: Bus, stop: threading.Event) -> None:
+def acquire(
+    config: RigConfig,
+    adapter: Adapter,
+    bus: Bus,
+    stop: threading.Event,
+    pulse: Pulse,
+    *,
+    turn: float = 0.0,
+) -> None:
     """Acquire until `stop` is set.
+
+    Args:
+        config: the rig's configuration.
+        adapter: its device, not opened yet.
+        bus: destination of its samples.
+        stop: ends the loop.
+        pulse: told of each turn.
+        turn: shortest time of a turn [s]; 0 passes samples on as they come.
 
     Raises:
         DeviceBusyError: another process holds the device.
@@ -29,17 +52,21 @@ def acquire(config: RigConfig, adapter: Adapter, bus: Bus, stop: threading.Event
     device = Supervisor(adapter)
     acquisition = Acquisition(config, adapter.clock_rate)
     publisher = Publisher(bus, SampleRing(bus, config.daq.ring))
-    heartbeat = Heartbeat("daq")
     device.start()
-    prepare_for_real_time()
-    heartbeat.ready()
-    while not stop.is_set():
-        for raw in device.read(acquisition.patience(time.monotonic_ns())):
-            publisher.publish(acquisition.update(raw))
-        publisher.publish(acquisition.tick(time.monotonic_ns(), device.link, adapter.counters()))
-        heartbeat.advance(acquisition.samples)
-    heartbeat.stopping()
-    device.close()
+    pulse.ready()
+    try:
+        while not stop.is_set():
+            began = time.monotonic()
+            for raw in device.read(acquisition.patience(time.monotonic_ns())):
+                publisher.publish(acquisition.update(raw))
+            link, counters = device.link, adapter.counters()
+            publisher.publish(acquisition.tick(time.monotonic_ns(), link, counters))
+            pulse.advance(acquisition.samples)
+            if (left := began + turn - time.monotonic()) > 0:
+                time.sleep(left)
+        pulse.stopping()
+    finally:
+        device.close()
 
 
 def run(path: Path | str, stop: threading.Event) -> None:
@@ -53,8 +80,9 @@ def run(path: Path | str, stop: threading.Event) -> None:
     adapter = adapter_for(config.daq.device, config.channels)
     raise_priority(DAQ)
     bus = connect(config, "daq")
+    prepare_for_real_time()
     try:
-        acquire(config, adapter, bus, stop)
+        acquire(config, adapter, bus, stop, Heartbeat("daq"))
     finally:
         bus.close()
 

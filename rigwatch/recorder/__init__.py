@@ -7,5 +7,6 @@ that it keeps beside segments.
 from rigwatch.recorder.positions import FILE as POSITIONS
 from rigwatch.recorder.process import run
 from rigwatch.recorder.retention_rules import expired
+from rigwatch.recorder.several import run_several
 
-__all__ = ["POSITIONS", "expired", "run"]
+__all__ = ["POSITIONS", "expired", "run", "run_several"]

@@ -16,7 +16,7 @@ from rigwatch.recorder.positions import Positions, save_positions
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, connect
-from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.host import Heartbeat, Pulse
 from rigwatch.wire.messages import ALARMS, ESTIMATES, EVENTS, HEALTH, RUN, Event, Health, RunInfo
 from rigwatch.wire.rig_config import RecorderSection, RigConfig, load_rig
 from rigwatch.wire.session import run_info
@@ -105,15 +105,14 @@ class Recorder:
         self._bus.publish(HEALTH, Health(PROCESS, t_ns, "stopped", "", {}))
 
 
-def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event) -> Path:
-    """Record until `stop` is set; returns the session's folder."""
+def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pulse: Pulse) -> Path:
+    """Record until `stop` is set, telling `pulse` of each turn; returns the session's folder."""
     recorder = Recorder(config, run, bus)
-    heartbeat = Heartbeat(PROCESS)
-    heartbeat.ready(f"recording to {recorder.store.folder}")
+    pulse.ready(f"recording to {recorder.store.folder}")
     while not stop.wait(recorder.settings.flush * _OF_FLUSH):
         recorder.turn(time.monotonic(), time.time_ns())
-        heartbeat.advance(recorder.feed.samples)
-    heartbeat.stopping()
+        pulse.advance(recorder.feed.samples)
+    pulse.stopping()
     recorder.close(time.monotonic(), time.time_ns())
     return recorder.store.folder
 
@@ -140,6 +139,6 @@ def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path:
     config = load_rig(path)
     bus = connect(config, PROCESS)
     try:
-        return record(config, describe_run(path, config, notes), bus, stop)
+        return record(config, describe_run(path, config, notes), bus, stop, Heartbeat(PROCESS))
     finally:
         bus.close()

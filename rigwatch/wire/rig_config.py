@@ -4,6 +4,7 @@ Each process has its section. `load_rig` reads the file; `configs/demo.toml` is 
 sections. The descriptions of the keys are the source of `docs/configuration.md`.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -307,6 +308,21 @@ def load_rig(path: Path | str) -> RigConfig:
     if len(set(names)) < len(names):
         raise ConfigError(path, "channels", f"the names {', '.join(names)}", "different names")
     return config
+
+
+def load_rigs(paths: Iterable[Path]) -> list[tuple[Path, RigConfig]]:
+    """The configurations of several rigs, each with its path.
+
+    Raises:
+        ConfigError: a file is invalid, or two are of one rig on one router.
+    """
+    loaded = [(path, load_rig(path)) for path in paths]
+    seen: dict[tuple[str, str], Path] = {}
+    for path, config in loaded:
+        other = seen.setdefault((config.bus.router, config.rig.id), path)
+        if other is not path:
+            raise ConfigError(path, "rig.id", f"that of {other}", "an id of its own")
+    return loaded
 
 
 def section_or_error(config: RigConfig, name: str, path: Path | str) -> Section:

@@ -11,6 +11,7 @@ from daq.adapters import adapter_for
 from daq.adapters.serial_line import SerialPort
 from rigwatch.commands import main
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.host import Heartbeat
 from rigwatch.wire.messages.topics import EVENTS, HEALTH, RING_KEY, SAMPLES
 from rigwatch.wire.ordering.ring_protocol import Ask, RingReply
 from sim_plant.serve.pty_line import PtyLine
@@ -27,7 +28,10 @@ def test_samples_are_published_kept_and_reported(tmp_path: Path) -> None:
     server = SerialServer(Device(ToySource()), PtyLine(tmp_path / "rig"))
     adapter = adapter_for(config.daq.device, config.channels)
     bus = network.bus("test", "daq")
-    with in_thread(server.run), in_thread(lambda stop: acquire(config, adapter, bus, stop)):
+    with (
+        in_thread(server.run),
+        in_thread(lambda stop: acquire(config, adapter, bus, stop, Heartbeat("daq", {}))),
+    ):
         first = samples.get(30.0)
         while (latest := health.get(30.0)).state != "running":
             pass
@@ -47,7 +51,10 @@ def test_a_frozen_reader_holds_up_nothing(tmp_path: Path) -> None:
     server = SerialServer(Device(ToySource()), PtyLine(tmp_path / "rig"))
     adapter = adapter_for(config.daq.device, config.channels)
     bus = network.bus("test", "daq")
-    with in_thread(server.run), in_thread(lambda stop: acquire(config, adapter, bus, stop)):
+    with (
+        in_thread(server.run),
+        in_thread(lambda stop: acquire(config, adapter, bus, stop, Heartbeat("daq", {}))),
+    ):
         received = 0
         while received < 60:
             received += len(live.get(30.0))
@@ -63,7 +70,7 @@ def test_a_second_start_is_refused(tmp_path: Path) -> None:
         adapter = adapter_for(config.daq.device, config.channels)
         bus = MemoryNetwork().bus("test", "daq")
         with pytest.raises(DeviceBusyError, match="in use by another process"):
-            acquire(config, adapter, bus, threading.Event())
+            acquire(config, adapter, bus, threading.Event(), Heartbeat("daq", {}))
         first.close()
 
 

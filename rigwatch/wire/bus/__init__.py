@@ -12,7 +12,7 @@ from rigwatch.wire.bus.alarm_list import ask_alarm_list, serve_alarm_list
 from rigwatch.wire.bus.bus import Bus, unique_process
 from rigwatch.wire.bus.command_check import CommandCheck, Verdict, command_mark, proved_here
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
-from rigwatch.wire.bus.connection import connect, log_refusals, open_router
+from rigwatch.wire.bus.connection import connect, joined, log_refusals, open_router
 from rigwatch.wire.bus.model_change import KEY, PATIENCE, ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
@@ -41,6 +41,7 @@ __all__ = [
     "command_alarms",
     "command_mark",
     "connect",
+    "joined",
     "log_refusals",
     "open_router",
     "proved_here",

@@ -3,6 +3,10 @@
 Zenoh is slow to import and not needed for a bus in memory, so it is imported on first use.
 """
 
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
+
 from rigwatch.wire.access import (
     access_settings,
     certificate_name,
@@ -12,7 +16,11 @@ from rigwatch.wire.access import (
 )
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.transport import Close
+from rigwatch.wire.errors import BusError
 from rigwatch.wire.rig_config import RigConfig
+
+ATTEMPT = 2.0
+"""Longest that `joined` waits for a router before it looks at its event [s]."""
 
 
 def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bus:
@@ -35,6 +43,37 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
     tls = tls_settings(config.bus, name)
     transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease, tls)
     return Bus(transport, config.rig.id, process, signer_of(config.bus.security, name))
+
+
+@contextlib.contextmanager
+def joined(
+    config: RigConfig, process: str, stop: threading.Event, say: Callable[[str], None]
+) -> Iterator[Bus | None]:
+    """The bus of a rig, left at the end; None if `stop` is set before the router answers.
+
+    Args:
+        config: the rig's configuration.
+        process: name of the process, such as "daq".
+        stop: ends the wait.
+        say: called once with one line if the router does not answer.
+    """
+    bus = None
+    while bus is None and not stop.is_set():
+        try:
+            bus = connect(config, process, ATTEMPT)
+        except BusError as error:
+            say(str(error))
+            say = _say_nothing
+            stop.wait(ATTEMPT / 2)
+    try:
+        yield bus
+    finally:
+        if bus is not None:
+            bus.close()
+
+
+def _say_nothing(_text: str) -> None:
+    """Remarks after the first."""
 
 
 def log_refusals() -> None:

@@ -1,9 +1,10 @@
-"""Services of the system: systemd notifications, real-time priority, ports, signals, files."""
+"""Services of the system: notifications, priority, threads of rigs, ports, signals, files."""
 
 from rigwatch.wire.host.ending import set_at_signal
 from rigwatch.wire.host.heartbeat import Heartbeat
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
+from rigwatch.wire.host.side_by_side import Part, Pulse, RigPulse, Work, run_side_by_side
 from rigwatch.wire.host.whole_file import replace_file, write_through
 
 __all__ = [
@@ -11,6 +12,10 @@ __all__ = [
     "MONITOR",
     "ROUTER",
     "Heartbeat",
+    "Part",
+    "Pulse",
+    "RigPulse",
+    "Work",
     "endpoint_address",
     "free_port",
     "free_ports",
@@ -18,6 +23,7 @@ __all__ = [
     "prepare_for_real_time",
     "raise_priority",
     "replace_file",
+    "run_side_by_side",
     "set_at_signal",
     "write_through",
 ]

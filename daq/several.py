@@ -1,0 +1,55 @@
+"""Several rigs in one acquisition process: each device is read in a thread of its own.
+
+A device that hangs, is unplugged or does not match its configuration delays no other. Samples are
+taken in turns: most of the cost of a sample is that of the calls around it, and a message of a turn
+costs daq, bus, monitor and recorder little more than that of one sample.
+"""
+
+import threading
+from pathlib import Path
+
+from daq.__main__ import acquire
+from daq.adapters import adapter_for
+from rigwatch.wire.bus import joined
+from rigwatch.wire.host import (
+    DAQ,
+    Heartbeat,
+    Part,
+    RigPulse,
+    Work,
+    prepare_for_real_time,
+    raise_priority,
+    run_side_by_side,
+    set_at_signal,
+)
+from rigwatch.wire.rig_config import RigConfig, load_rigs
+
+TURN = 0.0125
+"""Time from one reading of a device to the next: a sample waits for half of it on average [s]."""
+
+
+def work_of(config: RigConfig) -> Work:
+    """The acquisition of one rig."""
+
+    def work(stop: threading.Event, pulse: RigPulse) -> None:
+        adapter = adapter_for(config.daq.device, config.channels)
+        with joined(config, "daq", stop, pulse.say) as bus:
+            if bus is not None:
+                acquire(config, adapter, bus, stop, pulse, turn=TURN)
+
+    return work
+
+
+def run_several(paths: list[Path]) -> int:
+    """Acquire from the rigs at `paths` until a signal ends it; the exit code.
+
+    Raises:
+        ConfigError: a configuration is invalid, or two are of one rig.
+    """
+    stop = set_at_signal()
+    rigs = load_rigs(paths)
+    raise_priority(DAQ)
+    prepare_for_real_time()
+    parts = [Part(str(path), work_of(config)) for path, config in rigs]
+    run_side_by_side(parts, Heartbeat("daq"), stop)
+    return 0

@@ -1,0 +1,150 @@
+"""Several rigs in one process, each in its own thread: none waits for another.
+
+    rig a ──advance──▶ Part ─┐
+    rig b ──advance──▶ Part ─┴─ sum ─▶ heartbeat of the process
+
+A rig whose work fails is left alone for a while and starts anew, as its process would. A loop that
+stands still, in a device that never answers, is reported; the others go on.
+"""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from rigwatch.wire.host.heartbeat import Heartbeat
+
+BEAT = 0.2
+"""Time between two looks at the rigs [s]."""
+HANGS_AFTER = 5.0
+"""Time without a turn of a rig's loop after which that is reported [s]."""
+FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0
+"""Pauses before a rig that failed starts anew [s]."""
+START_PATIENCE = 10.0
+"""Longest wait for all rigs before the process counts as ready [s]."""
+STOP_PATIENCE = 5.0
+"""Longest wait for the rigs' loops to end [s]."""
+_log = logging.getLogger(__name__)
+
+
+class Pulse(Protocol):
+    """What a loop reports: to the supervisor, or as a part of a process of several rigs."""
+
+    def ready(self, status: str = "running") -> None:
+        """The loop begins."""
+
+    def advance(self, count: int) -> None:
+        """A turn is over; `count` samples have passed since the loop began."""
+
+    def stopping(self) -> None:
+        """The loop has ended."""
+
+
+class RigPulse(Pulse, Protocol):
+    """That of one rig among several."""
+
+    def say(self, text: str) -> None:
+        """Tell people a line about this rig."""
+
+
+Work = Callable[[threading.Event, RigPulse], None]
+"""The work of a rig until the event is set."""
+
+
+class Part:
+    """One rig of a process.
+
+    Args:
+        name: the rig's, for remarks.
+        work: called in the rig's thread, again after it failed.
+        say: called with remarks for people.
+
+    Attributes:
+        settled: whether its loop has begun, or has failed to.
+    """
+
+    def __init__(self, name: str, work: Work, say: Callable[[str], None] = _log.warning) -> None:
+        self.settled = False
+        self._name, self._work, self._out = name, work, say
+        self._stop = threading.Event()
+        self._before = self._now = 0
+        self._pause = FIRST_PAUSE
+        self._turned_at: float | None = None
+        self._hangs = False
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    @property
+    def count(self) -> int:
+        """Samples of all runs so far."""
+        return self._before + self._now
+
+    def ready(self, status: str = "running") -> None:  # noqa: ARG002 (a process has one status)
+        """See `Pulse`."""
+        self.settled = True
+        self._turned_at = time.monotonic()
+
+    def advance(self, count: int) -> None:
+        """See `Pulse`."""
+        self._turned_at = time.monotonic()
+        if count > self._now:
+            self._now, self._pause = count, FIRST_PAUSE
+
+    def stopping(self) -> None:
+        """See `Pulse`."""
+        self._turned_at = None
+
+    def say(self, text: str) -> None:
+        """See `RigPulse`."""
+        self._out(f"{self._name}: {text}")
+
+    def look(self) -> None:
+        """Report a loop that stands still, and one that goes on."""
+        at = self._turned_at
+        hangs = at is not None and time.monotonic() - at > HANGS_AFTER
+        if hangs != self._hangs:
+            self._hangs = hangs
+            how = f"hangs: no turn for {HANGS_AFTER:g} s" if hangs else "goes on"
+            self.say(how)
+
+    def stop(self) -> None:
+        """Ask the work to end."""
+        self._stop.set()
+
+    def wait(self, timeout: float) -> None:
+        """Wait for its end, up to `timeout` [s]."""
+        self._thread.join(max(0.0, timeout))
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            try:
+                self._work(self._stop, self)
+            except Exception as error:  # whatever is wrong with one rig, the others go on
+                self._failed(error)
+
+    def _failed(self, error: Exception) -> None:
+        self._before, self._now, self._turned_at = self.count, 0, None
+        self.settled = True
+        line = " ".join(str(error).split()) or type(error).__name__
+        self.say(f"{line}; starts anew in {self._pause:.0f} s")
+        self._stop.wait(self._pause)
+        self._pause = min(2 * self._pause, LONGEST_PAUSE)
+
+
+def run_side_by_side(parts: Sequence[Part], heartbeat: Heartbeat, stop: threading.Event) -> None:
+    """Watch over the rigs until `stop` is set, then end them."""
+    ready, patient_until = False, time.monotonic() + START_PATIENCE
+    while not stop.wait(BEAT):
+        if not ready and (all(p.settled for p in parts) or time.monotonic() > patient_until):
+            ready = True
+            heartbeat.ready(f"{len(parts)} rigs")
+        for part in parts:
+            part.look()
+        heartbeat.advance(sum(part.count for part in parts))
+    heartbeat.stopping()
+    for part in parts:
+        part.stop()
+    deadline = time.monotonic() + STOP_PATIENCE
+    for part in parts:
+        part.wait(deadline - time.monotonic())

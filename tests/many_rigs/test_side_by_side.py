@@ -1,0 +1,94 @@
+"""Rigs in threads of one process: one that hangs or fails delays none and is reported."""
+
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from rigwatch.wire.host import Heartbeat, Part, RigPulse, run_side_by_side, side_by_side
+from tests.waiting import eventually
+
+
+def counting(stop: threading.Event, pulse: RigPulse) -> None:
+    pulse.ready()
+    count = 0
+    while not stop.wait(0.001):
+        count += 1
+        pulse.advance(count)
+    pulse.stopping()
+
+
+class Running:
+    """Parts under their loop, in a thread."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+        self.stop = threading.Event()
+        self.parts: list[Part] = []
+
+    def start(self, **works: Callable[[threading.Event, RigPulse], None]) -> list[Part]:
+        self.parts = [Part(name, work, self.said.append) for name, work in works.items()]
+        loop = (self.parts, Heartbeat("daq", {}), self.stop)
+        self.thread = threading.Thread(target=run_side_by_side, args=loop)
+        self.thread.start()
+        return self.parts
+
+    def go_on(self, part: Part) -> None:
+        wanted = part.count + 20
+        eventually(lambda: part.count >= wanted, "samples of a rig")
+
+
+@pytest.fixture
+def running() -> Iterator[Running]:
+    made = Running()
+    yield made
+    made.stop.set()
+    made.thread.join()
+
+
+def test_one_that_hangs_is_reported_and_delays_none(running, monkeypatch):
+    monkeypatch.setattr(side_by_side, "HANGS_AFTER", 0.2)
+    let = threading.Event()
+
+    def hanging(stop: threading.Event, pulse: RigPulse) -> None:
+        pulse.ready()
+        let.wait()
+        counting(stop, pulse)
+
+    healthy, hung = running.start(a=counting, b=hanging)
+    eventually(lambda: running.said == ["b: hangs: no turn for 0.2 s"], "the hanging rig is named")
+    running.go_on(healthy)
+    assert hung.count == 0
+    let.set()
+    running.go_on(hung)
+    eventually(lambda: running.said[1:] == ["b: goes on"], "that it goes on")
+
+
+def test_one_that_fails_starts_anew_and_keeps_its_count(running, monkeypatch):
+    monkeypatch.setattr(side_by_side, "FIRST_PAUSE", 0.01)
+    breaks, runs = threading.Event(), []
+
+    def failing(stop: threading.Event, pulse: RigPulse) -> None:
+        runs.append(1)
+        if len(runs) == 1:
+            pulse.advance(100)
+            breaks.wait()
+            raise OSError("the device\nis gone")
+        counting(stop, pulse)
+
+    healthy, failed = running.start(a=counting, b=failing)
+    running.go_on(healthy)
+    breaks.set()
+    eventually(lambda: failed.count > 120, "the rig goes on")
+    running.go_on(healthy)
+    assert running.said == ["b: the device is gone; starts anew in 0 s"]
+
+
+def test_the_process_ends_beside_a_rig_that_never_ends(running, monkeypatch):
+    monkeypatch.setattr(side_by_side, "STOP_PATIENCE", 0.05)
+    held = threading.Event()
+    healthy, _ = running.start(a=counting, b=lambda _stop, _pulse: held.wait() and None)
+    running.go_on(healthy)
+    running.stop.set()
+    eventually(lambda: not running.thread.is_alive(), "the end of the loop")
+    held.set()
