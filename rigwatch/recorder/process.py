@@ -18,7 +18,7 @@ from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.host import Heartbeat, Pulse
 from rigwatch.wire.messages import ALARMS, ESTIMATES, EVENTS, HEALTH, RUN, Event, Health, RunInfo
-from rigwatch.wire.rig_config import RecorderSection, RigConfig, load_rig
+from rigwatch.wire.rig_config import RecorderSection, RigConfig, load_rig, rig_text
 from rigwatch.wire.session import run_info
 
 PROCESS = "recorder"
@@ -119,7 +119,7 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pul
 
 def describe_run(path: Path | str, config: RigConfig, notes: str = "") -> RunInfo:
     """The description at the head of a recording made with the configuration at `path`."""
-    text = Path(path).read_text(encoding="utf-8")
+    text = rig_text(path)
     return run_info(
         config.rig.id,
         config.rig.sample_rate,

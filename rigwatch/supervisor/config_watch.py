@@ -14,7 +14,7 @@ from pathlib import Path
 from rigwatch.supervisor.plan import PROCESSES
 from rigwatch.supervisor.supervisor import Supervisor
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.rig_config import RigConfig, load_rig, rig_text
 
 INTERVAL = 0.5
 """Time between two looks at the file [s]."""
@@ -70,9 +70,17 @@ class ConfigWatch:
     def _read(self) -> str:
         """Hash of the file's content; "" while it cannot be read, as in the midst of a save."""
         try:
-            return hashlib.sha256(self._path.read_bytes()).hexdigest()
+            return hashlib.sha256(_content(self._path)).hexdigest()
         except OSError:
             return ""
+
+
+def _content(path: Path) -> bytes:
+    """That of the file and its bases; of the file alone while they do not fit together."""
+    try:
+        return rig_text(path).encode()
+    except ConfigError:
+        return path.read_bytes()
 
 
 def affected(before: RigConfig, after: RigConfig) -> set[str]:

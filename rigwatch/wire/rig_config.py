@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.typed_files import Section, load
+from rigwatch.wire.typed_files import Section, holder, load_layered, whole_text
 
 Text = Annotated[str, Meta(min_length=1)]
 Positive = Annotated[float, Meta(gt=0)]
@@ -289,6 +289,13 @@ class RigConfig(Section, frozen=True):
     rig: Annotated[RigSection, Meta(description="what is watched")]
     channels: Annotated[tuple[ChannelSection, ...], Meta(min_length=1, description="channels")]
     daq: Annotated[DaqSection, Meta(description="data acquisition")]
+    base: Annotated[
+        str,
+        Meta(
+            description="a file whose keys hold where this one has none, relative to this file; "
+            "tables are merged key by key, channels by name"
+        ),
+    ] = ""
     bus: Annotated[BusSection, Meta(description="the bus")] = field(default_factory=BusSection)
     plant: Annotated[PlantSection | None, Meta(description="the simulated rig")] = None
     monitor: Annotated[MonitorSection | None, Meta(description="the monitor")] = None
@@ -297,17 +304,31 @@ class RigConfig(Section, frozen=True):
     dashboard: Annotated[DashboardSection | None, Meta(description="the dashboard")] = None
 
 
+_KIND = "adapter"
+"""Key of the sections that replace one another as a whole: devices."""
+
+
 def load_rig(path: Path | str) -> RigConfig:
     """The configuration at `path`; relative paths in it stay relative to the working folder.
 
     Raises:
         ConfigError: the file is invalid, or two channels have the same name.
     """
-    config = load(path, RigConfig)
+    config = load_layered(path, RigConfig, _KIND)
     names = [channel.name for channel in config.channels]
     if len(set(names)) < len(names):
-        raise ConfigError(path, "channels", f"the names {', '.join(names)}", "different names")
+        file = holder(path, "channels")
+        raise ConfigError(file, "channels", f"the names {', '.join(names)}", "different names")
     return config
+
+
+def rig_text(path: Path | str) -> str:
+    """The text of the configuration at `path`; with a base, the text of both together.
+
+    Raises:
+        ConfigError: a file cannot be read.
+    """
+    return whole_text(path, _KIND)
 
 
 def load_rigs(paths: Iterable[Path]) -> list[tuple[Path, RigConfig]]:

@@ -37,14 +37,14 @@ def explained(
     path, value, schema = _follow(place["path"] if place else "", raw, kind)
     if match := _UNKNOWN.search(reason):
         key, expected = _below(path, match["key"]), _near(match["key"], schema, value)
-        return ConfigError(file, key, "an unknown key", expected, _line(text, key))
+        return ConfigError(file, key, "an unknown key", expected, line_of(text, key))
     if match := _MISSING.search(reason):
         key = _below(path, match["key"])
-        return ConfigError(file, key, "no such key", "a value for it", _line(text, path))
+        return ConfigError(file, key, "no such key", "a value for it", line_of(text, path))
     if isinstance(error.__cause__, UnitError):
         unit, key = error.__cause__, _below(path, "unit")
-        return ConfigError(file, key, unit.found, unit.expected, _line(text, key))
-    return ConfigError(file, path, _shown(value), _expected(reason, schema), _line(text, path))
+        return ConfigError(file, key, unit.found, unit.expected, line_of(text, key))
+    return ConfigError(file, path, _shown(value), _expected(reason, schema), line_of(text, path))
 
 
 def _below(path: str, key: str) -> str:
@@ -123,7 +123,7 @@ def _fields(schema: Any, value: Any) -> dict[str, Any]:
     return {field.encode_name: field.type for struct in chosen for field in struct.fields}
 
 
-def _line(text: str, path: str) -> int | None:
+def line_of(text: str, path: str) -> int | None:
     """The line of the key at `path`, if it can be found by a plain search."""
     table, _, key = path.rpartition(".")
     here, counts = "", Counter[str]()
