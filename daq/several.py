@@ -6,6 +6,7 @@ costs daq, bus, monitor and recorder little more than that of one sample.
 """
 
 import threading
+from functools import partial
 from pathlib import Path
 
 from daq.__main__ import acquire
@@ -20,18 +21,21 @@ from rigwatch.wire.host import (
     prepare_for_real_time,
     raise_priority,
     run_side_by_side,
+    set_at_hangup,
     set_at_signal,
 )
-from rigwatch.wire.rig_config import RigConfig, load_rigs
+from rigwatch.wire.rig_config import check_rigs, load_rig
+from rigwatch.wire.typed_files import Section
 
 TURN = 0.0125
 """Time from one reading of a device to the next: a sample waits for half of it on average [s]."""
 
 
-def work_of(config: RigConfig) -> Work:
+def work_of(path: Path) -> Work:
     """The acquisition of one rig."""
 
     def work(stop: threading.Event, pulse: RigPulse) -> None:
+        config = load_rig(path)
         adapter = adapter_for(config.daq.device, config.channels)
         with joined(config, "daq", stop, pulse.say) as bus:
             if bus is not None:
@@ -40,16 +44,22 @@ def work_of(config: RigConfig) -> Work:
     return work
 
 
+def used(path: Path) -> tuple[Section, ...]:
+    """What the acquisition of a rig depends on."""
+    config = load_rig(path)
+    return config.rig, config.bus, config.daq, *config.channels
+
+
 def run_several(paths: list[Path]) -> int:
     """Acquire from the rigs at `paths` until a signal ends it; the exit code.
 
     Raises:
-        ConfigError: a configuration is invalid, or two are of one rig.
+        ConfigError: no configuration is valid, or two are of one rig.
     """
     stop = set_at_signal()
-    rigs = load_rigs(paths)
+    check_rigs(paths)
     raise_priority(DAQ)
     prepare_for_real_time()
-    parts = [Part(str(path), work_of(config)) for path, config in rigs]
-    run_side_by_side(parts, Heartbeat("daq"), stop)
+    parts = [Part(str(path), work_of(path), partial(used, path)) for path in paths]
+    run_side_by_side(parts, Heartbeat("daq"), stop, set_at_hangup())
     return 0

@@ -42,6 +42,7 @@ def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
     bus = _free_bus(config.bus)
     own = structs.replace(
         config,
+        base="",
         rig=config.rig if bus is config.bus else _another(config.rig, bus),
         bus=bus,
         daq=_serial(config.daq, folder),

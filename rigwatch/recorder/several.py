@@ -4,18 +4,20 @@ A disk that hangs or a session that takes long to go on with delays no other rig
 """
 
 import threading
+from functools import partial
 from pathlib import Path
 
 from rigwatch.recorder.process import PROCESS, describe_run, record
 from rigwatch.wire.bus import joined
-from rigwatch.wire.host import Heartbeat, Part, RigPulse, Work, run_side_by_side
-from rigwatch.wire.rig_config import RigConfig, load_rigs
+from rigwatch.wire.host import Heartbeat, Part, RigPulse, Work, run_side_by_side, set_at_hangup
+from rigwatch.wire.rig_config import check_rigs, load_rig, rig_text
 
 
-def work_of(path: Path, config: RigConfig, notes: str, folders: dict[Path, Path]) -> Work:
+def work_of(path: Path, notes: str, folders: dict[Path, Path]) -> Work:
     """The recording of one rig; it writes its session's folder into `folders` at its end."""
 
     def work(stop: threading.Event, pulse: RigPulse) -> None:
+        config = load_rig(path)
         with joined(config, PROCESS, stop, pulse.say) as bus:
             if bus is not None:
                 run = describe_run(path, config, notes)
@@ -24,14 +26,20 @@ def work_of(path: Path, config: RigConfig, notes: str, folders: dict[Path, Path]
     return work
 
 
+def used(path: Path) -> str:
+    """What the recording of a rig depends on: every key, as its session carries them."""
+    load_rig(path)
+    return rig_text(path)
+
+
 def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> list[Path]:
-    """Record the rigs at `paths` until `stop` is set; the folders of the sessions.
+    """Record the rigs at `paths` until `stop` is set; the folders of the last sessions.
 
     Raises:
-        ConfigError: a configuration is invalid, or two are of one rig.
+        ConfigError: no configuration is valid, or two are of one rig.
     """
     folders: dict[Path, Path] = {}
-    rigs = load_rigs(paths)
-    parts = [Part(str(path), work_of(path, config, notes, folders)) for path, config in rigs]
-    run_side_by_side(parts, Heartbeat(PROCESS), stop)
+    check_rigs(paths)
+    parts = [Part(str(path), work_of(path, notes, folders), partial(used, path)) for path in paths]
+    run_side_by_side(parts, Heartbeat(PROCESS), stop, set_at_hangup())
     return [folders[path] for path in paths if path in folders]

@@ -1,6 +1,7 @@
 """Starts the processes of a rig, monitors them, and restarts those that die or hang.
 
 plan.py        which processes a configuration asks for, and whose samples each uses
+several.py     the same for several rigs
 vitals.py      what a process has reported, and when it counts as hung
 child.py       one process: start, notifications, output, end
 supervisor.py  all processes: restart with back-off, status, orderly stop
@@ -9,7 +10,18 @@ config_watch.py  a change of the configuration restarts what it concerns
 
 from rigwatch.supervisor.config_watch import ConfigWatch
 from rigwatch.supervisor.console import Console, Flow
-from rigwatch.supervisor.plan import PROCESSES, plan
+from rigwatch.supervisor.plan import PROCESSES, ProcessPlan, plan
+from rigwatch.supervisor.several import Rigs, plan_several
 from rigwatch.supervisor.supervisor import Supervisor
 
-__all__ = ["PROCESSES", "ConfigWatch", "Console", "Flow", "Supervisor", "plan"]
+__all__ = [
+    "PROCESSES",
+    "ConfigWatch",
+    "Console",
+    "Flow",
+    "ProcessPlan",
+    "Rigs",
+    "Supervisor",
+    "plan",
+    "plan_several",
+]

@@ -31,7 +31,8 @@ class Child:
         self._unfinished = b""
         self._output = -1
         self._process: subprocess.Popen[bytes] | None = None
-        self._address = str(folder / f"{plan.name}.notify")
+        # Not by name: an address has room for a hundred bytes, and a rig's id may be long.
+        self._address = str(folder / f"{id(self):x}.notify")
         self.words = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
         self.words.bind(self._address)
         self.words.setblocking(False)
@@ -85,6 +86,11 @@ class Child:
         """Ask it to stop."""
         if self._process is not None:
             self._process.terminate()
+
+    def renew(self) -> None:
+        """Ask it to look at its configuration again."""
+        if self._process is not None:
+            self._process.send_signal(signal.SIGHUP)
 
     def kill(self) -> None:
         """Kill it and everything that it has started."""

@@ -3,7 +3,8 @@
     file changed ─▶ read ─┬─ wrong: told with its line, everything runs on as it was
                           └─ right: told, and the processes of the changed sections are restarted
 
-A recorder is restarted by every change, as a session carries the hash of its configuration.
+A recorder is restarted by every change, as a session carries the hash of its configuration. A daq
+or recorder of several rigs starts the changed rig anew by itself, so that the others go on.
 """
 
 import hashlib
@@ -30,6 +31,7 @@ class ConfigWatch:
         config: as it was read.
         supervisor: restarts the processes.
         tell: called with one line for each change.
+        read: reads the file, and raises `ConfigError` if it is wrong.
         clock: seconds on a monotonic clock [s].
     """
 
@@ -39,10 +41,12 @@ class ConfigWatch:
         config: RigConfig,
         supervisor: Supervisor,
         tell: Callable[[str], None],
+        *,
+        read: Callable[[Path], RigConfig] = load_rig,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._path, self._config, self._supervisor = Path(path), config, supervisor
-        self._tell, self._clock = tell, clock
+        self._tell, self._load, self._clock = tell, read, clock
         self._hash, self._looked_at = self._read(), clock()
 
     def look(self) -> None:
@@ -55,17 +59,20 @@ class ConfigWatch:
             return
         self._hash = found
         try:
-            self._take(load_rig(self._path))
+            self._take(self._load(self._path))
         except ConfigError as error:
             self._tell(f"{error}; everything runs on as it was configured before")
 
     def _take(self, config: RigConfig) -> None:
-        names = affected(self._config, config)
+        roles = affected(self._config, config)
         self._config = config
-        running = [name for name in PROCESSES if name in names & self._supervisor.processes.keys()]
-        self._tell(f"{self._path} has changed; started anew: {', '.join(running) or 'nothing'}")
-        for name in running:
-            self._supervisor.restart(name, "its configuration has changed")
+        plans = [watched.child.plan for watched in self._supervisor.processes.values()]
+        concerned = [one for one in plans if one.role in roles and one.reads(str(self._path))]
+        names = ", ".join(one.name for one in concerned)
+        self._tell(f"{self._path} has changed; started anew: {names or 'nothing'}")
+        for one in concerned:
+            act = self._supervisor.renew if one.renews else self._supervisor.restart
+            act(one.name, f"the configuration {self._path.name} has changed")
 
     def _read(self) -> str:
         """Hash of the file's content; "" while it cannot be read, as in the midst of a save."""

@@ -45,7 +45,7 @@ class Console:
     """Prints events and status.
 
     Args:
-        rig: the rig's id.
+        rig: the rig's id, or how many there are.
         as_json: one JSON object a line instead of text.
         out: where it is printed.
     """
@@ -69,6 +69,10 @@ class Console:
     def changed(self, text: str) -> None:
         """One line about the configuration."""
         self.event(ProcessEvent("configuration", "changed", text, 0, 0))
+
+    def remark(self, text: str) -> None:
+        """One line of the supervisor itself."""
+        self.event(ProcessEvent("up", "says", text, 0, 0))
 
     def status(self, supervisor: Supervisor, flow: Flow) -> None:
         """The state of all processes, at intervals."""

@@ -18,6 +18,7 @@ class ProcessPlan:
         source: the process whose samples it uses, empty if there is none here.
         may_finish: exit code 0 is intended, such as a viewer closed by its user.
         after: processes that get time to become ready before its first start.
+        renews: it starts a rig anew on SIGHUP, without a restart.
     """
 
     name: str
@@ -25,11 +26,21 @@ class ProcessPlan:
     source: str = ""
     may_finish: bool = False
     after: tuple[str, ...] = ()
+    renews: bool = False
+
+    @property
+    def role(self) -> str:
+        """What it is, such as "plant", without the rig that a name among several rigs has."""
+        return self.name.partition(" ")[0]
+
+    def reads(self, file: str) -> bool:
+        """Whether it reads this configuration."""
+        return file in self.arguments
 
 
 PROCESSES = ("router", "plant", "daq", "monitor", "recorder", "witness", "dashboard")
-_COMMANDS = {"recorder": "record"}
-_READERS = ("daq", "monitor", "recorder")
+COMMANDS = {"recorder": "record"}
+READERS = ("daq", "monitor", "recorder")
 """A simulated device waits for readers that want its first sample."""
 
 
@@ -38,17 +49,18 @@ def plan(config: RigConfig, path: Path | str, without: Collection[str] = ()) -> 
     return [
         ProcessPlan(
             name=name,
-            arguments=(sys.executable, "-m", "rigwatch", _COMMANDS.get(name, name), str(path)),
+            arguments=(sys.executable, "-m", "rigwatch", COMMANDS.get(name, name), str(path)),
             source=_source(name, config, without),
             may_finish=name == "dashboard",
-            after=_READERS if name == "plant" else (),
+            after=READERS if name == "plant" else (),
         )
         for name in PROCESSES
-        if name not in without and _is_wanted(name, config)
+        if name not in without and is_wanted(name, config)
     ]
 
 
-def _is_wanted(name: str, config: RigConfig) -> bool:
+def is_wanted(name: str, config: RigConfig) -> bool:
+    """Whether a rig's configuration asks for the process `name`."""
     return name in ("router", "daq") or getattr(config, name) is not None
 
 

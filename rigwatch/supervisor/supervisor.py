@@ -30,6 +30,7 @@ Kind = Literal[
     "ended",
     "ill",
     "restarting",
+    "renewing",
     "finished",
     "stopping",
     "stopped",
@@ -133,6 +134,15 @@ class Supervisor:
         self._stop(watched)
         watched.child.close_run()
         watched.start_at = self._clock()
+
+    def renew(self, name: str, reason: str) -> None:
+        """Ask a process of several rigs to start those anew that have changed."""
+        watched = self._watched[name]
+        if not watched.vitals.ready:
+            self.restart(name, reason)
+            return
+        self._say(watched, "renewing", reason)
+        watched.child.renew()
 
     def stop_on_signals(self) -> None:
         """Stop in order on SIGTERM and SIGINT."""

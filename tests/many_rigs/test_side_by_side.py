@@ -23,12 +23,16 @@ class Running:
 
     def __init__(self) -> None:
         self.said: list[str] = []
-        self.stop = threading.Event()
+        self.stop, self.renew = threading.Event(), threading.Event()
+        self.versions: dict[str, int] = {}
         self.parts: list[Part] = []
 
     def start(self, **works: Callable[[threading.Event, RigPulse], None]) -> list[Part]:
-        self.parts = [Part(name, work, self.said.append) for name, work in works.items()]
-        loop = (self.parts, Heartbeat("daq", {}), self.stop)
+        self.parts = [
+            Part(name, work, lambda n=name: self.versions.get(n), self.said.append)
+            for name, work in works.items()
+        ]
+        loop = (self.parts, Heartbeat("daq", {}), self.stop, self.renew)
         self.thread = threading.Thread(target=run_side_by_side, args=loop)
         self.thread.start()
         return self.parts
@@ -92,3 +96,21 @@ def test_the_process_ends_beside_a_rig_that_never_ends(running, monkeypatch):
     running.stop.set()
     eventually(lambda: not running.thread.is_alive(), "the end of the loop")
     held.set()
+
+
+def test_only_a_rig_whose_configuration_has_changed_starts_anew(running):
+    runs: list[str] = []
+
+    def noted(name: str) -> Callable[[threading.Event, RigPulse], None]:
+        return lambda stop, pulse: runs.append(name) or counting(stop, pulse)
+
+    first, second = running.start(a=noted("a"), b=noted("b"))
+    running.go_on(first)
+    running.go_on(second)
+    running.versions["b"] = 2
+    running.renew.set()
+    eventually(lambda: len(runs) == 3, "a rig starts anew")
+    running.go_on(first)
+    running.go_on(second)
+    assert sorted(runs) == ["a", "b", "b"]
+    assert running.said == []

@@ -34,7 +34,7 @@ class Rig:
         self.events: Events = []
         self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "rigwatch", "up", str(config), "--json", *more],
+            [sys.executable, "-m", "rigwatch", "up", "--json", *more, str(config)],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

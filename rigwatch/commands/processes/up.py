@@ -1,24 +1,36 @@
-"""`rigwatch up`: starts and supervises the processes of a rig."""
+"""`rigwatch up`: starts and supervises the processes of one or several rigs."""
 
 import argparse
 import time
+from collections.abc import Callable
+from pathlib import Path
 
 from rigwatch.commands.common import file_or_name
-from rigwatch.supervisor import PROCESSES, ConfigWatch, Console, Flow, Supervisor, plan
+from rigwatch.supervisor import (
+    PROCESSES,
+    ConfigWatch,
+    Console,
+    Flow,
+    ProcessPlan,
+    Rigs,
+    Supervisor,
+    plan,
+    plan_several,
+)
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import Heartbeat, endpoint_address, is_free
-from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.rig_config import RigConfig, check_rigs, load_rig, load_rigs
 
-HELP = "start and supervise all processes of a rig"
+HELP = "start and supervise all processes of one or several rigs"
 EXAMPLE = """  rigwatch up configs/demo.toml
-  rigwatch up configs/demo.toml --without dashboard --json"""
+  rigwatch up configs/demo.toml --without dashboard --json
+  rigwatch up rigs/*.toml               # one daq, monitor and recorder for all of them"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument(
-        "config", type=file_or_name(""), metavar="CONFIG", help="configuration of the rig"
-    )
+    help_ = "configuration of a rig; several rigs share daq, monitor and recorder"
+    parser.add_argument("config", type=file_or_name(""), nargs="+", metavar="CONFIG", help=help_)
     parser.add_argument(
         "--without",
         action="append",
@@ -34,21 +46,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run until a signal or for the given time; 0 after an orderly stop."""
-    config = load_rig(arguments.config)
-    _refuse_second_start(config, arguments.without)
-    console = Console(config.rig.id, arguments.json)
-    plans = plan(config, arguments.config, arguments.without)
-    supervisor = Supervisor(plans, console.event)
+    remarks: list[str] = []
+    rigs = _loaded(arguments.config, remarks.append)
+    _refuse_second_start(rigs, arguments.without)
+    console = Console(_name(rigs), arguments.json)
+    for remark in remarks:
+        console.remark(remark)
+    supervisor = Supervisor(_planned(rigs, arguments.without, console.remark), console.event)
     supervisor.stop_on_signals()
     flow, heartbeat = Flow(supervisor), Heartbeat("up")
-    watch = ConfigWatch(arguments.config, config, supervisor, console.changed)
+    watches = [
+        ConfigWatch(*rig, supervisor, console.changed, read=_reading(arguments.config))
+        for rig in rigs
+    ]
     stop_at = time.monotonic() + arguments.seconds
     is_ready = False
 
     def each_turn() -> None:
         nonlocal is_ready
         flow.look()
-        watch.look()
+        for watch in watches:
+            watch.look()
         console.status(supervisor, flow)
         if not is_ready and all(w.was_ready for w in supervisor.processes.values()):
             is_ready = True
@@ -63,11 +81,43 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _refuse_second_start(config: RigConfig, without: list[str]) -> None:
+def _loaded(paths: list[Path], say: Callable[[str], None]) -> Rigs:
+    """The configurations; of several, those that are valid."""
+    if len(paths) == 1:
+        return [(paths[0], load_rig(paths[0]))]
+    return load_rigs(paths, lambda mistake: say(f"{mistake}; this rig is left out"))
+
+
+def _reading(paths: list[Path]) -> Callable[[Path], RigConfig]:
+    """Reads one of the files, which must still be of a rig of its own."""
+
+    def read(path: Path) -> RigConfig:
+        config = load_rig(path)
+        check_rigs(paths)
+        return config
+
+    return read
+
+
+def _name(rigs: Rigs) -> str:
+    return rigs[0][1].rig.id if len(rigs) == 1 else f"{len(rigs)} rigs"
+
+
+def _planned(rigs: Rigs, without: list[str], say: Callable[[str], None]) -> list[ProcessPlan]:
+    if len(rigs) == 1:
+        path, config = rigs[0]
+        return plan(config, path, without)
+    if "dashboard" not in without and any(config.dashboard for _, config in rigs):
+        say("no dashboard for several rigs: `rigwatch fleet`, or `rigwatch dashboard` of one")
+    return plan_several(rigs, without)
+
+
+def _refuse_second_start(rigs: Rigs, without: list[str]) -> None:
     """Refuse a second `up` on one bus: the rig would have two sources of samples."""
-    address = endpoint_address(config.bus.listen)
-    if "router" not in without and address is not None and not is_free(*address):
-        raise BusError(
-            f"bus.listen: {config.bus.listen} is in use: is this rig up already? "
-            "Stop it, or name another port in [bus]"
-        )
+    for listen in {config.bus.listen for _, config in rigs}:
+        address = endpoint_address(listen)
+        if "router" not in without and address is not None and not is_free(*address):
+            raise BusError(
+                f"bus.listen: {listen} is in use: is this rig up already? "
+                "Stop it, or name another port in [bus]"
+            )

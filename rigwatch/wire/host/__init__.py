@@ -1,6 +1,6 @@
 """Services of the system: notifications, priority, threads of rigs, ports, signals, files."""
 
-from rigwatch.wire.host.ending import set_at_signal
+from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
 from rigwatch.wire.host.heartbeat import Heartbeat
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
@@ -24,6 +24,7 @@ __all__ = [
     "raise_priority",
     "replace_file",
     "run_side_by_side",
+    "set_at_hangup",
     "set_at_signal",
     "write_through",
 ]

@@ -1,4 +1,4 @@
-"""Ends a process on SIGINT or SIGTERM: its loop then stops in order."""
+"""Signals as events: SIGINT and SIGTERM end a process in order, SIGHUP renews its configuration."""
 
 import signal
 import threading
@@ -9,4 +9,11 @@ def set_at_signal(stop: threading.Event | None = None) -> threading.Event:
     event = stop or threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: event.set())
+    return event
+
+
+def set_at_hangup() -> threading.Event:
+    """A new event that SIGHUP sets; for the main thread."""
+    event = threading.Event()
+    signal.signal(signal.SIGHUP, lambda *_: event.set())
     return event

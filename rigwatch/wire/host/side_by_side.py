@@ -4,7 +4,8 @@
     rig b ──advance──▶ Part ─┴─ sum ─▶ heartbeat of the process
 
 A rig whose work fails is left alone for a while and starts anew, as its process would. A loop that
-stands still, in a device that never answers, is reported; the others go on.
+stands still, in a device that never answers, is reported; the others go on. When it
+is asked to renew, rigs whose configuration has changed start anew, and only those.
 """
 
 import logging
@@ -25,6 +26,7 @@ START_PATIENCE = 10.0
 """Longest wait for all rigs before the process counts as ready [s]."""
 STOP_PATIENCE = 5.0
 """Longest wait for the rigs' loops to end [s]."""
+_NOTHING = object()
 _log = logging.getLogger(__name__)
 
 
@@ -58,16 +60,24 @@ class Part:
     Args:
         name: the rig's, for remarks.
         work: called in the rig's thread, again after it failed.
+        version: what the work depends on, such as a configuration; raises if it is wrong.
         say: called with remarks for people.
 
     Attributes:
         settled: whether its loop has begun, or has failed to.
     """
 
-    def __init__(self, name: str, work: Work, say: Callable[[str], None] = _log.warning) -> None:
+    def __init__(
+        self,
+        name: str,
+        work: Work,
+        version: Callable[[], object] = lambda: None,
+        say: Callable[[str], None] = _log.warning,
+    ) -> None:
         self.settled = False
         self._name, self._work, self._out = name, work, say
-        self._stop = threading.Event()
+        self._version, self._taken = version, _NOTHING
+        self._stop, self._ended = threading.Event(), False
         self._before = self._now = 0
         self._pause = FIRST_PAUSE
         self._turned_at: float | None = None
@@ -108,8 +118,19 @@ class Part:
             how = f"hangs: no turn for {HANGS_AFTER:g} s" if hangs else "goes on"
             self.say(how)
 
+    def renew(self) -> None:
+        """Start the work anew if what it depends on has changed, and is right."""
+        try:
+            changed = self._version() != self._taken
+        except Exception as error:  # the rig goes on as it is
+            self.say(f"{_line(error)}; goes on as before")
+            return
+        if changed:
+            self._stop.set()
+
     def stop(self) -> None:
         """Ask the work to end."""
+        self._ended = True
         self._stop.set()
 
     def wait(self, timeout: float) -> None:
@@ -117,28 +138,47 @@ class Part:
         self._thread.join(max(0.0, timeout))
 
     def _run(self) -> None:
-        while not self._stop.is_set():
+        while not self._ended:
             try:
+                self._taken = self._version()
                 self._work(self._stop, self)
             except Exception as error:  # whatever is wrong with one rig, the others go on
                 self._failed(error)
+            self._before, self._now, self._turned_at = self.count, 0, None
+            if not self._ended:
+                self._stop.clear()
 
     def _failed(self, error: Exception) -> None:
-        self._before, self._now, self._turned_at = self.count, 0, None
-        self.settled = True
-        line = " ".join(str(error).split()) or type(error).__name__
-        self.say(f"{line}; starts anew in {self._pause:.0f} s")
+        self._turned_at, self.settled = None, True
+        self.say(f"{_line(error)}; starts anew in {self._pause:.0f} s")
         self._stop.wait(self._pause)
         self._pause = min(2 * self._pause, LONGEST_PAUSE)
 
 
-def run_side_by_side(parts: Sequence[Part], heartbeat: Heartbeat, stop: threading.Event) -> None:
-    """Watch over the rigs until `stop` is set, then end them."""
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def run_side_by_side(
+    parts: Sequence[Part], heartbeat: Heartbeat, stop: threading.Event, renew: threading.Event
+) -> None:
+    """Watch over the rigs until `stop` is set, then end them.
+
+    Args:
+        parts: the rigs.
+        heartbeat: of the process.
+        stop: ends the loop.
+        renew: when set, rigs whose configuration has changed start anew; it is cleared.
+    """
     ready, patient_until = False, time.monotonic() + START_PATIENCE
     while not stop.wait(BEAT):
         if not ready and (all(p.settled for p in parts) or time.monotonic() > patient_until):
             ready = True
             heartbeat.ready(f"{len(parts)} rigs")
+        if renew.is_set():
+            renew.clear()
+            for part in parts:
+                part.renew()
         for part in parts:
             part.look()
         heartbeat.advance(sum(part.count for part in parts))

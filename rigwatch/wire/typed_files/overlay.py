@@ -7,6 +7,7 @@ table of another kind (another `adapter`) replaces that of the base as a whole. 
 file that holds the key.
 """
 
+import os
 import re
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -67,7 +68,7 @@ def read_layers(path: Path | str) -> list[Layer]:
         named_in = layers[-1]
         if not isinstance(base, str):
             raise _of_base(named_in, repr(base), "the path of a file")
-        file = named_in.file.parent / base
+        file = _plain(named_in.file.parent / base)
         if not file.is_file():
             raise _of_base(named_in, repr(base), f"a file; there is no {file}")
         if any(file.samefile(layer.file) for layer in layers) or len(layers) == MOST_LAYERS:
@@ -109,6 +110,12 @@ def _layer(path: Path | str) -> Layer:
         return Layer(Path(path), text, loads(text))
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(path, "", str(error), "TOML") from error
+
+
+def _plain(path: Path) -> Path:
+    """The path without `..`, unless that is another file, as beside a link to a folder."""
+    short = Path(os.path.normpath(path))
+    return short if short.is_file() and short.samefile(path) else path
 
 
 def _of_base(layer: Layer, found: str, expected: str) -> ConfigError:
