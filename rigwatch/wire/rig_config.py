@@ -4,7 +4,6 @@ Each process has its section. `load_rig` reads the file; `configs/demo.toml` is 
 sections. The descriptions of the keys are the source of `docs/configuration.md`.
 """
 
-from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -329,51 +328,6 @@ def rig_text(path: Path | str) -> str:
         ConfigError: a file cannot be read.
     """
     return whole_text(path, _KIND)
-
-
-def load_rigs(
-    paths: Iterable[Path], say: Callable[[str], None] | None = None
-) -> list[tuple[Path, RigConfig]]:
-    """The configurations of several rigs, each with its path.
-
-    Args:
-        paths: the files.
-        say: called with the mistake of a file, which is left out; None refuses all because of it.
-
-    Raises:
-        ConfigError: a file is invalid, all are if `say` is given, or two are of one rig on one
-            router.
-    """
-    loaded, wrong = [], None
-    for path in paths:
-        try:
-            loaded.append((path, load_rig(path)))
-        except ConfigError as error:
-            if say is None:
-                raise
-            wrong = error
-            say(str(error))
-    if wrong is not None and not loaded:
-        raise wrong
-    _check_apart(loaded)
-    return loaded
-
-
-def check_rigs(paths: Iterable[Path]) -> None:
-    """Check that a process of several rigs can begin: it names wrong files rig by rig.
-
-    Raises:
-        ConfigError: no file is valid, or two are of one rig on one router.
-    """
-    load_rigs(paths, list[str]().append)
-
-
-def _check_apart(loaded: Iterable[tuple[Path, RigConfig]]) -> None:
-    seen: dict[tuple[str, str], Path] = {}
-    for path, config in loaded:
-        other = seen.setdefault((config.bus.router, config.rig.id), path)
-        if other is not path:
-            raise ConfigError(path, "rig.id", f"that of {other}", "an id of its own")
 
 
 def section_or_error(config: RigConfig, name: str, path: Path | str) -> Section:

@@ -1,10 +1,13 @@
 """Configurations of several rigs that one process works on: none may take what is another's."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.rig_config import RigConfig, load_rig
+
+Rigs = Sequence[tuple[Path, RigConfig]]
+"""Configurations of rigs, each with its path."""
 
 
 def load_rigs(paths: Sequence[Path]) -> list[tuple[Path, RigConfig]]:
@@ -13,7 +16,29 @@ def load_rigs(paths: Sequence[Path]) -> list[tuple[Path, RigConfig]]:
     Raises:
         ConfigError: one is invalid, or two are of one rig on one router.
     """
-    loaded = [(path, load_rig(path)) for path in paths]
+    return _apart([(path, load_rig(path)) for path in paths])
+
+
+def valid_rigs(paths: Sequence[Path], say: Callable[[str], object]) -> list[tuple[Path, RigConfig]]:
+    """The same without files that are wrong, of which `say` is told.
+
+    Raises:
+        ConfigError: all are invalid, or two are of one rig on one router.
+    """
+    loaded, mistakes = [], []
+    for path in paths:
+        try:
+            loaded.append((path, load_rig(path)))
+        except ConfigError as error:
+            mistakes.append(error)
+    if mistakes and not loaded:
+        raise mistakes[0]
+    for mistake in mistakes:
+        say(str(mistake))
+    return _apart(loaded)
+
+
+def _apart(loaded: list[tuple[Path, RigConfig]]) -> list[tuple[Path, RigConfig]]:
     check_own("rig.id", ((path, f"{config.bus.router} {config.rig.id}") for path, config in loaded))
     return loaded
 

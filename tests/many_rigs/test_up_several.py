@@ -11,8 +11,9 @@ from rigwatch.commands import main
 from rigwatch.supervisor import plan_several
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import HEALTH
-from rigwatch.wire.rig_config import load_rig, load_rigs
+from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session
+from rigwatch.wire.several_rigs import load_rigs
 from rigwatch.wire.typed_files import loads
 from sim_plant.serve.pty_line import PtyLine
 from sim_plant.serve.serial_server import SerialServer
