@@ -25,7 +25,7 @@ from rigwatch.wire.host import (
     set_at_signal,
 )
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.several_rigs import check_rigs
+from rigwatch.wire.several_rigs import valid_rigs
 from rigwatch.wire.typed_files import Section
 
 TURN = 0.0125
@@ -58,7 +58,7 @@ def run_several(paths: list[Path]) -> int:
         ConfigError: no configuration is valid, or two are of one rig.
     """
     stop = set_at_signal()
-    check_rigs(paths)
+    valid_rigs(paths, list[str]().append)  # a wrong file is named by its rig's thread
     raise_priority(DAQ)
     prepare_for_real_time()
     parts = [Part(str(path), work_of(path), partial(used, path)) for path in paths]

@@ -11,7 +11,7 @@ from rigwatch.recorder.process import PROCESS, describe_run, record
 from rigwatch.wire.bus import joined
 from rigwatch.wire.host import Heartbeat, Part, RigPulse, Work, run_side_by_side, set_at_hangup
 from rigwatch.wire.rig_config import load_rig, rig_text
-from rigwatch.wire.several_rigs import check_rigs
+from rigwatch.wire.several_rigs import valid_rigs
 
 
 def work_of(path: Path, notes: str, folders: dict[Path, Path]) -> Work:
@@ -40,7 +40,7 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
         ConfigError: no configuration is valid, or two are of one rig.
     """
     folders: dict[Path, Path] = {}
-    check_rigs(paths)
+    valid_rigs(paths, list[str]().append)  # a wrong file is named by its rig's thread
     parts = [Part(str(path), work_of(path, notes, folders), partial(used, path)) for path in paths]
     run_side_by_side(parts, Heartbeat(PROCESS), stop, set_at_hangup())
     return [folders[path] for path in paths if path in folders]

@@ -11,7 +11,7 @@ config_watch.py  a change of the configuration restarts what it concerns
 from rigwatch.supervisor.config_watch import ConfigWatch
 from rigwatch.supervisor.console import Console, Flow
 from rigwatch.supervisor.plan import PROCESSES, ProcessPlan, plan
-from rigwatch.supervisor.several import Rigs, plan_several
+from rigwatch.supervisor.several import plan_several
 from rigwatch.supervisor.supervisor import Supervisor
 
 __all__ = [
@@ -20,7 +20,6 @@ __all__ = [
     "Console",
     "Flow",
     "ProcessPlan",
-    "Rigs",
     "Supervisor",
     "plan",
     "plan_several",

@@ -14,8 +14,8 @@ from pathlib import Path
 from rigwatch.supervisor.plan import COMMANDS, READERS, ProcessPlan, is_wanted
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.rig_config import RigConfig
+from rigwatch.wire.several_rigs import Rigs
 
-Rigs = Sequence[tuple[Path, RigConfig]]
 RENEWING = ("daq", "recorder")
 SHARED = ("daq", "monitor", "recorder")
 

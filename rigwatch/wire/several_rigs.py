@@ -1,47 +1,46 @@
 """Configurations of several rigs that one process works on: none may take what is another's."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.rig_config import RigConfig, load_rig
 
+Rigs = Sequence[tuple[Path, RigConfig]]
+"""Configurations of rigs, each with its path."""
 
-def load_rigs(
-    paths: Iterable[Path], say: Callable[[str], None] | None = None
-) -> list[tuple[Path, RigConfig]]:
-    """The configurations of several rigs, each with its path.
 
-    Args:
-        paths: the files.
-        say: called with the mistake of a file, which is left out; None refuses all because of it.
+def load_rigs(paths: Sequence[Path]) -> list[tuple[Path, RigConfig]]:
+    """The configurations at `paths`, each with its path.
 
     Raises:
-        ConfigError: a file is invalid, all are if `say` is given, or two are of one rig on one
-            router.
+        ConfigError: one is invalid, or two are of one rig on one router.
     """
-    loaded, wrong = [], None
+    return _apart([(path, load_rig(path)) for path in paths])
+
+
+def valid_rigs(paths: Sequence[Path], say: Callable[[str], object]) -> list[tuple[Path, RigConfig]]:
+    """The same without files that are wrong, of which `say` is told.
+
+    Raises:
+        ConfigError: all are invalid, or two are of one rig on one router.
+    """
+    loaded, mistakes = [], []
     for path in paths:
         try:
             loaded.append((path, load_rig(path)))
         except ConfigError as error:
-            if say is None:
-                raise
-            wrong = error
-            say(str(error))
-    if wrong is not None and not loaded:
-        raise wrong
+            mistakes.append(error)
+    if mistakes and not loaded:
+        raise mistakes[0]
+    for mistake in mistakes:
+        say(str(mistake))
+    return _apart(loaded)
+
+
+def _apart(loaded: list[tuple[Path, RigConfig]]) -> list[tuple[Path, RigConfig]]:
     check_own("rig.id", ((path, f"{config.bus.router} {config.rig.id}") for path, config in loaded))
     return loaded
-
-
-def check_rigs(paths: Iterable[Path]) -> None:
-    """Check that a process of several rigs can begin: it names wrong files rig by rig.
-
-    Raises:
-        ConfigError: no file is valid, or two are of one rig on one router.
-    """
-    load_rigs(paths, list[str]().append)
 
 
 def check_own(key: str, values: Iterable[tuple[Path, str]]) -> None:

@@ -2,7 +2,12 @@
 
 from rigwatch.browser.recordings.import_preview import import_preview
 from rigwatch.browser.recordings.looking import Look, look_at
-from rigwatch.browser.recordings.new_study import make_study, template_data, template_names
+from rigwatch.browser.recordings.new_study import (
+    Part,
+    make_study,
+    template_data,
+    template_names,
+)
 from rigwatch.browser.recordings.recorded import (
     channels_of,
     check_session,
@@ -13,6 +18,7 @@ from rigwatch.browser.recordings.stories import Story, begin_story, stories
 
 __all__ = [
     "Look",
+    "Part",
     "Story",
     "begin_story",
     "channels_of",

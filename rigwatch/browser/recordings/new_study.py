@@ -1,7 +1,7 @@
 """Creates a study file from a template's settings and the user's recordings."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,8 @@ from rigwatch.wire.typed_files import as_toml, find_file, load, shipped_names
 from rigwatch.workbench.study import FILE, Span, Study, StudyFile, start_study
 
 USES = ("train", "held_out", "healthy")
+Part = tuple[str, Path, float, float | None]
+"""Use, recording, start and end [s] of a part of a study."""
 
 
 def template_names(own: Path) -> dict[str, list[str]]:
@@ -51,8 +53,9 @@ def _template(name: str) -> StudyFile:
 def make_study(
     folder: Path,
     begin: str,
-    spans: Sequence[tuple[str, Path, float, float | None]],
+    spans: Sequence[Part],
     own: Path | None = None,
+    values: Mapping[str, float] | None = None,
 ) -> Study:
     """Create a study in `folder`.
 
@@ -60,6 +63,7 @@ def make_study(
         folder: without a study.
         begin: name of a template, or "model:" followed by the name of a model.
         own: own model file in place of `begin`.
+        values: initial values of the model's parameters, in its units.
         spans: use, recording, start and end [s] of each part.
 
     Raises:
@@ -85,6 +89,8 @@ def make_study(
         file = StudyFile(model=model, train=train, held_out=held_out, healthy=healthy)
     else:
         file = structs.replace(_template(kind), train=train, held_out=held_out, healthy=healthy)
+    if values:
+        file = structs.replace(file, start=dict(values))
     return start_study(folder, as_toml(_said(file)))
 
 

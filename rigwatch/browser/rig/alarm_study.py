@@ -1,9 +1,11 @@
 """A study made from an alarm: healthy data before its onset, and data after it."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
-from rigwatch.browser.recordings import make_study
+from monitor.model import EquationsPlant, load_model
+from rigwatch.browser.recordings import Part, make_study
 from rigwatch.browser.rig.onset import Onset, onset_of
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm
@@ -22,6 +24,7 @@ AROUND = 0.5
 FRESH = 3.0
 """Age of the last sample up to which the recording is taken to go on [s]."""
 TEMPLATE = "rig"
+"""Used where the monitor's model has no equations."""
 
 
 class TooSoonError(SessionError):
@@ -64,7 +67,18 @@ def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm, now: float | Non
         ("held_out", faulty, half + AROUND, None),
         ("healthy", healthy, 0.0, None),
     ]
-    return make_study(root / name, TEMPLATE, parts)
+    return _made(root / name, config, parts)
+
+
+def _made(folder: Path, config: RigConfig, parts: Sequence[Part]) -> Study:
+    """With the equations that the monitor runs, from their healthy values; else the template's."""
+    file = Path(config.monitor.model) if config.monitor else None
+    plant = load_model(file).plant if file and file.is_file() else None
+    if not isinstance(plant, EquationsPlant):
+        return make_study(folder, TEMPLATE, parts)
+    start = dict(zip(plant.names, plant.values, strict=True))
+    own = Path(plant.model) if plant.model.endswith(".toml") else None
+    return make_study(folder, f"model:{plant.model}", parts, own, start)
 
 
 def _lengths(alarm: Alarm, onset: Onset, now: float) -> tuple[float, float]:

@@ -12,7 +12,6 @@ from rigwatch.supervisor import (
     Console,
     Flow,
     ProcessPlan,
-    Rigs,
     Supervisor,
     plan,
     plan_several,
@@ -20,7 +19,7 @@ from rigwatch.supervisor import (
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import Heartbeat, endpoint_address, is_free
 from rigwatch.wire.rig_config import RigConfig, load_rig
-from rigwatch.wire.several_rigs import check_rigs, load_rigs
+from rigwatch.wire.several_rigs import Rigs, valid_rigs
 
 HELP = "start and supervise all processes of one or several rigs"
 EXAMPLE = """  rigwatch up configs/demo.toml
@@ -86,7 +85,7 @@ def _loaded(paths: list[Path], say: Callable[[str], None]) -> Rigs:
     """The configurations; of several, those that are valid."""
     if len(paths) == 1:
         return [(paths[0], load_rig(paths[0]))]
-    return load_rigs(paths, lambda mistake: say(f"{mistake}; this rig is left out"))
+    return valid_rigs(paths, lambda mistake: say(f"{mistake}; this rig is left out"))
 
 
 def _reading(paths: list[Path]) -> Callable[[Path], RigConfig]:
@@ -94,7 +93,7 @@ def _reading(paths: list[Path]) -> Callable[[Path], RigConfig]:
 
     def read(path: Path) -> RigConfig:
         config = load_rig(path)
-        check_rigs(paths)
+        valid_rigs(paths, list[str]().append)
         return config
 
     return read

@@ -4,7 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
+from monitor.model import EquationsPlant
+from monitor.model.model_file import model_text
 from rigwatch.browser.rig import TooSoonError, study_of_alarm
 from rigwatch.simulated import EPOCH_NS, simulate, write_session
 from rigwatch.wire.errors import SessionError
@@ -12,8 +15,10 @@ from rigwatch.wire.messages import Alarm
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.session import open_session, run_info
 from rigwatch.wire.session.writer import SessionWriter
+from rigwatch.workbench.compare import compare
 from rigwatch.workbench.study import Study
 from tests.bus.rig import ROOT
+from tests.monitor import observed_rig
 
 RATE, ONSET = 256, 10 * 256
 SCENARIO = ROOT / "configs" / "scenarios" / "friction_stays.toml"
@@ -143,3 +148,20 @@ def test_an_onset_that_was_not_recorded_is_told(
     unfounded = replace(_alarm(recorded), seq=-1, onset_seq=-1)
     with pytest.raises(SessionError, match="found no sample that raised it"):
         study_of_alarm(tmp_path, config, unfounded, LONG_AGO)
+
+
+def test_the_study_takes_the_equations_that_the_monitor_runs(
+    recorded: Path, config: RigConfig, folder: Path, tmp_path: Path
+) -> None:
+    model = observed_rig.model()
+    assert isinstance(model.plant, EquationsPlant)
+    file = tmp_path / "observer.toml"
+    file.write_text(model_text(model), encoding="utf-8")
+    assert config.monitor is not None
+    watched = structs.replace(config, monitor=structs.replace(config.monitor, model=str(file)))
+    _until(recorded, folder, 24.0)
+    study = study_of_alarm(tmp_path, watched, _alarm(recorded), LONG_AGO)
+    assert study.file.model == model.plant.model
+    assert study.file.start == dict(zip(model.plant.names, model.plant.values, strict=True))
+    shown = compare(study)
+    assert shown.held_out_error > 2.0 * shown.noise_floor, "friction is not in these equations"
