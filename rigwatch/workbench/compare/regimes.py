@@ -14,8 +14,11 @@ and the variance between regimes is what chance does not explain,
 
 with s_b² the sandwich variance of θ_b over blocks of time, the moment estimate of a random-effects
 model (R. DerSimonian, N. Laird, Controlled Clinical Trials 7, 1986). The largest τ² of all signals
-is the variance of the strength from regime to regime, as in a prediction interval (J. Higgins,
-S. Thompson, D. Spiegelhalter, J. Royal Statistical Society A 172, 2009).
+counts.
+
+The machine's strength, for example the friction at full speed, is one of the regimes', not their
+mean. Five that change evenly from -a to a have τ² = 5/8·a²; a truth anywhere between them has the
+variance a²/3 (JCGM 100:2008 (GUM), 4.3.7).
 """
 
 import numpy as np
@@ -25,6 +28,8 @@ from rigwatch.wire.arrays import FloatArray, IntArray
 
 REGIMES = 5
 """Number of regimes by one signal."""
+WITHIN = 8 / 15
+"""Variance of a truth anywhere between the strengths of the regimes, over that between regimes."""
 
 
 def variances_between_regimes(fitted: Fit, recording: Recording, block: IntArray) -> FloatArray:

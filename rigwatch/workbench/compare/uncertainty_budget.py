@@ -27,7 +27,7 @@ from rigwatch.physics.engine.equations import Placement, compose
 from rigwatch.physics.engine.fit import Fit, evaluate
 from rigwatch.physics.engine.score import Candidate
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.compare.regimes import REGIMES, variances_between_regimes
+from rigwatch.workbench.compare.regimes import REGIMES, WITHIN, variances_between_regimes
 from rigwatch.workbench.data import Data, repeat_along_motion
 from rigwatch.workbench.fit import Fitted, block_numbers, covariance, with_kept_free
 from rigwatch.workbench.ranking import score_all
@@ -84,12 +84,12 @@ def _between_regimes(data: Data, bare: Fitted | None, fitted: Fitted) -> FloatAr
     found = _regimes_of(fitted.train, data)
     healthy = data.of_healthy
     if bare is None or healthy is None:
-        return found
+        return WITHIN * found
     steps = fitted.horizon, fitted.substeps, bare.train.initial
     along = evaluate(fitted.train, healthy.train, *steps)
     mimicked = _regimes_of(dataclasses.replace(along, error=bare.train.error), healthy)
     shared = np.minimum(found, mimicked)
-    return np.asarray(found - shared + shared / REGIMES)
+    return np.asarray(WITHIN * (found - shared) + shared / REGIMES)
 
 
 def _regimes_of(train: Fit, data: Data) -> FloatArray:
