@@ -22,13 +22,16 @@ def unweighed(bench: Bench, placement: Placement, fitted: Fitted) -> list[str]:
         fitted: the model with it.
     """
     model, values = bench.study.model, fitted.train.values()
+    given = bench.study.file.start
+    if not any(p.deviation and name not in given for name, p in model.parameters.items()):
+        return []
     own = placement.effect.parameters[placement.effect.strength]
     strength = placement.prefix + placement.effect.strength
     # A fault of the sensor whose motion drives the model is no parameter of the fit.
     found, size = [], values.get(strength, own.neutral) - own.neutral
     for name, slopes in by_known(bench.study, bench.data, fitted).items():
         share = slopes.get(strength, 0.0) * values[name] / size if size else 0.0
-        if name not in bench.study.file.start and abs(share) >= MATTERS:
+        if name not in given and abs(share) >= MATTERS:
             label = f"{placement.effect.strength} of {placement.name}@{placement.port}"
             found.append(f"{label} moves by {share:.2g} % for each percent of {_told(model, name)}")
     return found
