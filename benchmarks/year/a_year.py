@@ -28,8 +28,8 @@ from tools.benchmark_table import Row
 RATE = 8.0
 SESSION_BYTES, PART, SMALLEST = 6e5, 5.0, 2e6
 """Size of a session, part of the year's that the recording may use, and its least [bytes]."""
-BETWEEN_CHECKS = 2 * SESSION_BYTES
-"""What is recorded between two looks at the size [bytes]."""
+BETWEEN_CHECKS = 100e6 / 60.0
+"""What is recorded between two looks at the size, a minute of 100 MB an hour [bytes]."""
 DAYS, ALARM_DAYS = 60.0, 120.0
 MEMORY_PERCENT = 2.0
 IN_MEMORY = Path("/dev/shm")

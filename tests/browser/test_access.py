@@ -6,8 +6,10 @@ import threading
 from pathlib import Path
 
 import pytest
+from starlette.requests import Request
 
 from rigwatch.browser.server.access import Access, cookie_name, hosts_of
+from rigwatch.browser.server.context import number_of
 from rigwatch.browser.server.places import PlaceError, Places
 from rigwatch.browser.server.serving import Options, serve
 from rigwatch.wire.errors import RigwatchError
@@ -61,6 +63,34 @@ def test_what_is_forged_is_refused(
 ) -> None:
     assert ask(served, path, method, **headers)[0] == status
     assert ask(served, "/")[0] == 200
+
+
+MALFORMED = {
+    "text that is no UTF-8": ("/api/new", b'{"a": "\xff"}', 409),
+    "brackets in brackets": ("/api/new", b'{"a": ' + b"[" * 100_000, 409),
+    "a name longer than a file's": (f"/api/recording/{'a' * 300}.mcap", None, 404),
+    "a study with such a name": (f"/api/parts/{'a' * 300}", None, 404),
+    "spans that are no list": ("/api/new", b'{"name": "n", "begin": "emps", "spans": 5}', 409),
+    "a span that is none": ("/api/new", b'{"name": "n", "begin": "emps", "spans": [null]}', 409),
+}
+
+
+@pytest.mark.parametrize("text", ["nan", "-inf", "1e400", "9" * 400, "1e18", "x", ""])
+def test_a_number_in_an_address_is_exact_or_none(text: str) -> None:
+    asked = {"type": "http", "query_string": f"step={text}&to=-3".encode()}
+    assert number_of(Request(asked), "step") is None
+    assert number_of(Request(asked), "to") == -3.0
+
+
+@pytest.mark.parametrize(("path", "body", "status"), MALFORMED.values(), ids=MALFORMED)
+def test_what_is_malformed_is_refused_in_a_line(
+    served: Served, path: str, body: bytes | None, status: int
+) -> None:
+    """Found by mutating the requests of the pages (benchmarks, `fuzzed_requests`)."""
+    found, text = ask(served, path, "POST" if body else "GET", body=body or b"")
+    assert found == status, text
+    assert "Traceback" not in text
+    assert len(text) < 1000
 
 
 def test_without_a_token_nothing_is_shown(served: Served) -> None:

@@ -17,6 +17,8 @@ from rigwatch.wire.errors import RigwatchError
 
 MOST_BODY = 1 << 20
 """Largest request that is not an upload [bytes]."""
+LARGEST_NUMBER = 2.0**53
+"""Largest number in an address; the integers up to it are exact, and NaN is not below it."""
 
 
 @dataclass(frozen=True)
@@ -90,16 +92,17 @@ async def body_of(request: Request) -> dict[str, Any]:
             raise RigwatchError(f"found more than {MOST_BODY} bytes, expected a short request")
     try:
         return msgspec.json.decode(whole or b"{}", type=dict[str, Any])
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise RigwatchError(f"found no JSON: {error}") from None
 
 
 def number_of(request: Request, name: str) -> float | None:
-    """A numeric query parameter, None if missing or invalid."""
+    """A numeric query parameter, None if missing, invalid or beyond what counts exactly."""
     try:
-        return float(request.query_params[name])
+        found = float(request.query_params[name])
     except (KeyError, ValueError):
         return None
+    return found if abs(found) <= LARGEST_NUMBER else None
 
 
 def refused(text: str, status: int) -> Response:

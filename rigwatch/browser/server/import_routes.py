@@ -201,7 +201,7 @@ async def make(request: Request) -> Response:
     places, wanted = context_of(request).places, await body_of(request)
     folder = places.new(str(wanted.get("name", "")))
     spans = []
-    for part in wanted.get("spans", []):
+    for part in _spans(wanted.get("spans", [])):
         path = places.inside(str(part.get("session", "")))
         if not path.is_file():
             raise PlaceError(f"{part.get('session')}: no such recording")
@@ -215,6 +215,13 @@ async def make(request: Request) -> Response:
             raise PlaceError(f"{begin}: no such model")
     study = await run_in_threadpool(make_study, folder, begin, spans, own)
     return answer({"study": places.relative(study.folder)})
+
+
+def _spans(given: object) -> list[dict[str, Any]]:
+    """The spans of a request, each an object."""
+    if not isinstance(given, list) or not all(isinstance(part, dict) for part in given):
+        raise RigwatchError("spans: expected a list of objects with session, use, start and end")
+    return given
 
 
 def _seconds(part: dict[str, Any], name: str) -> float | None:

@@ -35,6 +35,7 @@ class Places:
         """
         try:
             found = (self.root / name).resolve()
+            found.exists()  # a name can be too long, or not be one in the file system's encoding
         except (ValueError, OSError):
             raise PlaceError(f"{name!r}: not a valid file name") from None
         if not found.is_relative_to(self.root):

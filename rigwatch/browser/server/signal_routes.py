@@ -20,6 +20,7 @@ from rigwatch.wire.arrays import FloatArray
 
 WIDEST = 4000
 CHARTS = {"signals": ("measured", "modelled"), "residual": ("residual",)}
+LONGEST_KEY = 128
 MOST_SPANS = 400
 """Largest number of spans drawn for a selected region."""
 
@@ -28,8 +29,8 @@ def _results(request: Request) -> Results:
     """The results named in a request by the page's key."""
     folder = context_of(request).places.study(request.path_params["name"])
     key = request.query_params.get("key", "")
-    if not key.isalnum():
-        raise PlaceError(f"{key!r}: no key of results")
+    if not key.isalnum() or len(key) > LONGEST_KEY:
+        raise PlaceError(f"{key[:LONGEST_KEY]!r}: no key of results")
     return Results(folder / RESULTS / key)
 
 

@@ -1,8 +1,7 @@
 """Malformed input for an hour: every target refuses it by one of its own errors, and in time.
 
-Input is mutated from valid examples: bits, bytes, spans cut, doubled or moved, numbers and brackets
-put in. A crash is any exception that is not a `RigwatchError`; a hang is above two seconds of the
-processor's time.
+Input is mutated from valid examples (`mutations.py`). A crash is any exception that is not a
+`RigwatchError`; a hang is above two seconds of the processor's time.
 """
 
 import os
@@ -16,6 +15,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import sympy
 
+from benchmarks.malformed.mutations import mutated
+from benchmarks.malformed.tables import import_readers
 from rigwatch.physics.engine.equations.expression import parse as parse_expression
 from rigwatch.wire.device.frame import Frame, FrameDecoder
 from rigwatch.wire.device.frame import encode as encode_frame
@@ -27,10 +28,6 @@ from rigwatch.wire.typed_files import find_config, parse
 from tools.benchmark_table import Row
 
 LONGEST_S = 2.0
-TOKENS = (
-    b"9" * 400, b"[" * 60, b"(" * 60, b"\x00", b"\xff\xff\xff\xff", b"nan", b"1e999", b"-", b"**",
-    b"\n", b'"', b"=", b"\xc3", b"{", b"0x", b"'''",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,8 @@ def run(quick: bool) -> list[Row]:
     """Ten seconds for each target, or an hour in all."""
     minutes = float(os.environ.get("RIGWATCH_FUZZ_MINUTES", "60"))
     with TemporaryDirectory() as folder:
-        targets = _targets(Path(folder))
+        only = os.environ.get("RIGWATCH_FUZZ_ONLY", "")
+        targets = {k: v for k, v in _targets(Path(folder)).items() if only in k}
         seconds = 10.0 if quick else 60.0 * minutes / len(targets)
         return [_row(name, target, seconds) for name, target in targets.items()]
 
@@ -75,33 +73,13 @@ def _row(name: str, target: Target, seconds: float) -> Row:
     )
 
 
-def mutated(chance: random.Random, examples: tuple[bytes, ...]) -> bytes:
-    """An example with one to eight mutations."""
-    data = bytearray(chance.choice(examples))
-    for _ in range(chance.randint(1, 8)):
-        at, kind = chance.randrange(len(data) + 1), chance.randrange(6)
-        end = min(len(data), at + chance.randint(1, 64))
-        if kind == 0 and at < len(data):
-            data[at] ^= 1 << chance.randrange(8)
-        elif kind == 1:
-            del data[at:end]
-        elif kind == 2:
-            data[at:at] = data[at:end] * chance.randint(1, 20)
-        elif kind == 3:
-            data[at:at] = chance.choice(TOKENS)
-        elif kind == 4:
-            data[at:at] = chance.choice(examples)[: chance.randint(1, 200)]
-        else:
-            data[at:end] = chance.randbytes(end - at)
-    return bytes(data)
-
-
 def _targets(folder: Path) -> dict[str, Target]:
     session = folder / "fuzzed.mcap"
     return {
         "frames of a device": Target(lambda d: FrameDecoder().feed(d), _frames()),
         "messages of the bus": Target(_decode_all, _messages()),
         "sessions": Target(lambda d: _read_session(session, d), (_session(folder),)),
+        **{name: Target(*one) for name, one in import_readers(folder).items()},
         "configuration": Target(
             lambda d: parse(d.decode(errors="replace"), RigConfig, "fuzzed.toml"),
             (find_config("demo.toml").read_bytes(),),

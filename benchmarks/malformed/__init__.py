@@ -1,0 +1,1 @@
+"""Malformed input: files, messages and requests."""
