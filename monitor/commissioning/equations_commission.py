@@ -227,11 +227,12 @@ def _model(  # noqa: PLR0917 -- all that was found
             levels(o.rows[:, list(layout.motions)], o.judged[:, PREDICTED], remainder),
             drive_energy(o.rows, seen, layout.motions),
             o.state,
+            motion,
         )
-        for o in parts
+        for o, motion in zip(parts, motions, strict=True)
     ]
     skip = round(SKIPPED * rate)
-    limits = healthy_limits(healthy, slow, skip)
+    limits = healthy_limits(healthy, slow, skip, rate)
     return RigModel(
         sample_rate=rate,
         channels=layout.channels,

@@ -10,6 +10,7 @@ from monitor.model import HealthyLimits
 from monitor.observer import (
     DEVIATIONS,
     DISAGREE,
+    LASTING,
     MEASURED,
     MEDIUM,
     OUTPUTS,
@@ -17,8 +18,10 @@ from monitor.observer import (
     SPREAD,
     DecisionRules,
     E,
+    Spectrum,
     decide,
     new_state,
+    steady_motion,
 )
 from monitor.signals import Codes
 from rigwatch.wire.arrays import FloatArray
@@ -30,13 +33,17 @@ LOW, HIGH = 5.0, 90.0
 
 @dataclass(frozen=True, eq=False)
 class HealthyPart:
-    """A healthy recording: judged columns, speed, levels of the motion, drive, and states."""
+    """A healthy recording: judged columns, speed, levels of the motion, drive, states, spectrum.
+
+    The spectrum begins after the start, during which it is transient.
+    """
 
     judged: FloatArray
     speed: FloatArray
     levels: FloatArray
     drive: FloatArray
     state: Codes
+    motion: Spectrum
 
     def energies(self, column: int, skip: int) -> FloatArray:
         """Mean squares of a judged column over medium windows."""
@@ -47,13 +54,16 @@ class HealthyPart:
         return np.column_stack([_means(level[skip:], MEDIUM) for level in self.levels.T])
 
 
-def healthy_limits(parts: Sequence[HealthyPart], speed_noise: float, skip: int) -> HealthyLimits:
+def healthy_limits(
+    parts: Sequence[HealthyPart], speed_noise: float, skip: int, rate: float
+) -> HealthyLimits:
     """Limits from healthy recordings.
 
     Args:
         parts: the recordings.
         speed_noise: speed that cannot be distinguished from rest.
         skip: number of samples skipped at the start of each.
+        rate: sample rate [Hz].
     """
     errors = [part.energies(E, skip) for part in parts]
     noise, growth = variance(errors, [part.grown(skip) for part in parts])
@@ -65,19 +75,30 @@ def healthy_limits(parts: Sequence[HealthyPart], speed_noise: float, skip: int) 
         for gap, size in zip(gaps, sizes, strict=True)
     )
     rules = DecisionRules(
-        noise, growth, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, speed_noise, NEVER, 1
+        noise, growth, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, speed_noise, NEVER, 1, 1.0
     )  # fmt: skip
     short = medium = friction = 0.0
+    lasting = []
     for part in parts:
         out = _tried(part, rules)
         allowed = out[SPREAD] ** 2
         short = max(short, _largest(part.judged[:, E], SHORT, allowed, skip))
         medium = max(medium, _largest(part.judged[:, E], MEDIUM, allowed, skip))
         friction = max(friction, float(np.abs(out[DEVIATIONS][skip:]).max()))
+        relative = part.judged[skip:, E] ** 2 / allowed[skip:]
+        lasting.append(float(_means(relative, min(LASTING, relative.size)).max()))
+    motions = [
+        steady_motion(p.motion, energy, rate) for p, energy in zip(parts, lasting, strict=True)
+    ]
+    steady = [motion for motion in motions if motion is not None]
     return HealthyLimits(
         noise=noise, growth=tuple(growth.tolist()), short=short, medium=medium, friction=friction,
         sensor_noise=sensor_noise, sensor_growth=sensor_growth, sensor=sensor,
         speed_noise=speed_noise,
+        steady_paces=tuple(motion.pace for motion in steady),
+        steady_sizes=tuple(motion.size for motion in steady),
+        steady_narrow=tuple(motion.narrow for motion in steady),
+        steady_energies=tuple(motion.energy for motion in steady),
     )  # fmt: skip
 
 
@@ -126,10 +147,11 @@ def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
     out = np.zeros((len(OUTPUTS), len(part.state)))
     inside, jumped = np.ones((2, len(part.state)), np.bool_)
     jumped[:] = False
+    usual = np.full(len(part.state), np.inf)
     kept = new_state(part.levels.shape[1])
     decide(
-        part.judged, part.speed, part.levels, part.drive, inside, jumped, part.state, rules,
-        kept, out,
+        part.judged, part.speed, part.levels, part.drive, inside, jumped, usual, part.state,
+        rules, kept, out,
     )  # fmt: skip
     out[SPREAD] = np.maximum(out[SPREAD], rules.noise)
     return out

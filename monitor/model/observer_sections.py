@@ -92,6 +92,14 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
     speed_noise: Annotated[
         float, Meta(gt=0, description="speed that cannot be distinguished from rest")
     ]
+    steady_paces: Annotated[
+        Floats, Meta(description="mean frequency of each steady healthy motion [Hz]")
+    ] = ()
+    steady_sizes: Annotated[Floats, Meta(description="size of each, as in the range")] = ()
+    steady_narrow: Annotated[Floats, Meta(description="narrowness of each")] = ()
+    steady_energies: Annotated[
+        Floats, Meta(description="largest energy over a second of each")
+    ] = ()
 
 
 class SchemeSection(Section, frozen=True, kw_only=True):

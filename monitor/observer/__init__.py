@@ -14,6 +14,7 @@ from monitor.observer import decision_state
 from monitor.observer.channel_jumps import ChannelJumps, bends_of
 from monitor.observer.decision_state import (
     DEVIATIONS,
+    LASTING,
     MEDIUM,
     OUTPUTS,
     SHORT,
@@ -52,12 +53,14 @@ from monitor.observer.prediction import (
 from monitor.observer.range_seen import RangeSeen, drive_energy, range_of, range_signals
 from monitor.observer.remainder import fit_remainder, no_remainder
 from monitor.observer.spectral_width import SpectralWidth, Spectrum
+from monitor.observer.usual_error import UsualError, steady_motion
 
 __all__ = [
     "DEVIATIONS",
     "DISAGREE",
     "DRY_UNIT",
     "EMPTY",
+    "LASTING",
     "MEASURED",
     "MEDIUM",
     "OUTPUTS",
@@ -76,6 +79,7 @@ __all__ = [
     "RangeSeen",
     "SpectralWidth",
     "Spectrum",
+    "UsualError",
     "balanced",
     "base_model",
     "bends_of",
@@ -95,4 +99,5 @@ __all__ = [
     "range_signals",
     "rate_columns",
     "remainder_signals",
+    "steady_motion",
 ]

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from monitor.model import HealthyLimits
 from rigwatch.wire.arrays import FloatArray
 
-SHORT, MEDIUM, LONG = 8, 32, 128
-"""Window lengths [samples]: of jump detection, estimates and naming."""
+SHORT, MEDIUM, LONG, LASTING = 8, 32, 128, 256
+"""Window lengths [samples]: of jump detection, estimates, naming, and small lasting changes."""
 RISING = 2
 """Samples after a reversal during which real friction still changes sign."""
 HISTORY = LONG + RISING
@@ -50,6 +50,7 @@ class Counts(NamedTuple):
     above: int = 10
     since_jump: int = 11
     judging: int = 12
+    lasted: int = 13
 
 
 AT = Counts()
@@ -62,11 +63,13 @@ class DecisionState(NamedTuple):
         rows: the last samples, shape (HISTORY, LEVELS + levels).
         counts: see `Counts`; since_onset is -1 without an episode.
         value: verdict, named force, and energies of the drive recently and before.
+        lasting: the last judged energies, relative to their limit, shape (LASTING,).
     """
 
     rows: FloatArray
     counts: NDArray[np.int64]
     value: FloatArray
+    lasting: FloatArray
 
 
 def new_state(levels: int) -> DecisionState:
@@ -78,7 +81,8 @@ def new_state(levels: int) -> DecisionState:
     count = np.zeros(len(AT), np.int64)
     count[AT.since_onset] = -1
     count[AT.since_jump] = WAKE
-    return DecisionState(np.zeros((HISTORY, LEVELS + levels)), count, np.zeros(4))
+    rows = np.zeros((HISTORY, LEVELS + levels))
+    return DecisionState(rows, count, np.zeros(4), np.zeros(LASTING))
 
 
 class DecisionRules(NamedTuple):
@@ -95,6 +99,7 @@ class DecisionRules(NamedTuple):
     speed_noise: float
     settle: int
     patience: int
+    lasting: float
 
 
 MARGIN = 1.6
@@ -116,6 +121,7 @@ def rules_of(limits: HealthyLimits, rate: float) -> DecisionRules:
         limits.speed_noise,
         round(SETTLE * rate),
         round(PATIENCE * rate),
+        energy,
     )
 
 

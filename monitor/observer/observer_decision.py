@@ -57,6 +57,7 @@ from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
 from monitor.observer.window_statistics import (
     dry_force,
     friction,
+    lasting_energy,
     mean_square,
     rest,
     reversals,
@@ -78,13 +79,17 @@ FITS, DRY_PART = 0.7, 0.5
 """Shares of the missing force, beyond noise, that friction must explain and that its dry part must
 contain; real friction also has presliding and the Stribeck effect, which neither part describes.
 """
+LEFT = 0.4
+"""Share of the force of dry friction alone that must be left beside viscous friction: what grows
+with the speed, as drag and a lost gain of the drive do, leaves none.
+"""
 AT_REST, STUCK = 0.25, 0.5
 """Share of the time at rest above which it is stiction."""
 OVER = 256
 """Samples without a departure after which an episode ends."""
 VIOLATED = 16
 """Consecutive samples in which the sensors must disagree."""
-SURE, LASTING = 2.0, 128
+SURE, REMAINS = 2.0, 128
 """Ratio to the limit above which a deviation is a departure at once, and samples after which a
 smaller one is: transients of a drive change are small or short.
 """
@@ -102,6 +107,7 @@ def decide(  # noqa: PLR0917 -- a kernel
     drive: FloatArray,
     inside: NDArray[np.bool_],
     jumped: NDArray[np.bool_],
+    usual: FloatArray,
     state: Codes,
     rules: DecisionRules,
     kept: DecisionState,
@@ -117,7 +123,7 @@ def decide(  # noqa: PLR0917 -- a kernel
         if state[k] != TAINTED:
             _remember(kept, judged[k], speed[k], levels[k])
         _follow_jumps(jumped[k], kept)
-        _one(k, inside[k], rules, kept, out)
+        _one(k, inside[k], usual[k], rules, kept, out)
 
 
 @njit()
@@ -171,7 +177,14 @@ def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatA
 
 
 @njit()
-def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: FloatArray) -> None:
+def _one(  # noqa: PLR0917 -- a kernel
+    k: int,
+    inside: bool,
+    usual: float,
+    rules: DecisionRules,
+    kept: DecisionState,
+    out: FloatArray,
+) -> None:
     count = kept.counts
     count[SINCE_START] += 1
     count[OUTSIDE] = 0 if not inside else min(count[OUTSIDE] + 1, LONG)
@@ -188,12 +201,13 @@ def _one(k: int, inside: bool, rules: DecisionRules, kept: DecisionState, out: F
     short = mean_square(kept, ERROR, SHORT) / spread**2 / rules.short
     medium = mean_square(kept, ERROR, MEDIUM) / spread**2 / rules.medium
     largest = max(np.sqrt(short), np.sqrt(medium), deviations / rules.friction)
-    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]))
+    lasting = lasting_energy(kept, spread**2 * usual * rules.lasting)
+    out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting))
     away = out[DEVIATION, k] > 1.0
     count[QUIET] = 0 if away else count[QUIET] + 1
     count[ABOVE] = count[ABOVE] + 1 if away else 0
     if count[ONSET] < 0:
-        away = out[DEVIATION, k] > SURE or count[ABOVE] >= LASTING
+        away = out[DEVIATION, k] > SURE or count[ABOVE] >= REMAINS
     away = away or count[JUMP_AGO] == 0
     mode = _mode(kept, rules)
     out[MODE, k] = mode
@@ -275,10 +289,10 @@ def _verdict(
         return OTHER
     since = count[ONSET]
     length = min(since + SHORT, LONG)
-    _, _, _, share, dry = friction(kept, length, spread)
+    beside, _, _, share, dry = friction(kept, length, spread)
     force = dry_force(kept, length)
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
-    fits = share > FITS and dry > DRY_PART and force > 0.0
+    fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > LEFT * force
     turned = reversals(kept, length, rules.speed_noise) > 0
     still = rest(kept, length, rules.speed_noise)
     sticks = since >= LONG // 2 and still > AT_REST and out[DEPARTED, k] > 0.0

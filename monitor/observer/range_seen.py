@@ -43,7 +43,11 @@ class RangeSeen:
         self._sizes = np.array(model.motion_range.sizes)
         self._paces = np.array([*model.motion_range.paces, np.inf])
 
-    def distance(self, seen: Observed) -> FloatArray:
+    def motion(self, seen: Observed) -> Spectrum:
+        """The spectrum of the motion after each sample; once for each block."""
+        return self._width.update(np.ascontiguousarray(seen.rows[:, self._speed]), seen.state)
+
+    def distance(self, seen: Observed, motion: Spectrum) -> FloatArray:
         """Distance from the fitted range, 1 at the limit, shape (n,).
 
         It is the largest of: distance of a signal from the centre, width of the spectrum compared
@@ -51,7 +55,6 @@ class RangeSeen:
         """
         signals = range_signals(seen)
         far = (np.abs(signals - self._middle) / self._half).max(axis=1)
-        motion = self._width.update(np.ascontiguousarray(seen.rows[:, self._speed]), seen.state)
         far = np.maximum(far, (1.0 - motion.narrow) / self._wider)
         known = self._paces[np.searchsorted(self._sizes, motion.size / ALLOWED)]
         far = np.maximum(far, motion.pace / (FASTER * known))

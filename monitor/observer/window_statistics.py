@@ -10,14 +10,17 @@ from monitor.observer.decision_state import (
     DRY,
     ERROR,
     HISTORY,
+    LASTING,
     RISING,
     SPEED,
     WET,
     DecisionState,
 )
 
-HEAD, FILLED = 0, 1
+HEAD, FILLED, WAS_JUDGING, LASTED = 0, 1, 12, 13
 """Indices of `decision_state.Counts` as constants for the kernel."""
+BURST = 3.0
+"""Largest energy of a sample that counts for a lasting change, relative to the limit."""
 RIDGE = 1e-3
 """Correlation of the viscous and the dry regressor above which they cannot be distinguished."""
 
@@ -30,6 +33,24 @@ def mean_square(kept: DecisionState, column: int, length: int) -> float:
     for ago in range(1, n + 1):
         total += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, column] ** 2
     return total / max(n, 1)
+
+
+@njit()
+def lasting_energy(kept: DecisionState, allowed: float) -> float:
+    """Mean square of the residual over `LASTING` judged samples; 0 until there are as many.
+
+    Args:
+        kept: the newest sample is added to it.
+        allowed: the limit of the mean square in the present motion, to which it is relative.
+    """
+    count = kept.counts
+    if count[WAS_JUDGING] == 0:
+        count[LASTED] = 0
+        return 0.0
+    newest = kept.rows[(count[HEAD] - 1) % HISTORY, ERROR]
+    kept.lasting[count[LASTED] % LASTING] = min(newest**2 / allowed, BURST)
+    count[LASTED] += 1
+    return float(np.mean(kept.lasting)) if count[LASTED] >= LASTING else 0.0
 
 
 @njit()

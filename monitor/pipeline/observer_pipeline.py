@@ -21,6 +21,7 @@ from monitor.observer import (
     Observed,
     ObserverSignals,
     RangeSeen,
+    UsualError,
     base_model,
     decide,
     drive_energy,
@@ -74,6 +75,7 @@ class ObserverMonitor:
     def _follow(self, model: RigModel) -> None:
         assert model.healthy is not None
         self.model = model
+        self._usual = UsualError(model.healthy, model.sample_rate)
         self.rules = d.rules_of(model.healthy, model.sample_rate)
         self._clipping = Clipping(model)
 
@@ -83,7 +85,8 @@ class ObserverMonitor:
         if admitted is None:
             return None
         seen = self._signals.update(admitted.signals, admitted.code)
-        far = self._range.distance(seen)
+        motion = self._range.motion(seen)
+        far = self._range.distance(seen, motion)
         jumped = self._jumps.update(admitted.signals, admitted.code)
         out = np.zeros((len(d.OUTPUTS), len(far)))
         layout, remainder = self._signals.layout, self.model.remainder
@@ -95,8 +98,8 @@ class ObserverMonitor:
         assert known is not None
         drive = drive_energy(seen.rows, known, layout.motions)
         decide(
-            seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)), seen.state,
-            self.rules, self._state, out,
+            seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)),
+            self._usual.update(motion), seen.state, self.rules, self._state, out,
         )  # fmt: skip
         conditions = self._conditions(admitted, seen, far, out)
         sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))

@@ -11,6 +11,7 @@ from monitor.pipeline.observer_pipeline import ObserverMonitor
 from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.signals.recordings import recording_of
 from rigwatch.wire.errors import ConfigError, ModelError
+from sim_plant.scenario import Event
 from tests.monitor.observed_rig import (
     FAULTS,
     FREE,
@@ -148,3 +149,15 @@ def test_motion_is_late_by_half_the_kernel() -> None:
     assert np.allclose(columns[8:, 0], 0.01 * t[4:-4] ** 3, atol=1e-12)
     assert np.allclose(columns[8:, 1], 0.03 * t[4:-4] ** 2, atol=1e-9)
     assert np.array_equal(columns[8:, 2], t[4:-4])
+
+
+@pytest.mark.parametrize("effect", [("actuator_gain", 0.95), ("actuator_gain", 0.9)])
+def test_a_lost_gain_of_the_drive_is_not_called_friction(effect: tuple[str, float]) -> None:
+    """At the resonance it is in phase with the speed, as friction is."""
+    name, value = effect
+    lost = (Event(at_s=6.0, effect=name, value=value),)
+
+    names = raised(watched(run(SINE, 10.0, lost, seed=31))).keys()
+
+    assert "other_fault" in names
+    assert not names & {"dry_friction", "stiction"}

@@ -1,12 +1,20 @@
-"""How broad a motion's spectrum is: tones, noise, rest, any cut of the samples."""
+"""How broad a motion's spectrum is; the healthy residual at motions known by it."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from msgspec import structs
 
+from monitor.model import HealthyLimits, RigModel
+from monitor.observer import SpectralWidth, Spectrum, UsualError, steady_motion
 from monitor.observer.lagged_motion import FIRST, WHOLE
-from monitor.observer.spectral_width import SpectralWidth
+from monitor.pipeline.rig_monitor import RigMonitor
+from sim_plant.excitation import Sine
+from sim_plant.scenario import Event
+from tests.monitor.observed_rig import FAULTS, FREE, RATE, SINE, block, model, raised, run, watched
 
-RATE, SLOW = 256.0, 0.003
+SLOW = 0.003
 
 
 def states(n: int) -> np.ndarray:
@@ -25,7 +33,7 @@ def noise(n: int) -> np.ndarray:
 
 
 def settled(speed: np.ndarray) -> np.ndarray:
-    return SpectralWidth(SLOW, RATE).update(speed, states(speed.size)).narrow[512:]
+    return np.asarray(SpectralWidth(SLOW, RATE).update(speed, states(speed.size)).narrow[512:])
 
 
 @pytest.mark.parametrize("frequency", [4.0, 8.0, 16.0])
@@ -55,7 +63,7 @@ def test_pace_of_a_tone_is_its_frequency(frequency: float) -> None:
     assert found.size[1024:] == pytest.approx(0.2 * 2.0 * np.pi * frequency / 2**0.5, rel=0.1)
 
 
-def test_any_cut_gives_the_same() -> None:
+def test_any_cut_gives_the_same_spectrum() -> None:
     speed, code = noise(1000), states(1000)
     whole = SpectralWidth(SLOW, RATE).update(speed, code)
     cut = SpectralWidth(SLOW, RATE)
@@ -65,3 +73,103 @@ def test_any_cut_gives_the_same() -> None:
     for name in whole._fields:
         pieces = [getattr(part, name) for part in parts]
         assert np.array_equal(np.concatenate(pieces), getattr(whole, name)), name
+
+
+KNOWN = 1.5
+SETTLED = 1024
+
+
+def spectrum(frequency: np.ndarray | float, size: float = 0.2, n: int = 3072) -> Spectrum:
+    """Spectrum of a tone; its frequency may change."""
+    phase = 2.0 * np.pi * np.cumsum(np.broadcast_to(frequency, n)) / RATE
+    return SpectralWidth(SLOW, RATE).update(size * np.sin(phase), states(n))
+
+
+def limits() -> HealthyLimits:
+    """With one steady motion, a tone of 8 Hz."""
+    after = Spectrum(*(figure[512:] for figure in spectrum(8.0)))
+    known = steady_motion(after, KNOWN, RATE)
+    assert known is not None
+    return HealthyLimits(
+        noise=1.0, growth=(0.0,), short=1.0, medium=1.0, friction=1.0, sensor_noise=1.0,
+        sensor_growth=0.0, sensor=1.0, speed_noise=SLOW,
+        steady_paces=(known.pace,), steady_sizes=(known.size,), steady_narrow=(known.narrow,),
+        steady_energies=(known.energy,),
+    )  # fmt: skip
+
+
+def usual(seen: Spectrum) -> np.ndarray:
+    return UsualError(limits(), RATE).update(seen)
+
+
+@pytest.mark.parametrize("frequency", [8.0, 8.1])
+def test_a_known_motion_has_its_own_limit(frequency: float) -> None:
+    assert np.all(usual(spectrum(frequency))[SETTLED:] == KNOWN)
+
+
+@pytest.mark.parametrize(("frequency", "size"), [(9.0, 0.2), (7.0, 0.2), (8.0, 0.3), (8.0, 0.1)])
+def test_another_motion_has_none(frequency: float, size: float) -> None:
+    assert np.isinf(usual(spectrum(frequency, size))[SETTLED:]).all()
+
+
+def test_a_motion_that_changes_has_none() -> None:
+    change = 1536
+    found = usual(spectrum(np.where(np.arange(3072) < change, 8.0, 11.0)))
+
+    assert np.all(found[SETTLED:change] == KNOWN)
+    assert np.isinf(found[change + 64 :]).all()
+
+
+def test_a_sweep_is_no_steady_motion() -> None:
+    assert steady_motion(spectrum(np.linspace(2.0, 14.0, 3072)), KNOWN, RATE) is None
+
+
+def test_any_cut_gives_the_same_limit() -> None:
+    seen = spectrum(np.where(np.arange(3072) < 1536, 8.0, 11.0))
+    cut, whole = UsualError(limits(), RATE), usual(seen)
+
+    parts = [
+        cut.update(Spectrum(*(figure[a:b] for figure in seen)))
+        for a, b in pairwise((0, 1, 9, 1500, 1540, 3072))
+    ]
+
+    assert np.array_equal(np.concatenate(parts), whole)
+
+
+def without_lasting() -> RigModel:
+    """The commissioned model as a file of an earlier version gives it."""
+    healthy = model().healthy
+    assert healthy is not None
+    bare = structs.replace(
+        healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_energies=()
+    )  # fmt: skip
+    return structs.replace(model(), healthy=bare)
+
+
+@pytest.mark.long
+def test_a_small_lasting_fault_is_noticed_at_a_known_motion() -> None:
+    drop = run(SINE, 12.0, (Event(at_s=6.0, effect="supply_drop", value=0.008),), seed=31)
+
+    assert not FAULTS & raised(watched(drop, without_lasting())).keys()
+    times = raised(watched(drop))
+    assert 6.0 <= times["departure"] < 9.0
+    assert not times.keys() & {"dry_friction", "stiction"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("drive", [SINE, FREE], ids=["locked", "free"])
+def test_a_healthy_rig_stays_quiet(drive: Sine) -> None:
+    assert not FAULTS & raised(watched(run(drive, 20.0, seed=33))).keys()
+
+
+@pytest.mark.long
+def test_block_sizes_change_no_bit_of_a_small_fault() -> None:
+    drop = run(SINE, 9.0, (Event(at_s=5.0, effect="supply_drop", value=0.008),), seed=31)
+    whole = watched(drop).estimates.column("deviation").values
+    monitor, parts = RigMonitor(model()), []
+    for a, b in pairwise((0, 7, 600, 1501, len(drop["voltage"]))):
+        found = monitor.update(block(drop, a, b))
+        if found is not None:
+            parts.append(found.estimates.column("deviation").values)
+
+    assert np.array_equal(np.concatenate(parts), whole)
