@@ -27,6 +27,7 @@ from rigwatch.physics.engine.equations import Placement, compose
 from rigwatch.physics.engine.fit import Fit, evaluate
 from rigwatch.physics.engine.score import Candidate
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.regimes import REGIMES, WITHIN, variances_between_regimes
 from rigwatch.workbench.data import Data, repeat_along_motion
 from rigwatch.workbench.fit import Fitted, block_numbers, covariance, with_kept_free
@@ -85,8 +86,12 @@ def _between_regimes(data: Data, bare: Fitted | None, fitted: Fitted) -> FloatAr
     healthy = data.of_healthy
     if bare is None or healthy is None:
         return WITHIN * found
-    steps = fitted.horizon, fitted.substeps, bare.train.initial
-    along = evaluate(fitted.train, healthy.train, *steps)
+    steps = bare.horizon, fitted.substeps, bare.train.initial
+    try:
+        along = evaluate(fitted.train, healthy.train, *steps)
+    except ModelError:
+        # The effect makes the healthy motion diverge, so nothing there can be like it.
+        return WITHIN * found
     mimicked = _regimes_of(dataclasses.replace(along, error=bare.train.error), healthy)
     shared = np.minimum(found, mimicked)
     return np.asarray(WITHIN * (found - shared) + shared / REGIMES)
