@@ -5,7 +5,7 @@ import pytest
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.compile.step_size import pace
+from rigwatch.physics.engine.compile.step_size import FINEST, constant_rates, pace, steps_for
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
@@ -79,3 +79,43 @@ def test_the_last_states_are_those_of_the_last_sample():
 
 def replace_effect(placement, parameters):
     return Placement(placement.name, replace(placement.effect, parameters=parameters), "load")
+
+
+INTERVAL = 1 / 200
+EDGE = 2.785293563
+"""Rate times step at which a Runge-Kutta step of fourth order neither grows nor decays."""
+
+
+def motor():
+    return compile_system(compose(shipped_models()["motor"]))
+
+
+def discharged(inductance, substeps):
+    """Speed without voltage, from one ampere."""
+    compiled = motor()
+    return compiled.simulate(
+        np.zeros((40, 1)), INTERVAL, np.zeros(1, np.int64), 40, initial=np.array([[0.0, 1.0]]),
+        parameters=compiled.vector({"L": inductance, "J": 1e-3, "K": 0.1, "R": 1.0, "b": 1e-4}),
+        substeps=substeps,
+    ).outputs[0, :, 0]  # fmt: skip
+
+
+@pytest.mark.parametrize("substeps", [1, 2, 4])
+def test_the_current_decays_where_as_many_steps_as_asked_for_would_keep_it(substeps):
+    edge = INTERVAL / substeps / EDGE
+    assert discharged(edge, substeps) == pytest.approx(
+        discharged(edge, 64), abs=1e-3 * discharged(edge, 64).max()
+    )
+
+
+def test_a_slow_model_takes_the_steps_asked_for():
+    system = motor().system
+    names = list(system.parameters)
+    at = motor().vector({"L": 0.05, "R": 1.0})
+    assert steps_for(system, constant_rates(system), at, INTERVAL) == 1
+    at[names.index("L")] = 1e-9
+    assert steps_for(system, constant_rates(system), at, INTERVAL) == FINEST
+
+
+def test_rates_that_depend_on_the_motion_are_left_to_the_steps_asked_for():
+    assert constant_rates(compose(shipped_models()["tanks"])) == ()

@@ -3,8 +3,11 @@
 Over a horizon much shorter than its time constants a model stays near each window's initial state,
 and missing physics does not show. Over a long horizon errors accumulate and few windows remain for
 statistics. The horizon therefore spans the slowest mode of the model that a recording shows: three
-time constants, or two periods if it oscillates. To find the modes, the model is fitted once over a
-horizon derived from the outputs.
+time constants, and at least two periods if it oscillates. An oscillation's time constant is that of
+its decay: as long as the initial state rings on, it stands in for what is missing near the
+resonance, and only what shifts the mean is left. A light damper rings for hundreds of periods, over
+which the smallest error of the frequency adds up; a dozen are enough. To find the modes, the model
+is fitted once over a horizon derived from the outputs.
 """
 
 from dataclasses import replace
@@ -14,7 +17,7 @@ from msgspec import structs
 
 from rigwatch.physics.engine.fit import Recording, filled
 from rigwatch.physics.engine.score import autocorrelation, first_below
-from rigwatch.wire.arrays import ComplexArray, FloatArray
+from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import predicts_along_motion, prepare, quiet_scale
 from rigwatch.workbench.fit import Fitted, eigenvalues, fit_base, with_hold
@@ -23,7 +26,9 @@ from rigwatch.workbench.study import Study
 SPANS = 3.0
 """Horizon over the slowest time constant."""
 PERIODS = 2.0
-"""Periods in a horizon if the slowest motion oscillates."""
+"""Smallest number of periods in a horizon if the slowest motion oscillates."""
+MOST_PERIODS = 12.0
+"""The same at most."""
 WINDOWS = 10
 """Minimum number of windows in the shortest recording."""
 FEWEST = 20
@@ -91,16 +96,27 @@ def _slowest(found: ComplexArray, longest: float) -> tuple[float, str] | None:
     resolved = rate[np.abs(rate) * longest > 1]
     if not len(resolved):
         return None
-    oscillating = np.abs(resolved.imag) > np.abs(resolved.real)
-    horizons = np.where(
-        oscillating, 2 * np.pi * PERIODS / np.abs(resolved), SPANS / np.abs(resolved)
-    )
+    horizons = _spans(resolved)
     # Modes of all windows: the slowest that is not an outlier.
     slowest = float(np.quantile(horizons, 1 - 0.5 / found.shape[1]))
-    at = int(np.argmin(np.abs(horizons - slowest)))
-    if oscillating[at]:
-        return slowest, f"the model's period of {slowest / PERIODS:.2g} s"
+    at = resolved[np.argmin(np.abs(horizons - slowest))]
+    if _oscillates(at):
+        period, decay = 2 * np.pi / abs(at), 1 / abs(at.real)
+        return slowest, f"the model's period of {period:.2g} s that decays in {decay:.2g} s"
     return slowest, f"the model's time constant of {slowest / SPANS:.2g} s"
+
+
+def _oscillates(rate: ComplexArray) -> BoolArray:
+    """Whether modes swing more than they decay."""
+    return np.asarray(np.abs(rate.imag) > np.abs(rate.real))
+
+
+def _spans(rate: ComplexArray) -> FloatArray:
+    """Horizon for each mode [s]."""
+    constant = SPANS / np.maximum(np.abs(rate.real), 1e-300)
+    period = 2 * np.pi / np.abs(rate)
+    ringing = np.clip(constant, PERIODS * period, MOST_PERIODS * period)
+    return np.asarray(np.where(_oscillates(rate), ringing, SPANS / np.abs(rate)))
 
 
 def _from_correlation(recording: Recording) -> float:

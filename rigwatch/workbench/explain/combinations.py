@@ -8,7 +8,7 @@ window by window, they are a free constant each, and such a set leaves no place 
 The search ends when a set reduces the residual to noise.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from rigwatch.physics.engine.fit import Fit
@@ -117,7 +117,7 @@ def combinations(
             return found
     best = min(found, key=lambda each: each.search_error, default=None)
     if best is not None and len(best.rows) > 1:
-        found += _exchanged(bench, best)
+        found += _improved(bench, best)
     return found
 
 
@@ -155,27 +155,60 @@ def _similar(one: Combination, other: Combination) -> bool:
     return a.port == b.port and (b.label in a.alike or a.label in b.alike)
 
 
-def _exchanged(bench: Bench, best: Combination) -> list[Combination]:
-    """A set with one of its effects exchanged for one that looks alike at the same port.
+def _improved(bench: Bench, best: Combination) -> list[Combination]:
+    """Sets made from the best by exchanging its effects one at a time, as long as that helps.
 
-    The search extends the better of two that look alike, such as a lag and a digital filter; with
-    the other effects in the model the other one may be better.
+    The search extends the better of two that look alike, such as a lag and a delay, or an offset
+    of a sensor and a constant force. With the others in the model the other one may be better, and
+    only when one is right does it show in its turn which of the next two is.
     """
-    found = []
+    found: list[Combination] = []
+    for _ in range(MAX_EFFECTS):
+        tried = {each.labels for each in found}
+        found += _exchanged(bench, best, tried)
+        better = min(found, key=lambda each: each.search_error, default=best)
+        if not _lowers(better, best.search_error) or reaches_noise(bench, better.fitted):
+            break
+        best = better
+    return found
+
+
+def _exchanged(
+    bench: Bench, best: Combination, tried: Collection[frozenset[str]]
+) -> Iterator[Combination]:
+    """Each set with one of its effects exchanged for one that resembles it, at any port.
+
+    Args:
+        bench: the study.
+        best: the set.
+        tried: labels of sets that were fitted already.
+    """
     for row in best.rows:
-        if not any(label.endswith(f"@{row.port}") for label in row.alike):
-            continue
         rest = without(bench, best, row)
         if rest is None:
             continue
         study = with_rows(bench.study, rest.rows)
         every = scored(study, bench.data, rest.fitted, candidates(study, bench.data.train))
-        alike = [r for r in every if r.port == row.port and r.label in row.alike]
-        for other in alike[:BRANCHES]:
+        for other in _substitutes(row, every):
+            if rest.labels | {other.label} in tried:
+                continue
             _fit_with(bench, rest.rows, rest.fitted, other)
             if other.fitted is not None:
-                found.append(_combination(bench, (*rest.rows, other)))
-    return found
+                yield _combination(bench, (*rest.rows, other))
+
+
+def _substitutes(row: Ranked, every: Sequence[Ranked]) -> list[Ranked]:
+    """The best that look alike or belong to the family, at the same port and at others."""
+    family = row.placement.effect.family
+
+    def resembles(each: Ranked) -> bool:
+        kin = bool(family) and each.placement.effect.family == family
+        return each.label != row.label and (kin or each.label in row.alike)
+
+    alike = [each for each in every if resembles(each)]
+    here = [each for each in alike if each.port == row.port]
+    elsewhere = [each for each in alike if each.port != row.port]
+    return [*here[:BRANCHES], *elsewhere[:BRANCHES]]
 
 
 def _extended(

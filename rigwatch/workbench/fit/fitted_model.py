@@ -24,6 +24,7 @@ from rigwatch.physics.engine.search import (
     ShortHorizons,
     WholeRuns,
     convergence,
+    kept_promise,
     multi_start_fit,
 )
 from rigwatch.wire.arrays import ComplexArray, FloatArray
@@ -76,7 +77,7 @@ def fit_base(
     placements, start = placements_of(study, data.train), parameters_of(study.file)
     try:
         if not multi_start and study.file.effects and study.file.effects[-1].model:
-            return _kept(fit_model(study, data, placements, start, scale))
+            return _kept(fit_model(study, data, placements, start, scale), data)
         return fit_with_retry(study, data, placements, start, scale, multi_start=True)
     except ModelError:
         if not placements:
@@ -88,11 +89,13 @@ def fit_base(
     return found
 
 
-def _kept(found: Fitted) -> Fitted:
+def _kept(found: Fitted, data: Data) -> Fitted:
     """A fit started from the accepted one, with its convergence."""
-    return replace(
-        found, convergence=convergence(found.train, [], "the accepted fit", near_noise=False)
-    )
+    gradient = None
+    if not data.along_motion:
+        gradient = kept_promise(found.train, data.train, found.horizon, found.substeps)
+    ended = convergence(found.train, [], "the accepted fit", near_noise=False, gradient=gradient)
+    return replace(found, convergence=ended)
 
 
 def fit_with_retry(

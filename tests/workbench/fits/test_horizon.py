@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rigwatch.workbench.compare.compare import compare
+from rigwatch.workbench.compare.horizon import with_horizon
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.steps.change import add, undo
 from rigwatch.workbench.study.study import Study, open_study
@@ -52,3 +53,49 @@ def test_it_stays_with_the_first_effect_and_goes_with_it(tmp_path: Path) -> None
 def test_what_is_given_is_taken(tmp_path: Path) -> None:
     found = compare(studied_with(tmp_path, "horizon = 0.5"))
     assert not any("horizon" in remark for remark in found.remarks)
+
+
+LIGHT = """
+name = "lightly damped"
+summary = "A mass on a spring that rings for many periods."
+inputs.u = { unit = "m/s^2", hold = "zero" }
+states.x = { unit = "m", derivative = "v", measured = "x" }
+states.v = { unit = "m/s", derivative = "u - c*v - k*x + load", rate_of = "x" }
+parameters.c = { value = 0.7, unit = "1/s" }
+parameters.k = { value = 900.0, unit = "1/s^2" }
+outputs.x = { unit = "m", expression = "x" }
+[ports.load]
+kind = "force"
+unit = "m/s^2"
+variables.x = { expression = "x", unit = "m" }
+"""
+
+
+def ringing(seed: int, damping: float, samples: int = 4000) -> dict[str, np.ndarray]:
+    """An oscillator of 30 rad/s, driven by noise and read a hundred times a second."""
+    generator = np.random.default_rng(seed)
+    u, x, v = generator.normal(size=samples), np.zeros(samples), 0.0
+    for i in range(1, samples):
+        x[i] = x[i - 1]
+        for _ in range(20):
+            v += 0.0005 * (u[i - 1] - damping * v - 900 * x[i])
+            x[i] += 0.0005 * v
+    return {"u": u, "x": x}
+
+
+@pytest.mark.parametrize(
+    ("damping", "periods"),
+    [
+        pytest.param(20.0, 2.0, id="two periods, if the oscillation decays sooner"),
+        pytest.param(3.0, 9.5, id="three time constants of the decay"),
+        pytest.param(0.6, 12.0, id="a dozen periods, if it rings for longer"),
+    ],
+)
+def test_an_oscillation_is_followed_until_it_has_decayed(
+    tmp_path: Path, damping: float, periods: float
+) -> None:
+    tables = [ringing(seed, damping) for seed in (0, 1)]
+    study = studied(tmp_path, LIGHT, tables[:1], tables[1:], {"u": "m/s^2", "x": "m"})
+    chosen = with_horizon(study)
+    assert chosen.file.horizon == pytest.approx(periods * 2 * np.pi / 30, rel=0.06)
+    assert "that decays in" in chosen.horizon_from

@@ -2,13 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import sympy
 
 from rigwatch.physics.engine.compile.kernel import native_kernel
 from rigwatch.physics.engine.compile.static_kernel import StaticKernel
-from rigwatch.physics.engine.compile.step_size import FINEST
+from rigwatch.physics.engine.compile.step_size import FINEST, constant_rates, steps_for
 from rigwatch.physics.engine.equations import System
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ModelError
@@ -91,7 +93,7 @@ class CompiledSystem:
             initial: shape (windows, states).
             parameters: all of them, shape (n_p,).
             substeps: Runge-Kutta steps between samples.
-            finest: most steps between samples for stiff effects, see `step_size.pace`.
+            finest: most steps between samples for stiff effects or models, see `step_size`.
             rows: number of input rows per change of a held input, for inputs at finer nodes.
 
         Raises:
@@ -99,10 +101,16 @@ class CompiledSystem:
         """
         outputs = np.empty((len(starts), length, len(self.system.outputs)))
         slopes = np.empty((*outputs.shape, self.columns))
-        arguments = self._arguments(inputs, dt, starts, length, initial, parameters, substeps)
+        needed = min(finest, steps_for(self.system, self._rates, parameters, dt))
+        steps = max(substeps, needed)
+        arguments = self._arguments(inputs, dt, starts, length, initial, parameters, steps)
         last = np.empty((len(starts), len(self.system.states)))
         self.kernel.simulate(*arguments, outputs, slopes, last, rows, finest)
         return Simulation(outputs, slopes, last)
+
+    @cached_property
+    def _rates(self) -> tuple[sympy.Expr, ...]:
+        return constant_rates(self.system)
 
     @property
     def hold(self) -> FloatArray:

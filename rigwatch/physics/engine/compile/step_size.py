@@ -7,15 +7,23 @@ divided into as many steps as it needs:
 
     steps per second = max(|∂(dz/dt)/∂z| / 1.0 of effect states,
                            |∂(effect's share of dx/dt)/∂x| / 0.1 of states that cross zero)
+
+A model's own constant rates, such as R/L of a winding, ask for the same. Where a step is just
+stable a mode that should decay at once does not decay at all, so that its initial state becomes a
+free constant of each window, and a fit finds that instead of the parameters.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import sympy
 
 from rigwatch.physics.engine.compile.derivatives import derivative
+from rigwatch.physics.engine.compile.static_kernel import numpy_function
 from rigwatch.physics.engine.equations import System, compose, symbol
+from rigwatch.wire.arrays import FloatArray
 
 STABLE = 1.0
 """Largest rate times step, with a margin."""
@@ -23,6 +31,9 @@ ACCURATE = 0.1
 """The same near zero crossings of a state, such as speed, where accuracy needs smaller steps."""
 PASSIVE = 2.0
 """The same for an effect state that is driven by signals and drives nothing itself."""
+SMOOTH = 0.5
+"""The same for a model's own constant rates: the error, a thousandth of a mode that has decayed in
+two steps, is too small to be seen as a jump of a fit's error where the number of steps changes."""
 FINEST = 256
 """Most steps between two samples."""
 FILLED = 1
@@ -52,6 +63,30 @@ def pace(system: System) -> Pace:
     asked += [slope / allowed for slope in _of_memory(system)]
     order = list(system.states)
     return Pace(tuple(order.index(name) for name in steep), tuple(asked))
+
+
+def constant_rates(system: System) -> tuple[sympy.Expr, ...]:
+    """|∂(dx/dt)/∂x| of the model's states, where it depends on parameters alone [1/s]."""
+    known = {symbol(name) for name in system.parameters}
+    slopes = (derivative(system.derivatives[name], symbol(name)) for name in system.model.states)
+    return tuple(dict.fromkeys(s for s in slopes if s.free_symbols and s.free_symbols <= known))
+
+
+def steps_for(
+    system: System, rates: tuple[sympy.Expr, ...], parameters: FloatArray, spacing: float
+) -> int:
+    """Steps between samples that the model's constant rates need.
+
+    Args:
+        system: the equations.
+        rates: its `constant_rates`.
+        parameters: all of them, shape (n_p,).
+        spacing: time between samples [s].
+    """
+    if not rates:
+        return 1
+    found = np.abs(numpy_function(tuple(system.parameters), rates)(*parameters))
+    return math.ceil(min(float(np.nanmax(found)) * spacing / SMOOTH, FINEST))
 
 
 def _steep(system: System) -> dict[str, sympy.Expr]:

@@ -5,7 +5,15 @@ search (ShortHorizons, WholeRuns) ──attempts──▶ multi_start_fit ──
 
 from rigwatch.physics.engine.search.convergence import Convergence, convergence
 from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
+from rigwatch.physics.engine.search.promised_step import kept_promise
 from rigwatch.physics.engine.search.short_horizons import ShortHorizons
 from rigwatch.physics.engine.search.whole_runs import WholeRuns
 
-__all__ = ["Convergence", "ShortHorizons", "WholeRuns", "convergence", "multi_start_fit"]
+__all__ = [
+    "Convergence",
+    "ShortHorizons",
+    "WholeRuns",
+    "convergence",
+    "kept_promise",
+    "multi_start_fit",
+]

@@ -23,8 +23,8 @@ class Attempt:
         fit: the fit.
         cost: the minimised cost.
         error: scaled error, root mean square.
-        gradient: predicted relative reduction of the cost by a further step, None if the cost is
-            the squared error alone.
+        gradient: predicted relative reduction of the cost by a further step; None for that of the
+            squared error.
     """
 
     begun: str

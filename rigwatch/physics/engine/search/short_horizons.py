@@ -24,6 +24,7 @@ from rigwatch.physics.engine.search.convergence import AGREE, PROMISED, promise,
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
 from rigwatch.physics.engine.search.equation_error import equation_error_starts
 from rigwatch.physics.engine.search.multi_start_fit import Attempt
+from rigwatch.physics.engine.search.promised_step import kept_promise
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
@@ -75,7 +76,7 @@ class ShortHorizons:
     def enough(self, found: Sequence[Attempt]) -> bool:
         """Whether the best is a minimum and at noise level, or reached by two starts."""
         best = min(found, key=lambda each: each.cost)
-        steep = promise(best.fit) > PROMISED
+        steep = (promise(best.fit) if best.gradient is None else best.gradient) > PROMISED
         system = self.compiled.system
         agreeing = sum(each.error <= AGREE * best.error for each in found)
         fixed = not system.model.states or not system.free
@@ -111,7 +112,8 @@ class ShortHorizons:
         if growing:
             start = self._grown(start)
         found = self._fit(self.horizon, start, self.initial)
-        return Attempt(name, found, spread(found), spread(found))
+        gradient = kept_promise(found, self.recording, self.horizon, self.substeps)
+        return Attempt(name, found, spread(found), spread(found), gradient)
 
     def _fit(self, horizon: int, start: FloatArray, initial: FloatArray | None = None) -> Fit:
         return fit(
