@@ -33,7 +33,7 @@ def noise(n: int) -> np.ndarray:
 
 
 def settled(speed: np.ndarray) -> np.ndarray:
-    return np.asarray(SpectralWidth(SLOW, RATE).update(speed, states(speed.size)).narrow[512:])
+    return SpectralWidth(SLOW, RATE).update(speed, states(speed.size)).narrow[512:]
 
 
 @pytest.mark.parametrize("frequency", [4.0, 8.0, 16.0])
