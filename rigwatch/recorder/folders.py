@@ -6,6 +6,8 @@ A recorder that was killed and restarted continues in the same folder and querie
 missed samples.
 """
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +19,9 @@ from rigwatch.wire.session import SUFFIX, Session, open_session
 
 LONGEST_BREAK = 120.0
 """Interruption after which a recorder starts a new session [s]."""
+
+
+_STAMP = re.compile(r"\d{8}T\d{6}Z(-\d+)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +36,13 @@ class Place:
     folder: Path
     last: tuple[int, int] | None = None
     positions: Positions = field(default_factory=dict)
+
+
+def sessions_of(root: Path, rig: str) -> Iterator[Path]:
+    """Folders of the rig's sessions, without those of a rig whose id begins with this one's."""
+    for path in root.glob(f"{rig}-*Z*"):
+        if _STAMP.fullmatch(path.name.removeprefix(f"{rig}-")):
+            yield path
 
 
 def choose(root: Path, run: RunInfo) -> Place:
@@ -54,7 +66,7 @@ def _unused(folder: Path) -> Path:
 def _interrupted(root: Path, run: RunInfo) -> Place | None:
     """The newest session of this rig if it is recent and has the same configuration."""
     try:
-        folders = [path for path in root.glob(f"{run.rig}-*Z*") if any(path.glob(f"*{SUFFIX}"))]
+        folders = [path for path in sessions_of(root, run.rig) if any(path.glob(f"*{SUFFIX}"))]
         newest = max(folders, key=lambda path: max(f.stat().st_mtime for f in path.iterdir()))
         session = open_session(newest)
         same = session.info.configuration_sha256 == run.configuration_sha256

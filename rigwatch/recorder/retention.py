@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from rigwatch.recorder.folders import sessions_of
 from rigwatch.recorder.positions import FILE
 from rigwatch.recorder.retention_rules import expired
 from rigwatch.wire.messages import ALARMS, Event
@@ -69,7 +70,8 @@ class Retention:
 
     def _segments(self, newest: Path | None) -> Iterator[Segment]:
         root = Path(self._settings.folder)
-        for path in root.glob(f"{self._rig}-*Z*/*{SUFFIX}"):
+        segments = (one for own in sessions_of(root, self._rig) for one in own.glob(f"*{SUFFIX}"))
+        for path in segments:
             if path == newest:
                 continue
             try:
