@@ -9,7 +9,7 @@ from monitor.alarms.kinds import ALARM_KINDS, AlarmKind, check_settings, setting
 from monitor.alarms.manager import AlarmManager, Announcement
 from monitor.alarms.operator import bounded
 from monitor.alarms.quality import SensorFlags
-from monitor.alarms.record import AlarmRecord
+from monitor.alarms.record import AlarmRecord, just_returned
 from monitor.alarms.state import Occasion
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "SensorFlags",
     "bounded",
     "check_settings",
+    "just_returned",
     "last_records",
     "read_journal",
     "settings_of",

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from monitor.alarms import AlarmJournal, Announcement
+from monitor.alarms import AlarmJournal, Announcement, just_returned
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
@@ -98,7 +98,9 @@ class MonitorProcess:
         bus.watch_tokens(f"{ALIVE_KEY}/recorder", self._recorder_changed)
         self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
         if self._journal:
-            self.say(self.rig.alarms.restore(self._journal.newest(), time.time_ns()))
+            newest = self._journal.newest()
+            standing = self.rig.alarms.restore(newest, time.time_ns())
+            self.say([*just_returned(newest), *standing])
             self._standing = self.rig.alarms.standing()
         # Only now: before, an answer would say that no alarm stands.
         serve_alarm_list(bus, lambda: self._explainer.with_causes(self._standing))

@@ -14,6 +14,7 @@ from rigwatch.wire.bus import Bus, Close, ask_alarm_list
 from rigwatch.wire.bus.alarm_list import KEY
 from rigwatch.wire.bus.transport import Answer
 from tests.monitor_process.test_process import Bench
+from tests.waiting import eventually
 
 
 @pytest.fixture
@@ -61,3 +62,21 @@ def test_no_alarm_is_listed_that_a_kill_could_lose(
     raise_disk(bench)
     assert listed == [[]]
     assert [alarm.name for alarm in ask_alarm_list(bench.observer)] == ["disk"]
+
+
+def test_a_return_to_normal_that_a_kill_kept_back_is_told_by_the_next_monitor(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def remark(*, active: bool) -> None:
+        at = Occasion("rig", 7, 1, time.time_ns())
+        bench.monitor.say(bench.monitor.rig.alarms.report("not_armed", at, active=active))
+
+    remark(active=True)
+    heard = bench.alarm_states()
+    assert [name for name, _ in heard] == ["not_armed"]
+    monkeypatch.setattr(bench.bus, "publish", lambda *_: None)  # written to the journal, not said
+    remark(active=False)
+    bench.kill()
+    assert bench.alarm_states() == []
+    bench.start()
+    eventually(lambda: ("not_armed", "normal") in bench.alarm_states(), "the return is told")
