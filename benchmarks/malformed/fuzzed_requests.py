@@ -114,7 +114,7 @@ class Client:
         host = self.served.address.removeprefix("http://")
         head = (
             f"{method} {path} HTTP/1.1\r\nHost: {host}\r\nOrigin: {self.served.address}\r\n"
-            f"Cookie: rigwatch={self.served.token}\r\nConnection: close\r\n"
+            f"Authorization: {self.served.bearer}\r\nConnection: close\r\n"
             f"Content-Length: {len(data)}\r\n\r\n"
         )
         return head.encode() + data

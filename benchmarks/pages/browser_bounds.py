@@ -33,7 +33,7 @@ def run(quick: bool) -> list[Row]:
 
 def _ask(served: Any, path: str, method: str = "GET", body: Any = None, **more: str) -> int:
     line = http.client.HTTPConnection(served.address.removeprefix("http://"), timeout=3600)
-    head = {"Cookie": f"rigwatch={served.token}", "Origin": served.address} | more
+    head = {"Authorization": served.bearer, "Origin": served.address} | more
     try:
         line.request(method, path, body, {k.replace("_", "-"): v for k, v in head.items()})
         answer = line.getresponse()

@@ -125,7 +125,7 @@ def _explain(page: Any, study: str) -> Row:
 
 def _ranked(served: Any, study: str, told: "queue.Queue[float]") -> None:
     """Hear when the engine has its ranking."""
-    head = {"Cookie": f"rigwatch={served.token}"}
+    head = {"Authorization": served.bearer}
     with urlopen(Request(f"{served.address}/api/events/{study}", headers=head)) as events:
         for line in events:
             if RANKED.encode() in line:
@@ -202,7 +202,7 @@ def _long(page: Any, root: Path, samples: int, *, quick: bool) -> list[Row]:
 def _asked(page: Any, study: Path, spans: int = 200) -> list[float]:
     """Times of range requests, as a client has them [ms]."""
     kept = max((study / RESULTS).iterdir(), key=lambda path: path.stat().st_mtime)
-    head = {"Cookie": f"rigwatch={page.served.token}"}
+    head = {"Authorization": page.served.bearer}
     rng, took = np.random.default_rng(1), []
     for _ in range(spans):
         start = rng.uniform(0, 15_000)

@@ -117,7 +117,7 @@ class Kills:
     def _ask(self, method: str, path: str, body: str | None = None) -> str:
         self.served = self.served or Served(self.root)
         line = http.client.HTTPConnection(self.served.address.removeprefix("http://"), timeout=60)
-        head = {"Cookie": f"rigwatch={self.served.token}", "Origin": self.served.address}
+        head = {"Authorization": self.served.bearer, "Origin": self.served.address}
         line.request(method, path, body, head)
         answer = line.getresponse()
         text = answer.read().decode()

@@ -35,6 +35,7 @@ class Served:
     Attributes:
         folder: that is served.
         address, token: of its pages.
+        bearer: the token in the header `Authorization`, for clients that are no browser.
     """
 
     def __init__(self, folder: Path, *arguments: str, cwd: Path | None = None) -> None:
@@ -53,6 +54,7 @@ class Served:
         self.whole = msgspec.json.decode(first)["address"]
         split = urlsplit(self.whole)
         self.address, self.token = f"{split.scheme}://{split.netloc}", split.query[len("token=") :]
+        self.bearer = f"Bearer {self.token}"
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
