@@ -4,28 +4,29 @@
 
 Most of the cost of a sample is that of a call, and results do not depend on how samples are divided
 into blocks: the samples of a turn are judged as one block. Under load turns get longer, blocks with
-them, and a sample costs less. A rig joins when its router answers; one that fails is left alone for
-a while and starts anew, as its process would.
+them, and a sample costs less. A rig joins when its files are right and its router answers; one that
+fails is left alone for a while and starts anew, as its process would.
 """
 
+import contextlib
 import logging
 import queue
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from monitor.model import RigModel
 from monitor.process.loop import (
     LONGEST_BLOCK,
     MonitorProcess,
-    monitor_section,
     prepared,
 )
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.delivery import Item
-from rigwatch.wire.errors import one_line
+from rigwatch.wire.errors import RigwatchError, line_about
 from rigwatch.wire.host import (
     MONITOR,
     Heartbeat,
@@ -34,8 +35,8 @@ from rigwatch.wire.host import (
     set_at_signal,
 )
 from rigwatch.wire.messages import SampleBlock, pieces
-from rigwatch.wire.rig_config import RigConfig
-from rigwatch.wire.several_rigs import check_own, load_rigs
+from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.several_rigs import check_own, valid_rigs
 
 TURN = 0.025
 """Time from one turn to the next: samples wait for half of it on average [s]."""
@@ -47,30 +48,33 @@ Say = Callable[[str], None]
 _log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """A rig whose files are right and whose router has answered."""
+
+    config: RigConfig
+    model: RigModel
+    bus: Bus
+
+
 class Seat:
     """One rig of the process: joined, or waiting for its router or for another attempt.
 
+    Each attempt reads the rig's files anew, so that a mistake that was corrected ends.
+
     Args:
         path: its configuration.
-        config: the same, loaded.
-        model: of the rig.
         say: called with remarks for people.
         join: connects to the rig's bus, and waits for its router.
     """
 
     def __init__(
-        self,
-        path: Path,
-        config: RigConfig,
-        model: RigModel,
-        say: Say,
-        join: Callable[[RigConfig, str], Bus] = connect,
+        self, path: Path, say: Say, join: Callable[[RigConfig, str], Bus] = connect
     ) -> None:
-        self._path, self._config, self._model = path, config, model
-        self._say, self._join = say, join
+        self._path, self._say, self._join = path, say, join
         self._process: MonitorProcess | None = None
         self._due: deque[Item] = deque()
-        self._joined: queue.SimpleQueue[Bus] = queue.SimpleQueue()
+        self._joined: queue.SimpleQueue[Joined] = queue.SimpleQueue()
         self._pause, self._again_at = FIRST_PAUSE, float("inf")
         self._before = 0
         self._connect()
@@ -106,24 +110,26 @@ class Seat:
             self._pause = FIRST_PAUSE
 
     def _connect(self) -> None:
-        """Wait for the rig's router in a thread: it may never answer."""
-        call = threading.Thread(target=self._await_router, daemon=True)
+        """Read the rig's files and wait for its router in a thread: it may never answer."""
+        call = threading.Thread(target=self._enter, daemon=True)
         call.start()
 
-    def _await_router(self) -> None:
+    def _enter(self) -> None:
         try:
-            self._joined.put(self._join(self._config, "monitor"))
+            config = load_rig(self._path)
+            model = prepared(config, self._path)
+            self._joined.put(Joined(config, model, self._join(config, "monitor")))
         except Exception as error:  # said, and tried again, in the loop's thread
-            self._say(f"{self._path}: {one_line(error)}")
+            self._say(line_about(self._path, error))
             self._again_at = time.monotonic() + LONGEST_PAUSE
 
     def _start(self) -> None:
         if not self._joined.empty():
-            bus = self._joined.get()
+            rig = self._joined.get()
             try:
-                self._process = MonitorProcess(self._config, self._path, self._model, bus)
+                self._process = MonitorProcess(rig.config, self._path, rig.model, rig.bus)
             except Exception as error:  # as in `turn`
-                bus.close()
+                rig.bus.close()
                 self._wait(error)
         elif time.monotonic() >= self._again_at:
             self._again_at = float("inf")
@@ -135,7 +141,7 @@ class Seat:
         self._wait(error)
 
     def _wait(self, error: Exception) -> None:
-        self._say(f"{self._path}: {one_line(error)}; starts anew in {self._pause:.0f} s")
+        self._say(f"{line_about(self._path, error)}; starts anew in {self._pause:.0f} s")
         self._again_at = time.monotonic() + self._pause
         self._pause = min(2 * self._pause, LONGEST_PAUSE)
 
@@ -148,7 +154,7 @@ class Seat:
         try:
             process.close()
         except Exception as error:  # the bus is left in any case
-            self._say(f"{self._path}: {one_line(error)}")
+            self._say(line_about(self._path, error))
         finally:
             process.bus.close()
 
@@ -175,16 +181,17 @@ def run_several(paths: list[Path]) -> int:
     """Monitor the rigs at `paths` until a signal ends it; the exit code.
 
     Raises:
-        RigwatchError: a configuration or model is invalid, or two are of one rig or one journal.
+        RigwatchError: no configuration is valid, or two are of one rig or one journal.
     """
     stop = set_at_signal()
-    loaded = load_rigs(paths)
+    loaded = valid_rigs(paths, list[str]().append)  # a wrong file is named by its rig's seat
     check_own("monitor.journal", _journals(loaded))
-    models = [prepared(config, path) for path, config in loaded]
+    for path, config in loaded:
+        _prepare(path, config)
     raise_priority(MONITOR)
     heartbeat = Heartbeat("monitor")
     prepare_for_real_time()
-    seats = [Seat(*rig, model, _log.warning) for rig, model in zip(loaded, models, strict=True)]
+    seats = [Seat(path, _log.warning) for path in paths]
     heartbeat.ready()
     take_turns(seats, stop, heartbeat)
     heartbeat.stopping()
@@ -193,7 +200,13 @@ def run_several(paths: list[Path]) -> int:
     return 0
 
 
+def _prepare(path: Path, config: RigConfig) -> None:
+    """Compile what the rig needs before any is watched; its seat says what is wrong with it."""
+    with contextlib.suppress(RigwatchError):
+        prepared(config, path)
+
+
 def _journals(loaded: list[tuple[Path, RigConfig]]) -> Iterable[tuple[Path, str]]:
     for path, config in loaded:
-        if journal := monitor_section(config, path).journal:
-            yield path, str(Path(journal).resolve())
+        if config.monitor and config.monitor.journal:
+            yield path, str(Path(config.monitor.journal).resolve())

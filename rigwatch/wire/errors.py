@@ -31,6 +31,12 @@ def one_line(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
+def line_about(file: Path | str, error: BaseException) -> str:
+    """An error on one line that begins with the file that it is about."""
+    text = one_line(error)
+    return text if text.startswith(str(file)) else f"{file}: {text}"
+
+
 def reason_of(error: BaseException) -> str:
     """Why, without the file, where the caller's sentence names it."""
     return getattr(error, "strerror", None) or one_line(error)

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from monitor.pipeline import RigMonitor
-from monitor.process.loop import suitable_model
 from monitor.process.several import Seat, run_several
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
@@ -36,8 +35,7 @@ class Bench:
         self.seats = [self.seat(rig_file(folder, f"r{number}")) for number in range(count)]
 
     def seat(self, path: Path) -> Seat:
-        config = load_rig(path)
-        return Seat(path, config, suitable_model(config, path), self.said.append, self.join)
+        return Seat(path, self.said.append, self.join)
 
     def join(self, config: RigConfig, process: str) -> Bus:
         if config.rig.id == "r0":
@@ -135,6 +133,24 @@ def test_a_rig_that_fails_starts_anew_and_goes_on_where_it_was(bench, monkeypatc
     assert said.endswith("the disk is gone; starts anew in 0 s")
     assert sorted(_values(bench.judged[1])) == list(range(80))
     assert sum(seat.delivered for seat in bench.seats) >= 160
+
+
+def test_a_wrong_file_is_named_and_its_rig_joins_once_it_is_right(tmp_path, monkeypatch):
+    monkeypatch.setattr("monitor.process.several.LONGEST_PAUSE", 0.01)
+    network, said, path = MemoryNetwork(), [], rig_file(tmp_path, "a")
+    right = path.read_text()
+    path.write_text(right.replace('id = "a"', "id = 7"))
+    seat = Seat(path, said.append, lambda config, process: network.bus(config.rig.id, process))
+
+    def turned(holds):
+        seat.turn()
+        return holds()
+
+    assert wait_until(lambda: turned(lambda: said), PATIENCE, 0.001)
+    assert "rig.id: found 7, expected" in said[0]
+    path.write_text(right)
+    assert wait_until(lambda: turned(lambda: seat.is_running), PATIENCE, 0.001)
+    seat.close()
 
 
 def test_two_configurations_of_one_rig_or_one_journal_are_refused(tmp_path):

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from rigwatch.wire.errors import one_line
+from rigwatch.wire.errors import line_about
 from rigwatch.wire.host.heartbeat import Heartbeat
 
 BEAT = 0.2
@@ -124,7 +124,7 @@ class Part:
         try:
             changed = self._version() != self._taken
         except Exception as error:  # the rig goes on as it is
-            self.say(f"{one_line(error)}; goes on as before")
+            self._out(f"{line_about(self._name, error)}; goes on as before")
             return
         if changed:
             self._stop.set()
@@ -151,7 +151,7 @@ class Part:
 
     def _failed(self, error: Exception) -> None:
         self._turned_at, self.settled = None, True
-        self.say(f"{one_line(error)}; starts anew in {self._pause:.0f} s")
+        self._out(f"{line_about(self._name, error)}; starts anew in {self._pause:.0f} s")
         self._stop.wait(self._pause)
         self._pause = min(2 * self._pause, LONGEST_PAUSE)
 
