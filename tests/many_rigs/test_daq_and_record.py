@@ -119,9 +119,11 @@ class Site:
 
     def start_record(self) -> "subprocess.Popen[str]":
         words = ["-m", "rigwatch", "record", "--json", *map(str, self.paths)]
-        return subprocess.Popen(
+        started = subprocess.Popen(
             [sys.executable, *words], cwd=ROOT, stdout=subprocess.PIPE, text=True
         )
+        self.held.callback(started.kill)
+        return started
 
     def go_on(self, *names: str, samples: int = 128) -> None:
         """So many more samples of each of these rigs come."""

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import subprocess
 import sys
 from dataclasses import fields, replace
 from pathlib import Path
@@ -244,3 +245,33 @@ def test_the_tag_before_each_field_is_its_number_and_wire_type(started):
     }
     assert started.field_tags(Column)["values"] == 3 << 3 | by_length
     assert started.field_tags(Alarm)["first_out"] == 13 << 3 | varint
+
+
+FIRST_MESSAGES = """
+import sys, threading
+import numpy as np
+from rigwatch.wire.messages import Column, SampleBlock
+from rigwatch.wire.messages.protobuf import encode
+
+sys.setswitchinterval(1e-6)
+times = np.arange(2, dtype=np.int64)
+column = Column("a", "V", np.zeros(2), np.zeros(2, np.uint8))
+block = SampleBlock("rig", 1, 0, times, times, (column,))
+together, sent = threading.Barrier(16), []
+
+def send():
+    together.wait()
+    sent.append(encode(block))
+
+threads = [threading.Thread(target=send) for _ in range(16)]
+for thread in threads: thread.start()
+for thread in threads: thread.join()
+assert len(sent) == 16 and len(set(sent)) == 1
+"""
+
+
+def test_threads_that_send_their_first_message_at_once_all_can() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_MESSAGES], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

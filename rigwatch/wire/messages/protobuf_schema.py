@@ -113,20 +113,24 @@ def _is_varint(field: Any) -> bool:
     return single and field.type in (_Field.TYPE_SINT64, _Field.TYPE_BOOL)
 
 
-@cache
-def _pool() -> descriptor_pool.DescriptorPool:
-    pool = descriptor_pool.DescriptorPool()
-    pool.Add(_file_descriptor())
-    return pool
-
-
-@cache
-def proto_class(name: str) -> type[ProtoMessage]:
-    """The protobuf class of a message class's name."""
-    return message_factory.GetMessageClass(_pool().FindMessageTypeByName(f"{PACKAGE}.{name}"))
-
-
 def hints_of(kind: Any) -> list[tuple[str, Any]]:
     """Names and annotations of a message's fields, in order."""
     hints = get_type_hints(kind)
     return [(field.name, hints[field.name]) for field in fields(kind)]
+
+
+def _proto_classes() -> dict[str, type[ProtoMessage]]:
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(_file_descriptor())
+    found = {name: pool.FindMessageTypeByName(f"{PACKAGE}.{name}") for name in KINDS}
+    return {name: message_factory.GetMessageClass(one) for name, one in found.items()}
+
+
+# Made at import, in one thread: two threads that made them at once would each have a pool of its
+# own, and a column of one does not fit into a block of the other.
+_PROTO_CLASSES = _proto_classes()
+
+
+def proto_class(name: str) -> type[ProtoMessage]:
+    """The protobuf class of a message class's name."""
+    return _PROTO_CLASSES[name]
