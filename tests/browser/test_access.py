@@ -2,12 +2,14 @@
 
 import http.client
 import json
+import socket
 import threading
 from pathlib import Path
 
 import pytest
 from starlette.requests import Request
 
+from rigwatch.browser.recordings import visible_files
 from rigwatch.browser.server.access import Access, cookie_name, hosts_of
 from rigwatch.browser.server.context import number_of
 from rigwatch.browser.server.places import PlaceError, Places
@@ -176,6 +178,34 @@ def test_links_do_not_lead_out(served: Served, tmp_path: Path) -> None:
     finally:
         for name in links:
             (served.folder / name).unlink()
+
+
+def test_a_request_that_breaks_off_is_no_error(served: Served) -> None:
+    host, _, port = served.address.removeprefix("http://").rpartition(":")
+    before = len(served.said)
+    for path in ("/api/new", "/api/import-preview"):
+        head = (
+            f"POST {path} HTTP/1.1\r\nHost: {host}:{port}\r\nOrigin: {served.address}\r\n"
+            f"Authorization: {served.bearer}\r\nContent-Length: 1000\r\n\r\n"
+        )
+        with socket.create_connection((host, int(port)), timeout=60) as line:
+            line.sendall(head.encode() + b'{"name": ')
+    assert ask(served, "/")[0] == 200
+    assert served.said[before:] == []
+
+
+def test_hidden_folders_are_not_looked_into_and_links_that_lead_out_not_followed(
+    tmp_path: Path,
+) -> None:
+    root, outside = tmp_path / "root", tmp_path / "outside"
+    for folder in (root / "a" / "b" / "c" / "d", root / ".uploads", outside):
+        folder.mkdir(parents=True)
+        (folder / "x.mcap").touch()
+    for folder in (root, root / "a", root / "a" / "b" / "c"):
+        (folder / "seen.mcap").touch()
+    (root / "a" / "linked").symlink_to(outside)
+    found = {path.relative_to(root).as_posix() for path in visible_files(root)}
+    assert found == {"seen.mcap", "a/seen.mcap", "a/b/c/seen.mcap"}
 
 
 def test_a_study_that_names_files_outside_is_not_opened(served: Served, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from rigwatch.browser.recordings.recorded import (
     write_channels,
 )
 from rigwatch.browser.recordings.stories import Story, begin_story, stories
+from rigwatch.browser.recordings.visible_files import visible_files
 
 __all__ = [
     "Look",
@@ -30,5 +31,6 @@ __all__ = [
     "stories",
     "template_data",
     "template_names",
+    "visible_files",
     "write_channels",
 ]

@@ -1,31 +1,26 @@
 """The recordings of a folder, and their channels for a chart."""
 
 import hashlib
-from collections.abc import Iterator
+import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rigwatch.browser.recordings.visible_files import visible_files
 from rigwatch.browser.signals import write_trace
 from rigwatch.browser.work import RESULTS, Results, apart
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.session import SUFFIX, open_session
 
-DEEP = 4
 MOST = 500
+_WRITING = threading.Lock()
 
 
 def recordings_in(root: Path) -> list[str]:
     """All sessions below a folder, by relative name; links that lead outside are skipped."""
-    return sorted(path.relative_to(root).as_posix() for path in _sessions(root))[:MOST]
-
-
-def _sessions(root: Path) -> Iterator[Path]:
-    for depth in range(DEEP):
-        for path in root.glob("/".join(["*"] * depth + [f"*{SUFFIX}"])):
-            if path.resolve().is_relative_to(root) and path.is_file():
-                yield path
+    found = (path for path in visible_files(root) if path.suffix == SUFFIX and path.is_file())
+    return sorted(path.relative_to(root).as_posix() for path in found)[:MOST]
 
 
 def channels_of(root: Path, path: Path) -> tuple[Results, dict[str, Any]]:
@@ -37,8 +32,9 @@ def channels_of(root: Path, path: Path) -> tuple[Results, dict[str, Any]]:
     stat = path.stat()
     key = f"{path}:{stat.st_ino}:{stat.st_size}:{stat.st_mtime_ns}"
     kept = Results(root / RESULTS / hashlib.sha256(key.encode()).hexdigest()[:32])
-    if not kept.has("recording.json"):
-        kept.write("recording", apart(write_channels, kept, path))
+    with _WRITING:  # two that wrote the same would take each other's files away
+        if not kept.has("recording.json"):
+            kept.write("recording", apart(write_channels, kept, path))
     found: dict[str, Any] = kept.read("recording")
     return kept, found
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 
 from rigwatch.browser.server.places import PlaceError, Places
@@ -75,6 +75,8 @@ def told(handler: Handler) -> Handler:
             return answer({"error": str(error)}, 404)
         except RigwatchError as error:
             return answer({"error": str(error)}, 409)
+        except ClientDisconnect:
+            return answer({"error": "the request ended before its content"}, 400)
 
     return guarded
 

@@ -4,13 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from rigwatch.browser.recordings import visible_files
 from rigwatch.browser.views.study_state import State, state_of
 from rigwatch.browser.views.study_view import headline
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.study import FILE, LEDGER
-
-DEEP = 3
-"""Depth of folders below the root in which studies are searched."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +77,5 @@ def _listed(root: Path, folder: Path) -> Listed:
 
 def study_folders(root: Path) -> Iterator[Path]:
     """Folders with a study; links that lead out of the root are not followed."""
-    found = {
-        path.parent
-        for depth in range(1, DEEP + 1)
-        for path in root.glob("/".join(["*"] * depth + [FILE]))
-        if path.resolve().is_relative_to(root.resolve())
-    }
-    return iter(sorted(found))
+    found = {path.parent for path in visible_files(root) if path.name == FILE}
+    return iter(sorted(found - {root}))
