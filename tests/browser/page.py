@@ -247,6 +247,9 @@ def looking(driver: webdriver.Chrome, served: Served) -> Iterator[Page]:
     """The browser at a server: in the end no page has failed or asked for anything elsewhere."""
     page = Page(driver, served)
     page.enter()
-    yield page
-    assert page.errors() == []
-    assert page.requests() <= {served.address}
+    try:
+        yield page
+        assert page.errors() == []
+        assert page.requests() <= {served.address}
+    finally:
+        driver.get("about:blank")  # a page that stays open calls its server, also one that ended
