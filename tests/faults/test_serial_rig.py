@@ -112,9 +112,9 @@ def test_08_a_device_that_starts_anew_and_a_counter_that_wraps(
 
 def test_10_a_clock_that_jumps(rig: Field, device: SerialDevice) -> None:
     ready(rig, device)
-    boot = device.device.boot
+    boot, before = device.device.boot, time.time_ns() - 10**9
     jump = device.source.inject(lambda codes: device.device.jump_clock(0.5), 1).sent()
-    event = rig.event("clock_jump", time.time_ns() - 10**9)
+    event = rig.event("clock_jump", before)
     assert "jumped by +0.5" in event.text
     rig.judged(boot, jump + 64)
     blocks = [b for b in rig.estimates() if b.boot == boot]
