@@ -58,7 +58,7 @@ def run_several(paths: list[Path]) -> int:
         ConfigError: no configuration is valid, or two are of one rig.
     """
     stop = set_at_signal()
-    valid_rigs(paths, list[str]().append)  # a wrong file is named by its rig's thread
+    valid_rigs(paths)  # a wrong file is named by its rig's thread
     raise_priority(DAQ)
     prepare_for_real_time()
     parts = [Part(str(path), work_of(path), partial(used, path)) for path in paths]

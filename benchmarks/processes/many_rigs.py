@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -80,9 +80,9 @@ def measured(folder: Path, count: int, seconds: float) -> tuple[float, float, fl
             return min(latest) >= 0
 
         assert wait_until(all_there, 120.0, 0.05), "not all rigs were judged"
-        _for(SETTLE, lambda: take(counted=False))
+        repeat_for(SETTLE, lambda: take(counted=False))
         before, began = _cpu(monitor), time.monotonic()
-        _for(seconds, lambda: take(counted=True))
+        repeat_for(seconds, lambda: take(counted=True))
         share = 100 * (_cpu(monitor) - before) / (time.monotonic() - began) / count
         memory = psutil.Process(monitor.pid).memory_info().rss / 1e6
         assert source.poll() is None
@@ -92,8 +92,8 @@ def measured(folder: Path, count: int, seconds: float) -> tuple[float, float, fl
     return share, memory, float(p50), float(p99), missing
 
 
-def _for(seconds: float, call: object) -> None:
-    assert callable(call)
+def repeat_for(seconds: float, call: Callable[[], object]) -> None:
+    """Call every few milliseconds."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         call()

@@ -26,6 +26,7 @@ import psutil
 
 from benchmarks.archives.recordings import MODEL, RATE, ROOT
 from benchmarks.processes.many_devices import sent_times
+from benchmarks.processes.many_rigs import repeat_for
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.messages import ESTIMATES
 from rigwatch.wire.rig_config import load_rig
@@ -91,10 +92,10 @@ def measured(folder: Path, count: int, seconds: float) -> Found:
         buses = [connect(load_rig(path), "subscriber", 60.0) for path in paths]
         heard = Estimates(buses, folder / "sent")
         assert wait_until(heard.all_there, 120.0, 0.05), "not all rigs were judged"
-        _for(SETTLE, heard.take)
+        repeat_for(SETTLE, heard.take)
         heard.forget()
         before, began = _cpu(processes), time.monotonic()
-        _for(seconds, heard.take)
+        repeat_for(seconds, heard.take)
         took = time.monotonic() - began
         used = {name: spent - before[name] for name, spent in _cpu(processes).items()}
         memory = {name: one.memory_info().rss / 1e6 for name, one in processes.items()}
@@ -133,14 +134,6 @@ class Estimates:
         """Whether every rig has been judged."""
         self.take()
         return min(self._latest) >= 0
-
-
-def _for(seconds: float, call: object) -> None:
-    assert callable(call)
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
-        call()
-        time.sleep(0.004)
 
 
 def _cpu(processes: dict[str, psutil.Process]) -> dict[str, float]:

@@ -184,7 +184,7 @@ def run_several(paths: list[Path]) -> int:
         RigwatchError: no configuration is valid, or two are of one rig or one journal.
     """
     stop = set_at_signal()
-    loaded = valid_rigs(paths, list[str]().append)  # a wrong file is named by its rig's seat
+    loaded = valid_rigs(paths)  # a wrong file is named by its rig's seat
     check_own("monitor.journal", _journals(loaded))
     for path, config in loaded:
         _prepare(path, config)

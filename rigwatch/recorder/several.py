@@ -40,7 +40,7 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
         ConfigError: no configuration is valid, or two are of one rig.
     """
     folders: dict[Path, Path] = {}
-    valid_rigs(paths, list[str]().append)  # a wrong file is named by its rig's thread
+    valid_rigs(paths)  # a wrong file is named by its rig's thread
     parts = [Part(str(path), work_of(path, notes, folders), partial(used, path)) for path in paths]
     run_side_by_side(parts, Heartbeat(PROCESS), stop, set_at_hangup())
     return [folders[path] for path in paths if path in folders]

@@ -1,7 +1,7 @@
 """The processes that a rig's configuration asks for, in starting order."""
 
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,7 +49,7 @@ def plan(config: RigConfig, path: Path | str, without: Collection[str] = ()) -> 
     return [
         ProcessPlan(
             name=name,
-            arguments=(sys.executable, "-m", "rigwatch", COMMANDS.get(name, name), str(path)),
+            arguments=arguments(name, [path]),
             source=_source(name, config, without),
             may_finish=name == "dashboard",
             after=READERS if name == "plant" else (),
@@ -57,6 +57,11 @@ def plan(config: RigConfig, path: Path | str, without: Collection[str] = ()) -> 
         for name in PROCESSES
         if name not in without and is_wanted(name, config)
     ]
+
+
+def arguments(name: str, paths: Sequence[Path | str]) -> tuple[str, ...]:
+    """The command line of the process `name` of the rigs at `paths`."""
+    return (sys.executable, "-m", "rigwatch", COMMANDS.get(name, name), *map(str, paths))
 
 
 def is_wanted(name: str, config: RigConfig) -> bool:

@@ -6,12 +6,11 @@ A simulated device and a witness belong to one rig: the first stands for its har
 watches the monitor from outside. The dashboard shows one rig and is started by hand.
 """
 
-import sys
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
-from rigwatch.supervisor.plan import COMMANDS, READERS, ProcessPlan, is_wanted
+from rigwatch.supervisor.plan import READERS, ProcessPlan, arguments, is_wanted
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.rig_config import RigConfig
 from rigwatch.wire.several_rigs import Rigs
@@ -54,15 +53,11 @@ def _routers(rigs: Rigs) -> list[tuple[Path, RigConfig]]:
 def _one(name: str, path: Path, config: RigConfig) -> ProcessPlan:
     """A process of one rig."""
     after = READERS if name == "plant" else ()
-    return ProcessPlan(f"{name} {config.rig.id}", _arguments(name, [path]), after=after)
+    return ProcessPlan(f"{name} {config.rig.id}", arguments(name, [path]), after=after)
 
 
 def _shared(name: str, rigs: Rigs) -> ProcessPlan:
     """A process of all these rigs."""
     source = "" if name == "daq" else "daq"
-    arguments = _arguments(name, [path for path, _ in rigs])
-    return ProcessPlan(name, arguments, source, renews=name in RENEWING and len(rigs) > 1)
-
-
-def _arguments(name: str, paths: Sequence[Path]) -> tuple[str, ...]:
-    return (sys.executable, "-m", "rigwatch", COMMANDS.get(name, name), *map(str, paths))
+    command = arguments(name, [path for path, _ in rigs])
+    return ProcessPlan(name, command, source, renews=name in RENEWING and len(rigs) > 1)

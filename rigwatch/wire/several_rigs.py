@@ -19,8 +19,10 @@ def load_rigs(paths: Sequence[Path]) -> list[tuple[Path, RigConfig]]:
     return _apart([(path, load_rig(path)) for path in paths])
 
 
-def valid_rigs(paths: Sequence[Path], say: Callable[[str], object]) -> list[tuple[Path, RigConfig]]:
-    """The same without files that are wrong, of which `say` is told.
+def valid_rigs(
+    paths: Sequence[Path], say: Callable[[str], object] | None = None
+) -> list[tuple[Path, RigConfig]]:
+    """The same without files that are wrong, of which `say`, if given, is told.
 
     Raises:
         ConfigError: all are invalid, or two are of one rig on one router.
@@ -33,8 +35,9 @@ def valid_rigs(paths: Sequence[Path], say: Callable[[str], object]) -> list[tupl
             mistakes.append(error)
     if mistakes and not loaded:
         raise mistakes[0]
-    for mistake in mistakes:
-        say(str(mistake))
+    if say is not None:
+        for mistake in mistakes:
+            say(str(mistake))
     return _apart(loaded)
 
 

@@ -128,8 +128,9 @@ def test_10_a_clock_that_jumps(rig: Field, device: SerialDevice) -> None:
 
 
 def test_35_a_gap_in_the_samples(rig: Field, device: SerialDevice) -> None:
-    boot, since = device.device.boot, len(rig.gaps)
+    rig.calm(device.device, "gap")
     ready(rig, device)
+    boot, since = device.device.boot, len(rig.gaps)
     device.faults.start("lose", 2)
     short = rig.gap(since)
     assert short.last - short.first == 1

@@ -93,7 +93,7 @@ def _reading(paths: list[Path]) -> Callable[[Path], RigConfig]:
 
     def read(path: Path) -> RigConfig:
         config = load_rig(path)
-        valid_rigs(paths, list[str]().append)
+        valid_rigs(paths)
         return config
 
     return read

@@ -2,7 +2,7 @@
 
 from rigwatch.wire.typed_files.bounded import loads
 from rigwatch.wire.typed_files.loading import Section, load, parse, read_text
-from rigwatch.wire.typed_files.overlay import holder, load_layered, read_layers, whole_text
+from rigwatch.wire.typed_files.overlay import holder, load_layered, whole_text
 from rigwatch.wire.typed_files.shipped import copy_out, find_config, find_file, shipped_names
 from rigwatch.wire.typed_files.writing import as_toml
 
@@ -17,7 +17,6 @@ __all__ = [
     "load_layered",
     "loads",
     "parse",
-    "read_layers",
     "read_text",
     "shipped_names",
     "whole_text",

@@ -7,7 +7,7 @@ expected.
 
 import tomllib
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -37,14 +37,23 @@ def parse(text: str, kind: type[S], file: Path | str) -> S:
     Raises:
         ConfigError: the text is not TOML or is not a valid `kind`.
     """
-    try:
-        raw = loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(file, "", str(error), "TOML") from error
+    raw = tables(text, file)
     try:
         return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:
         raise explained(error, raw, kind, text, file) from None
+
+
+def tables(text: str, file: Path | str) -> dict[str, Any]:
+    """The TOML `text` as plain values; `file` is named in errors.
+
+    Raises:
+        ConfigError: the text is not TOML.
+    """
+    try:
+        return loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(file, "", str(error), "TOML") from error
 
 
 def read_text(path: Path) -> str:

@@ -9,7 +9,6 @@ file that holds the key.
 
 import os
 import re
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,9 +17,8 @@ from typing import Any
 import msgspec
 
 from rigwatch.wire.errors import ConfigError
-from rigwatch.wire.typed_files.bounded import loads
 from rigwatch.wire.typed_files.explanation import explained, line_of
-from rigwatch.wire.typed_files.loading import S, read_text
+from rigwatch.wire.typed_files.loading import S, read_text, tables
 from rigwatch.wire.typed_files.writing import as_toml
 
 BASE, NAME = "base", "name"
@@ -106,10 +104,7 @@ def whole_text(path: Path | str, tag: str = "") -> str:
 
 def _layer(path: Path | str) -> Layer:
     text = read_text(Path(path))
-    try:
-        return Layer(Path(path), text, loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(path, "", str(error), "TOML") from error
+    return Layer(Path(path), text, tables(text, path))
 
 
 def _plain(path: Path) -> Path:

@@ -107,21 +107,29 @@ def spread(fitted: Fit) -> float:
 
 def promise(fitted: Fit) -> float:
     """Predicted relative reduction of the squared error by a Gauss-Newton step within bounds."""
-    names = fitted.compiled.system.free
-    residual, jacobian = fitted.error.ravel(), _jacobian(fitted)
+    residual = fitted.error.ravel()
     size = float(residual @ residual)
-    held = set(at_bound(fitted))
-    moving = [i for i, name in enumerate(names) if name not in held]
-    if not moving or size == 0:
+    columns, sizes = slopes(fitted)
+    seen = sizes > 0
+    if size == 0 or not np.any(seen):
         return 0.0
-    columns = jacobian[:, moving]
-    length = np.sqrt(np.sum(columns**2, axis=0))
-    seen = columns[:, length > 0] / length[length > 0]
-    if not seen.shape[1]:
-        return 0.0
-    left, values, _ = np.linalg.svd(seen, full_matrices=False)
+    left, values, _ = np.linalg.svd(columns[:, seen], full_matrices=False)
     basis = left[:, values > UNDETERMINED * values[0]]
     return float(np.sum((basis.T @ residual) ** 2) / size)
+
+
+def slopes(fitted: Fit) -> tuple[FloatArray, FloatArray]:
+    """Slopes of the residuals along the free parameters, normalised, and their lengths.
+
+    Returns:
+        columns of length 1, shape (residuals, free); their lengths, 0 for a parameter on a bound
+        and for one that changes nothing.
+    """
+    held = set(at_bound(fitted))
+    moving = [name not in held for name in fitted.compiled.system.free]
+    columns = _jacobian(fitted) * moving
+    sizes = np.sqrt(np.sum(columns**2, axis=0))
+    return columns / np.where(sizes > 0, sizes, 1.0), sizes
 
 
 def at_bound(fitted: Fit) -> tuple[str, ...]:

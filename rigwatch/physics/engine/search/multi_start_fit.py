@@ -23,15 +23,14 @@ class Attempt:
         fit: the fit.
         cost: the minimised cost.
         error: scaled error, root mean square.
-        gradient: predicted relative reduction of the cost by a further step; None for that of the
-            squared error.
+        gradient: predicted relative reduction of the cost by a further step.
     """
 
     begun: str
     fit: Fit
     cost: float
     error: float
-    gradient: float | None = None
+    gradient: float
 
 
 class Search(Protocol):

@@ -12,8 +12,8 @@ from rigwatch.physics.engine.fit import Fit, Recording, bounds, error_at
 from rigwatch.physics.engine.search.convergence import (
     PROMISED,
     UNDETERMINED,
-    at_bound,
     promise,
+    slopes,
 )
 from rigwatch.wire.arrays import FloatArray
 
@@ -36,23 +36,29 @@ def kept_promise(fitted: Fit, recording: Recording, horizon: int, substeps: int)
         system = fitted.compiled
         return error_at(system, recording, horizon, parameters, fitted.scale, substeps) ** 2
 
-    here, kept = size(fitted.parameters), 0.0
+    here, step = size(fitted.parameters), _gauss_newton_step(fitted)
+    kept = 0.0
     for part in FRACTIONS:
         expected = promised * part * (2 - part) * here
-        found = here - size(_moved(fitted, part))
+        found = here - size(_within_bounds(fitted, part * step))
         kept = max(kept, found / expected)
     return promised * min(kept, 1.0)
 
 
-def _moved(fitted: Fit, part: float) -> FloatArray:
-    """All parameters after a part of a Gauss-Newton step within bounds."""
+def _gauss_newton_step(fitted: Fit) -> FloatArray:
+    """The step of each free parameter, 0 for those on a bound."""
+    columns, sizes = slopes(fitted)
+    seen = sizes > 0
+    step = np.zeros(sizes.size)
+    found, *_ = np.linalg.lstsq(columns[:, seen], -fitted.error.ravel(), rcond=UNDETERMINED)
+    step[seen] = found / sizes[seen]
+    return step
+
+
+def _within_bounds(fitted: Fit, step: FloatArray) -> FloatArray:
+    """All parameters after a step of the free ones that ends at their bounds."""
     system, parameters = fitted.compiled.system, fitted.parameters.copy()
-    moving = [name not in at_bound(fitted) for name in system.free]
-    jacobian = fitted.jacobian.reshape(fitted.error.size, fitted.jacobian.shape[-1]) * moving
-    size = np.sqrt(np.sum(jacobian**2, axis=0))
-    size[size == 0] = 1.0
-    step, *_ = np.linalg.lstsq(jacobian / size, -fitted.error.ravel(), rcond=UNDETERMINED)
     names = list(system.parameters)
     free = [names.index(name) for name in system.free]
-    parameters[free] = np.clip(parameters[free] + part * step / size, *bounds(system))
+    parameters[free] = np.clip(parameters[free] + step, *bounds(system))
     return parameters

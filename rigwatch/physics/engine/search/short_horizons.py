@@ -20,7 +20,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit import Fit, Recording, error_at, fit
-from rigwatch.physics.engine.search.convergence import AGREE, PROMISED, promise, spread
+from rigwatch.physics.engine.search.convergence import AGREE, PROMISED, spread
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
 from rigwatch.physics.engine.search.equation_error import equation_error_starts
 from rigwatch.physics.engine.search.multi_start_fit import Attempt
@@ -76,7 +76,7 @@ class ShortHorizons:
     def enough(self, found: Sequence[Attempt]) -> bool:
         """Whether the best is a minimum and at noise level, or reached by two starts."""
         best = min(found, key=lambda each: each.cost)
-        steep = (promise(best.fit) if best.gradient is None else best.gradient) > PROMISED
+        steep = best.gradient > PROMISED
         system = self.compiled.system
         agreeing = sum(each.error <= AGREE * best.error for each in found)
         fixed = not system.model.states or not system.free
