@@ -5,10 +5,11 @@ more of it the more parameters it has. Each effect is therefore judged together 
 of the sets of effects that explain the error best is selected, and each of its effects is ranked
 against all candidates while the rest of the set is in the model. An effect is named as missing if
 it comes first there and if every equally good set contains it. If no set reduces the residual to
-noise, something else is missing as well, and the verdict on single effects stands.
+noise, something else is missing as well, and the verdict on single effects stands. If that names
+none, its text says what the best set leaves, and what every equally good set has in common.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from rigwatch.workbench.compare import Bench
@@ -34,6 +35,7 @@ from rigwatch.workbench.ranking import (
     refit,
 )
 
+UNNAMED = ("undetermined", "unknown_effect")
 ROUNDS = 3
 """Largest number of times that an effect of the set is replaced by a better one."""
 
@@ -59,7 +61,7 @@ class _Member:
 def several_effects(
     bench: Bench, rows: Sequence[Ranked], verdict: Verdict, progress: Progress
 ) -> Verdict:
-    """The verdict after trying sets of effects; unchanged if no set reduces the residual to noise.
+    """The verdict after trying sets of effects; the same if no set reduces the residual to noise.
 
     Args:
         bench: the study.
@@ -68,9 +70,11 @@ def several_effects(
         progress: called with a line of text as each part begins.
     """
     every = combinations(bench, rows, progress, _max_parameters(bench, verdict.best))
-    if not any(len(each.rows) > 1 and reaches_noise(bench, each.fitted) for each in every):
+    if not every:
         return verdict
     best = simplest_of_best(every)
+    if not any(len(each.rows) > 1 and reaches_noise(bench, each.fitted) for each in every):
+        return _with_best_set(verdict, best, every)
     parts: list[_Member] = []
     for _ in range(ROUNDS):
         if len(best.rows) == 1:
@@ -109,6 +113,22 @@ def _leaves_little(bench: Bench, best: Ranked) -> bool:
     return left < 1 - EXPLAINED or reaches_noise(bench, best.fitted)
 
 
+def _with_best_set(verdict: Verdict, best: Combination, every: Sequence[Combination]) -> Verdict:
+    """The verdict with what the best set leaves in its text; that of a named effect unchanged."""
+    if verdict.word not in UNNAMED or len(best.rows) == 1:
+        return verdict
+    text = f"{verdict.text}; {_joined(best.labels)} together leave {best.fitted.held_out_error:.3g}"
+    equals = [each.labels for each in every if not_worse(each, best)]
+    common = frozenset.intersection(*equals)
+    if common and common != best.labels:
+        text += f", and each of the {len(equals)} sets that are as good contains {_joined(common)}"
+    return replace(verdict, text=text)
+
+
+def _joined(labels: Collection[str]) -> str:
+    return ", ".join(sorted(labels))
+
+
 def _with_equal_sets(verdict: Verdict, best: Combination, every: Sequence[Combination]) -> Verdict:
     """The verdict on one effect; undetermined if a set of other effects is equally good.
 
@@ -141,7 +161,7 @@ def _judge_each(
         rest = without(bench, best, row)
         if rest is None:
             continue
-        progress(f"judging {row.label} together with {', '.join(sorted(rest.labels))}")
+        progress(f"judging {row.label} together with {_joined(rest.labels)}")
         study, floor = with_rows(bench.study, rest.rows), floor_of(bench, best.fitted)
         found = judge(rest.fitted, rank(study, bench.data, rest.fitted, floor), floor)
         other = found.best
@@ -189,7 +209,7 @@ def _set_verdict(
     return replace(
         found,
         best=row,
-        text=f"with {', '.join(sorted(others))}: {found.text}{_how_to_add(row, others)}",
+        text=f"with {_joined(others)}: {found.text}{_how_to_add(row, others)}",
         second=second,
         evidence=Evidence(left, found.evidence.margin),
         beside=others,
@@ -212,5 +232,5 @@ def _undetermined_by_sets(verdict: Verdict, best: Combination) -> Verdict:
     ):
         return verdict
     rivals = tuple(sorted({*verdict.rivals, *best.labels}))
-    text = f"{', '.join(sorted(best.labels))} together explain more than {verdict.best.label}"
+    text = f"{_joined(best.labels)} together explain more than {verdict.best.label}"
     return replace(verdict, word="undetermined", rivals=rivals, text=text)

@@ -53,6 +53,17 @@ def test_without_the_truth_among_them_no_effect_is_named_with_confidence(three, 
     assert verdict.word in ("unknown_effect", "undetermined")
 
 
+def test_what_the_best_set_leaves_is_told_if_something_else_is_missing_too():
+    bench = hiding("coulomb", "quadratic_drag", "dead_band")
+    outside = {"dead_band", "saturation", "valve_hysteresis", "curvature", "asymmetry", "gain"}
+    rest = {n: e for n, e in bench.study.effects.items() if n not in outside}
+    _, verdict = ranking(
+        dataclasses.replace(bench, study=dataclasses.replace(bench.study, effects=rest))
+    )
+    assert verdict.word in ("unknown_effect", "undetermined")
+    assert "coulomb@load" in verdict.text.partition(" together leave ")[0].rpartition("; ")[2]
+
+
 def test_two_simple_effects_are_not_taken_for_one_with_a_shape():
     bench = hiding("coulomb", "quadratic_drag")
     _, verdict = ranking(bench)
