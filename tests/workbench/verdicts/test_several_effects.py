@@ -51,8 +51,10 @@ def test_without_the_truth_among_them_no_effect_is_named_with_confidence(three, 
     study = dataclasses.replace(three.study, effects=rest)
     _, verdict = ranking(dataclasses.replace(three, study=study))
     assert verdict.word in ("unknown_effect", "undetermined")
+    assert " together leave " in verdict.text
 
 
+@pytest.mark.nightly
 def test_what_the_best_set_leaves_is_told_if_something_else_is_missing_too():
     bench = hiding("coulomb", "quadratic_drag", "dead_band")
     outside = {"dead_band", "saturation", "valve_hysteresis", "curvature", "asymmetry", "gain"}
