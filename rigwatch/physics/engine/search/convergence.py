@@ -36,7 +36,7 @@ class Convergence:
         converged: whether verdicts may rely on it.
         gradient: predicted relative reduction of the squared error by a further step.
         starts: number of fits from different starts.
-        agreeing: number of fits with the same error as the best, including itself.
+        agreeing: number of fits that reached the same optimum as the best, including itself.
         undetermined: free parameters that the data do not determine.
         at_bound: free parameters on a bound.
         begun: start of the best fit, in words.
@@ -72,8 +72,7 @@ def convergence(
             the squared error alone.
     """
     gradient = promise(best) if gradient is None else gradient
-    size = spread(best)
-    agreeing = 1 + sum(spread(other) <= AGREE * size for other in others)
+    agreeing = 1 + sum(agrees(other, best) for other in others)
     alone = bool(others) and agreeing == 1 and not near_noise
     steep = gradient > PROMISED
     reason = f"a further step would reduce the squared error by {gradient:.1%}" if steep else ""
@@ -94,7 +93,7 @@ def convergence(
 
 def _agreed(agreeing: int, starts: int, *, near_noise: bool) -> str:
     if agreeing > 1:
-        return f"{agreeing} of {starts} starts lead to the same error"
+        return f"{agreeing} of {starts} starts lead to the same optimum"
     if near_noise:
         return "the error is as small as the sensors' noise"
     return "the gradient vanishes; no other start was tried"
@@ -103,6 +102,21 @@ def _agreed(agreeing: int, starts: int, *, near_noise: bool) -> str:
 def spread(fitted: Fit) -> float:
     """Root mean square of the scaled residuals."""
     return float(np.sqrt(np.mean((fitted.rms / fitted.scale) ** 2)))
+
+
+def agrees(other: Fit, best: Fit) -> bool:
+    """Whether a fit reached the optimum of the best: the same error, or nearly the same parameters.
+
+    The error of a machine that sticks is rough: fits stop at different heights of one valley. By
+    the slopes of the best, their parameters leave the same error.
+    """
+    if spread(other) <= AGREE * spread(best):
+        return True
+    names = best.compiled.system.free
+    step = np.array([other.values()[name] - best.values()[name] for name in names])
+    residual = best.error.ravel()
+    there = np.linalg.norm(residual + _jacobian(best) @ step)
+    return bool(there <= AGREE * np.linalg.norm(residual))
 
 
 def promise(fitted: Fit) -> float:

@@ -20,7 +20,7 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit import Fit, Recording, error_at, fit
-from rigwatch.physics.engine.search.convergence import AGREE, PROMISED, spread
+from rigwatch.physics.engine.search.convergence import PROMISED, agrees, spread
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
 from rigwatch.physics.engine.search.equation_error import equation_error_starts
 from rigwatch.physics.engine.search.multi_start_fit import Attempt
@@ -78,7 +78,7 @@ class ShortHorizons:
         best = min(found, key=lambda each: each.cost)
         steep = best.gradient > PROMISED
         system = self.compiled.system
-        agreeing = sum(each.error <= AGREE * best.error for each in found)
+        agreeing = sum(agrees(each.fit, best.fit) for each in found)
         fixed = not system.model.states or not system.free
         return not steep and (fixed or agreeing > 1 or self.near_noise(best))
 
