@@ -15,11 +15,12 @@ parameters,
 Second, model error mimics a little of every effect. The apparent strength of an effect on a healthy
 recording is used as a standard deviation of its strength.
 
-Along the measured motion, where model error exceeds noise, there are three more. The model's
+Along the measured motion, where model error exceeds noise, there are four more. The model's
 response to an effect is itself in error by a share of it. A residual that repeats with the
 excitation is counted once, and not once per period. And a law that is not the machine's gives one
 strength for slow and another for fast motion (`regimes.py`); what the base model leaves on the
-healthy recording also varies so, but averages out over the regimes. The contributions are
+healthy recording also varies so, but averages out over the regimes. Laws of the base that the
+healthy recording leaves open give a strength each (`model_form.py`). The contributions are
 independent and add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
@@ -34,6 +35,7 @@ from rigwatch.physics.engine.fit import Fit, evaluate
 from rigwatch.physics.engine.score import Candidate
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare.model_form import variances_between_bases
 from rigwatch.workbench.compare.regimes import REGIMES, WITHIN, variances_between_regimes
 from rigwatch.workbench.data import Data, repeat_along_motion, repeat_of
 from rigwatch.workbench.fit import Fitted, block_numbers, covariance, with_kept_free
@@ -66,7 +68,10 @@ def added_variances(
     healthy = data.of_healthy
     if study.kept is None or bare is None or healthy is None:
         return found
-    for name, variance in _variances(study, study.kept, data, fitted).items():
+    parts = [_variances(study, study.kept, data, fitted)]
+    if data.along_motion:
+        parts.append(variances_between_bases(study, data, bare, fitted))
+    for name, variance in (each for part in parts for each in part.items()):
         found[name] = found.get(name, 0.0) + variance
     for placement in fitted.placements:
         name = placement.prefix + placement.effect.strength
