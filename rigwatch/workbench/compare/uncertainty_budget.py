@@ -88,8 +88,8 @@ def _of_repeats(data: Data, fitted: Fitted) -> dict[str, float]:
     (once, few), (by_time, many) = (covariance(fitted.train, each) for each in (repeat, 0))
     counted_once, variance = np.diag(once), np.diag(by_time)
     beyond = counted_once > f_distribution.ppf(CERTAIN, few, many) * variance
-    added = np.where(beyond, counted_once - variance, 0.0)
-    return dict(zip(fitted.compiled.system.free, added.tolist(), strict=True))
+    added = zip(fitted.compiled.system.free, (counted_once - variance).tolist(), strict=True)
+    return {name: more for (name, more), counts in zip(added, beyond, strict=True) if counts}
 
 
 def _of_motion(data: Data, bare: Fitted | None, fitted: Fitted) -> dict[str, float]:
