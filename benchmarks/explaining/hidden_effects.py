@@ -16,6 +16,7 @@ seeds below `JUDGED` make the calibration of the workbench, the others test it.
 
 import sys
 import time
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ from benchmarks.explaining.hidden import asked, collected, confusion, counted, s
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.preparation import Bench, bench_of
+from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain import verdict_calibration as calibration
 from rigwatch.workbench.explain.explain import ranking
@@ -111,7 +113,7 @@ class Case:
     Attributes:
         hidden: names; none for a healthy plant.
         share: of an output's rms that they change.
-        seed: of excitation and noise.
+        seed: of the excitation; with the rest of the case, of the noise.
         held: whether the force is held between samples; unknown to the workbench.
     """
 
@@ -190,10 +192,19 @@ def excitation(seed: int) -> FloatArray:
     return multisine(np.arange(0.25, 8, 0.25), 4.0, seed=seed)
 
 
-def noisy(hidden: tuple[Hidden, ...], seed: int, *, held: bool = False) -> Recording:
-    """One recording of the plant, with sensor noise."""
-    force = excitation(seed)
-    return recorded(force, hidden, NOISE * size_of(force, held=held), seed + 7, held=held)
+def noisy(
+    hidden: tuple[Hidden, ...], seed: int, noise: int | None = None, *, held: bool = False
+) -> Recording:
+    """One recording of the plant.
+
+    Args:
+        hidden: hidden effects.
+        seed: of the excitation.
+        noise: seed of the sensors' noise.
+        held: as in `Case`.
+    """
+    force, noise = excitation(seed), seed + 7 if noise is None else noise
+    return recorded(force, hidden, NOISE * size_of(force, held=held), noise, held=held)
 
 
 def solve(case: Case) -> Outcome:
@@ -220,11 +231,21 @@ def simulated(case: Case) -> Data:
         Hidden(name, strength_for(name, excitation(case.seed), share, held=case.held))
         for name in case.hidden
     )
-    return Data(
-        noisy(hidden, case.seed, held=case.held),
-        noisy(hidden, case.seed + 1000, held=case.held),
-        noisy((), case.seed + 2000, held=case.held), HORIZON, (),
-    )  # fmt: skip
+    uses = ((hidden, 0), (hidden, 1000), ((), 2000))
+    made = [
+        noisy(effects, case.seed + more, _noise_seed(case, more), held=case.held)
+        for effects, more in uses
+    ]
+    return Data(made[0], made[1], made[2], HORIZON, ())
+
+
+def _noise_seed(case: Case, use: int) -> int:
+    """Seed of the noise of one recording.
+
+    Cases of one excitation have noise of their own: with common noise all of their parameters would
+    be wrong alike, and the intervals counted would be as few as the seeds.
+    """
+    return zlib.crc32(f"{case.hidden} {case.share} {case.seed} {case.held} {use}".encode())
 
 
 def _named_next(best: Ranked, data: Data) -> tuple[str, ...]:
@@ -253,7 +274,8 @@ def _covered(bench: Bench, case: Case, rows: Sequence[Ranked]) -> tuple[int, int
             true[f"{fitted.placements[-1].prefix}{EXACT[name]}"] = strength
     if fitted is None:
         return 0, 0
-    found = values(fitted.train)
+    more = added_variances(bench.study, bench.data, bench.bare, fitted)
+    found = values(fitted.train, more)
     inside = [
         low <= true[name] <= high
         for name in true

@@ -1,5 +1,10 @@
 """Uncertainty contributions beyond the scatter of a recording: healthy recording, model error.
 
+In a free simulation a law that is not quite the machine's, such as the creep of a smoothed dry
+friction where the machine sticks, leaves an error that repeats with the excitation and moves the
+parameters alike in each repetition. If the variance with repetitions counted once exceeds that over
+time by more than chance, by an F test, it replaces it.
+
 They bias a fit equally along a whole recording. First, the parameters kept from the
 healthy recording, and those known to a stated deviation (for example a mass), are uncertain. With S
 their covariance, and J_θ and J_κ the derivatives of the residual by the fitted and the kept
@@ -10,17 +15,19 @@ parameters,
 Second, model error mimics a little of every effect. The apparent strength of an effect on a healthy
 recording is used as a standard deviation of its strength.
 
-Along the measured motion, where model error exceeds noise, there are three more. The model's
+Along the measured motion, where model error exceeds noise, there are four more. The model's
 response to an effect is itself in error by a share of it. A residual that repeats with the
 excitation is counted once, and not once per period. And a law that is not the machine's gives one
 strength for slow and another for fast motion (`regimes.py`); what the base model leaves on the
-healthy recording also varies so, but averages out over the regimes. The contributions are
+healthy recording also varies so, but averages out over the regimes. Laws of the base that the
+healthy recording leaves open give a strength each (`model_form.py`). The contributions are
 independent and add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
 import dataclasses
 
 import numpy as np
+from scipy.stats import f as f_distribution
 
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Placement, compose
@@ -28,12 +35,15 @@ from rigwatch.physics.engine.fit import Fit, evaluate
 from rigwatch.physics.engine.score import Candidate
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare.model_form import variances_between_bases
 from rigwatch.workbench.compare.regimes import REGIMES, WITHIN, variances_between_regimes
-from rigwatch.workbench.data import Data, repeat_along_motion
+from rigwatch.workbench.data import Data, repeat_along_motion, repeat_of
 from rigwatch.workbench.fit import Fitted, block_numbers, covariance, with_kept_free
 from rigwatch.workbench.ranking import score_all
 from rigwatch.workbench.study import Kept, Study
 
+CERTAIN = 0.99
+"""Probability of the F test that an error repeats with the excitation."""
 RESPONSE_ERROR = 0.01
 """Relative error of the response to an effect along the measured motion, as a standard deviation.
 
@@ -54,17 +64,32 @@ def added_variances(
     """
     if not fitted.compiled.system.free:
         return {}
-    found = _of_motion(data, bare, fitted) if data.along_motion else {}
+    found = _of_motion(data, bare, fitted) if data.along_motion else _of_repeats(data, fitted)
     healthy = data.of_healthy
     if study.kept is None or bare is None or healthy is None:
         return found
-    for name, variance in _variances(study, study.kept, data, fitted).items():
+    parts = [_variances(study, study.kept, data, fitted)]
+    if data.along_motion:
+        parts.append(variances_between_bases(study, data, bare, fitted))
+    for name, variance in (each for part in parts for each in part.items()):
         found[name] = found.get(name, 0.0) + variance
     for placement in fitted.placements:
         name = placement.prefix + placement.effect.strength
         if name in found:
             found[name] += apparent_strength(healthy, bare, placement, fitted) ** 2
     return found
+
+
+def _of_repeats(data: Data, fitted: Fitted) -> dict[str, float]:
+    """Variances of the fitted parameters due to an error that repeats with the excitation."""
+    repeat = 0 if data.train.thinning is not None else repeat_of(data.train)
+    if not repeat:
+        return {}
+    (once, few), (by_time, many) = (covariance(fitted.train, each) for each in (repeat, 0))
+    counted_once, variance = np.diag(once), np.diag(by_time)
+    beyond = counted_once > f_distribution.ppf(CERTAIN, few, many) * variance
+    added = zip(fitted.compiled.system.free, (counted_once - variance).tolist(), strict=True)
+    return {name: more for (name, more), counts in zip(added, beyond, strict=True) if counts}
 
 
 def _of_motion(data: Data, bare: Fitted | None, fitted: Fitted) -> dict[str, float]:

@@ -202,7 +202,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     compared = comparison(bench)
     if verdict.best is not None and verdict.best.fitted is not None:
         more = added_variances(bench.study, bench.data, bench.bare, verdict.best.fitted)
-        told = unweighed(bench, verdict.best.placement, verdict.best.fitted)
+        told = unweighed(bench, verdict.best.placement, verdict.best.fitted, more)
         compared = replace(compared, remarks=[*compared.remarks, *told])
     listed = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows

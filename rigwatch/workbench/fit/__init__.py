@@ -17,6 +17,7 @@ from rigwatch.workbench.fit.healthy_parameters import (
     poorly_determined,
     with_healthy_parameters,
     with_kept_free,
+    with_values,
 )
 from rigwatch.workbench.fit.healthy_reference import with_healthy_reference
 from rigwatch.workbench.fit.healthy_remainder import learns_from_healthy, with_healthy_remainder
@@ -61,4 +62,5 @@ __all__ = [
     "with_healthy_remainder",
     "with_hold",
     "with_kept_free",
+    "with_values",
 ]

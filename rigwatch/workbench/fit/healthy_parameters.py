@@ -55,7 +55,7 @@ def with_healthy_parameters(study: Study, data: Data, scale: FloatArray | None =
     fitted = Kept(tuple(kept), uncertain, found.convergence)
     return replace(
         study,
-        model=_with_values(study.model, found.train.values()),
+        model=with_values(study.model, found.train.values()),
         kept=with_known(fitted, healthy, found),
     )
 
@@ -138,7 +138,8 @@ def with_kept_free(model: Model, names: Collection[str] = ()) -> Model:
     return structs.replace(model, parameters=free)
 
 
-def _with_values(model: Model, values: Mapping[str, float]) -> Model:
+def with_values(model: Model, values: Mapping[str, float]) -> Model:
+    """The model with these values, and its kept parameters fixed at them."""
     changed = {
         name: structs.replace(p, value=values[name], fixed=p.fixed or p.kept)
         for name, p in model.parameters.items()

@@ -7,8 +7,9 @@ cluster-robust covariance "CR3": R. M. Bell, D. F. McCaffrey, Survey Methodology
 
     θ − θ₋b = (N − Nb)⁻¹·gb,   cov θ = (B − 1)/B · Σ_b (θ − θ₋b)(θ − θ₋b)ᵀ
 
-with N = JᵀJ, Nb = JbᵀJb and gb = Jbᵀrb of B blocks, and Student's t for B − m degrees of freedom
-and m parameters.
+with N = JᵀJ, Nb = JbᵀJb and gb = Jbᵀrb of B blocks. A parameter that shows in a few blocks only, as
+a stop that is seldom reached, has a variance of few degrees of freedom. Student's t therefore has
+those of each variance, after Satterthwaite for independent residuals (Bell and McCaffrey, 2002).
 """
 
 from collections.abc import Collection, Mapping
@@ -70,8 +71,8 @@ def as_written(found: Mapping[str, Value], system: System) -> dict[str, Value]:
     return {n: value.shown_in(units[n]) if units[n] else value for n, value in found.items()}
 
 
-def covariance(fitted: Fit, repeat: int = 0) -> tuple[FloatArray, int]:
-    """Covariance of the free parameters, shape (m, m), and degrees of freedom.
+def covariance(fitted: Fit, repeat: int = 0) -> tuple[FloatArray, FloatArray]:
+    """Covariance of the free parameters, (m, m), and degrees of freedom of each variance, (m,).
 
     Args:
         fitted: the fit.
@@ -83,11 +84,37 @@ def covariance(fitted: Fit, repeat: int = 0) -> tuple[FloatArray, int]:
     size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
     whole = whole / size
     number = block_numbers(fitted, repeat)
-    count = int(number.max()) + 1
-    parts = [np.flatnonzero(number == block) for block in range(count)]
+    parts = [np.flatnonzero(number == block) for block in range(int(number.max()) + 1)]
+    own = np.array([whole[rows].T @ whole[rows] for rows in parts])
     normal = whole.T @ whole
-    moved = np.array([_moved(normal, whole[rows], error[rows]) for rows in parts]) / size
-    return np.asarray(moved.T @ moved * ((count - 1) / count)), max(count - m, 1)
+    rest = np.array([np.linalg.pinv(normal - each, rcond=1e-12) for each in own])
+    slopes = np.array([whole[rows].T @ error[rows] for rows in parts])
+    moved = np.einsum("bij,bj->bi", rest, slopes) / size
+    spread = moved.T @ moved * ((len(parts) - 1) / len(parts))
+    return np.asarray(spread), _degrees_of_freedom(normal, own, rest)
+
+
+def _degrees_of_freedom(normal: FloatArray, own: FloatArray, rest: FloatArray) -> FloatArray:
+    """Degrees of freedom of each variance, shape (m,).
+
+    The change of a parameter when block b is left out is uᵀ·gb. For independent residuals these
+    changes have the covariance Ω, and their squares as many degrees of freedom as (tr Ω)²/tr Ω².
+
+    Args:
+        normal: N, shape (m, m).
+        own: Nb of each block, shape (blocks, m, m).
+        rest: (N − Nb)⁻¹, shape (blocks, m, m).
+    """
+    inverse = np.linalg.pinv(normal, rcond=1e-12)
+    found = np.ones(len(normal))
+    for index in range(len(normal)):
+        u = rest[:, :, index]
+        turned = np.einsum("bi,bij->bj", u, own)
+        omega = np.diag(np.sum(turned * u, axis=1)) - turned @ inverse @ turned.T
+        size = float(np.sum(omega**2))
+        if size > 0:
+            found[index] = max(float(np.trace(omega)) ** 2 / size, 1.0)
+    return found
 
 
 def block_numbers(fitted: Fit, repeat: int = 0) -> IntArray:
@@ -112,13 +139,6 @@ def block_numbers(fitted: Fit, repeat: int = 0) -> IntArray:
     return np.repeat(np.arange(len(lengths)), lengths)
 
 
-def _moved(normal: FloatArray, jacobian: FloatArray, error: FloatArray) -> FloatArray:
-    """Change of the parameters when a block is left out, shape (m,)."""
-    return np.asarray(
-        np.linalg.pinv(normal - jacobian.T @ jacobian, rcond=1e-12) @ (jacobian.T @ error)
-    )
-
-
 def values(fitted: Fit, added_variances: Mapping[str, float] | None = None) -> dict[str, Value]:
     """Every parameter of the model with its interval, in SI.
 
@@ -129,9 +149,8 @@ def values(fitted: Fit, added_variances: Mapping[str, float] | None = None) -> d
     system = fitted.compiled.system
     spread: dict[str, float] = {}
     if system.free:
-        matrix, free = covariance(fitted)
         more = np.array([(added_variances or {}).get(name, 0.0) for name in system.free])
-        width = student.ppf(0.5 + CONFIDENCE / 2, free) * np.sqrt(np.diag(matrix) + more)
+        width = _half_widths(fitted, more)
         spread = dict(zip(system.free, width.tolist(), strict=True))
     notes = identifiability(fitted)
     found = {}
@@ -141,6 +160,21 @@ def values(fitted: Fit, added_variances: Mapping[str, float] | None = None) -> d
         told = TOLD if parameter.is_told else ""
         found[name] = Value(value, parameter.unit, interval, notes.get(name, told))
     return found
+
+
+def _half_widths(fitted: Fit, more: FloatArray) -> FloatArray:
+    """Half widths of the intervals, shape (m,).
+
+    Args:
+        fitted: the fit.
+        more: additional variances, shape (m,); as uncertain as blocks without a structure are.
+    """
+    matrix, degrees = covariance(fitted)
+    own = np.maximum(np.diag(matrix), 1e-100)
+    blocks_left = max(int(block_numbers(fitted).max()) + 1 - len(own), 1)
+    # Degrees of freedom of a sum (B. L. Welch, F. E. Satterthwaite; GUM, G.4).
+    together = (own + more) ** 2 / (own**2 / degrees + more**2 / blocks_left)
+    return np.asarray(student.ppf(0.5 + CONFIDENCE / 2, together) * np.sqrt(own + more))
 
 
 def interval_with_held(fitted: Fit, name: str, held: Collection[str]) -> tuple[float, float] | None:
@@ -155,9 +189,8 @@ def interval_with_held(fitted: Fit, name: str, held: Collection[str]) -> tuple[f
     if name not in free:
         return None
     kept = [index for index, other in enumerate(free) if other not in held]
-    matrix, degrees = covariance(replace(fitted, jacobian=fitted.jacobian[..., kept]))
-    at = kept.index(free.index(name))
-    width = float(student.ppf(0.5 + CONFIDENCE / 2, degrees) * np.sqrt(matrix[at, at]))
+    alone = replace(fitted, jacobian=fitted.jacobian[..., kept])
+    width = float(_half_widths(alone, np.zeros(len(kept)))[kept.index(free.index(name))])
     value = fitted.values()[name]
     return value - width, value + width
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigwatch.physics.engine.equations import Model, check_variants, excludes
+from rigwatch.physics.engine.equations import Model, check_variants, neighbours
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -141,12 +141,7 @@ def take_base(study: Study, variants: Sequence[str]) -> Study:
 
 def _next(model: Model, at: _Tried, rejected: Container[str]) -> list[tuple[str, ...]]:
     """Bases to try next: each further variant added, replacing those that it excludes."""
-    own = at.base.variants
-    return [
-        (*(n for n in own if not excludes(model, name, n)), name)
-        for name in model.variants
-        if name not in own and name not in rejected
-    ]
+    return [n for n in neighbours(model, at.base.variants) if n[-1] not in rejected]
 
 
 def _improves(best: _Tried, one: _Tried) -> bool:

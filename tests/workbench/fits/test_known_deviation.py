@@ -1,5 +1,6 @@
 """Intervals hold what is taken for known; a short healthy recording says what it leaves open."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.compare import Comparison, compare
 from rigwatch.workbench.compare.preparation import open_bench
+from rigwatch.workbench.compare.uncertainty_budget import added_variances
 from rigwatch.workbench.compare.unweighed import unweighed
 from rigwatch.workbench.study.study import Study, open_study
 from tests.workbench.machine import Table, recorded, studied
@@ -90,9 +92,16 @@ def test_a_strength_says_how_it_moves_with_a_mass_that_nobody_weighed(tmp_path: 
     for name, keys in (("prior", ""), ("weighed", "start = { m = 1.2 }\ndeviation = { m = 0.1 }")):
         study = rubbing(tmp_path / name, run(2, 0.0, 1000), "deviation = 0.1,", keys)
         bench = open_bench(study)
-        told.append(unweighed(bench, bench.base.placements[0], bench.base))
+        more = added_variances(bench.study, bench.data, bench.bare, bench.base)
+        told.append(unweighed(bench, bench.base.placements[0], bench.base, more))
     assert len(told[0]) == 1
     assert "Fc of coulomb@load moves by 1 % for each percent of m (" in told[0][0]
+    ratio = re.search(r"the recordings alone show (\S+) N per kg \((\S+) … (\S+)\)", told[0][0])
+    assert ratio
+    value, low, high = map(float, ratio.groups())
+    # The mass is uncertain by a tenth, its ratio to the friction is not.
+    assert value == pytest.approx(0.3, rel=0.05)
+    assert 0 < high - low < 0.2 * value
     assert not told[1]
 
 

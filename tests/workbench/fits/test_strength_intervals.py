@@ -145,6 +145,22 @@ def test_repeating_a_recording_does_not_narrow_the_interval_of_model_error() -> 
     assert by_time < 0.4 * counted_once
 
 
+def test_a_parameter_that_shows_in_few_windows_has_the_interval_of_few_degrees_of_freedom() -> None:
+    fitted = found_in(0)[0]
+    random = np.random.default_rng(3)
+    seldom = np.where(np.arange(20) % 7 == 0, 1.0, 0.02)[:, None, None] * np.ones((20, 16, 1))
+    hits = []
+    for _ in range(400):
+        noise = random.normal(size=(20, 16))
+        moved = float(np.sum(seldom[..., 0] * noise) / np.sum(seldom**2))
+        left = replace(fitted, error=noise - moved * seldom[..., 0], jacobian=seldom)
+        value = values(left)[STRENGTH]
+        hits.append(abs(moved) <= half_width(value) * value.value)
+    # With the 19 degrees of freedom of 20 blocks it would be nine tenths or less.
+    assert 0.93 <= np.mean(hits) <= 0.99
+    assert covariance(left)[1][0] < 4
+
+
 def test_chance_is_no_difference_between_regimes() -> None:
     found = []
     for seed in range(200):

@@ -56,7 +56,7 @@ from rigwatch.physics.engine.equations.system import (
     signal_order,
     units_at,
 )
-from rigwatch.physics.engine.equations.variants import excludes, with_variants
+from rigwatch.physics.engine.equations.variants import neighbours, with_variants
 
 __all__ = [
     "FUNCTIONS",
@@ -88,7 +88,6 @@ __all__ = [
     "check_model",
     "check_variants",
     "compose",
-    "excludes",
     "has_hidden_states",
     "library",
     "load_effects",
@@ -97,6 +96,7 @@ __all__ = [
     "model_named",
     "model_text",
     "names_in",
+    "neighbours",
     "offered",
     "parse",
     "parse_effects",

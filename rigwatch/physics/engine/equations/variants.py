@@ -51,6 +51,20 @@ def excludes(model: Model, one: str, other: str) -> bool:
     return one == other or (a.group != "" and a.group == b.group) or bool(_touched(a) & _touched(b))
 
 
+def neighbours(model: Model, names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Sets of variants one step away: each further variant added, replacing those that it excludes.
+
+    Args:
+        model: the unmodified model.
+        names: of the variants in use.
+    """
+    return [
+        (*(n for n in names if not excludes(model, name, n)), name)
+        for name in model.variants
+        if name not in names
+    ]
+
+
 def _touched(variant: Variant) -> set[str]:
     named = (name for table in TABLES for name in getattr(variant, table))
     return {*named, *variant.without}

@@ -39,6 +39,8 @@ NEAR = 3.0
 """Ratio of error to noise above which another search must reach the same optimum."""
 LOOK, POLISH = 25, 60
 """Most simulations of a first search over a part of a recording, and of one over the whole."""
+BRIEF = 15
+"""Most simulations of a brief search."""
 ROUNDS = 3
 """Most continuations of a search over the whole while a further step predicts a reduction."""
 REACH = 1.0
@@ -82,6 +84,8 @@ class WholeRuns:
         robust: transition of the robust loss to linear [standard deviations of noise].
         substeps: Runge-Kutta steps between samples.
         starts: number of further searches if the one from the given values ends above `GOOD`.
+        brief: whether one search of `BRIEF` simulations is enough, where the values to start from
+            are near.
     """
 
     def __init__(
@@ -97,9 +101,12 @@ class WholeRuns:
         robust: float = ROBUST,
         substeps: int = 2,
         starts: int = STARTS,
+        brief: bool = False,
     ) -> None:
         self._compiled, self._recordings, self._scale = compiled, recordings, scale
-        self._robust, self._substeps, self._starts = robust, substeps, starts
+        self._robust, self._substeps = robust, substeps
+        self._starts = 0 if brief else starts
+        self._most, self._rounds = (BRIEF, 0) if brief else (POLISH, ROUNDS)
         self._begin = compiled.parameters if start is None else start
         self._problem = self._posed(initial)
         self._m, first = len(self._problem.free), self._problem.initial
@@ -171,11 +178,11 @@ class WholeRuns:
 
     def _polished(self, z: FloatArray) -> _Look:
         """The search from z over all of the recordings."""
-        look = self._run(z, POLISH)
-        for _ in range(ROUNDS):
+        look = self._run(z, self._most)
+        for _ in range(self._rounds):
             if look.promise <= PROMISED or look.rms >= BLOWN_UP:
                 break
-            further = self._run(look.z, POLISH)
+            further = self._run(look.z, self._most)
             # In a curved valley a linearisation predicts a reduction that a full round misses.
             found = 1 - further.cost / look.cost
             look = replace(further, promise=min(further.promise, found))

@@ -1,0 +1,103 @@
+"""Model form: how much a strength depends on laws of the base model that the data leave open.
+
+A model file offers variants of its laws: of the flow, the valve, the heat, the sensors. Those that
+describe the healthy recording about as well as the base could as well be the machine's, and each
+gives another strength. The base and, one at a time, the base with each variant are therefore fitted
+to the beginning of the healthy recording, and the effect is fitted again with each. The largest
+difference from the base within a group of variants is a standard deviation of the strength; groups
+are independent and add in quadrature (JCGM 100:2008 (GUM), 5.1).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from msgspec import structs
+
+from rigwatch.physics.engine.compile import compile_system
+from rigwatch.physics.engine.equations import Model, along_measured_motion, compose, neighbours
+from rigwatch.physics.engine.fit import Recording, beginning
+from rigwatch.physics.engine.search import WholeRuns, multi_start_fit
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import RigwatchError
+from rigwatch.workbench.data import Data
+from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free, with_values
+from rigwatch.workbench.study import Study, varied
+
+BEGINNING = 3072
+"""Samples of the healthy recording to which variants are fitted."""
+AS_GOOD = 1.1
+"""Largest ratio of the errors on the healthy recording at which a variant counts."""
+
+
+def variances_between_bases(
+    study: Study, data: Data, bare: Fitted | None, fitted: Fitted
+) -> dict[str, float]:
+    """Variances of the fitted parameters between bases that the healthy recording allows, by name.
+
+    Args:
+        study: prepared, with parameters from the healthy recording.
+        data: its recordings along the measured motion.
+        bare: the model alone, fitted to the healthy recording.
+        fitted: the model with some effects.
+    """
+    healthy = data.of_healthy
+    if bare is None or healthy is None or not (fitted.placements and study.model.variants):
+        return {}
+    part, own = beginning(healthy.train, BEGINNING), study.file.variants
+    moved: dict[str, FloatArray] = {}
+    try:
+        base = _tried(study, own, part, bare)
+        before = _strengths(study, data, base.model, fitted)
+    except RigwatchError:
+        return {}
+    for names in neighbours(study.model, own):
+        try:
+            other = _tried(study, names, part, bare)
+            if other.error > AS_GOOD * base.error:
+                continue
+            difference = _strengths(study, data, other.model, fitted) - before
+        except RigwatchError:
+            continue
+        group = study.model.variants[names[-1]].group or names[-1]
+        moved[group] = np.maximum(moved.get(group, 0.0), difference**2)
+    total = np.sum([np.zeros_like(before), *moved.values()], axis=0)
+    return dict(zip(fitted.compiled.system.free, total.tolist(), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A base with the parameters of a healthy recording, and its error there."""
+
+    model: Model
+    error: float
+
+
+def _tried(study: Study, names: Sequence[str], healthy: Recording, bare: Fitted) -> _Tried:
+    """The base with these variants, fitted from the parameters that it shares with the study's."""
+    model = _along(study, names)
+    loose = with_kept_free(model)
+    before = with_kept_free(_along(study, study.file.variants)).parameters
+    shared = [n for n, p in loose.parameters.items() if before.get(n) == p]
+    compiled = compile_system(compose(loose, ()))
+    start = compiled.vector({n: study.model.parameters[n].value for n in shared})
+    scale, steps = bare.train.scale, study.file.substeps
+    search = WholeRuns(compiled, [healthy], scale, start=start, substeps=steps, brief=True)
+    found, _ = multi_start_fit(search)
+    error = float(np.sqrt(np.mean((found.rms / scale) ** 2)))
+    return _Tried(with_values(model, found.values()), error)
+
+
+def _along(study: Study, names: Sequence[str]) -> Model:
+    """The model with these variants along the measured motion, with the study's holds."""
+    model = along_measured_motion(varied(study, names).model)
+    return structs.replace(model, inputs=study.model.inputs)
+
+
+def _strengths(study: Study, data: Data, model: Model, fitted: Fitted) -> FloatArray:
+    """The fitted parameters with another base, shape (m,)."""
+    prefixes = tuple(placement.prefix for placement in fitted.placements)
+    start = {n: v for n, v in fitted.train.values().items() if n.startswith(prefixes)}
+    other, scale = replace(study, model=model, kept=None), fitted.train.scale
+    found = fit_model(other, data, fitted.placements, start, scale).train.values()
+    return np.array([found[name] for name in fitted.compiled.system.free])
