@@ -271,11 +271,12 @@ class Field:
         self.settle(device)
 
     def calm(self, device: Device, *names: str) -> None:
-        """A new monitor if one of the alarms has been raised so often that it soon chatters."""
+        """A new monitor if one of the alarms stands, or was raised so often that it chatters."""
         recent = time.time_ns() - 60 * 10**9
         for name in names:
-            raised = [one for one in self.journalled(name) if one.active]
-            if sum(one.alarm.t_ns > recent for one in raised) >= 3:
+            records = self.journalled(name)
+            raised = [one for one in records if one.active and one.alarm.t_ns > recent]
+            if len(raised) >= 3 or any(one.active for one in records[-1:]):
                 self.renew_monitor(device)
                 return
 

@@ -205,9 +205,9 @@ def test_13_a_signal_at_its_rail(rig: Field, device: SerialDevice) -> None:
     flags = rig.read("acceleration", boot, first, first + 8)[1] & quality.SATURATED
     assert np.flatnonzero(flags).tolist() == list(range(2, 8)), "from the third sample on"
     for name in ("theta1", "theta2"):
-        theta = estimated(rig, boot, first - 64, first + 300, name)
-        before = np.abs(theta[:64]).max()
-        assert np.abs(theta[64:]).max() < 3.0 * before + 0.01, "kept out of the estimates"
+        theta = estimated(rig, boot, first, first + 64, name)
+        assert np.isfinite(theta).all()
+        assert (theta[2:8] == theta[1]).all(), "kept out of the estimates"
 
 
 def test_17_spikes(rig: Field, device: SerialDevice) -> None:
@@ -285,14 +285,17 @@ def test_36_a_rig_that_stands_still(rig: Field, device: SerialDevice) -> None:
     ready(rig, device)
     still = Standstill(slice(None))
     first, boot = device.source.inject(still, 640).sent(), device.device.boot
-    rig.judged(boot, first + 600)
-    still_from = first + still.moved + round(RATE)
-    assert not estimated(rig, boot, still_from, first + 600, "observable").any()
-    for name in ("theta1", "theta2", "theta1_high", "theta2_high"):
-        frozen = estimated(rig, boot, still_from, first + 600, name)
-        assert np.isfinite(frozen).all()
-        assert (frozen == frozen[0]).all(), "frozen and bounded"
+    frozen(rig, boot, first + still.moved + round(RATE), first + 600)
     rig.judged(boot, first + 700)
+
+
+def frozen(rig: Field, boot: int, first: int, last: int) -> None:
+    """The estimates are marked as not observable, and neither they nor their bounds change."""
+    assert not estimated(rig, boot, first, last, "observable").any()
+    for name in ("theta1", "theta2", "theta1_high", "theta2_high"):
+        values = estimated(rig, boot, first, last, name)
+        assert np.isfinite(values).all()
+        assert (values == values[0]).all(), "frozen and bounded"
 
 
 def test_36_a_rig_that_is_driven_and_stands_still(rig: Field, device: SerialDevice) -> None:
@@ -303,9 +306,8 @@ def test_36_a_rig_that_is_driven_and_stands_still(rig: Field, device: SerialDevi
     # The window, and the decay of the velocity's filter to the least velocity.
     assert 0 <= remark.seq - (first + held.moved) <= 3 * RATE
     assert estimated(rig, boot, remark.seq, remark.seq, "armed").tolist() == [1.0]
-    # At first the noise may lift the velocity above its least value for some samples again.
-    rig.judged(boot, first + 1280)
-    assert not estimated(rig, boot, first + 1200, first + 1270, "observable").any()
+    # The velocity's filter decays from the last swing to the least velocity that is judged.
+    frozen(rig, boot, first + held.moved + round(1.5 * RATE), first + 1270)
     rig.cleared("not_observable")
 
 
@@ -321,33 +323,38 @@ def test_42_a_slow_reader(rig: Field, device: SerialDevice) -> None:
     assert lost(rig, since) == []
 
 
-def test_03_a_silent_device(rig: Field, device: SerialDevice) -> None:
-    rig.calm(device.device, "stale")
+def noticed_within(
+    seconds: float, rig: Field, device: SerialDevice, name: str, faulty: Callable[[bool], None]
+) -> None:
+    """The alarm comes in time after `faulty(True)`.
 
-    def silence() -> float:
-        rig.cleared("stale")
-        device.silent = True
-        took = rig.noticed("stale", time.time_ns())
-        device.silent = False
-        rig.cleared("stale")
+    It is not waited for to clear: on a machine that makes samples late again and again it
+    chatters, and stays for as long as that goes on. Each attempt has a monitor without a past.
+    """
+    rig.calm(device.device, name)
+
+    def attempt() -> float:
+        began = time.time_ns()
+        faulty(True)
+        took = rig.noticed(name, began)
+        faulty(False)
         return took
 
-    least_of(silence, 0.1, lambda: rig.renew_monitor(device.device))
+    least_of(attempt, seconds, lambda: rig.renew_monitor(device.device), tries=5)
+
+
+def test_03_a_silent_device(rig: Field, device: SerialDevice) -> None:
+    def silent(now: bool) -> None:
+        device.silent = now
+
+    noticed_within(0.1, rig, device, "stale", silent)
 
 
 def test_16_a_slow_device(rig: Field, device: SerialDevice) -> None:
-    rig.calm(device.device, "slow_device")
+    def slow(now: bool) -> None:
+        device.slow_down(2.0 if now else 1.0)
 
-    def slow() -> float:
-        rig.cleared("slow_device")
-        began = time.time_ns()
-        device.slow_down(2.0)
-        took = rig.noticed("slow_device", began)
-        device.slow_down(1.0)
-        rig.cleared("slow_device")
-        return took
-
-    least_of(slow, 0.5, lambda: rig.renew_monitor(device.device))
+    noticed_within(0.5, rig, device, "slow_device", slow)
 
 
 def test_04_garbage_on_the_line(rig: Field, device: SerialDevice) -> None:
@@ -355,7 +362,6 @@ def test_04_garbage_on_the_line(rig: Field, device: SerialDevice) -> None:
     rig.calm(device.device, "line_noise")
 
     def garbage() -> float:
-        rig.cleared("line_noise")
         began, first = time.time_ns(), device.device.next_seq
         device.faults.start("garbage")
         took = rig.noticed("line_noise", began)
