@@ -20,6 +20,9 @@ HISTORY_BYTES = (16 << 20) - 20_000
 """Length of a journal that is rotated soon [bytes]."""
 AFTER_S = 3.0
 """Time after a reason in which its alarms may still come [s]."""
+BEFORE_S = 0.5
+"""How far a rig that a busy machine delays lags behind the clock: the samples that it takes then
+carry earlier times [s]."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,8 @@ class Reason:
 
     def covers(self, alarm: dict[str, Any]) -> bool:
         """Whether it explains the alarm."""
-        within = self.begin_ns <= alarm["t"] <= self.end_ns + int(AFTER_S * 1e9)
-        return within and alarm["name"] in self.names
+        first, last = self.begin_ns - int(BEFORE_S * 1e9), self.end_ns + int(AFTER_S * 1e9)
+        return first <= alarm["t"] <= last and alarm["name"] in self.names
 
     def is_told(self, raised: Iterable[dict[str, Any]]) -> bool:
         """Whether one of the alarms tells it."""

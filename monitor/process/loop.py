@@ -19,6 +19,7 @@ from monitor.process.health import HealthBook
 from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_reports
 from monitor.process.model_requests import ModelDesk, Place
 from monitor.process.operator_desk import OperatorDesk
+from monitor.process.presence import Presence
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
 from rigwatch.wire.bus import Bus, CommandCheck, connect, serve_alarm_list
@@ -82,20 +83,19 @@ class MonitorProcess:
         self._health = HealthBook("monitor")
         self._device = config.daq.name
         self._patience = Patience(time.monotonic())
-        self._daq_alive = False
+        self._daq_presence, self._recorder_presence = Presence(), Presence()
         self._daq_trouble = ""
         self._daq: Health | None = None
         self._delivered_s = self._estimated_s = 0.0
         self._router_lost_at: float | None = None
         self._recorder: Health | None = None
-        self._recorder_alive = False
         self._unsuitable = ""
         self._standing = self.rig.alarms.standing()
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
         self._healths = bus.subscribe(HEALTH)
-        bus.watch_tokens(f"{ALIVE_KEY}/daq", self._daq_changed)
-        bus.watch_tokens(f"{ALIVE_KEY}/recorder", self._recorder_changed)
+        self._follow("daq", self._daq_presence)
+        self._follow("recorder", self._recorder_presence)
         self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
         if self._journal:
             newest = self._journal.newest()
@@ -145,9 +145,8 @@ class MonitorProcess:
         for name, occasion, holds in device_reports(seen, self._daq, unjudged, self._unsuitable):
             self.say(self.rig.alarms.report(name, occasion, active=holds))
         failure = self._journal.failure if self._journal else ""
-        for name, occasion, holds in disk_reports(
-            seen, self._recorder, self._recorder_alive, failure
-        ):
+        recorder_there = self._recorder_presence.holds(time.monotonic())
+        for name, occasion, holds in disk_reports(seen, self._recorder, recorder_there, failure):
             self.say(self.rig.alarms.report(name, occasion, active=holds))
         self._announce_router(seen)
         self._announce_clock_step(seen)
@@ -231,11 +230,17 @@ class MonitorProcess:
             return 0
         return max(0, min(len(block), self._done[1] + 1 - block.seq))
 
-    def _daq_changed(self, _key: str, alive: bool) -> None:
-        self._daq_alive = alive
+    def _follow(self, process: str, presence: Presence) -> None:
+        def changed(_key: str, alive: bool) -> None:
+            presence.token(time.monotonic(), alive=alive)
 
-    def _recorder_changed(self, _key: str, alive: bool) -> None:
-        self._recorder_alive = alive
+        self.bus.watch_tokens(f"{ALIVE_KEY}/{process}", changed)
+
+    def _daq_there(self) -> bool:
+        now = time.monotonic()
+        if self.reader.heard:
+            self._daq_presence.heard(now - self.reader.silent_for())
+        return self._daq_presence.holds(now)
 
     def _hear_of_others(self) -> None:
         for health in self._healths.drain():
@@ -244,21 +249,22 @@ class MonitorProcess:
                 self._daq_trouble = health.text if health.state == "reconnecting" else ""
             elif health.source.startswith("recorder"):
                 self._recorder = None if health.state == "stopped" else health
-                self._recorder_alive = True
+                self._recorder_presence.heard(time.monotonic())
 
     def _seen(self) -> Seen:
         self._hear_of_others()
+        daq_there = self._daq_there()
         silent = self._patience.counted(
             time.monotonic(),
             self.reader.silent_for(),
-            daq_alive=self._daq_alive,
+            daq_alive=daq_there,
             heard=self.reader.heard,
         )
         return Seen(
             time.time_ns(),
             time.monotonic_ns(),
             silent,
-            self._daq_trouble if self._daq_alive else "the daq process is not there",
+            self._daq_trouble if daq_there else "the daq process is not there",
             self.reader.heard,
             self.reader.contested,
             self._device,

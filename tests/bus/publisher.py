@@ -1,6 +1,6 @@
 """Publishes samples as daq does: into the ring, then onto the bus. A process that tests kill.
 
-python -m tests.bus.publisher CONFIG BOOT [--ring N] [--rate HZ] [--wave]
+python -m tests.bus.publisher CONFIG BOOT [--ring N] [--rate HZ] [--wave] [--twice N]
 """
 
 import argparse
@@ -39,6 +39,7 @@ def main() -> None:
     parser.add_argument("--ring", type=int, default=65536)
     parser.add_argument("--rate", type=float, default=256.0)
     parser.add_argument("--wave", action="store_true")
+    parser.add_argument("--twice", type=int, default=0, help="send every Nth sample again")
     arguments = parser.parse_args()
     bus = connect(load_rig(arguments.config), "daq")
     ring = SampleRing(bus, arguments.ring)
@@ -51,6 +52,8 @@ def main() -> None:
             part = make(seq, 1, arguments.boot, start_ns)
             ring.add(part)
             bus.publish(SAMPLES, part)
+            if arguments.twice and seq % arguments.twice == 0:
+                bus.publish(SAMPLES, part)
         sent = due
         time.sleep(max(0.0, start + sent / arguments.rate - time.monotonic()))
 

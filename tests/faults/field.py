@@ -6,6 +6,7 @@ an alarm's time against the time of the injection, both of this machine's clock.
 """
 
 import json
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -27,11 +28,13 @@ from rigwatch.wire.messages import (
     EVENTS,
     GAPS,
     HEALTH,
+    SAMPLES,
     Alarm,
     EstimateBlock,
     Event,
     Gap,
     Health,
+    SampleBlock,
     Topic,
 )
 from sim_plant.serve import Device, LineFaults, PtyLine, SerialServer
@@ -142,15 +145,26 @@ class SerialDevice:
         self.server = SerialServer(self.device, self.line, faults=self.faults)
         self.period = 1.0 / RATE
         self.silent = False
+        self.pause_s = 0.0
 
     def serve(self, stop: threading.Event) -> None:
         """Send each sample when it is due; a standstill is not made up for."""
         due = time.monotonic()
         with self.line:
             while not stop.wait(max(0.0, due - time.monotonic())):
+                if self.pause_s:
+                    due += self._paused()
                 due = max(due + self.period, time.monotonic() - 1.0)
                 if not self.silent:
                     self.server.step(1)
+
+    def _paused(self) -> float:
+        """Take no sample for a while; the device's clock goes on. How long it was [s]."""
+        began = time.monotonic()
+        time.sleep(self.pause_s)
+        self.pause_s, took = 0.0, time.monotonic() - began
+        self.device.jump_clock(took)
+        return took
 
     def slow_down(self, factor: float) -> None:
         """Take that many times as long for each sample, with a clock that stays right."""
@@ -257,11 +271,12 @@ class Field:
         self.settle(device)
 
     def calm(self, device: Device, *names: str) -> None:
-        """A new monitor if one of the alarms has been raised so often that it soon chatters."""
+        """A new monitor if one of the alarms stands, or was raised so often that it chatters."""
         recent = time.time_ns() - 60 * 10**9
         for name in names:
-            raised = [one for one in self.journalled(name) if one.active]
-            if sum(one.alarm.t_ns > recent for one in raised) >= 3:
+            records = self.journalled(name)
+            raised = [one for one in records if one.active and one.alarm.t_ns > recent]
+            if len(raised) >= 3 or any(one.active for one in records[-1:]):
                 self.renew_monitor(device)
                 return
 
@@ -269,6 +284,7 @@ class Field:
         subscriptions = {
             topic: self.bus.subscribe(topic) for topic in (ALARMS, ESTIMATES, EVENTS, GAPS, HEALTH)
         }
+        subscriptions[SAMPLES] = self.bus.subscribe_lossy(SAMPLES)
         while not stop.wait(0.005):
             for topic, subscription in subscriptions.items():
                 self.heard.of(topic).extend(subscription.drain())
@@ -289,6 +305,26 @@ class Field:
 
     def estimates(self) -> list[EstimateBlock]:
         return self.heard.of(ESTIMATES)
+
+    @property
+    def samples(self) -> list[SampleBlock]:
+        """As they came from the bus, without those that readers fetch from the ring."""
+        return self.heard.of(SAMPLES)
+
+    def read(self, channel: str, boot: int, first: int, last: int) -> tuple[Any, Any]:
+        """Values and quality flags of the samples from `first` to `last`, once they have come."""
+        found: dict[int, tuple[float, int]] = {}
+
+        def there() -> bool:
+            for block in [b for b in list(self.samples) if b.boot == boot]:
+                read = block.channel(channel)
+                pairs = zip(read.values, read.quality, strict=True)
+                found.update({block.seq + i: pair for i, pair in enumerate(pairs)})
+            return all(n in found for n in range(first, last + 1))
+
+        eventually(there, f"samples {first} to {last}")
+        values, flags = zip(*(found[n] for n in range(first, last + 1)), strict=True)
+        return np.array(values), np.array(flags, np.uint8)
 
     def health(self, source: str) -> Health:
         """The newest health of a process."""
@@ -339,6 +375,24 @@ class Field:
             ),
             f"alarm {name}",
         )
+
+    def noticed(self, name: str, after_ns: int) -> float:
+        """Time from a moment [ns] until the alarm was raised that is active now; waits for one [s].
+
+        Infinite if it was raised before: a busy machine delays samples too, and while an alarm
+        stands, nothing more is said.
+        """
+        found: list[AlarmRecord] = []
+
+        def active() -> bool:
+            found[:] = self.journalled(name)[-1:]
+            return bool(found and found[0].active)
+
+        eventually(active, f"alarm {name}")
+        raised = next(
+            (r.alarm for r in self.journalled(name) if r.active and r.alarm.t_ns >= after_ns), None
+        )
+        return (raised.t_ns - after_ns) * 1e-9 if raised else math.inf
 
     def cleared(self, name: str) -> None:
         """Wait until an alarm is not active, with or without having been."""

@@ -12,6 +12,7 @@ import pytest
 from rigwatch.wire.bus import ask_alarm_list
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import SAMPLES, Alarm
+from rigwatch.wire.messages import quality_flags as quality
 from tests.bus.rig import rigwatch
 from tests.faults.field import (
     AMPLITUDE,
@@ -81,7 +82,10 @@ def test_06_dropped_and_inserted_bytes(rig: Field, device: SerialDevice, kind: s
     device.faults.start(kind, 1)
     rig.judged(boot, first + 64)
     eventually(lambda: len(lost(rig, since)) > 0 or kind == "insert", "the gap")
-    assert sum(last - first + 1 for first, last in lost(rig, since)) <= 2
+    told = [n for a, b in lost(rig, since) for n in range(a, b + 1)]
+    assert len(told) <= 2
+    came = estimated(rig, boot, first, first + 64).tolist()
+    assert sorted([*came, *told]) == list(range(first, first + 65)), "all but the gap"
 
 
 def test_07_frames_that_come_twice(rig: Field, device: SerialDevice) -> None:
@@ -125,6 +129,23 @@ def test_10_a_clock_that_jumps(rig: Field, device: SerialDevice) -> None:
     assert steps.max() < 0.25e9, "the stamps follow the host's clock"
     armed = estimated(rig, boot, jump - 1, jump, "armed")
     assert armed.tolist() == [1.0, 0.0], "the filters start anew"
+
+
+def test_10_a_device_that_pauses_without_counting(rig: Field, device: SerialDevice) -> None:
+    ready(rig, device)
+    boot, since, began = device.device.boot, len(rig.gaps), time.time_ns()
+    device.pause_s = 0.3
+    eventually(lambda: device.pause_s == 0.0, "the device pauses")
+    last = device.device.next_seq
+    rig.judged(boot, last + 64)
+    stamps = {
+        b.seq + i: int(t) for b in rig.estimates() if b.boot == boot for i, t in enumerate(b.t_ns)
+    }
+    longest = max(range(last - 64, last + 64), key=lambda n: stamps[n] - stamps[n - 1])
+    assert stamps[longest] - stamps[longest - 1] >= 0.3e9, "the stamps show it"
+    assert estimated(rig, boot, longest - 1, longest, "armed").tolist() == [1.0, 0.0]
+    assert lost(rig, since) == [], "no number is missing"
+    assert not [e for e in rig.events if e.code == "clock_jump" and e.t_ns >= began]
 
 
 def test_35_a_gap_in_the_samples(rig: Field, device: SerialDevice) -> None:
@@ -178,10 +199,15 @@ def test_13_a_signal_at_its_rail(rig: Field, device: SerialDevice) -> None:
         codes[:, ACCELERATION] = 32767
 
     first = device.source.inject(rail, 8).sent()
+    boot = device.device.boot
     alarm = rig.raised("sensor_saturated.acceleration", after_seq=first)
     assert alarm.seq - first < 0.012 * RATE
-    theta = estimated(rig, device.device.boot, first, first + 64, "theta1")
-    assert np.isfinite(theta).all()
+    flags = rig.read("acceleration", boot, first, first + 8)[1] & quality.SATURATED
+    assert np.flatnonzero(flags).tolist() == list(range(2, 8)), "from the third sample on"
+    for name in ("theta1", "theta2"):
+        theta = estimated(rig, boot, first, first + 64, name)
+        assert np.isfinite(theta).all()
+        assert (theta[2:8] == theta[1]).all(), "kept out of the estimates"
 
 
 def test_17_spikes(rig: Field, device: SerialDevice) -> None:
@@ -193,15 +219,21 @@ def test_17_spikes(rig: Field, device: SerialDevice) -> None:
     def quiet(codes: np.ndarray) -> None:
         """Nothing."""
 
-    single = device.source.inject(spike, 1).sent()
+    ready(rig, device)
+    boot, single = device.device.boot, device.source.inject(spike, 1).sent()
     assert counted(rig, "flagged_spike") == before + 1
-    rig.judged(device.device.boot, single + 256)
+    flags = rig.read("position", boot, single - 1, single + 1)[1] & quality.SPIKE
+    assert flags.tolist() == [0, quality.SPIKE, 0], "that sample"
+    for name in ("theta1", "theta2"):
+        theta = estimated(rig, boot, single - 64, single + 256, name)
+        assert np.abs(theta[64:]).max() < 3.0 * np.abs(theta[:64]).max() + 0.01, "kept out"
     assert rig.journalled("sensor_spike.position") == []
     for _ in range(3):
         last = device.source.inject(spike, 1).sent()
         device.source.inject(quiet, 40).sent()
         time.sleep(0.15)
     assert rig.raised("sensor_spike.position").seq == last, "with the third within a second"
+    assert counted(rig, "flagged_spike") == before + 4
 
 
 def test_11_a_stuck_sensor(rig: Field, device: SerialDevice) -> None:
@@ -253,14 +285,17 @@ def test_36_a_rig_that_stands_still(rig: Field, device: SerialDevice) -> None:
     ready(rig, device)
     still = Standstill(slice(None))
     first, boot = device.source.inject(still, 640).sent(), device.device.boot
-    rig.judged(boot, first + 600)
-    still_from = first + still.moved + round(RATE)
-    assert not estimated(rig, boot, still_from, first + 600, "observable").any()
-    for name in ("theta1", "theta2", "theta1_high", "theta2_high"):
-        frozen = estimated(rig, boot, still_from, first + 600, name)
-        assert np.isfinite(frozen).all()
-        assert (frozen == frozen[0]).all(), "frozen and bounded"
+    frozen(rig, boot, first + still.moved + round(RATE), first + 600)
     rig.judged(boot, first + 700)
+
+
+def frozen(rig: Field, boot: int, first: int, last: int) -> None:
+    """The estimates are marked as not observable, and neither they nor their bounds change."""
+    assert not estimated(rig, boot, first, last, "observable").any()
+    for name in ("theta1", "theta2", "theta1_high", "theta2_high"):
+        values = estimated(rig, boot, first, last, name)
+        assert np.isfinite(values).all()
+        assert (values == values[0]).all(), "frozen and bounded"
 
 
 def test_36_a_rig_that_is_driven_and_stands_still(rig: Field, device: SerialDevice) -> None:
@@ -271,9 +306,8 @@ def test_36_a_rig_that_is_driven_and_stands_still(rig: Field, device: SerialDevi
     # The window, and the decay of the velocity's filter to the least velocity.
     assert 0 <= remark.seq - (first + held.moved) <= 3 * RATE
     assert estimated(rig, boot, remark.seq, remark.seq, "armed").tolist() == [1.0]
-    # At first the noise may lift the velocity above its least value for some samples again.
-    rig.judged(boot, first + 1280)
-    assert not estimated(rig, boot, first + 1200, first + 1270, "observable").any()
+    # The velocity's filter decays from the last swing to the least velocity that is judged.
+    frozen(rig, boot, first + held.moved + round(1.5 * RATE), first + 1270)
     rig.cleared("not_observable")
 
 
@@ -289,32 +323,38 @@ def test_42_a_slow_reader(rig: Field, device: SerialDevice) -> None:
     assert lost(rig, since) == []
 
 
-def test_03_a_silent_device(rig: Field, device: SerialDevice) -> None:
-    rig.calm(device.device, "stale")
+def noticed_within(
+    seconds: float, rig: Field, device: SerialDevice, name: str, faulty: Callable[[bool], None]
+) -> None:
+    """The alarm comes in time after `faulty(True)`.
 
-    def silence() -> float:
-        device.silent = True
+    It is not waited for to clear: on a machine that makes samples late again and again it
+    chatters, and stays for as long as that goes on. Each attempt has a monitor without a past.
+    """
+    rig.calm(device.device, name)
+
+    def attempt() -> float:
         began = time.time_ns()
-        alarm = rig.raised("stale", after_ns=began)
-        device.silent = False
-        rig.cleared("stale")
-        return (alarm.t_ns - began) * 1e-9
+        faulty(True)
+        took = rig.noticed(name, began)
+        faulty(False)
+        return took
 
-    least_of(silence, 0.1, lambda: rig.renew_monitor(device.device))
+    least_of(attempt, seconds, lambda: rig.renew_monitor(device.device), tries=5)
+
+
+def test_03_a_silent_device(rig: Field, device: SerialDevice) -> None:
+    def silent(now: bool) -> None:
+        device.silent = now
+
+    noticed_within(0.1, rig, device, "stale", silent)
 
 
 def test_16_a_slow_device(rig: Field, device: SerialDevice) -> None:
-    rig.calm(device.device, "slow_device")
+    def slow(now: bool) -> None:
+        device.slow_down(2.0 if now else 1.0)
 
-    def slow() -> float:
-        began = time.time_ns()
-        device.slow_down(2.0)
-        alarm = rig.raised("slow_device", after_ns=began)
-        device.slow_down(1.0)
-        rig.cleared("slow_device")
-        return (alarm.t_ns - began) * 1e-9
-
-    least_of(slow, 0.5, lambda: rig.renew_monitor(device.device))
+    noticed_within(0.5, rig, device, "slow_device", slow)
 
 
 def test_04_garbage_on_the_line(rig: Field, device: SerialDevice) -> None:
@@ -324,12 +364,12 @@ def test_04_garbage_on_the_line(rig: Field, device: SerialDevice) -> None:
     def garbage() -> float:
         began, first = time.time_ns(), device.device.next_seq
         device.faults.start("garbage")
-        alarm = rig.raised("line_noise", after_ns=began)
+        took = rig.noticed("line_noise", began)
         newest = rig.estimates()[-1]
         assert newest.seq + len(newest) <= first + 4, "no sample of garbage is accepted"
         device.faults.stop("garbage")
         rig.cleared("line_noise")
-        return (alarm.t_ns - began) * 1e-9
+        return took
 
     least_of(garbage, 1.0, lambda: rig.renew_monitor(device.device))
     assert counted(rig, "skipped_bytes") > before
@@ -339,20 +379,25 @@ def test_01_an_unplugged_device(rig: Field, device: SerialDevice) -> None:
     rig.calm(device.device, "link")
 
     def unplug() -> float:
-        since, began = len(rig.gaps), time.time_ns()
+        """The longer of the times to the alarm and to the return, as a share of its bound."""
+        rig.cleared("link")
+        boot, since, began = device.device.boot, len(rig.gaps), time.time_ns()
+        first = device.device.next_seq
         device.faults.start("unplug", 400)
         alarm = rig.raised("link", after_ns=began)
         assert "the line was closed" in alarm.cause
         rig.cleared("link")
         gap = rig.gap(since)
-        assert 380 <= gap.last - gap.first + 1 <= 700
-        rig.judged(device.device.boot, gap.last + 1)
-        back = next(b for b in rig.estimates() if b.seq + len(b) > gap.last + 1)
-        assert back.seq <= gap.last + 1, "the gap ends where samples go on"
-        assert back.t_ns[0] - device.line.plugged_ns < 1.1e9, "reopened within a second"
-        return (alarm.t_ns - device.line.unplugged_ns) * 1e-9
+        assert gap.last - gap.first + 1 >= 380
+        came = estimated(rig, boot, min(first, gap.first) - 64, gap.last + 64).tolist()
+        whole = set(range(min(first, gap.first) - 64, gap.last + 65))
+        assert whole - set(came) == set(range(gap.first, gap.last + 1)), "the exact numbers"
+        (back,) = (int(b.t_ns[gap.last + 1 - b.seq]) for b in rig.estimates()
+                   if b.boot == boot and b.seq <= gap.last + 1 < b.seq + len(b))  # fmt: skip
+        told_s = (alarm.t_ns - device.line.unplugged_ns) * 1e-9
+        return max(told_s / 0.1, (back - device.line.plugged_ns) * 1e-9 / 1.0)
 
-    least_of(unplug, 0.1, lambda: rig.renew_monitor(device.device))
+    least_of(unplug, 1.0, lambda: rig.renew_monitor(device.device))
 
 
 def test_02_a_device_plugged_in_under_another_name(rig: Field, device: SerialDevice) -> None:
@@ -362,6 +407,7 @@ def test_02_a_device_plugged_in_under_another_name(rig: Field, device: SerialDev
     device.device.restart()
     event = rig.event("boot_changed", began)
     assert f"boot {device.device.boot:08x}" in event.text
+    assert event.t_ns - device.line.plugged_ns < 2e9
     rig.judged(device.device.boot, device.device.next_seq)
     first = next(b for b in rig.estimates() if b.boot == device.device.boot)
     assert first.t_ns[0] - device.line.plugged_ns < 2e9

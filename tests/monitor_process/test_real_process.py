@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from monitor.alarms import read_journal
 from rigwatch.wire.bus.bus import Bus
-from rigwatch.wire.messages.message_types import EstimateBlock
-from rigwatch.wire.messages.topics import ESTIMATES
+from rigwatch.wire.messages.message_types import Alarm, EstimateBlock, Health
+from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, HEALTH
 from tests.bus.rig import TestRig, kill, rigwatch, stopped
 from tests.monitor_process.model import monitor_section
 from tests.waiting import PATIENCE, eventually
@@ -80,6 +81,59 @@ def test_a_killed_or_frozen_monitor_judges_every_sample_and_keeps_its_alarms(rig
     assert "its condition still holds" in refused.stderr
     monitor.send_signal(signal.SIGTERM)
     assert monitor.wait(PATIENCE) == 0
+
+
+@pytest.mark.parametrize("state", ["unacknowledged", "normal"])
+def test_a_kill_between_journal_and_delivery_leaves_no_change_untold(
+    rig: TestRig, state: str
+) -> None:
+    rig.router()
+    observer = rig.bus("observer")
+    alarms, heard = observer.subscribe(ALARMS), list[Change]()
+
+    def listen() -> list[Change]:
+        heard.extend(map(change_of, alarms.drain()))
+        return heard
+
+    def disk(trouble: float, until: str) -> None:
+        """A recorder's word about its disk, until the change that it causes is in the journal."""
+
+        def written() -> bool:
+            observer.publish(
+                HEALTH, Health("recorder", 1, "recording", "", {"disk_trouble": trouble})
+            )
+            return changes(rig, "disk")[-1:] == [until] or killed.poll() is not None
+
+        eventually(written, f"disk {until}")
+
+    killed = rig.start("-m", "tests.monitor_process.killed_monitor", str(rig.path), "disk", state)
+    eventually(lambda: "alive/monitor" in observer.tokens("alive/*"), "the monitor is there")
+    disk(1.0, "unacknowledged")
+    disk(0.0, "cleared_unacknowledged")
+    if state == "normal":
+        for more in ((), ("--reset",)):  # the last is not answered
+            rigwatch("ack", str(rig.path), "disk", "--user", "ann", *more)
+    assert killed.wait(PATIENCE) == -signal.SIGKILL
+    (change,) = [c for c in journalled(rig) if c[:2] == ("disk", state)]
+    assert change not in listen(), "written and not said"
+    rig.start("-m", "rigwatch", "monitor", str(rig.path))
+    eventually(lambda: change in listen(), "the next monitor tells it")
+
+
+Change = tuple[str, str, int]
+
+
+def change_of(alarm: Alarm) -> Change:
+    return alarm.name, alarm.state, alarm.t_ns
+
+
+def journalled(rig: TestRig) -> list[Change]:
+    return [change_of(one.alarm) for one in read_journal(rig.folder / "alarms.jsonl")[0]]
+
+
+def changes(rig: TestRig, name: str) -> list[str]:
+    """The states of an alarm, as the journal has them."""
+    return [state for alarm, state, _ in journalled(rig) if alarm == name]
 
 
 def test_commands_without_router_or_monitor_fail_in_one_line(rig: TestRig) -> None:

@@ -7,6 +7,8 @@ Reasons for the settings:
 * congestion control DROP: with BLOCK one frozen reader stops the publisher for seconds;
 * `express` is off: with it, Zenoh lost a quarter of the messages at high rates;
 * a limit on payload size in the router: payloads larger than any valid message are not forwarded;
+* no shared memory: it would hold 16 MB for each process, left behind by a kill, and 2 to 8 MB more
+  in each other process that it speaks to, for messages of which few are longer than 3 kB;
 * a connection that sends nothing is closed after a second, so that a flood of them causes little
   delay.
 """
@@ -55,6 +57,7 @@ def _common_settings(lease: float) -> dict[str, Any]:
         "connect/exit_on_failure": False,
         "connect/retry": retry,
         "transport/link/tx/lease": round(lease * 1e3),
+        "transport/shared_memory/enabled": False,
     }
 
 
