@@ -107,11 +107,13 @@ def _imported(
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
         # A log of a real machine has gaps: missing values are invalid samples, not errors.
+        # The model states the unit of a signal, whatever its name stands for elsewhere.
         mapping = structs.replace(
             logs.mapping,
             channels=found.channels,
             time=logs.mapping.time or found.time,
             flag_missing=True,
+            any_unit=True,
         )
         made = import_file(path, target, mapping)
         written.append(target)

@@ -132,3 +132,24 @@ def test_what_is_missing_is_reported_and_nothing_is_left_behind(
     assert said in error
     assert "Traceback" not in error
     assert not (tmp_path / "study").exists()
+
+
+SERVO = """
+name = "servo"
+summary = "An angle called position."
+inputs.goal = { unit = "rad" }
+states.x = { unit = "rad", derivative = "k*(goal - x)", measured = "position" }
+parameters.k = { value = 1.0, unit = "1/s", low = 0.0 }
+outputs.position = { unit = "rad", expression = "x" }
+"""
+
+
+@pytest.mark.parametrize(("header", "factor"), [("position", 1.0), ("position_deg", np.pi / 180)])
+def test_the_model_states_what_a_position_is_measured_in(tmp_path, header, factor):
+    (tmp_path / "servo.toml").write_text(SERVO)
+    time = np.arange(400) / 100
+    table = {"time_s": time, "goal_rad": np.sin(time), header: np.sin(time - 0.5) / factor}
+    paths = [written(tmp_path / f"{name}.csv", table) for name in ("one", "two")]
+    assert made(tmp_path, *paths, more=["--model", str(tmp_path / "servo.toml")]) == 0
+    data = prepare(open_study(tmp_path / "study"))
+    np.testing.assert_allclose(data.train.outputs[:300, 0], np.sin(time - 0.5)[:300], atol=1e-6)
