@@ -5,6 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
+from benchmarks.explaining.machine_studies import machine_study
+from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.several_effects import several_effects
 from rigwatch.workbench.explain.verdict import judge
@@ -79,3 +81,14 @@ def test_an_effect_with_a_shape_of_its_own_is_not_taken_for_two_simple_ones():
     assert verdict.word == "missing_effect"
     assert "stribeck@load" in verdict.members
     assert verdict.second == ()
+
+
+def test_friction_that_falls_with_speed_is_not_taken_for_dry_friction_and_drag(tmp_path):
+    shares = {"coulomb": 0.1, "air_drag": 0.1}
+    study = machine_study(tmp_path, "pendulum", shares, noise=0.002, seed=114)
+    found, verdict = ranking(open_bench(study))
+    falling = next(row for row in found if row.label == "stribeck@shaft")
+    # Alone it explains nearly all, and no other effect resembles it.
+    assert falling.accepted
+    assert (verdict.word, verdict.members[0]) == ("missing_effect", "coulomb@shaft")
+    assert verdict.beside == ("quadratic_drag@shaft",)
