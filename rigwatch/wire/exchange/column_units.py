@@ -44,8 +44,13 @@ AMBIGUOUS = {
 """Both accelerations and masses are given in g, so the unit must be written unambiguously."""
 
 
-def conversion(unit: str, channel: str) -> Conversion:
+def conversion(unit: str, channel: str, *, any_unit: bool = False) -> Conversion:
     """Conversion of values of `channel` from `unit` to SI.
+
+    Args:
+        unit: of the values.
+        channel: its name.
+        any_unit: whether names with a fixed quantity accept others, as a servo's position in rad.
 
     Raises:
         ImportDataError: the unit is unknown, ambiguous, or not one of the channel's kind.
@@ -56,11 +61,11 @@ def conversion(unit: str, channel: str) -> Conversion:
         found = unit_of(unit)
     except UnitError as error:
         raise ImportDataError(f"{channel}: {error}") from None
-    wanted = CHANNEL_UNITS.get(channel)
+    wanted = None if any_unit and channel != "time" else CHANNEL_UNITS.get(channel)
     if wanted is not None and found.dimension != unit_of(wanted).dimension:
         raise ImportDataError(
             f"{channel}: found the unit {unit!r}, expected one of {_USUAL[wanted]} or another unit"
-            " of the same kind"
+            " of the same kind, or `any_unit = true` in the mapping"
         )
     si = wanted or ("" if found.si == "1" else found.si)
     return Conversion(si, float(found.factor), float(found.offset))

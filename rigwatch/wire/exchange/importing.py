@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from msgspec import structs
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError
@@ -63,8 +64,7 @@ def import_file(source: Path, target: Path, mapping: ImportMapping, start_ns: in
         raise ImportDataError(f"{source}: no channel is mapped, its columns are {columns}")
     base, remarks = _time_base(table, mapping)
     channels = tuple(
-        _channel(name, text, table, base, allow_missing=mapping.flag_missing)
-        for name, text in mapping.channels.items()
+        _channel(name, text, table, base, mapping) for name, text in mapping.channels.items()
     )
     block = _block(mapping.device, channels, base.grid, start_ns)
     remarks = (f"imported from {source.name}", *remarks)
@@ -83,8 +83,8 @@ def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[s
     """The times, and remarks on changes to them."""
     if not mapping.time:
         return _counted(table, mapping)
-    source = _source("time", mapping.time, table)
-    times = _in_si("time", source, table, allow_missing=False)
+    source = _source("time", mapping.time, table, mapping)
+    times = _in_si("time", source, table, structs.replace(mapping, flag_missing=False))
     _check_increasing(table, source.column, times)
     grid = fit_grid(times, mapping.rate, mapping.max_hole)
     if not grid.jittered:
@@ -101,11 +101,11 @@ def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[s
     )
 
 
-def _source(channel: str, text: str, table: Table) -> Source:
+def _source(channel: str, text: str, table: Table, mapping: ImportMapping) -> Source:
     """The source of a channel, its column and unit checked; errors name the file."""
     try:
         source = parse_source(channel, text, table.names)
-        conversion(source.unit, channel)
+        conversion(source.unit, channel, any_unit=mapping.any_unit)
     except ImportDataError as error:
         raise ImportDataError(f"{table.path}: {error}") from None
     return source
@@ -114,7 +114,7 @@ def _source(channel: str, text: str, table: Table) -> Source:
 def _counted(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str, ...]]:
     if mapping.rate is None:
         raise ImportDataError(f"{table.path}: found neither time nor rate, expected one of them")
-    first = _source(*next(iter(mapping.channels.items())), table)
+    first = _source(*next(iter(mapping.channels.items())), table, mapping)
     count = len(table.cells[first.column])
     times = np.arange(count) / mapping.rate
     return _TimeBase(Grid(mapping.rate, times, False, np.zeros(count, bool), (0.0, 0.0)), times), ()
@@ -128,9 +128,9 @@ def _check_increasing(table: Table, column: str, times: FloatArray) -> None:
         raise ImportDataError(f"{table.place(row, column)}: {found}")
 
 
-def _in_si(channel: str, source: Source, table: Table, *, allow_missing: bool) -> FloatArray:
-    to_si = conversion(source.unit, channel)
-    values = table.numbers(source.column, allow_missing)
+def _in_si(channel: str, source: Source, table: Table, mapping: ImportMapping) -> FloatArray:
+    to_si = conversion(source.unit, channel, any_unit=mapping.any_unit)
+    values = table.numbers(source.column, mapping.flag_missing)
     factor = source.factor
     if isinstance(factor, str):
         if factor not in table.scalars:
@@ -144,10 +144,10 @@ def _in_si(channel: str, source: Source, table: Table, *, allow_missing: bool) -
     return (factor * values + source.offset) * to_si.factor + to_si.offset
 
 
-def _channel(name: str, text: str, table: Table, base: _TimeBase, *, allow_missing: bool) -> Column:
-    source = _source(name, text, table)
-    unit = conversion(source.unit, name).unit
-    values = _in_si(name, source, table, allow_missing=allow_missing)
+def _channel(name: str, text: str, table: Table, base: _TimeBase, mapping: ImportMapping) -> Column:
+    source = _source(name, text, table, mapping)
+    unit = conversion(source.unit, name, any_unit=mapping.any_unit).unit
+    values = _in_si(name, source, table, mapping)
     if len(values) != len(base.times):
         found = f"found {len(values)} values, expected {len(base.times)} as there are times"
         raise ImportDataError(f"{table.path}: {name}: {found}")

@@ -57,6 +57,10 @@ class ImportMapping(Section, frozen=True):
     flag_missing: Annotated[
         bool, Meta(description="take NaN and empty cells as invalid samples, not as an error")
     ] = False
+    any_unit: Annotated[
+        bool,
+        Meta(description="accept any unit at `position`, `velocity` and other names of fixed kind"),
+    ] = False
     notes: Annotated[str, Meta(description="remark kept in the session, such as the source")] = ""
 
 

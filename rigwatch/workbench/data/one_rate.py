@@ -5,6 +5,7 @@ the slowest rate among them. Larger differences are resampled only if the study 
 that changes the signal content.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -22,6 +23,8 @@ ALIKE = 0.05
 """Relative difference up to which they are resampled without `rate`."""
 THINNED = 1.1
 """Ratio of rates above which signals are low-passed first."""
+MENTIONED = 3
+"""Most recordings that are named one by one."""
 PASSED = 0.4
 """Corner of the low-pass over the new rate; a zero-phase Butterworth of order 8."""
 
@@ -59,9 +62,12 @@ def on_one_rate(
     if max(found) <= target * (1 + SAME) and max(found) <= min(found) * (1 + SAME):
         return made, remarks
     for index, own in enumerate(found):
-        if own != target:
+        if not math.isclose(own, target):
             made[index] = resampled(tables[index], target, kept)
             remarks.append(f"{names[index]}: {own:.6g} Hz, resampled to {target:.6g} Hz")
+    if len(remarks) > MENTIONED:
+        span = f"{min(found):.6g} to {max(found):.6g} Hz"
+        remarks = [f"{len(remarks)} recordings of {span}, resampled to {target:.6g} Hz"]
     return made, remarks
 
 

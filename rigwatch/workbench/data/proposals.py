@@ -20,6 +20,10 @@ KEPT = 20
 """Samples at rest kept before the motion, as they show the initial state."""
 TRAIN_SHARE = 0.6
 """Share of a single recording used for training; the rest is held out."""
+ONE_IN = 4
+"""Of so many recordings one is held out, and at least one."""
+GOLDEN = 0.5 * (5**0.5 - 1)
+"""Golden ratio: steps of this share of a series spread evenly over it, for any number of steps."""
 ENERGY, BEYOND = 0.999, 4.0
 """Share of a signal's energy that defines its top frequency, and ratio of low-pass to that."""
 BELOW_NYQUIST = 0.8
@@ -61,8 +65,8 @@ def proposed_split(
 ) -> tuple[list[Part], list[Part]]:
     """Training parts and held-out parts.
 
-    Of several recordings, the one whose excitation exceeds the others' least is held out; a single
-    one is split into two within its motion.
+    Of several recordings, the one whose excitation exceeds the others' least is held out, and of
+    eight and more a quarter of them; a single one is split into two within its motion.
 
     Args:
         tables: the recordings.
@@ -70,11 +74,29 @@ def proposed_split(
     """
     parts = [Part(index, *moving(table, names)) for index, table in enumerate(tables)]
     if len(tables) > 1:
-        decides = min(range(len(tables)), key=lambda index: (_excess(tables, names, index), -index))
-        return [p for p in parts if p.recording != decides], [parts[decides]]
+        decide = _deciding(tables, names)
+        return [p for p in parts if p.recording not in decide], [parts[at] for at in decide]
     whole, last = parts[0], len(tables[0]) * tables[0].dt
     cut = round(whole.start + TRAIN_SHARE * (min(whole.end, last) - whole.start), 3)
     return [Part(0, whole.start, cut)], [Part(0, cut, whole.end)]
+
+
+def _deciding(tables: Sequence[Columns], names: Sequence[str]) -> list[int]:
+    """Recordings to hold out, one in four of many: those whose excitation exceeds least.
+
+    Of equals, logs of a series of settings, neighbours are alike: the choice is spread over them.
+    """
+    excess = [_excess(tables, names, index) for index in range(len(tables))]
+    count = max(len(tables) // ONE_IN, 1)
+    limit = sorted(excess)[count - 1]
+    certain = [index for index, own in enumerate(excess) if own < limit]
+    equal = [index for index, own in enumerate(excess) if own == limit]
+    spread = [
+        equal[-1 - int(number * GOLDEN * len(equal)) % len(equal)]
+        for number in range(count - len(certain))
+    ]
+    # Two numbers of a short series may fall on one recording.
+    return sorted({*certain, *spread})
 
 
 def _excess(tables: Sequence[Columns], names: Sequence[str], index: int) -> float:

@@ -148,7 +148,7 @@ def _recording(
     study: Study, tables: Sequence[Columns], horizon: int, use: str, remarks: list[str]
 ) -> Recording:
     """Parts joined in sequence, each cut to whole windows so that no window spans two parts."""
-    inputs, outputs = [], []
+    inputs, outputs, beyond = [], [], list[float]()
     for table in tables:
         length = len(table) // horizon * horizon if study.model.states else len(table)
         if length == 0:
@@ -156,14 +156,12 @@ def _recording(
                 f"{use}: found {len(table)} samples, expected at least one horizon of {horizon}"
             )
         if length < len(table):
-            beyond = (len(table) - length) * table.dt
-            remarks.append(
-                f"{use}: the last {beyond:.3g} s of a recording are not counted, since they fill no"
-                f" horizon of {horizon * table.dt:g} s"
-            )
+            beyond.append((len(table) - length) * table.dt)
         u, y = _matched(study, table)
         inputs.append(u[:length])
         outputs.append(without_ends(study, y, table.dt)[:length])
+    if beyond:
+        remarks.append(_beyond(use, beyond, horizon * tables[0].dt))
     thin = study.file.thin
     parts = tuple(len(u) for u in inputs)
     thinning = Thinning(thin.factor, thin.edge, parts) if thin else None
@@ -172,6 +170,14 @@ def _recording(
     if use != "telling":
         _check_excitation(study.model, u, use)
     return Recording(tables[0].dt, u, y, thinning, parts)
+
+
+def _beyond(use: str, spans: Sequence[float], horizon: float) -> str:
+    """The remark on ends of recordings that fill no horizon; all times in seconds."""
+    which = f"{spans[0]:.3g} s of a recording"
+    if len(spans) > 1:
+        which = f"{min(spans):.3g} to {max(spans):.3g} s of {len(spans)} recordings"
+    return f"{use}: the last {which} are not counted, since they fill no horizon of {horizon:g} s"
 
 
 def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:

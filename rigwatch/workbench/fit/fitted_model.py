@@ -7,7 +7,12 @@ from functools import partial
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import compile_system, even_substeps
+from rigwatch.physics.engine.compile import (
+    CompiledSystem,
+    compile_system,
+    even_substeps,
+    resolved,
+)
 from rigwatch.physics.engine.equations import Placement, System, compose
 from rigwatch.physics.engine.fit import (
     Fit,
@@ -163,7 +168,7 @@ def fit_model(
     Raises:
         ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
     """
-    compiled = compile_system(compose(study.model, placements))
+    compiled = _compiled(study, placements, start, data.train.dt)
     horizon = data.horizon if study.model.states else len(data.train)
     begin, substeps = compiled.vector(start), study.file.substeps
     first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
@@ -183,6 +188,14 @@ def fit_model(
         begin = fit_over(horizon // SHORTER, start=begin).parameters
     found = _settled(study, data, fit_over(horizon, start=begin, initial=first), horizon, substeps)
     return _judged(study, data, placements, found, horizon, later, None)
+
+
+def _compiled(
+    study: Study, placements: Sequence[Placement], start: Mapping[str, float], spacing: float
+) -> CompiledSystem:
+    """The model with its effects, bounded to modes that the recording resolves."""
+    compiled = compile_system(compose(study.model, placements))
+    return replace(compiled, system=resolved(compiled.system, compiled.vector(start), spacing))
 
 
 def _settled(study: Study, data: Data, found: Fit, horizon: int, substeps: int) -> Fit:

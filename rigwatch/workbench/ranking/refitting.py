@@ -70,11 +70,12 @@ def fit_each(  # noqa: PLR0917 -- they belong together
 ) -> list[Ranked]:
     """Fit rows in turn and return those that explain the error.
 
-    Once a row explains the error, only rows similar to it are fitted.
+    Once a row explains the error, only rows similar to it are fitted, and those with fewer
+    parameters: two of them together may explain what its shape parameters mimic.
     """
     enough: list[Ranked] = []
     for number, row in enumerate(rows, start=1):
-        if any(other.cosines[row.label] < SIMILAR for other in enough):
+        if any(_is_unlike(row, other) for other in enough):
             row.reason = f"unlike {enough[0].label}, which explains {EXPLAINED:.0%}; not fitted"
             continue
         progress(f"fitting {row.label}, {number} of at most {len(rows)}")
@@ -82,6 +83,11 @@ def fit_each(  # noqa: PLR0917 -- they belong together
         if row.accepted and leaves_nothing(row, base, floor):
             enough.append(row)
     return enough
+
+
+def _is_unlike(row: Ranked, other: Ranked) -> bool:
+    """Whether it explains another part of the error than one that explains it all, no simpler."""
+    return row.free >= other.free and other.cosines[row.label] < SIMILAR
 
 
 def refit_elsewhere(

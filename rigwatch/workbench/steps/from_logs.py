@@ -94,7 +94,7 @@ def _imported(
         raise ModelError(
             f"--set: found log {min(other)!r}{nearest(min(other), dict.fromkeys(names))}"
         )
-    reading, remarks = None, list[str]()
+    reading, remarks = None, list[tuple[str, str]]()
     for path in (*logs.data, *logs.healthy):
         target = folder / f"{path.stem}.mcap"
         if path.suffix == ".mcap":
@@ -107,17 +107,30 @@ def _imported(
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
         # A log of a real machine has gaps: missing values are invalid samples, not errors.
+        # The model states the unit of a signal, whatever its name stands for elsewhere.
         mapping = structs.replace(
             logs.mapping,
             channels=found.channels,
             time=logs.mapping.time or found.time,
             flag_missing=True,
+            any_unit=True,
         )
         made = import_file(path, target, mapping)
         written.append(target)
-        remarks += [f"{path.name}: {remark}" for remark in (*found.remarks, *made.remarks[1:])]
+        remarks += [(path.name, remark) for remark in (*found.remarks, *made.remarks[1:])]
         reading = reading or found
-    return reading or Matched({}, "", {}, ()), remarks
+    return reading or Matched({}, "", {}, ()), _each_once(remarks)
+
+
+def _each_once(remarks: list[tuple[str, str]]) -> list[str]:
+    """Remarks on logs, each once: those of one machine are mostly alike."""
+    logs = dict[str, list[str]]()
+    for log, remark in remarks:
+        logs.setdefault(remark, []).append(log)
+    return [
+        f"{names[0] if len(names) == 1 else f'{names[0]} and {len(names) - 1} more'}: {remark}"
+        for remark, names in logs.items()
+    ]
 
 
 def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str, list[str]]:

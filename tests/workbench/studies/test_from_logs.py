@@ -132,3 +132,48 @@ def test_what_is_missing_is_reported_and_nothing_is_left_behind(
     assert said in error
     assert "Traceback" not in error
     assert not (tmp_path / "study").exists()
+
+
+SERVO = """
+name = "servo"
+summary = "An angle called position."
+inputs.goal = { unit = "rad" }
+states.x = { unit = "rad", derivative = "k*(goal - x)", measured = "position" }
+parameters.k = { value = 1.0, unit = "1/s", low = 0.0 }
+outputs.position = { unit = "rad", expression = "x" }
+"""
+
+
+@pytest.mark.parametrize(("header", "factor"), [("position", 1.0), ("position_deg", np.pi / 180)])
+def test_the_model_states_what_a_position_is_measured_in(tmp_path, header, factor):
+    (tmp_path / "servo.toml").write_text(SERVO)
+    time = np.arange(400) / 100
+    table = {"time_s": time, "goal_rad": np.sin(time), header: np.sin(time - 0.5) / factor}
+    paths = [written(tmp_path / f"{name}.csv", table) for name in ("one", "two")]
+    assert made(tmp_path, *paths, more=["--model", str(tmp_path / "servo.toml")]) == 0
+    data = prepare(open_study(tmp_path / "study"))
+    np.testing.assert_allclose(data.train.outputs[:300, 0], np.sin(time - 0.5)[:300], atol=1e-6)
+
+
+def test_of_many_logs_a_quarter_is_held_out_spread_over_them_and_remarks_come_once(
+    tmp_path, capsys
+):
+    (tmp_path / "servo.toml").write_text(SERVO)
+    paths = []
+    for number in range(16):
+        time = np.arange(400) / (100 + 0.1 * number)
+        size = 1.0 + (number == 5)
+        table = {"time": time, "goal": size * np.sin(time), "position": np.sin(time - 0.5)}
+        paths.append(written(tmp_path / f"log{number:02d}.csv", table))
+    assert made(tmp_path, *paths, more=["--model", str(tmp_path / "servo.toml")]) == 0
+    file = open_study(tmp_path / "study").file
+    held_out = [int(span.session[3:5]) for span in file.held_out]
+    assert len(held_out) == 4
+    assert len(file.train) == 12
+    # Logs of a series of settings stand in order; the one that goes furthest is for training.
+    assert max(np.diff([-1, *held_out, 16])) <= 8
+    assert 5 not in held_out
+    said = capsys.readouterr().err.splitlines()
+    assert said.count("log00.csv and 15 more: goal: no unit in its header, assumed rad") == 1
+    assert sum("Hz, resampled to" in line for line in said) == 1
+    assert sum("are not counted" in line for line in said) <= 2

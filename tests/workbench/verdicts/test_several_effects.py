@@ -5,12 +5,17 @@ import dataclasses
 import numpy as np
 import pytest
 
+from rigwatch.physics.engine.equations.model import model_text
+from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.several_effects import several_effects
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking.rank import rank
 from rigwatch.workbench.ranking.refitting import no_progress
+from sim_plant.machines import MACHINES, log
+from sim_plant.machines import strength_for as machine_strength
 from sim_plant.oscillator import Hidden, strength_for
+from tests.workbench.machine import studied
 from tests.workbench.simulated import fitted, multisine
 
 FORCE = multisine(np.arange(0.25, 8.0, 0.25), 4.0)
@@ -79,3 +84,22 @@ def test_an_effect_with_a_shape_of_its_own_is_not_taken_for_two_simple_ones():
     assert verdict.word == "missing_effect"
     assert "stribeck@load" in verdict.members
     assert verdict.second == ()
+
+
+def test_friction_that_falls_with_speed_is_not_taken_for_dry_friction_and_drag(tmp_path):
+    plant, seed = MACHINES["pendulum"], 114
+    hidden = {name: machine_strength(plant, name, 0.1, seed) for name in ("coulomb", "air_drag")}
+    tables = [log(plant, hidden, 0.002, number) for number in (seed, seed + 1000)]
+    rate = 1 / np.diff(tables[0]["time_s"]).mean()
+    named = [{"voltage": t["voltage_V"], "angle": t["angle_rad"]} for t in tables]
+    keys = "horizon = 1.0\nstart = { R = 4.0, K = 0.5 }"
+    units = {"voltage": "V", "angle": "rad"}
+    study = studied(
+        tmp_path, model_text("pendulum"), named[:1], named[1:], units, keys, [rate, rate]
+    )
+    found, verdict = ranking(open_bench(study))
+    falling = next(row for row in found if row.label == "stribeck@shaft")
+    # Alone it explains nearly all, and no other effect resembles it.
+    assert falling.accepted
+    assert (verdict.word, verdict.members[0]) == ("missing_effect", "coulomb@shaft")
+    assert verdict.beside == ("quadratic_drag@shaft",)

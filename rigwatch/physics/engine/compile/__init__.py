@@ -14,6 +14,7 @@ from rigwatch.physics.engine.compile.compiled_system import (
 )
 from rigwatch.physics.engine.compile.derivatives import derivative
 from rigwatch.physics.engine.compile.integrator import across, call, lateness, place
+from rigwatch.physics.engine.compile.resolved_rates import resolved
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
 
@@ -30,4 +31,5 @@ __all__ = [
     "lateness",
     "numpy_function",
     "place",
+    "resolved",
 ]

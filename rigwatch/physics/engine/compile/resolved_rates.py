@@ -1,0 +1,78 @@
+"""Bounds of parameters within which a recording resolves the model's fastest modes.
+
+Where friction or a coarse encoder hides a winding's inductance, a fit may lower it without limit:
+R/L grows until the steps of the integration are just stable. A mode there does not decay, so its
+initial state is a free constant of each window, and every simulation takes hundreds of steps a
+sample. A mode that decays within a sixteenth of a sample is instantaneous for any recording.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import sympy
+from msgspec import structs
+
+from rigwatch.physics.engine.compile.static_kernel import numpy_function
+from rigwatch.physics.engine.compile.step_size import constant_rates
+from rigwatch.physics.engine.equations import Parameter, System
+from rigwatch.wire.arrays import FloatArray
+
+FASTEST = 16.0
+"""Largest rate of a mode times the time between samples."""
+HALVINGS = 60
+"""Steps of the search for a bound."""
+
+
+def resolved(system: System, parameters: FloatArray, spacing: float) -> System:
+    """The system with bounds of free parameters that keep its constant rates resolved.
+
+    Only rates that depend on one free parameter set a bound: with two, the bound of one would
+    depend on the other. A model that starts beyond the limit is left as it is.
+
+    Args:
+        system: the equations.
+        parameters: values of all parameters, shape (n_p,).
+        spacing: time between samples [s].
+    """
+    bounded = dict(system.parameters)
+    for rate in constant_rates(system):
+        names = sorted({str(each) for each in rate.free_symbols} & set(system.free))
+        if len(names) == 1:
+            (name,) = names
+            bounded[name] = _bounded(system, bounded[name], name, rate, parameters, spacing)
+    return replace(system, parameters=bounded)
+
+
+def _bounded(  # noqa: PLR0917 -- they belong together
+    system: System,
+    parameter: Parameter,
+    name: str,
+    rate: sympy.Expr,
+    parameters: FloatArray,
+    spacing: float,
+) -> Parameter:
+    """A parameter with the bounds at which the rate reaches the limit."""
+    function = numpy_function(tuple(system.parameters), (rate,))
+    index = list(system.parameters).index(name)
+
+    def too_fast(value: float) -> bool:
+        found = function(*np.concatenate([parameters[:index], [value], parameters[index + 1 :]]))[0]
+        return not abs(float(found)) * spacing <= FASTEST
+
+    start = float(np.clip(parameters[index], parameter.low, parameter.high))
+    if too_fast(start):
+        return parameter
+    low, high = (
+        _edge(too_fast, start, end) if np.isfinite(end) and too_fast(end) else end
+        for end in (parameter.low, parameter.high)
+    )
+    return structs.replace(parameter, low=low, high=high)
+
+
+def _edge(too_fast: Callable[[float], bool], slow: float, fast: float) -> float:
+    """The value next to which the rate is too fast."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (slow + fast)
+        slow, fast = (slow, middle) if too_fast(middle) else (middle, fast)
+    return slow
