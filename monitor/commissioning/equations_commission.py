@@ -51,7 +51,7 @@ from monitor.observer import (
 )
 from monitor.signals import GOOD, NEW_BOOT, Codes, Recording
 from rigwatch.physics.engine.equations import measured_states
-from rigwatch.physics.engine.fit import lateness
+from rigwatch.physics.transfer import lateness
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.fit import lateness
 from rigwatch.physics.engine.fit.smoothing import smoothed
+from rigwatch.physics.transfer import lateness
 from rigwatch.wire.arrays import FloatArray
 
 RATE, SECONDS = 256.0, 24.0

@@ -141,7 +141,8 @@ def without_lasting() -> RigModel:
     healthy = model().healthy
     assert healthy is not None
     bare = structs.replace(
-        healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_energies=()
+        healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_energies=(),
+        steady_shorts=(), steady_mediums=(), steady_frictions=(),
     )  # fmt: skip
     return structs.replace(model(), healthy=bare)
 

@@ -5,7 +5,6 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.effect_states import EffectStates, hold_at
-from rigwatch.physics.engine.fit.lateness import lateness
 from rigwatch.physics.engine.fit.measured_recording import (
     motion_lateness,
     motion_recording,
@@ -49,7 +48,6 @@ __all__ = [
     "hold_at",
     "initial_states",
     "joined",
-    "lateness",
     "motion_lateness",
     "motion_recording",
     "motion_widths",

@@ -21,9 +21,9 @@ from rigwatch.physics.engine.equations import (
     predicted_outputs,
 )
 from rigwatch.physics.engine.fit.decimation import Thinning
-from rigwatch.physics.engine.fit.lateness import lateness
 from rigwatch.physics.engine.fit.recording import Recording, filled
 from rigwatch.physics.engine.fit.smoothing import best_width, flat_to, smoothed
+from rigwatch.physics.transfer import lateness
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 
