@@ -51,6 +51,7 @@ from monitor.observer import (
 )
 from monitor.signals import GOOD, NEW_BOOT, Codes, Recording
 from rigwatch.physics.engine.equations import measured_states
+from rigwatch.physics.transfer import lateness
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 
@@ -103,7 +104,8 @@ def _fitted(used: Sequence[Recording], name: str, corner: float, rate: float) ->
     port = force_port(model)
     layout = layout_of(model, port)
     lag = EquationsPlant(model=name, names=(), values=(), port=port).half_width
-    moved = [_motion(one, layout, lag, rate) for one in used]
+    late = _lateness(used, layout, rate)
+    moved = [_motion(one, layout, lag, rate, late) for one in used]
     n = layout.inputs
     known = fit_sensor(model, [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved], rate)
     stretches = [
@@ -117,12 +119,23 @@ def _fitted(used: Sequence[Recording], name: str, corner: float, rate: float) ->
     )
     return EquationsPlant(
         model=name, names=found.names, values=found.values, port=port, coulomb=found.coulomb,
-        turn=turn, half_width=lag, corner=corner,
+        turn=turn, half_width=lag, late=late, corner=corner,
     )  # fmt: skip
 
 
-def _motion(one: Recording, layout: Layout, lag: int, rate: float) -> FloatArray:
-    columns, state = FixedLag(layout.columns, lag, rate).update(*_admitted(one, layout))
+def _lateness(used: Sequence[Recording], layout: Layout, rate: float) -> float:
+    """Lateness of the motion behind the sensor of its rate [s], from the started recordings."""
+    column, output = layout.balance, layout.channels[-1]
+    begin = round(STARTED * rate)
+    pairs = [
+        (one.channel(layout.channels[column.channel])[begin:], one.channel(output)[begin:])
+        for one in used
+    ]
+    return lateness(pairs, 1.0 / rate, column.order)
+
+
+def _motion(one: Recording, layout: Layout, lag: int, rate: float, late: float) -> FloatArray:
+    columns, state = FixedLag(layout.columns, lag, rate, late).update(*_admitted(one, layout))
     return np.ascontiguousarray(columns[state != EMPTY])
 
 

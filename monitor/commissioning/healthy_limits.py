@@ -18,6 +18,7 @@ from monitor.observer import (
     SPREAD,
     DecisionRules,
     E,
+    Extremes,
     Spectrum,
     decide,
     new_state,
@@ -77,29 +78,37 @@ def healthy_limits(
     rules = DecisionRules(
         noise, growth, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, speed_noise, NEVER, 1, 1.0
     )  # fmt: skip
-    short = medium = friction = 0.0
-    lasting = []
-    for part in parts:
-        out = _tried(part, rules)
-        allowed = out[SPREAD] ** 2
-        short = max(short, _largest(part.judged[:, E], SHORT, allowed, skip))
-        medium = max(medium, _largest(part.judged[:, E], MEDIUM, allowed, skip))
-        friction = max(friction, float(np.abs(out[DEVIATIONS][skip:]).max()))
-        relative = part.judged[skip:, E] ** 2 / allowed[skip:]
-        lasting.append(float(_means(relative, min(LASTING, relative.size)).max()))
-    motions = [
-        steady_motion(p.motion, energy, rate) for p, energy in zip(parts, lasting, strict=True)
-    ]
+    largest = [_extremes(part, rules, skip) for part in parts]
+    motions = [steady_motion(p.motion, own, rate) for p, own in zip(parts, largest, strict=True)]
     steady = [motion for motion in motions if motion is not None]
     return HealthyLimits(
-        noise=noise, growth=tuple(growth.tolist()), short=short, medium=medium, friction=friction,
+        noise=noise, growth=tuple(growth.tolist()),
+        short=max(own.short for own in largest), medium=max(own.medium for own in largest),
+        friction=max(own.friction for own in largest),
         sensor_noise=sensor_noise, sensor_growth=sensor_growth, sensor=sensor,
         speed_noise=speed_noise,
         steady_paces=tuple(motion.pace for motion in steady),
         steady_sizes=tuple(motion.size for motion in steady),
         steady_narrow=tuple(motion.narrow for motion in steady),
-        steady_energies=tuple(motion.energy for motion in steady),
+        steady_energies=tuple(motion.extremes.lasting for motion in steady),
+        steady_shorts=tuple(motion.extremes.short for motion in steady),
+        steady_mediums=tuple(motion.extremes.medium for motion in steady),
+        steady_frictions=tuple(motion.extremes.friction for motion in steady),
     )  # fmt: skip
+
+
+def _extremes(part: HealthyPart, rules: DecisionRules, skip: int) -> Extremes:
+    """Largest energies and friction of a recording, relative to its healthy spread."""
+    out = _tried(part, rules)
+    allowed = out[SPREAD] ** 2
+    error = part.judged[:, E]
+    relative = error[skip:] ** 2 / allowed[skip:]
+    return Extremes(
+        lasting=float(_means(relative, min(LASTING, relative.size)).max()),
+        short=_largest(error, SHORT, allowed, skip),
+        medium=_largest(error, MEDIUM, allowed, skip),
+        friction=float(np.abs(out[DEVIATIONS][skip:]).max()),
+    )
 
 
 def variance(
@@ -147,7 +156,7 @@ def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
     out = np.zeros((len(OUTPUTS), len(part.state)))
     inside, jumped = np.ones((2, len(part.state)), np.bool_)
     jumped[:] = False
-    usual = np.full(len(part.state), np.inf)
+    usual = np.full((len(Extremes._fields), len(part.state)), np.inf)
     kept = new_state(part.levels.shape[1])
     decide(
         part.judged, part.speed, part.levels, part.drive, inside, jumped, usual, part.state,

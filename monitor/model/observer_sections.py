@@ -23,6 +23,10 @@ class EquationsPlant(Section, frozen=True, kw_only=True, tag="equations", tag_fi
     half_width: Annotated[
         int, Meta(ge=2, le=32, description="lag of the smoothed motion [samples]")
     ] = 4
+    late: Annotated[
+        float,
+        Meta(description="lateness of the motion behind the predicted output's sensor [s]"),
+    ] = 0.0
     corner: Annotated[
         float, Meta(gt=0, description="corner of the high-pass of residual and regressors [Hz]")
     ] = 2.0
@@ -99,6 +103,15 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
     steady_narrow: Annotated[Floats, Meta(description="narrowness of each")] = ()
     steady_energies: Annotated[
         Floats, Meta(description="largest energy over a second of each")
+    ] = ()
+    steady_shorts: Annotated[
+        Floats, Meta(description="largest energy of a short window of each")
+    ] = ()
+    steady_mediums: Annotated[
+        Floats, Meta(description="largest energy of a medium window of each")
+    ] = ()
+    steady_frictions: Annotated[
+        Floats, Meta(description="largest Coulomb estimate of each in standard deviations")
     ] = ()
 
 

@@ -53,7 +53,7 @@ from monitor.observer.prediction import (
 from monitor.observer.range_seen import RangeSeen, drive_energy, range_of, range_signals
 from monitor.observer.remainder import fit_remainder, no_remainder
 from monitor.observer.spectral_width import SpectralWidth, Spectrum
-from monitor.observer.usual_error import UsualError, steady_motion
+from monitor.observer.usual_error import Extremes, UsualError, steady_motion
 
 __all__ = [
     "DEVIATIONS",
@@ -72,6 +72,7 @@ __all__ = [
     "ChannelJumps",
     "DecisionRules",
     "E",
+    "Extremes",
     "FixedLag",
     "Layout",
     "Observed",

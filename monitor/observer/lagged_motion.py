@@ -35,10 +35,14 @@ class FixedLag:
         columns: columns computed from the channels.
         half_width: lag [samples].
         rate: sample rate [Hz].
+        late: lateness of the smoothed channels behind the delayed ones [s].
     """
 
-    def __init__(self, columns: Sequence[MotionColumn], half_width: int, rate: float) -> None:
-        self._kernels = np.array([_kernel(column.order, half_width, rate) for column in columns])
+    def __init__(
+        self, columns: Sequence[MotionColumn], half_width: int, rate: float, late: float = 0.0
+    ) -> None:
+        kernels = [_kernel(column.order, half_width, rate, late) for column in columns]
+        self._kernels = np.array(kernels)
         self._channels = np.array([column.channel for column in columns])
         self._ring = np.zeros((2 * half_width + 1, int(self._channels.max()) + 1))
         self._count = np.zeros(3, np.int64)
@@ -59,7 +63,7 @@ EMPTY, FIRST, WHOLE, TAINTED = 0, 1, 2, 3
 """States of a sample, see `FixedLag.update`."""
 
 
-def _kernel(order: int, half_width: int, rate: float) -> FloatArray:
+def _kernel(order: int, half_width: int, rate: float, late: float) -> FloatArray:
     """Weights, oldest sample first, shape (2·half_width + 1,)."""
     width = 2 * half_width + 1
     if order == DELAY:
@@ -69,7 +73,8 @@ def _kernel(order: int, half_width: int, rate: float) -> FloatArray:
         second = savgol_coeffs(width, 3, deriv=2, delta=1.0, use="dot")
         smoothing = np.cumsum(np.cumsum(second))[:-2]
         return np.asarray(np.concatenate([[0.0], smoothing, [0.0]]), np.float64)
-    return np.asarray(savgol_coeffs(width, 3, deriv=order, delta=1.0 / rate, use="dot"))
+    at = half_width + late * rate
+    return np.asarray(savgol_coeffs(width, 3, deriv=order, delta=1.0 / rate, pos=at, use="dot"))
 
 
 @kernel()

@@ -47,6 +47,11 @@ class Layout:
     rates: tuple[int, ...]
     signals: tuple[str, ...]
 
+    @property
+    def balance(self) -> MotionColumn:
+        """The predicted output as derived from the motion."""
+        return self.columns[self.inputs + 1]
+
 
 def layout_of(model: Model, port: str) -> Layout:
     """The layout for an unmodified model.
@@ -110,7 +115,7 @@ class ObserverSignals:
 
     def __init__(self, plant: EquationsPlant, remainder: RemainderSection, rate: float) -> None:
         self.layout = layout_of(base_model(plant.model), plant.port)
-        self._motion = FixedLag(self.layout.columns, plant.half_width, rate)
+        self._motion = FixedLag(self.layout.columns, plant.half_width, rate, plant.late)
         self._along = AlongMotion(plant, rate)
         self.remainder_size = len(self.layout.motions) + self._along.hidden
         self._high_passed = HighPassed(plant.corner, rate, remainder)

@@ -79,9 +79,10 @@ FITS, DRY_PART = 0.7, 0.5
 """Shares of the missing force, beyond noise, that friction must explain and that its dry part must
 contain; real friction also has presliding and the Stribeck effect, which neither part describes.
 """
-LEFT = 0.4
-"""Share of the force of dry friction alone that must be left beside viscous friction: what grows
-with the speed, as drag and a lost gain of the drive do, leaves none.
+LEFT, LEFT_EARLY = 0.55, 0.8
+"""Shares of the force of dry friction alone that must be left beside viscous friction, over longer
+windows and over those shorter than `MEDIUM`, which hardly tell the two apart: what grows with the
+speed, as drag, a saturated drive and a lost gain of it do, leaves less.
 """
 AT_REST, STUCK = 0.25, 0.5
 """Share of the time at rest above which it is stiction."""
@@ -123,7 +124,7 @@ def decide(  # noqa: PLR0917 -- a kernel
         if state[k] != TAINTED:
             _remember(kept, judged[k], speed[k], levels[k])
         _follow_jumps(jumped[k], kept)
-        _one(k, inside[k], usual[k], rules, kept, out)
+        _one(k, inside[k], usual[:, k], rules, kept, out)
 
 
 @njit()
@@ -180,7 +181,7 @@ def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatA
 def _one(  # noqa: PLR0917 -- a kernel
     k: int,
     inside: bool,
-    usual: float,
+    usual: FloatArray,
     rules: DecisionRules,
     kept: DecisionState,
     out: FloatArray,
@@ -198,10 +199,12 @@ def _one(  # noqa: PLR0917 -- a kernel
         kept, MEASURED, MEDIUM
     )
     out[SENSORS, k] = mean_square(kept, DISAGREE, MEDIUM) / sensor_variance / rules.sensor
-    short = mean_square(kept, ERROR, SHORT) / spread**2 / rules.short
-    medium = mean_square(kept, ERROR, MEDIUM) / spread**2 / rules.medium
-    largest = max(np.sqrt(short), np.sqrt(medium), deviations / rules.friction)
-    lasting = lasting_energy(kept, spread**2 * usual * rules.lasting)
+    margin = rules.lasting
+    short = mean_square(kept, ERROR, SHORT) / spread**2 / min(rules.short, usual[1] * margin)
+    medium = mean_square(kept, ERROR, MEDIUM) / spread**2 / min(rules.medium, usual[2] * margin)
+    friction_limit = min(rules.friction, usual[3] * np.sqrt(margin))
+    largest = max(np.sqrt(short), np.sqrt(medium), deviations / friction_limit)
+    lasting = lasting_energy(kept, spread**2 * usual[0] * margin)
     out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting))
     away = out[DEVIATION, k] > 1.0
     count[QUIET] = 0 if away else count[QUIET] + 1
@@ -292,7 +295,8 @@ def _verdict(
     beside, _, _, share, dry = friction(kept, length, spread)
     force = dry_force(kept, length)
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
-    fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > LEFT * force
+    least = LEFT_EARLY if length < MEDIUM else LEFT
+    fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > least * force
     turned = reversals(kept, length, rules.speed_noise) > 0
     still = rest(kept, length, rules.speed_noise)
     sticks = since >= LONG // 2 and still > AT_REST and out[DEPARTED, k] > 0.0

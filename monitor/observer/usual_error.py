@@ -1,9 +1,9 @@
-"""The healthy residual's lasting energy at the present motion.
+"""The healthy residual's extremes at the present motion.
 
 What equations leave of a healthy rig depends on the motion and hardly on anything else. A steady
 motion that was recorded at commissioning is therefore compared with what was left of it then,
 which is far less than the worst of all motions. Of any other motion, and while the motion changes,
-the lasting energy of a healthy rig is not known.
+the extremes of a healthy rig are not known.
 """
 
 from collections.abc import Iterator
@@ -27,17 +27,26 @@ STEADY = 0.9
 """Share of a recording that is the same motion as its median, if it is a steady one."""
 
 
+class Extremes(NamedTuple):
+    """Largest values of a healthy residual: energies of three windows, and of the friction."""
+
+    lasting: float
+    short: float = np.inf
+    medium: float = np.inf
+    friction: float = np.inf
+
+
 class Motion(NamedTuple):
-    """A steady motion, and the largest lasting energy of its healthy residual."""
+    """A steady motion, and the extremes of its healthy residual."""
 
     pace: float
     size: float
     narrow: float
-    energy: float
+    extremes: Extremes
 
 
 class UsualError:
-    """The largest healthy energy at each sample's motion, block by block.
+    """The extremes of the healthy residual at each sample's motion, block by block.
 
     Args:
         limits: of the healthy residual, with the steady motions of commissioning.
@@ -49,30 +58,30 @@ class UsualError:
         self._smooth = _Smooth(rate)
 
     def update(self, seen: Spectrum) -> FloatArray:
-        """The energy after each sample, infinite where it is not known, shape (n,)."""
+        """The extremes after each sample, infinite where they are not known, shape (4, n)."""
         smooth = self._smooth.update(seen)
         steady = np.abs(seen.pace - smooth.pace) <= RIPPLE * PACE * smooth.pace
         steady &= np.abs(seen.size - smooth.size) <= RIPPLE * SIZE * smooth.size
-        found = np.zeros(seen.pace.size)
+        found = np.zeros((len(Extremes._fields), seen.pace.size))
         for motion in self._known:
             same = _same(smooth, motion)
-            found[same] = np.maximum(found[same], motion.energy)
+            found[:, same] = np.maximum(found[:, same], np.array(motion.extremes)[:, None])
         return np.where(steady & (found > 0.0), found, np.inf)
 
 
-def steady_motion(seen: Spectrum, energy: float, rate: float) -> Motion | None:
+def steady_motion(seen: Spectrum, extremes: Extremes, rate: float) -> Motion | None:
     """The motion of a recording, None if it changes or is too short.
 
     Args:
         seen: the spectrum after the start.
-        energy: largest lasting energy of the recording's residual.
+        extremes: of the recording's residual.
         rate: sample rate [Hz].
     """
     if seen.pace.size == 0:
         return None
     smooth = _Smooth(rate).update(seen)
     pace, size, narrow = (float(np.median(x)) for x in (smooth.pace, smooth.size, smooth.narrow))
-    middle = Motion(pace, size, narrow, energy)
+    middle = Motion(pace, size, narrow, extremes)
     steady = size > 0.0 and float(np.mean(_same(smooth, middle))) >= STEADY
     return middle if steady else None
 
@@ -95,8 +104,12 @@ class _Smooth:
 
 def _known(limits: HealthyLimits) -> Iterator[Motion]:
     shapes = zip(limits.steady_paces, limits.steady_sizes, limits.steady_narrow, strict=True)
-    for (pace, size, narrow), energy in zip(shapes, limits.steady_energies, strict=True):
-        yield Motion(pace, size, narrow, energy)
+    windows = limits.steady_shorts, limits.steady_mediums, limits.steady_frictions
+    # Model files of earlier versions have the lasting energy only.
+    unknown = (np.inf,) * len(limits.steady_paces)
+    extremes = zip(limits.steady_energies, *(each or unknown for each in windows), strict=True)
+    for shape, largest in zip(shapes, extremes, strict=True):
+        yield Motion(*shape, Extremes(*largest))
 
 
 def _same(seen: Spectrum, motion: Motion) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ from monitor.observer import (
     PREDICTED,
     ChannelJumps,
     E,
+    Extremes,
     Observed,
     ObserverSignals,
     RangeSeen,
@@ -97,13 +98,15 @@ class ObserverMonitor:
         known = self.model.motion_range
         assert known is not None
         drive = drive_energy(seen.rows, known, layout.motions)
+        usual = self._usual.update(motion)
         decide(
             seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)),
-            self._usual.update(motion), seen.state, self.rules, self._state, out,
+            usual, seen.state, self.rules, self._state, out,
         )  # fmt: skip
         conditions = self._conditions(admitted, seen, far, out)
         sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))
-        return Result(self._estimates(block, admitted, seen, out), (*conditions, *sensors))
+        limit = self._force_limit(out, usual[Extremes._fields.index("friction")])
+        return Result(self._estimates(block, admitted, seen, out, limit), (*conditions, *sensors))
 
     def _jump_conditions(
         self, admitted: Admitted, jumped: NDArray[np.bool_], out: FloatArray
@@ -116,7 +119,12 @@ class ObserverMonitor:
         )
 
     def _estimates(
-        self, block: SampleBlock, admitted: Admitted, seen: Observed, out: FloatArray
+        self,
+        block: SampleBlock,
+        admitted: Admitted,
+        seen: Observed,
+        out: FloatArray,
+        limit: FloatArray,
     ) -> EstimateBlock:
         at = admitted.padding
         speed = seen.rows[:, self._signals.layout.speed]
@@ -129,8 +137,8 @@ class ObserverMonitor:
             ("velocity", "m/s", speed),
             ("theta1", "N", out[d.FORCE]),
             ("theta2", "N s/m", out[d.VISCOUS]),
-            ("theta1_low", "N", -self._force_limit(out)),
-            ("theta1_high", "N", self._force_limit(out)),
+            ("theta1_low", "N", -limit),
+            ("theta1_high", "N", limit),
             ("observable", "", (np.abs(speed) > self.rules.speed_noise).astype(np.float64)),
             ("armed", "", armed.astype(np.float64)),
             ("deviation", "", out[d.DEVIATION]),
@@ -153,11 +161,12 @@ class ObserverMonitor:
             ),
         )
 
-    def _force_limit(self, out: FloatArray) -> FloatArray:
+    def _force_limit(self, out: FloatArray, usual: FloatArray) -> FloatArray:
         """Coulomb force at which the rig has departed [N]; 0 at rest."""
         sizes = np.abs(out[d.DEVIATIONS])
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = np.abs(out[d.FORCE]) / sizes * self.rules.friction
+            allowed = np.minimum(self.rules.friction, usual * np.sqrt(self.rules.lasting))
+            found = np.abs(out[d.FORCE]) / sizes * allowed
         return np.where(sizes > 0.0, found, 0.0)
 
     def _conditions(

@@ -7,7 +7,7 @@ import pytest
 from msgspec import structs
 
 from monitor.model import HealthyLimits, RigModel
-from monitor.observer import SpectralWidth, Spectrum, UsualError, steady_motion
+from monitor.observer import Extremes, SpectralWidth, Spectrum, UsualError, steady_motion
 from monitor.observer.lagged_motion import FIRST, WHOLE
 from monitor.pipeline.rig_monitor import RigMonitor
 from sim_plant.excitation import Sine
@@ -88,18 +88,18 @@ def spectrum(frequency: np.ndarray | float, size: float = 0.2, n: int = 3072) ->
 def limits() -> HealthyLimits:
     """With one steady motion, a tone of 8 Hz."""
     after = Spectrum(*(figure[512:] for figure in spectrum(8.0)))
-    known = steady_motion(after, KNOWN, RATE)
+    known = steady_motion(after, Extremes(KNOWN), RATE)
     assert known is not None
     return HealthyLimits(
         noise=1.0, growth=(0.0,), short=1.0, medium=1.0, friction=1.0, sensor_noise=1.0,
         sensor_growth=0.0, sensor=1.0, speed_noise=SLOW,
         steady_paces=(known.pace,), steady_sizes=(known.size,), steady_narrow=(known.narrow,),
-        steady_energies=(known.energy,),
+        steady_energies=(known.extremes.lasting,),
     )  # fmt: skip
 
 
 def usual(seen: Spectrum) -> np.ndarray:
-    return UsualError(limits(), RATE).update(seen)
+    return UsualError(limits(), RATE).update(seen)[0]
 
 
 @pytest.mark.parametrize("frequency", [8.0, 8.1])
@@ -121,7 +121,7 @@ def test_a_motion_that_changes_has_none() -> None:
 
 
 def test_a_sweep_is_no_steady_motion() -> None:
-    assert steady_motion(spectrum(np.linspace(2.0, 14.0, 3072)), KNOWN, RATE) is None
+    assert steady_motion(spectrum(np.linspace(2.0, 14.0, 3072)), Extremes(KNOWN), RATE) is None
 
 
 def test_any_cut_gives_the_same_limit() -> None:
@@ -129,7 +129,7 @@ def test_any_cut_gives_the_same_limit() -> None:
     cut, whole = UsualError(limits(), RATE), usual(seen)
 
     parts = [
-        cut.update(Spectrum(*(figure[a:b] for figure in seen)))
+        cut.update(Spectrum(*(figure[a:b] for figure in seen)))[0]
         for a, b in pairwise((0, 1, 9, 1500, 1540, 3072))
     ]
 
@@ -141,7 +141,8 @@ def without_lasting() -> RigModel:
     healthy = model().healthy
     assert healthy is not None
     bare = structs.replace(
-        healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_energies=()
+        healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_energies=(),
+        steady_shorts=(), steady_mediums=(), steady_frictions=(),
     )  # fmt: skip
     return structs.replace(model(), healthy=bare)
 

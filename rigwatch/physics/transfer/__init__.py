@@ -7,6 +7,7 @@ excitation.
 
 from rigwatch.physics.transfer.frequency_fit import fit_transfer_function
 from rigwatch.physics.transfer.frequency_response import FrequencyResponse, frequency_response
+from rigwatch.physics.transfer.lateness import lateness
 from rigwatch.physics.transfer.output_error import (
     OutputErrorFit,
     OutputErrorOrders,
@@ -25,6 +26,7 @@ __all__ = [
     "fit_output_error",
     "fit_transfer_function",
     "frequency_response",
+    "lateness",
     "period_by_correlation",
     "shortest_period",
     "velocity_filter",

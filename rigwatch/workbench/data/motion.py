@@ -16,7 +16,12 @@ from rigwatch.physics.engine.equations import (
     measured_states,
     predicted_outputs,
 )
-from rigwatch.physics.engine.fit import Recording, motion_recording, motion_widths
+from rigwatch.physics.engine.fit import (
+    Recording,
+    motion_lateness,
+    motion_recording,
+    motion_widths,
+)
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data.signals import Data, MotionSensor
 from rigwatch.workbench.study import Study
@@ -32,6 +37,10 @@ UNCHECKED = (
 )
 RANGE_RATIO = 1.2
 """Ratio of motion ranges above which a recording is reported to exceed the healthy one."""
+LATE = (
+    "{channel} is {late:.2g} ms {side} what measures its rate, on the healthy recording: its"
+    " motion is shifted by that"
+)
 FORM = "predicted along the measured motion: {shown} drive the model, {hidden} are simulated"
 
 
@@ -57,12 +66,15 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     # One width for all recordings: the smoothing is part of the fitted model.
     shown_by = data.healthy or data.train
     widths = motion_widths(study.model, shown_by)
+    late = motion_lateness(study.model, data.healthy) if data.healthy is not None else {}
     slow = SLOW * _rms(motion_recording(study.model, shown_by, widths=widths).inputs)
 
     def made(recording: Recording) -> Recording:
         shortest = min(recording.parts or (len(recording),)) * recording.dt
         settling = min(SETTLING, shortest / 10)
-        whole = motion_recording(study.model, recording, settling=settling, widths=widths)
+        whole = motion_recording(
+            study.model, recording, settling=settling, widths=widths, late=late
+        )
         return _while_moving(study, whole, slow)
 
     healthy = made(data.healthy) if data.healthy is not None else None
@@ -71,13 +83,19 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     longest = max(len(r) for r in (train, held_out, healthy) if r is not None)
     shown = ", ".join(state.name for state in measured_states(study.model))
     form = FORM.format(shown=shown, hidden=", ".join(model.states) or "no states")
-    told = () if healthy is not None else (UNCHECKED,)
+    told: tuple[str, ...] = () if healthy is not None else (UNCHECKED,)
+    told += tuple(_lateness_remark(channel, late[channel]) for channel in late)
     remarks = (*data.remarks, form, *told, *motion_range_remarks(study, train, held_out, healthy))
     along = Data(
         train, held_out, healthy, longest, remarks, along_motion=True, motion=_sensors(study),
         telling=telling,
     )  # fmt: skip
     return replace(study, model=model), along
+
+
+def _lateness_remark(channel: str, late: float) -> str:
+    side = "behind" if late > 0.0 else "ahead of"
+    return LATE.format(channel=channel, late=1e3 * abs(late), side=side)
 
 
 def _while_moving(study: Study, recording: Recording, slow: FloatArray) -> Recording:

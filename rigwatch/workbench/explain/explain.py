@@ -21,6 +21,7 @@ from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
     limited_verdict,
     much_left,
+    undetermined_if_little_and_unexplained,
     undetermined_if_much_left,
 )
 from rigwatch.workbench.explain.several_effects import may_need_several, several_effects
@@ -137,6 +138,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
         verdict = limited_verdict(bench.base, rows, bench.floor, verdict)
     elif along:
         verdict = undetermined_if_much_left(bench.base, bench.floor, verdict)
+        verdict = undetermined_if_little_and_unexplained(bench.base, bench.floor, verdict)
     verdict = with_base_offered(bench.study, unchecked(bench, verdict))
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]

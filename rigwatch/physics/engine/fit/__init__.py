@@ -5,7 +5,11 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.effect_states import EffectStates, hold_at
-from rigwatch.physics.engine.fit.measured_recording import motion_recording, motion_widths
+from rigwatch.physics.engine.fit.measured_recording import (
+    motion_lateness,
+    motion_recording,
+    motion_widths,
+)
 from rigwatch.physics.engine.fit.port_signals import port_signals
 from rigwatch.physics.engine.fit.problem import Problem
 from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
@@ -44,6 +48,7 @@ __all__ = [
     "hold_at",
     "initial_states",
     "joined",
+    "motion_lateness",
     "motion_recording",
     "motion_widths",
     "port_signals",

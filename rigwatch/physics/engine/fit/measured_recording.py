@@ -23,6 +23,7 @@ from rigwatch.physics.engine.equations import (
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.recording import Recording, filled
 from rigwatch.physics.engine.fit.smoothing import best_width, flat_to, smoothed
+from rigwatch.physics.transfer import lateness
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 
@@ -37,6 +38,7 @@ def motion_recording(
     parts: Sequence[int] = (),
     settling: float = 0.0,
     widths: Mapping[str, int] | None = None,
+    late: Mapping[str, float] | None = None,
 ) -> Recording:
     """A recording for `along_measured_motion(model)`, from one for the model itself.
 
@@ -46,6 +48,7 @@ def motion_recording(
         parts: lengths of the concatenated parts; the recording's own if empty.
         settling: time at the start of each part that does not count [s].
         widths: of the smoothing, by channel [samples]; chosen from the noise if None.
+        late: lateness of channels of the motion [s], see `motion_lateness`; none if None.
 
     Raises:
         ModelError: no channel measures any of the model's states, or one has no valid sample.
@@ -57,7 +60,8 @@ def motion_recording(
     motion = []
     for state in measured_states(model):
         signal, width = channels[state.channel], chosen[state.channel]
-        motion.append(_smoothed_parts(signal, recording.dt, width, state.order, cut))
+        behind = (late or {}).get(state.channel, 0.0)
+        motion.append(_smoothed_parts(signal, recording.dt, width, state.order, cut, late=behind))
         counted &= _whole_kernel(signal, width, cut)
     inputs = np.column_stack([recording.inputs, *motion])
     outputs = _measured_outputs(model, recording, chosen, cut)
@@ -81,6 +85,39 @@ def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ())
             raise ModelError(f"{model.name}: found no valid sample of {channel!r}")
         found[channel] = best_width(filled(longest), order)
     return found
+
+
+def motion_lateness(
+    model: Model, recording: Recording, parts: Sequence[int] = ()
+) -> dict[str, float]:
+    """Lateness of each channel of the motion behind the output that measures its rate [s].
+
+    Args:
+        model: the original model, not transformed.
+        recording: of the healthy rig, whose sensors are as they should be.
+        parts: lengths of the concatenated parts; the recording's own if empty.
+    """
+    cut, channels = _ends(recording, parts), _channels(model, recording)
+    outputs = predicted_outputs(model)
+    if not outputs or recording.thinning is not None:
+        return {}
+    other = np.split(channels[model.outputs[outputs[0]].channel or outputs[0]], cut)
+    found: dict[str, float] = {}
+    for state in balanced_states(model):
+        own = np.split(channels[state.channel], cut)
+        pairs = [(_longest(*pair)) for pair in zip(own, other, strict=True)]
+        found[state.channel] = lateness(pairs, recording.dt, state.order + 1)
+    return {channel: late for channel, late in found.items() if late}
+
+
+def _longest(own: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The longest stretch in which both channels are valid."""
+    valid = np.isfinite(own) & np.isfinite(other)
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], valid.astype(np.int8), [0]]))).reshape(-1, 2)
+    if not ends.size:
+        return own[:0], other[:0]
+    begin, end = ends[np.argmax(ends[:, 1] - ends[:, 0])]
+    return own[begin:end], other[begin:end]
 
 
 def _orders(model: Model) -> dict[str, int]:
@@ -133,9 +170,9 @@ def _channels(model: Model, recording: Recording) -> dict[str, FloatArray]:
 
 
 def _smoothed_parts(
-    signal: FloatArray, dt: float, width: int, order: int, cut: Sequence[int]
+    signal: FloatArray, dt: float, width: int, order: int, cut: Sequence[int], *, late: float = 0.0
 ) -> FloatArray:
-    pieces = [smoothed(filled(piece), dt, width, order) for piece in np.split(signal, cut)]
+    pieces = [smoothed(filled(piece), dt, width, order, late) for piece in np.split(signal, cut)]
     return np.concatenate(pieces)
 
 

@@ -10,6 +10,8 @@ and the width with the smallest error is used: wide for a coarse converter, narr
 The kernel is symmetric and has zero phase; in real time it is delayed by half its width.
 """
 
+from math import factorial
+
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
@@ -23,7 +25,9 @@ NOISE_BANDS = 8
 """Number of bands; the quietest gives the noise."""
 
 
-def smoothed(signal: FloatArray, dt: float, width: int, order: int = 0) -> FloatArray:
+def smoothed(
+    signal: FloatArray, dt: float, width: int, order: int = 0, late: float = 0.0
+) -> FloatArray:
     """The smoothed signal or its derivative of an order, shape (n,).
 
     Args:
@@ -31,13 +35,18 @@ def smoothed(signal: FloatArray, dt: float, width: int, order: int = 0) -> Float
         dt: time between samples [s].
         width: odd number of samples of the polynomial fit; fewer for a shorter signal.
         order: number of differentiations.
+        late: lateness of the channel [s]; the polynomial is evaluated that much later.
     """
     fitting = min(width, len(signal) - 1 + len(signal) % 2)
     if fitting <= POLYNOMIAL:
         for _ in range(order):
             signal = np.gradient(signal, dt)
         return np.asarray(signal, np.float64)
-    return np.asarray(savgol_filter(signal, fitting, POLYNOMIAL, deriv=order, delta=dt))
+    found = savgol_filter(signal, fitting, POLYNOMIAL, deriv=order, delta=dt)
+    for more in range(1, POLYNOMIAL + 1 - order) if late else ():
+        steeper = savgol_filter(signal, fitting, POLYNOMIAL, deriv=order + more, delta=dt)
+        found = found + steeper * late**more / factorial(more)
+    return np.asarray(found)
 
 
 def best_width(signal: FloatArray, order: int) -> int:

@@ -1,0 +1,94 @@
+"""How late a channel of the motion is behind the channel that measures its rate of change.
+
+Position and acceleration often come from sensors with different conditioners. A demodulator or a
+filter delays one of them by a few milliseconds. Both see the same motion, so the delay shows
+without a model, in the phase between the differentiated position and the acceleration:
+
+    φ(ω) = ω·τ + c/ω,   τ: lateness of the position, c: corners of high-passes (AC coupling)
+
+A force that depends on a late position would otherwise be predicted late, and every effect at the
+load would leave the difference as a residual.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import csd, welch
+
+from rigwatch.wire.arrays import FloatArray
+
+SEGMENT = 512
+"""Samples of a spectrum's segment."""
+LOW, HIGH = 4, 0.25
+"""Lowest line and highest frequency used, the latter relative to the rate."""
+COHERENT, ALIKE = 0.5, 0.99
+"""Least coherence of a frequency line, and of the whole of both signals once shifted: above 0.999
+for position and acceleration, less where the other channel is not the derivative."""
+SURE = 4.0
+"""Standard deviations by which a lateness must differ from zero."""
+LEAST, MOST = 0.03, 2.0
+"""Smallest lateness that matters and largest that is believed [samples]."""
+
+Pair = tuple[FloatArray, FloatArray]
+
+
+def lateness(pairs: Sequence[Pair], dt: float, order: int) -> float:
+    """Lateness of a channel behind its derivative's [s], 0 if the two do not tell.
+
+    Args:
+        pairs: of each recording, the channel and the measurement of its derivative, without gaps,
+            each of shape (n,).
+        dt: time between samples [s].
+        order: of the derivative.
+    """
+    long = [pair for pair in pairs if len(pair[0]) >= 2 * SEGMENT]
+    if not long:
+        return 0.0
+    own, other, cross, segments = _spectra(long, order)
+    omega: FloatArray = 2.0 * np.pi * np.arange(len(own)) / SEGMENT
+    coherence = np.abs(cross) ** 2 / np.maximum(own * other, 1e-300)
+    used = (coherence > COHERENT) & (np.arange(len(own)) >= LOW) & (omega < 2.0 * np.pi * HIGH)
+    if used.sum() <= 2:
+        return 0.0
+    found, deviation, phase = _fitted(omega[used], cross[used], coherence[used], segments)
+    together = np.abs(np.sum(cross[used] * np.exp(-1j * phase))) ** 2
+    alike = together / (own[used].sum() * other[used].sum())
+    sure = abs(found) > SURE * deviation and LEAST < abs(found) <= MOST
+    return float(found * dt) if alike > ALIKE and sure else 0.0
+
+
+def _spectra(pairs: Sequence[Pair], order: int) -> tuple[FloatArray, FloatArray, np.ndarray, float]:
+    """Power of the differentiated channel, of its measurement, both crossed; segments averaged."""
+    own, other, cross, segments = [], [], [], 0.0
+    for channel, rate in pairs:
+        steep, level = _differentiated(channel, rate, order)
+        settings = {"nperseg": SEGMENT, "detrend": "constant", "scaling": "spectrum"}
+        weight = len(steep) / SEGMENT
+        own.append(weight * welch(steep, **settings)[1])
+        other.append(weight * welch(level, **settings)[1])
+        cross.append(weight * csd(steep, level, **settings)[1])
+        segments += weight
+    return sum(own), sum(other), sum(cross), segments
+
+
+def _differentiated(channel: FloatArray, rate: FloatArray, order: int) -> Pair:
+    """Central differences of the channel, and its measurement at the same instants."""
+    for _ in range(order // 2):
+        channel, rate = np.diff(channel, 2), rate[1:-1]
+    if order % 2:
+        channel, rate = 0.5 * (channel[2:] - channel[:-2]), rate[1:-1]
+    return channel, rate
+
+
+def _fitted(
+    omega: FloatArray, cross: np.ndarray, coherence: FloatArray, segments: float
+) -> tuple[float, float, FloatArray]:
+    """Lateness [samples], its standard deviation, and the fitted phase of the measurement."""
+    angle = np.angle(cross)
+    spread = np.sqrt((1.0 - coherence) / (2.0 * coherence * segments)) + 1e-4
+    columns = np.column_stack([omega, 1.0 / omega])
+    found = np.linalg.lstsq(columns / spread[:, None], angle / spread, rcond=None)[0]
+    left = (angle - columns @ found) / spread
+    size = max(float(np.sqrt(np.sum(left**2) / (len(omega) - 2))), 1.0)
+    inverse = np.linalg.inv((columns / spread[:, None]).T @ (columns / spread[:, None]))
+    return float(found[0]), size * float(np.sqrt(inverse[0, 0])), columns @ found
