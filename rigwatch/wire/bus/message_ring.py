@@ -78,13 +78,17 @@ class Outlet:
     Args:
         transport: carries the bytes.
         rig, process: of the sender.
+        ring_bytes: capacity of each topic's ring [bytes].
     """
 
-    def __init__(self, transport: Transport, rig: str, process: str) -> None:
+    def __init__(
+        self, transport: Transport, rig: str, process: str, ring_bytes: int = RING_BYTES
+    ) -> None:
         self.run = 1 + secrets.randbits(52)
         self._transport = transport
         self._rig = rig
-        self._rings = {topic.name: MessageRing(self.run) for topic in TOPICS if topic.numbered}
+        numbered = [topic.name for topic in TOPICS if topic.numbered]
+        self._rings = {name: MessageRing(self.run, ring_bytes) for name in numbered}
         for topic in TOPICS:
             if topic.numbered:
                 self._serve(bus_key(rig, ring_key(process, topic)), self._rings[topic.name])
