@@ -3,9 +3,10 @@
     plant ─pty─▶ daq, monitor, recorder ─▶ router of the site ─▶ proxy ─▶ router, recorder
                                                                  killed   of the headquarters
 
-The rig is the demonstration's, judged by its monitor. For the time of the cut nothing goes through the proxy; then it is there again. Every
-sample and estimate, alarm and event of the site's recording must be in that of the headquarters,
-once and with the same bits. `python -m benchmarks.processes.cut_site SECONDS` cuts for another time.
+The rig is the demonstration's, judged by its monitor. For the time of the cut there is no proxy.
+Every sample and estimate, alarm and event of the site's recording must be in that of the
+headquarters, once and with the same bits. `python -m benchmarks.processes.cut_site SECONDS` cuts
+for another time.
 """
 
 import re
@@ -14,13 +15,15 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.archives.recordings import MODEL
 from benchmarks.processes.live_rig import LiveRig, live_rig
-from rigwatch.wire.bus import connect
+from rigwatch.wire.bus import Subscription, connect
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
@@ -38,8 +41,11 @@ from tests.bus.rig import answers, free_port
 from tests.waiting import eventually
 from tools.benchmark_table import Row, as_text
 
-BEFORE, AFTER = 10.0, 5.0
-"""Time before the cut, and after all has been filled in [s]."""
+Counters = Mapping[str, float]
+BEFORE, AFTER = 2560, 5.0
+"""Samples before the cut, and time after all has been filled in [s]."""
+RINGS = 300.0
+"""Shorter cuts than this the rings would bridge by themselves [s]."""
 LONGEST = 300.0
 """Longest wait for what was missed [s]."""
 
@@ -64,7 +70,7 @@ def run(quick: bool) -> list[Row]:
 
 def row(seconds: float) -> Row:
     """The row of a cut of so many seconds."""
-    with live_rig() as rig:
+    with live_rig(needs_model=False) as rig:
         found = cut(rig, seconds)
         own, far = (open_session(next((rig.folder / name).iterdir())) for name in ("own", "far"))
         counts = {line.name: differing(own, far, line.name) for line in (SAMPLES, ESTIMATES)}
@@ -84,7 +90,7 @@ def row(seconds: float) -> Row:
 
 def cut(rig: LiveRig, seconds: float) -> Figures:
     """Run both sites, cut the link for so long, and wait until all is filled in."""
-    far, port, target = headquarters(rig)
+    far, port, target = headquarters(rig, small=seconds < RINGS)
     for name in ("router", "daq", "monitor", "record"):
         rig.command(name)
     proxy = start_proxy(rig, port, target)
@@ -92,41 +98,54 @@ def cut(rig: LiveRig, seconds: float) -> Figures:
     recorder = rig.start("-m", "rigwatch", "record", str(far))
     rig.wait_for("daq", "monitor", "recorder", "headquarters")
     rig.command("plant")
-    time.sleep(BEFORE)
+    bus = connect(load_rig(far), "benchmark", 60.0)
+    health = bus.subscribe(HEALTH)
+    figures(health, lambda counters: counters["samples"] >= BEFORE)
     proxy.kill()
     proxy.wait()
     time.sleep(seconds)
     start_proxy(rig, port, target)
     mended = time.monotonic()
-    found = complete(far)
+    names = [f"filled_{name}" for name in ("samples", "estimates", "messages")]
+    counters = figures(health, lambda c: all(c[name] for name in names) and not c["filling"])
+    bus.close()
     took = time.monotonic() - mended
     time.sleep(AFTER)
     recorder.send_signal(signal.SIGTERM)
     recorder.wait(60.0)
     time.sleep(AFTER)
     rig.close()
-    return Figures(found, took)
+    return Figures({name.removeprefix("filled_"): counters[name] for name in names}, took)
 
 
-def headquarters(rig: LiveRig) -> tuple[Path, int, int]:
-    """Its configuration, the port of the proxy, and that of the site's router."""
-    text = rig.path.read_text()
+def headquarters(rig: LiveRig, *, small: bool) -> tuple[Path, int, int]:
+    """Its configuration, the port of the proxy, and that of the site's router.
+
+    Args:
+        rig: of the site.
+        small: whether rings hold some seconds only, as a short cut would need nothing else.
+    """
+    text = re.sub(r'(?m)^model = ".*"', f'model = "{MODEL}"', rig.path.read_text())
+    if small:
+        text = text.replace("ring = 65536", "ring = 1024").replace(
+            "megabytes = 32.0", "megabytes = 0.5"
+        )
     target = int(re.findall(r"tcp/127\.0\.0\.1:(\d+)", text)[0])
     port, own = free_port(), free_port()
-    link = f'[bus]\nlinks = ["tcp/127.0.0.1:{port}"]\n'
+    link = f'links = ["tcp/127.0.0.1:{port}"]'
     path = rig.folder / "headquarters.toml"
-    there = text.replace(f"127.0.0.1:{target}", f"127.0.0.1:{own}").replace("[bus]\n", link, 1)
-    path.write_text(recorded_in(there, rig.folder / "far", "\nremote = true"))
+    there = text.replace(f"127.0.0.1:{target}", f"127.0.0.1:{own}").replace("links = []", link, 1)
+    there = there.replace("remote = false", "remote = true")
+    path.write_text(recorded_in(there, rig.folder / "far"))
     rig.path.write_text(recorded_in(text, rig.folder / "own"))
     return path, port, target
 
 
-def recorded_in(text: str, folder: Path, more: str = "") -> str:
+def recorded_in(text: str, folder: Path) -> str:
     """A configuration with another folder of recordings."""
     head, tail = text.split("[recorder]\n", 1)
-    return (
-        head + "[recorder]\n" + re.sub(r"folder = .*", f'folder = "{folder}"{more}', tail, count=1)
-    )
+    own = re.sub(r"folder = .*", f'folder = "{folder}"', tail, count=1)
+    return f"{head}[recorder]\n{own}"
 
 
 def start_proxy(rig: LiveRig, port: int, target: int) -> "subprocess.Popen[bytes]":
@@ -136,19 +155,19 @@ def start_proxy(rig: LiveRig, port: int, target: int) -> "subprocess.Popen[bytes
     return proxy
 
 
-def complete(far: Path) -> dict[str, float]:
-    """The figures of the headquarters' recorder once all answers are there."""
-    bus = connect(load_rig(far), "benchmark", 60.0)
-    heard, deadline, figures = bus.subscribe(HEALTH), time.monotonic() + LONGEST, {}
+def figures(heard: Subscription, wanted: Callable[[Counters], object]) -> Counters:
+    """The figures of the headquarters' recorder once they are as wanted.
+
+    Raises:
+        TimeoutError: they are not within `LONGEST`.
+    """
+    deadline = time.monotonic() + LONGEST
     while time.monotonic() < deadline:
         health = heard.get(timeout=1.0)
-        if isinstance(health, Health) and health.source == "headquarters":
-            figures = {k[7:]: v for k, v in health.counters.items() if k.startswith("filled_")}
-            figures.pop("share")
-            if figures["messages"] and figures["estimates"] and not health.counters["filling"]:
-                break
-    bus.close()
-    return figures
+        own = isinstance(health, Health) and health.source == "headquarters"
+        if own and health.counters and wanted(health.counters):
+            return dict(health.counters)
+    raise TimeoutError("the headquarters' recorder does not get there")
 
 
 def differing(own: Session, far: Session, kind: str) -> tuple[int, int, int]:
