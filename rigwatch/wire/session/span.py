@@ -13,7 +13,15 @@ from typing import Any, BinaryIO
 import zstandard
 
 from rigwatch.wire.errors import MessageError, SessionError
-from rigwatch.wire.messages import EstimateBlock, SampleBlock, Topic, blocks, decode, encode
+from rigwatch.wire.messages import (
+    EstimateBlock,
+    SampleBlock,
+    Topic,
+    blocks,
+    decode,
+    decode_block,
+    encode,
+)
 from rigwatch.wire.session.chunk_reader import ChunkReader
 from rigwatch.wire.session.chunks import (
     CHUNK,
@@ -24,7 +32,6 @@ from rigwatch.wire.session.chunks import (
     next_chunk,
     unpacked,
 )
-from rigwatch.wire.session.packed import decode_block
 from rigwatch.wire.session.writer import message_time
 
 _TIMES = struct.Struct("<QQ")
