@@ -23,6 +23,7 @@ import numpy as np
 
 from benchmarks.archives.recordings import MODEL
 from benchmarks.processes.live_rig import LiveRig, live_rig
+from rigwatch.recorder import last_block
 from rigwatch.wire.bus import Subscription, connect
 from rigwatch.wire.messages import (
     ALARMS,
@@ -109,6 +110,7 @@ def cut(rig: LiveRig, seconds: float) -> Figures:
     names = [f"filled_{name}" for name in ("samples", "estimates", "messages")]
     counters = figures(health, lambda c: all(c[name] for name in names) and not c["filling"])
     bus.close()
+    eventually(lambda: up_to_date(rig.folder / "far"), "the estimates are those of now")
     took = time.monotonic() - mended
     time.sleep(AFTER)
     recorder.send_signal(signal.SIGTERM)
@@ -168,6 +170,14 @@ def figures(heard: Subscription, wanted: Callable[[Counters], object]) -> Counte
         if own and health.counters and wanted(health.counters):
             return dict(health.counters)
     raise TimeoutError("the headquarters' recorder does not get there")
+
+
+def up_to_date(root: Path) -> bool:
+    """Whether estimates are recorded as far as samples; the rings need a while to give theirs."""
+    session = open_session(next(root.iterdir()))
+    ends = [last_block(session, line) for line in (SAMPLES, ESTIMATES)]
+    samples, estimates = (int(block.t_ns[-1]) if block else 0 for block in ends)
+    return estimates > samples - 2 * 10**9
 
 
 def differing(own: Session, far: Session, kind: str) -> tuple[int, int, int]:
