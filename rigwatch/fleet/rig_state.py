@@ -7,7 +7,9 @@ from rigwatch.wire.messages import Alarm, Health
 
 UNREACHABLE, GONE = 100, 90
 """Ranks of a rig whose router does not answer, and of one that lacks a process."""
-_SEVERITY = {"critical": 80, "error": 60, "warning": 40, "info": 20}
+ERROR = 60
+"""Rank from which on a rig needs somebody now."""
+_SEVERITY = {"critical": 80, "error": ERROR, "warning": 40, "info": 20}
 _ACTIVE = {"unacknowledged": 9, "acknowledged": 5}
 _TROUBLED = 10
 """Rank of a process that says it is not well, without an alarm."""

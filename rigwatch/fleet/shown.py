@@ -3,9 +3,11 @@
 import math
 import shlex
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from rigwatch.fleet.rig_state import RigState
+from rigwatch.fleet.rig_state import ERROR, RigState, rank_of
 from rigwatch.page import page
+from rigwatch.wire.messages import Alarm
 
 HEAD = ("rig", "state", "alarms", "lost", "p99 [ms]", "more")
 
@@ -48,12 +50,45 @@ def as_page(states: Sequence[RigState], every_s: float = 0.0) -> str:
         states: the worst first.
         every_s: time after which a browser loads the page again [s]; 0 for never.
     """
-    return page(
-        __package__,
-        "fleet.html",
-        states=states,
-        every_s=every_s,
-        summary=summary(states),
-        figure=figure,
-        command=command,
-    )
+    return page(__package__, "fleet.html", every_s=every_s, **_values(states))
+
+
+def as_live_page(states: Sequence[RigState]) -> str:
+    """The same as a page that follows the server; style and code come from there."""
+    return page(__package__, "live.html", **_values(states))
+
+
+def as_part(states: Sequence[RigState]) -> str:
+    """What changes in a live page: everything below its head."""
+    return page(__package__, "rigs.html", **_values(states))
+
+
+def _values(states: Sequence[RigState]) -> dict[str, object]:
+    return {
+        "states": states,
+        "summary": summary(states),
+        "figure": figure,
+        "command": command,
+        "colour": colour,
+        "alarms_of": alarms_of,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """A standing alarm of one of the rigs, and how bad it is."""
+
+    rig: str
+    alarm: Alarm
+    rank: int
+
+
+def alarms_of(states: Sequence[RigState]) -> list[Standing]:
+    """The alarms of all rigs, the worst first."""
+    found = [Standing(state.rig, one, rank_of(one)) for state in states for one in state.alarms]
+    return sorted(found, key=lambda one: (-one.rank, one.alarm.t_ns))
+
+
+def colour(rank: int) -> str:
+    """The style of a rank, beside the words that say the same."""
+    return "good" if rank == 0 else "no" if rank >= ERROR else "warn"

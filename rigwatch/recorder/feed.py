@@ -16,6 +16,7 @@ class Feed:
         resume_after: (boot, seq) of the last sample stored by an earlier run of this recorder;
             later ones are fetched from the ring.
         positions: the same for numbered topics.
+        gaps_in_place: gaps are not published, and those of messages are in their place.
 
     Attributes:
         samples: samples delivered.
@@ -27,13 +28,15 @@ class Feed:
         bus: Bus,
         resume_after: tuple[int, int] | None = None,
         positions: Positions | None = None,
+        *,
+        gaps_in_place: bool = False,
     ) -> None:
         self.samples = self.gap_samples = 0
         self._name = bus.process
-        self._reader = SampleReader(bus, resume_after)
+        self._reader = SampleReader(bus, resume_after, publish_gaps=not gaps_in_place)
         resumed = positions or {}
         self._numbered = {
-            line.name: bus.listen(line, resumed.get(line.name))
+            line.name: bus.listen(line, resumed.get(line.name), gaps_in_place=gaps_in_place)
             for line in _SUBSCRIBED
             if line.numbered
         }
@@ -42,21 +45,35 @@ class Feed:
 
     def take(self) -> list[Message]:
         """Messages received since the last call; does not wait."""
-        found: list[Message] = list(self._reader.read(0.0))
-        for item in found:
-            if isinstance(item, SampleBlock):
-                self.samples += len(item)
-            elif isinstance(item, Gap):
-                self.gap_samples += max(0, item.last - item.first + 1)
+        found = self._counted(list(self._reader.read(0.0)))
         for subscription in self._others:
-            found += [message for message in subscription.drain() if not self._is_own(message)]
+            found += self._drained(subscription)
             if isinstance(subscription, CompleteSubscription):
                 found += subscription.reports()
         return found
 
+    def rest(self) -> list[Message]:
+        """What was taken and still waits, at the end."""
+        return []
+
+    def _counted(self, found: list[Message]) -> list[Message]:
+        for item in found:
+            if isinstance(item, SampleBlock):
+                self.samples += len(item)
+            elif isinstance(item, Gap) and not item.topic:
+                self.gap_samples += max(0, item.last - item.first + 1)
+        return found
+
+    def _drained(self, subscription: Subscription, *, own: bool = False) -> list[Message]:
+        return [message for message in subscription.drain() if own or not self._is_own(message)]
+
     def positions(self) -> Positions:
         """Positions in the numbered topics."""
         return {name: listened.positions() for name, listened in self._numbered.items()}
+
+    def figures(self) -> dict[str, float]:
+        """Further figures for the recorder's health."""
+        return {}
 
     def lost(self, topic: str) -> int:
         """Messages of numbered topics known to be lost."""

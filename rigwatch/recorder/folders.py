@@ -7,6 +7,7 @@ missed samples.
 """
 
 import re
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -14,7 +15,7 @@ from pathlib import Path
 
 from rigwatch.recorder.positions import Positions, load_positions
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import RunInfo
+from rigwatch.wire.messages import SAMPLES, Block, RunInfo, Topic
 from rigwatch.wire.session import SUFFIX, Session, open_session
 
 LONGEST_BREAK = 120.0
@@ -45,9 +46,15 @@ def sessions_of(root: Path, rig: str) -> Iterator[Path]:
             yield path
 
 
-def choose(root: Path, run: RunInfo) -> Place:
-    """The folder for a recording that starts at `run.t_ns`."""
-    going_on = _interrupted(root, run)
+def choose(root: Path, run: RunInfo, longest_break: float = LONGEST_BREAK) -> Place:
+    """The folder for a recording that starts at `run.t_ns`.
+
+    Args:
+        root: folder of all sessions.
+        run: description of the recording.
+        longest_break: interruption after which a new session starts [s].
+    """
+    going_on = _interrupted(root, run, longest_break)
     if going_on is not None:
         return going_on
     stamp = datetime.fromtimestamp(run.t_ns // 1_000_000_000, UTC).strftime("%Y%m%dT%H%M%SZ")
@@ -63,29 +70,29 @@ def _unused(folder: Path) -> Path:
     return found
 
 
-def _interrupted(root: Path, run: RunInfo) -> Place | None:
+def _interrupted(root: Path, run: RunInfo, longest_break: float) -> Place | None:
     """The newest session of this rig if it is recent and has the same configuration."""
     try:
         folders = [path for path in sessions_of(root, run.rig) if any(path.glob(f"*{SUFFIX}"))]
         newest = max(folders, key=lambda path: max(f.stat().st_mtime for f in path.iterdir()))
         session = open_session(newest)
         same = session.info.configuration_sha256 == run.configuration_sha256
-        last = _last_sample(session) if same else None
+        last = last_block(session, SAMPLES) if same else None
     except (OSError, SessionError, ValueError):
         return None
     if last is None:
         return None
-    boot, seq, t_ns = last
-    recent = abs(run.t_ns - t_ns) <= LONGEST_BREAK * 1e9
-    return Place(newest, (boot, seq), load_positions(newest)) if recent else None
+    recent = abs(run.t_ns - int(last.t_ns[-1])) <= longest_break * 1e9
+    end = last.boot, last.seq + len(last) - 1
+    return Place(newest, end, load_positions(newest)) if recent else None
 
 
-def _last_sample(session: Session) -> tuple[int, int, int] | None:
-    """(boot, seq, t_ns) of the last sample, in the last segment that has any."""
+def last_block(session: Session, topic: Topic) -> Block | None:
+    """The last block of samples or estimates, in the last segment that has any."""
     for path in reversed(session.segments):
-        last = None
-        for block in Session(path, (path,)).samples():
-            last = block
-        if last is not None:
-            return last.boot, last.seq + len(last) - 1, int(last.t_ns[-1])
+        one = Session(path, (path,))
+        found: Iterator[Block] = one.samples() if topic is SAMPLES else one.estimates()
+        last = deque(found, maxlen=1)
+        if last:
+            return last[0]
     return None

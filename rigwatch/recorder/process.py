@@ -11,18 +11,32 @@ from pathlib import Path
 
 from rigwatch.recorder.disk import DiskWatch, free_share
 from rigwatch.recorder.feed import Feed
-from rigwatch.recorder.folders import choose
+from rigwatch.recorder.folders import LONGEST_BREAK, choose
+from rigwatch.recorder.past import PastServer
 from rigwatch.recorder.positions import Positions, save_positions
+from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.host import Heartbeat, Pulse
-from rigwatch.wire.messages import ALARMS, ESTIMATES, EVENTS, HEALTH, RUN, Event, Health, RunInfo
+from rigwatch.wire.messages import (
+    ALARMS,
+    ESTIMATES,
+    EVENTS,
+    HEALTH,
+    RECORDERS,
+    RUN,
+    Event,
+    Health,
+    RunInfo,
+)
 from rigwatch.wire.rig_config import RecorderSection, RigConfig, load_rig, rig_text
 from rigwatch.wire.session import run_info
 
-PROCESS = "recorder"
+PROCESS, REMOTE = RECORDERS
 HEALTH_EVERY = 1.0
+UNSETTLED_NS = 2_000_000_000
+"""Age of messages that count as recorded once the disk has been written [ns]."""
 _OF_FLUSH = 0.8
 """Share of the flush time that one loop iteration waits; the rest is for the disk."""
 
@@ -38,16 +52,20 @@ class Recorder:
 
     def __init__(self, config: RigConfig, run: RunInfo, bus: Bus) -> None:
         self.settings = config.recorder or RecorderSection()
-        place = choose(Path(self.settings.folder), run)
+        root, remote = Path(self.settings.folder), self.settings.remote
+        place = choose(root, run, math.inf if remote else LONGEST_BREAK)
         self.store = Store(place.folder, run, self.settings.segment)
-        self.feed = Feed(bus, place.last, place.positions)
+        self.feed = RemoteFeed(bus, place) if remote else Feed(bus, place.last, place.positions)
         self._bus = bus
+        self._settled = 0
         self._disk = DiskWatch()
         self._retention = Retention(self.settings, config.rig.id)
         self._told_at = -HEALTH_EVERY
         self._told_trouble = self._trouble()
         self._kept: Positions = {}
-        bus.publish(RUN, run)
+        if not remote:
+            bus.publish(RUN, run)
+            PastServer(bus, root, lambda: self._settled)
 
     def turn(self, now: float, t_ns: int) -> None:
         """Store received messages; `now` is monotonic time [s], `t_ns` Unix time [ns]."""
@@ -70,6 +88,8 @@ class Recorder:
     def _flush(self, now: float, t_ns: int) -> None:
         taken = self.feed.positions()
         self._tell(self.store.flush(now, t_ns))
+        if not self.store.failure:
+            self._settled = t_ns - UNSETTLED_NS
         if not self.store.failure and taken != self._kept:
             self._kept = taken
             save_positions(self.store.folder, taken)
@@ -93,16 +113,17 @@ class Recorder:
             "free_share": -1.0 if math.isnan(share) else share,
             "disk_trouble": float(bool(self.store.failure) or self._disk.short),
         }
-        return Health(PROCESS, t_ns, state, self.store.failure, counters)
+        counters |= self.feed.figures()
+        return Health(self._bus.process, t_ns, state, self.store.failure, counters)
 
     def close(self, now: float, t_ns: int) -> None:
         """Write waiting messages and close the session."""
-        for message in self.feed.take():
+        for message in [*self.feed.take(), *self.feed.rest()]:
             self.store.add(message)
         self.feed.close()
         self._tell(self.store.close(now, t_ns))
         # An orderly stop is not a failure: supervisors no longer expect a recording.
-        self._bus.publish(HEALTH, Health(PROCESS, t_ns, "stopped", "", {}))
+        self._bus.publish(HEALTH, Health(self._bus.process, t_ns, "stopped", "", {}))
 
 
 def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pulse: Pulse) -> Path:
@@ -115,6 +136,11 @@ def record(config: RigConfig, run: RunInfo, bus: Bus, stop: threading.Event, pul
     pulse.stopping()
     recorder.close(time.monotonic(), time.time_ns())
     return recorder.store.folder
+
+
+def process_name(config: RigConfig) -> str:
+    """The name of the process that records a rig, beside that of the rig's own site."""
+    return REMOTE if config.recorder and config.recorder.remote else PROCESS
 
 
 def describe_run(path: Path | str, config: RigConfig, notes: str = "") -> RunInfo:
@@ -137,7 +163,7 @@ def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path:
         BusError: the router's endpoint is invalid.
     """
     config = load_rig(path)
-    bus = connect(config, PROCESS)
+    bus = connect(config, process_name(config))
     try:
         return record(config, describe_run(path, config, notes), bus, stop, Heartbeat(PROCESS))
     finally:

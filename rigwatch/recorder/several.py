@@ -7,7 +7,7 @@ import threading
 from functools import partial
 from pathlib import Path
 
-from rigwatch.recorder.process import PROCESS, describe_run, record
+from rigwatch.recorder.process import PROCESS, describe_run, process_name, record
 from rigwatch.wire.bus import joined
 from rigwatch.wire.host import Heartbeat, Part, RigPulse, Work, run_side_by_side, set_at_hangup
 from rigwatch.wire.rig_config import load_rig, rig_text
@@ -19,7 +19,7 @@ def work_of(path: Path, notes: str, folders: dict[Path, Path]) -> Work:
 
     def work(stop: threading.Event, pulse: RigPulse) -> None:
         config = load_rig(path)
-        with joined(config, PROCESS, stop, pulse.say) as bus:
+        with joined(config, process_name(config), stop, pulse.say) as bus:
             if bus is not None:
                 run = describe_run(path, config, notes)
                 folders[path] = record(config, run, bus, stop, pulse)

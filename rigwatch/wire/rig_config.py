@@ -63,9 +63,24 @@ class BusSection(Section, frozen=True):
     listen: Annotated[Text, Meta(description="endpoint on which `rigwatch router` listens")] = (
         "tcp/127.0.0.1:7447"
     )
+    links: Annotated[
+        tuple[Text, ...],
+        Meta(
+            description="endpoints of other sites' routers that `rigwatch router` links to; beyond "
+            "loopback only with keys"
+        ),
+    ] = ()
     lease: Annotated[
         float, Meta(gt=0, description="silence after which a link counts as broken [s]")
     ] = 10.0
+    ring_megabytes: Annotated[
+        float,
+        Meta(
+            gt=0,
+            description="memory of each numbered topic for messages that readers may have missed "
+            "[MB]",
+        ),
+    ] = 32.0
     security: Annotated[SecuritySection, Meta(description="who may speak")] = field(
         default_factory=SecuritySection
     )
@@ -208,6 +223,13 @@ class RecorderSection(Section, frozen=True):
     folder: Annotated[Text, Meta(description="folder of the sessions")] = "sessions"
     segment: Annotated[float, Meta(gt=0, description="length of a segment [s]")] = 3600.0
     flush: Annotated[float, Meta(gt=0, le=0.5, description="time between flushes [s]")] = 0.5
+    remote: Annotated[
+        bool,
+        Meta(
+            description="records a rig of another site over linked routers; what it missed it "
+            "fetches from the rings and then from the recordings of that site"
+        ),
+    ] = False
     keep_days: Annotated[
         float, Meta(ge=0, description="age at which segments are removed [days]; 0 for never")
     ] = 0.0

@@ -38,10 +38,17 @@ class Served:
         bearer: the token in the header `Authorization`, for clients that are no browser.
     """
 
-    def __init__(self, folder: Path, *arguments: str, cwd: Path | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *arguments: str,
+        cwd: Path | None = None,
+        command: tuple[str, ...] | None = None,
+    ) -> None:
         self.folder = folder
+        words = command or ("workbench", str(folder))
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "rigwatch", "workbench", str(folder), "--json", *arguments],
+            [sys.executable, "-m", "rigwatch", *words, "--json", *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)},

@@ -239,9 +239,9 @@ def test_fifty_clients_are_served(served: Served) -> None:
 
 def test_others_are_let_in_by_tls_or_behind_a_proxy_alone(tmp_path: Path) -> None:
     with pytest.raises(RigwatchError, match="--behind-proxy"):
-        serve(Options(tmp_path, "0.0.0.0"), lambda _: None)
+        serve(Options("0.0.0.0", folder=tmp_path), lambda _: None)
     with pytest.raises(RigwatchError, match="expected both"):
-        serve(Options(tmp_path, certificate=tmp_path / "a.pem"), lambda _: None)
+        serve(Options(folder=tmp_path, certificate=tmp_path / "a.pem"), lambda _: None)
 
 
 def test_a_proxy_is_named_without_its_port() -> None:

@@ -115,9 +115,9 @@ class TestRig:
         """A process that publishes samples of `boot` at 256 Hz, from seq 0."""
         return self.start("-m", "tests.bus.publisher", str(path or self.path), str(boot), *options)
 
-    def proxy(self) -> "tuple[subprocess.Popen[bytes], int]":
+    def proxy(self, port: int = 0) -> "tuple[subprocess.Popen[bytes], int]":
         """A TCP proxy before the router, and its port."""
-        port = free_port()
+        port = port or free_port()
         process = self.start("-m", "tests.bus.rig", str(port), str(self.listen))
         eventually(lambda: answers(port), "the proxy listens")
         return process, port

@@ -8,7 +8,9 @@ from rigwatch.wire.ordering.outcomes import Loss
 PERIOD_NS = 3_906_250
 
 
-def block(seq: int, n: int = 1, boot: int = 7, start_ns: int = 0) -> SampleBlock:
+def block(
+    seq: int, n: int = 1, boot: int = 7, start_ns: int = 0, period_ns: float = PERIOD_NS
+) -> SampleBlock:
     """Samples `seq` … `seq + n - 1` of `boot`; sample k has the value k + boot / 1000."""
     numbers = np.arange(seq, seq + n)
     return SampleBlock(
@@ -16,7 +18,7 @@ def block(seq: int, n: int = 1, boot: int = 7, start_ns: int = 0) -> SampleBlock
         boot,
         seq,
         numbers * 3906,
-        start_ns + numbers * PERIOD_NS,
+        start_ns + (numbers * period_ns).astype(np.int64),
         (
             Column("voltage", "V", numbers + boot / 1000, np.zeros(n, np.uint8)),
             Column("position", "m", -(numbers + boot / 1000)),

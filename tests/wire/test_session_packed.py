@@ -1,15 +1,18 @@
-"""The fast reader of blocks says what the general decoder says, for any bytes."""
+"""The fast reader and writer of blocks say what the general ones say, for any bytes."""
 
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages import decode, encode
+from rigwatch.wire.messages import columns_of
+from rigwatch.wire.messages import encode as quick_encode
 from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
-from rigwatch.wire.session.packed import decode_block
+from rigwatch.wire.messages.packed import decode_block
+from rigwatch.wire.messages.protobuf import decode, encode
 
 Block = SampleBlock | EstimateBlock
 NAMES = st.sampled_from(["voltage", "position", "", "θ1", "x" * 200])
@@ -51,6 +54,34 @@ def test_blocks_come_back_whatever_came_before(several: list[Block]) -> None:
     for block in (*several, *several):
         data = encode(block)
         assert said(type(block), data, fast=True) == data
+
+
+@settings(max_examples=200, deadline=None)
+@given(blocks())
+def test_a_block_has_the_same_bytes_either_way(block: Block) -> None:
+    assert quick_encode(block) == encode(block)
+    halves = [Column(c.name, c.unit, c.values[::2], c.quality[::2]) for c in columns_of(block)]
+    every_second = replace_columns(block, halves)
+    assert quick_encode(every_second) == encode(every_second)
+
+
+def replace_columns(block: Block, columns: list[Column]) -> Block:
+    """Every second sample: arrays with gaps between their numbers."""
+    t_ns = block.t_ns[::2]
+    if isinstance(block, SampleBlock):
+        us = block.device_us[::2]
+        return SampleBlock(block.device, block.boot, block.seq, us, t_ns, tuple(columns))
+    return EstimateBlock(block.device, block.boot, block.seq, t_ns, tuple(columns))
+
+
+def test_numbers_of_other_types_and_too_large_ones_are_left_to_the_general_encoder() -> None:
+    counts = Column("count", "", np.array([1, 2]))
+    odd = EstimateBlock("rig", 1, 2, np.array([3, 4], np.int32), (counts,))
+    assert quick_encode(odd) == encode(odd)
+    large = EstimateBlock("rig", 2**64, 2, np.array([3]), ())
+    for one in (quick_encode, encode):
+        with pytest.raises(ValueError, match="range"):
+            one(large)
 
 
 @settings(max_examples=200, deadline=None)

@@ -1,5 +1,5 @@
 """The web server: access control, routes and responses."""
 
-from rigwatch.browser.server.serving import Options, serve
+from rigwatch.browser.server.serving import Listening, Options, serve, serve_fleet
 
-__all__ = ["Options", "serve"]
+__all__ = ["Listening", "Options", "serve", "serve_fleet"]

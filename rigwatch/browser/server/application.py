@@ -37,7 +37,7 @@ STATIC = Path(str(files("rigwatch.browser.server").joinpath("static")))
 def application(context: Context, access: Access) -> Starlette:
     """The pages of a folder, for requests that `access` allows."""
     routes = [
-        Route("/static/page.css", _style),
+        Route("/static/page.css", style),
         Mount("/static", StaticFiles(directory=STATIC)),
         *editor_routes.ROUTES,
         *import_routes.ROUTES,
@@ -59,7 +59,8 @@ def application(context: Context, access: Access) -> Starlette:
     return app
 
 
-async def _style(_: Request) -> Response:
+async def style(_: Request) -> Response:
+    """The style of every page."""
     return Response(STYLE, media_type="text/css")
 
 

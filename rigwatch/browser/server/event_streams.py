@@ -7,8 +7,6 @@ from collections.abc import AsyncGenerator, AsyncIterator
 from starlette.requests import Request
 from starlette.responses import StreamingResponse
 
-from rigwatch.browser.server.context import context_of
-
 STILL_HERE = b": still here\n\n"
 """Sent when there is nothing to tell, so that a page that has gone is noticed."""
 HEADERS = {"cache-control": "no-store", "x-accel-buffering": "no"}
@@ -21,7 +19,7 @@ def event(kind: str, content: bytes = b"{}") -> bytes:
 
 def event_stream(request: Request, events: AsyncGenerator[bytes, None]) -> StreamingResponse:
     """Events as a response, until the page leaves or the server is stopped."""
-    stream = _until(context_of(request).stopping, events)
+    stream = _until(request.app.state.context.stopping, events)
     return StreamingResponse(stream, media_type="text/event-stream", headers=HEADERS)
 
 

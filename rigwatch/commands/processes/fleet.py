@@ -1,22 +1,25 @@
 """`rigwatch fleet`: the state of many rigs at a glance, the worst first."""
 
 import argparse
+import json
 import sys
 import time
+import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.common import check_folder, print_json
 
 if TYPE_CHECKING:
-    from rigwatch.fleet import RigState
+    from rigwatch.fleet import Fleet, RigState
 
 HELP = "show many rigs, the worst first: alarms, missing processes, losses, latency"
 EXAMPLE = """\
   rigwatch fleet rigs/*.toml
   rigwatch fleet rigs/*.toml --follow
   rigwatch fleet rigs/*.toml --json
-  rigwatch fleet rigs/*.toml --page fleet.html --follow"""
+  rigwatch fleet rigs/*.toml --page fleet.html --follow
+  rigwatch fleet rigs/*.toml --serve"""
 EXIT_UNWELL = 1
 _EVERY_S = 2.0
 
@@ -30,6 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--timeout", type=float, default=3.0, metavar="S", help="longest wait for a rig (3)"
     )
     parser.add_argument("--page", type=Path, metavar="FILE.html", help="write a web page instead")
+    parser.add_argument("--serve", action="store_true", help="serve a live web page instead")
+    parser.add_argument("--port", type=int, default=0, help="of that page, else a free one")
+    parser.add_argument("--open", action="store_true", help="open it in this machine's browser")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -39,6 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_folder(arguments.page)
     fleet = Fleet(arguments.config, arguments.timeout)
     try:
+        if arguments.serve:
+            return _serve(arguments, fleet)
         while True:
             states = fleet.look()
             _show(arguments, states)
@@ -47,6 +55,26 @@ def run(arguments: argparse.Namespace) -> int:
             time.sleep(_EVERY_S)
     finally:
         fleet.close()
+
+
+def _serve(arguments: argparse.Namespace, fleet: "Fleet") -> int:
+    """0 when it was ended."""
+    try:
+        from rigwatch.browser.server import Listening, serve_fleet
+    except ModuleNotFoundError as error:
+        from rigwatch.wire.errors import MissingExtraError
+
+        raise MissingExtraError(
+            error.name or "starlette", "workbench", "the live page of many rigs"
+        ) from None
+
+    def ready(address: str) -> None:
+        print(json.dumps({"address": address}) if arguments.json else address, flush=True)
+        if arguments.open:
+            webbrowser.open(address)
+
+    serve_fleet(fleet.look, Listening(port=arguments.port), ready)
+    return 0
 
 
 def _show(arguments: argparse.Namespace, states: "list[RigState]") -> None:

@@ -64,8 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     serve(
         Options(
-            folder, arguments.address, arguments.port, arguments.certificate, arguments.key,
-            tuple(arguments.behind_proxy), arguments.rig, arguments.most_upload << 20,
+            arguments.address, arguments.port, arguments.certificate, arguments.key,
+            tuple(arguments.behind_proxy), folder, arguments.rig, arguments.most_upload << 20,
         ),
         ready,
     )  # fmt: skip

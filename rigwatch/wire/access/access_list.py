@@ -36,12 +36,20 @@ _SAYS: dict[str, tuple[str, ...]] = {
 }
 _ANSWERS = {
     "daq": (RING_KEY,),
+    "recorder": ("recorder/past",),
     "monitor": ("ring/**", "monitor/standing", "monitor/receiver", "monitor/model"),
     "witness": ("ring/witness/**", "monitor/standing", "monitor/receiver"),
 }
 _TOKENS = {"daq": ("source/**",), "monitor": ("said/**",), "witness": ("said/witness/**",)}
 _ASKS = {"operator": ("monitor/receiver", "monitor/model")}
-_EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing")
+_EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing", "recorder/past")
+
+LINKED = "router"
+"""The role of routers, also of those of other sites."""
+_MESSAGES = [
+    "put", "delete", "query", "reply", "declare_subscriber", "declare_queryable",
+    "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",
+]  # fmt: skip
 
 
 def access_settings(bus: BusSection, rig: str) -> dict[str, Any]:
@@ -63,7 +71,7 @@ def access_list(register: Register, rig: str) -> dict[str, Any]:
         names = [one.common_name for one in valid if one.role == role]
         if not names:
             continue
-        own = _role_rules(role, rig)
+        own = _linked(rig) if role == LINKED else _role_rules(role, rig)
         rules += own
         subjects.append({"id": role, "cert_common_names": names})
         policies.append({"rules": ["listen", *(rule["id"] for rule in own)], "subjects": [role]})
@@ -97,13 +105,14 @@ def _role_rules(role: str, rig: str) -> list[dict[str, Any]]:
     return rules
 
 
+def _linked(rig: str) -> list[dict[str, Any]]:
+    """A router of another site speaks for the processes behind it, which it has checked."""
+    return [_rule("router links", _MESSAGES, rig, ("**",))]
+
+
 def _listening(rig: str) -> dict[str, Any]:
     """Rules for what the router may send to any client."""
-    everything = [
-        "put", "delete", "query", "reply", "declare_subscriber", "declare_queryable",
-        "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",
-    ]  # fmt: skip
-    return _rule("listen", everything, rig, ("**",)) | {"flows": ["egress"]}
+    return _rule("listen", _MESSAGES, rig, ("**",)) | {"flows": ["egress"]}
 
 
 def _rule(name: str, messages: list[str], rig: str, keys: tuple[str, ...]) -> dict[str, Any]:

@@ -13,19 +13,25 @@ _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
 def check_exposure(bus: BusSection) -> None:
-    """Refuse a router that is reachable from a network without authentication.
+    """Refuse a router that is reachable from a network, or reaches out, without authentication.
 
     Raises:
-        ConfigError: `bus.listen` is not a loopback address and there are no keys.
+        ConfigError: `bus.listen` or one of `bus.links` is not a loopback address and there are no
+            keys.
     """
-    address = endpoint_address(bus.listen)
+    for key, endpoint in [("bus.listen", bus.listen), *(("bus.links", one) for one in bus.links)]:
+        _check_endpoint(bus, key, endpoint)
+
+
+def _check_endpoint(bus: BusSection, key: str, endpoint: str) -> None:
+    address = endpoint_address(endpoint)
     local = address is not None and address[0] in _LOOPBACK
-    if bus.security.keys and not bus.listen.startswith("tls/"):
-        raise ConfigError("configuration", "bus.listen", bus.listen, "tls/… where there are keys")
+    if bus.security.keys and not endpoint.startswith("tls/"):
+        raise ConfigError("configuration", key, endpoint, "tls/… where there are keys")
     if local or bus.security.keys or bus.security.isolated_network:
         return
     expected = "a loopback address, or keys in bus.security.keys (`rigwatch keys new`)"
-    raise ConfigError("configuration", "bus.listen", f"{bus.listen} without keys", expected)
+    raise ConfigError("configuration", key, f"{endpoint} without keys", expected)
 
 
 def certificate_name(bus: BusSection, process: str) -> str:

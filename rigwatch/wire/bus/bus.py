@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 
 from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
-from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, Outlet
+from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, RING_BYTES, Outlet
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Transport
 from rigwatch.wire.errors import BusError
@@ -30,15 +30,22 @@ class Bus:
         rig: the rig's id, first part of every key.
         process: name of the process, such as "daq"; a liveliness token exists while it lives.
         signer: signs the commands of this machine's operator; None for a process that sends none.
+        ring_bytes: memory of the ring of each numbered topic [bytes].
     """
 
     def __init__(
-        self, transport: Transport, rig: str, process: str, signer: CommandSigner | None = None
+        self,
+        transport: Transport,
+        rig: str,
+        process: str,
+        signer: CommandSigner | None = None,
+        ring_bytes: int = RING_BYTES,
     ) -> None:
         self.transport = transport
         self.signer = signer
         self.rig = rig
         self.process = process
+        self._ring_bytes = ring_bytes
         self._outlet: Outlet | None = None
         self._lock = threading.Lock()
         self._at_close: list[Close] = []
@@ -67,7 +74,7 @@ class Bus:
     def _numbered(self) -> Outlet:
         with self._lock:
             if self._outlet is None:
-                self._outlet = Outlet(self.transport, self.rig, self.process)
+                self._outlet = Outlet(self.transport, self.rig, self.process, self._ring_bytes)
             return self._outlet
 
     def subscribe(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:
@@ -81,9 +88,13 @@ class Bus:
         topic: Topic,
         resume_after: Mapping[str, Place] | None = None,
         capacity: int = QUEUE_CAPACITY,
+        *,
+        gaps_in_place: bool = False,
     ) -> CompleteSubscription:
         """The messages of a numbered topic, after those that an earlier run has processed."""
-        return CompleteSubscription(self, topic, capacity, resume_after)
+        return CompleteSubscription(
+            self, topic, capacity, resume_after, gaps_in_place=gaps_in_place
+        )
 
     def subscribe_lossy(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:
         """The topic's messages as received; some may be lost, which suits e.g. a display."""

@@ -44,6 +44,7 @@ class CompleteSubscription(Subscription):
         capacity: messages queued before further ones are left to the ring.
         resume_after: run and number of the last message of each process that an earlier run of this
             subscriber has processed; None for messages from now on.
+        gaps_in_place: losses are not published but returned among the messages, in their place.
 
     Attributes:
         lost: messages known to be lost.
@@ -56,10 +57,12 @@ class CompleteSubscription(Subscription):
         topic: Topic,
         capacity: int = QUEUE_CAPACITY,
         resume_after: Mapping[str, Place] | None = None,
+        *,
+        gaps_in_place: bool = False,
     ) -> None:
         super().__init__(topic, capacity)
         self.lost = self.foreign = 0
-        self._bus = bus
+        self._bus, self._gaps_in_place = bus, gaps_in_place
         self._senders: dict[str, Sender] = {}
         self._runs: dict[int, str] = {}
         self._inbox: SimpleQueue[Any] = SimpleQueue()
@@ -224,11 +227,14 @@ class CompleteSubscription(Subscription):
             self.rejected += 1
 
     def _miss(self, process: str, loss: Loss) -> None:
-        self.lost += max(0, loss.last - loss.first + 1)
         gap = Gap(
             process, loss.boot, loss.first, loss.last, time.time_ns(),
             self._bus.process, loss.reason, self.topic.name,
         )  # fmt: skip
+        if self._gaps_in_place:
+            self._ready.append(gap)
+            return
+        self.lost += max(0, loss.last - loss.first + 1)
         self._reports.append(gap)
         self._bus.publish(GAPS, gap)
 

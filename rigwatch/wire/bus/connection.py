@@ -42,7 +42,9 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
     name = certificate_name(config.bus, process)
     tls = tls_settings(config.bus, name)
     transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease, tls)
-    return Bus(transport, config.rig.id, process, signer_of(config.bus.security, name))
+    signer = signer_of(config.bus.security, name)
+    ring_bytes = round(config.bus.ring_megabytes * (1 << 20))
+    return Bus(transport, config.rig.id, process, signer, ring_bytes)
 
 
 @contextlib.contextmanager
@@ -88,6 +90,7 @@ def open_router(config: RigConfig) -> Close:
 
     Raises:
         BusError: the endpoint is malformed or already in use.
+        ConfigError: the bus would be open to a network without keys.
     """
     from rigwatch.wire.bus import zenoh_transport
 
@@ -95,4 +98,8 @@ def open_router(config: RigConfig) -> Close:
     secured = tls_settings(config.bus, "router", listens=True) | access_settings(
         config.bus, config.rig.id
     )
-    return zenoh_transport.open_router(config.bus.listen, config.bus.lease, secured)
+    if config.bus.links:
+        secured |= tls_settings(config.bus, "router")
+    return zenoh_transport.open_router(
+        config.bus.listen, config.bus.lease, secured, config.bus.links
+    )

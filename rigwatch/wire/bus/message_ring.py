@@ -7,10 +7,15 @@ return stored messages.
 """
 
 import secrets
+import struct
 import threading
 import time
 from collections import deque
-from itertools import islice
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import zstandard
 
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Transport
 from rigwatch.wire.messages import TOPICS, Topic, bus_key
@@ -19,6 +24,9 @@ from rigwatch.wire.ordering import UNKNOWN, Ask, Numbered, RingReply
 SAID_KEY = "said"
 RING_BYTES = 32 << 20
 """Capacity per topic [bytes]: two minutes of estimates, months of alarms."""
+PACKED, PACK_LEVEL = 64, 1
+"""Messages that are compressed together, and zstd's level: half a millisecond each second."""
+_LENGTH = struct.Struct("<I")
 REPLY_BYTES = MAX_PAYLOAD // 2
 LARGEST_NUMBERED = MAX_PAYLOAD - 64
 """Largest payload of a numbered message [bytes]; a reply also holds its run and number."""
@@ -29,16 +37,44 @@ def ring_key(process: str, topic: Topic) -> str:
     return f"ring/{process}/{topic.name}"
 
 
+@dataclass(frozen=True, slots=True)
+class Pack:
+    """Consecutive messages, compressed: `first` is the number of the first, `size` their bytes."""
+
+    first: int
+    count: int
+    size: int
+    data: bytes
+
+    @classmethod
+    def of(cls, messages: Sequence[Numbered]) -> "Pack":
+        """Pack some messages."""
+        payloads = [message.payload for message in messages]
+        whole = b"".join(_LENGTH.pack(len(payload)) + payload for payload in payloads)
+        # A copy: what zstandard returns keeps the memory of the largest possible result.
+        packed = bytes(memoryview(zstandard.compress(whole, PACK_LEVEL)))
+        return cls(messages[0].seq, len(payloads), sum(map(len, payloads)), packed)
+
+    def messages(self, run: int) -> Iterator[Numbered]:
+        """The messages, of this run."""
+        whole, at = zstandard.decompress(self.data), 0
+        for number in range(self.first, self.first + self.count):
+            (length,) = _LENGTH.unpack_from(whole, at)
+            at += _LENGTH.size + length
+            yield Numbered(run, number, whole[at - length : at])
+
+
 class MessageRing:
-    """The newest messages of one topic of one run.
+    """The newest messages of one topic of one run; all but the last ones are kept compressed.
 
     Args:
         run: the process's run.
-        capacity: total size of the stored payloads [bytes].
+        capacity: total size of the payloads that are kept at least, before compression [bytes].
     """
 
     def __init__(self, run: int, capacity: int = RING_BYTES) -> None:
         self._run, self._capacity = run, capacity
+        self._packs: deque[Pack] = deque()
         self._kept: deque[Numbered] = deque()
         self._bytes = 0
         self._next = 0
@@ -51,25 +87,40 @@ class MessageRing:
             self._next += 1
             self._kept.append(message)
             self._bytes += len(payload)
-            while self._bytes > self._capacity:
-                self._bytes -= len(self._kept.popleft().payload)
+            if len(self._kept) >= 2 * PACKED:
+                self._packs.append(Pack.of([self._kept.popleft() for _ in range(PACKED)]))
+            self._forget()
             return message
+
+    def _forget(self) -> None:
+        while self._packs and self._bytes - self._packs[0].size >= self._capacity:
+            self._bytes -= self._packs.popleft().size
+        while not self._packs and self._bytes > self._capacity:
+            self._bytes -= len(self._kept.popleft().payload)
 
     def reply(self, ask: Ask) -> RingReply[Numbered]:
         """The requested messages still stored, as many as fit into one reply."""
         if ask.boot != self._run:
             return RingReply(ask.boot, UNKNOWN, ())
-        with self._lock:
-            oldest, newest = self._next - len(self._kept), self._next - 1
-            found: list[Numbered] = []
-            size = 0
-            for message in islice(self._kept, max(0, ask.first - oldest), None):
-                size += len(message.payload) + 64
-                if message.seq > ask.last or (found and size > REPLY_BYTES):
-                    break
-                found.append(message)
+        with self._lock:  # for a moment only: it delays publishing
+            packs, kept, newest = tuple(self._packs), tuple(self._kept), self._next - 1
+        found: list[Numbered] = []
+        size = 0
+        for message in self._from(ask.first, packs, kept):
+            size += len(message.payload) + 64
+            if message.seq > ask.last or (found and size > REPLY_BYTES):
+                break
+            found.append(message)
         settled = found[-1].seq if found else min(ask.last, newest)
         return RingReply(self._run, settled, tuple(found))
+
+    def _from(
+        self, first: int, packs: Iterable[Pack], kept: Iterable[Numbered]
+    ) -> Iterator[Numbered]:
+        """The messages from number `first` on."""
+        later = (pack for pack in packs if pack.first + pack.count > first)
+        unpacked = (message for pack in later for message in pack.messages(self._run))
+        return (message for message in chain(unpacked, kept) if message.seq >= first)
 
 
 class Outlet:
@@ -78,13 +129,17 @@ class Outlet:
     Args:
         transport: carries the bytes.
         rig, process: of the sender.
+        ring_bytes: capacity of each topic's ring [bytes].
     """
 
-    def __init__(self, transport: Transport, rig: str, process: str) -> None:
+    def __init__(
+        self, transport: Transport, rig: str, process: str, ring_bytes: int = RING_BYTES
+    ) -> None:
         self.run = 1 + secrets.randbits(52)
         self._transport = transport
         self._rig = rig
-        self._rings = {topic.name: MessageRing(self.run) for topic in TOPICS if topic.numbered}
+        numbered = [topic.name for topic in TOPICS if topic.numbered]
+        self._rings = {name: MessageRing(self.run, ring_bytes) for name in numbered}
         for topic in TOPICS:
             if topic.numbered:
                 self._serve(bus_key(rig, ring_key(process, topic)), self._rings[topic.name])

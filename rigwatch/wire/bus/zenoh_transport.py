@@ -19,7 +19,7 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import zenoh
@@ -69,7 +69,7 @@ def _client_settings(endpoint: str, lease: float) -> dict[str, Any]:
     }
 
 
-def _router_settings(endpoint: str, lease: float) -> dict[str, Any]:
+def _router_settings(endpoint: str, lease: float, links: Sequence[str] = ()) -> dict[str, Any]:
     size_filter = {
         "id": "largest-message",
         "flows": ["ingress", "egress"],
@@ -80,7 +80,7 @@ def _router_settings(endpoint: str, lease: float) -> dict[str, Any]:
     return _common_settings(lease) | {
         "mode": "router",
         "listen/endpoints": [endpoint],
-        "connect/endpoints": [],
+        "connect/endpoints": [*links],
         "low_pass_filter": [size_filter],
         "transport/unicast/accept_timeout": ACCEPT_MS,
         "transport/unicast/accept_pending": MOST_PENDING,
@@ -105,7 +105,10 @@ def log_refusals() -> None:
 
 
 def open_router(
-    endpoint: str, lease: float = LEASE, secured: Mapping[str, Any] | None = None
+    endpoint: str,
+    lease: float = LEASE,
+    secured: Mapping[str, Any] | None = None,
+    links: Sequence[str] = (),
 ) -> Close:
     """Run a router that listens at `endpoint` until the returned function is called.
 
@@ -113,11 +116,13 @@ def open_router(
         endpoint: such as tcp/127.0.0.1:7447.
         lease: silence after which a link counts as broken [s].
         secured: settings of certificates and access; none without keys.
+        links: routers of other sites, each linked whenever it can be reached.
 
     Raises:
-        BusError: the endpoint is not well formed or already taken.
+        BusError: an endpoint is not well formed, or this one already taken.
     """
-    config = _configured(_router_settings(endpoint, lease) | dict(secured or {}), endpoint)
+    settings = _router_settings(endpoint, lease, links) | dict(secured or {})
+    config = _configured(settings, ", ".join((endpoint, *links)))
     try:
         session = zenoh.open(config)
     except zenoh.ZError:

@@ -65,6 +65,7 @@ class SampleReader:
         history: number of samples before those (or before the first received) that are also read
             if the ring has them; missing ones are not a gap.
         capacity: messages queued for a slow reader before further ones are left to the ring.
+        publish_gaps: whether gaps are also published; not if they may still be filled.
 
     Attributes:
         heard: whether a sample block was ever received.
@@ -79,12 +80,14 @@ class SampleReader:
         resume_after: tuple[int, int] | None = None,
         history: int = 0,
         capacity: int = QUEUE_CAPACITY,
+        *,
+        publish_gaps: bool = True,
     ) -> None:
         self.heard = False
         self.rejected = 0
         self.rejected_by: Counter[str] = Counter()
         self.dropped = 0
-        self._bus = bus
+        self._bus, self._publish_gaps = bus, publish_gaps
         self._order: SampleOrder[SampleBlock] = SampleOrder(resume_after, history)
         self._owners = Owners()
         self._refused_boot: int | None = None
@@ -259,7 +262,10 @@ class SampleReader:
 
     def _report(self, item: Gap | Event) -> None:
         self._ready.append(item)
-        self._bus.publish(GAPS if isinstance(item, Gap) else EVENTS, item)
+        if not isinstance(item, Gap):
+            self._bus.publish(EVENTS, item)
+        elif self._publish_gaps:
+            self._bus.publish(GAPS, item)
 
     # ---- called in the query thread ------------------------------------------------------
 

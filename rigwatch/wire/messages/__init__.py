@@ -15,6 +15,7 @@ from rigwatch.wire.messages.blocks import (
     pieces,
     unseen,
 )
+from rigwatch.wire.messages.codec import decode, encode
 from rigwatch.wire.messages.json_fields import json_fields
 from rigwatch.wire.messages.message_types import (
     EVERY_ALARM,
@@ -40,7 +41,7 @@ from rigwatch.wire.messages.message_types import (
     SampleBlock,
     Severity,
 )
-from rigwatch.wire.messages.protobuf import decode, encode
+from rigwatch.wire.messages.packed import decode_block
 from rigwatch.wire.messages.quality_flags import NON_FINITE, SATURATED, SPIKE, STALE, valid
 from rigwatch.wire.messages.topics import (
     ALARMS,
@@ -51,6 +52,7 @@ from rigwatch.wire.messages.topics import (
     GAPS,
     HEALTH,
     MODELS,
+    RECORDERS,
     RING_KEY,
     RUN,
     SAMPLES,
@@ -77,6 +79,7 @@ __all__ = [
     "NOT_PROVED",
     "PROBABLY_MISSING",
     "PROVED",
+    "RECORDERS",
     "RING_KEY",
     "RUN",
     "SAMPLES",
@@ -108,6 +111,7 @@ __all__ = [
     "continues",
     "cut",
     "decode",
+    "decode_block",
     "encode",
     "json_fields",
     "merged",

@@ -66,6 +66,8 @@ TOPICS: tuple[Topic, ...] = (
     MODELS,
 )
 
+RECORDERS = (RUN.publisher, "headquarters")
+"""The recorder of a rig at its own site, and one at another."""
 RING_KEY = "daq/ring"
 """Key of the adapter's ring of recent samples, queried by readers that missed some."""
 ALIVE_KEY = "alive"

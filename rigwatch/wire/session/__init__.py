@@ -5,6 +5,7 @@ describes.
 """
 
 from rigwatch.wire.session.edit import Written, first_time, iso_time, newest, recover, trim
+from rigwatch.wire.session.losses import Span, without
 from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
 from rigwatch.wire.session.reader import (
     MERGED_SAMPLES,
@@ -14,6 +15,7 @@ from rigwatch.wire.session.reader import (
     open_session,
 )
 from rigwatch.wire.session.segment import SUFFIX, is_segment, segment_name
+from rigwatch.wire.session.span import Part, Place, Wanted, read_page
 from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.summary import ChannelSummary, DeviceSummary, Summary, summarise
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
@@ -25,10 +27,14 @@ __all__ = [
     "ChannelSummary",
     "DeviceSummary",
     "LostSpan",
+    "Part",
+    "Place",
     "Recorded",
     "Session",
     "SessionWriter",
+    "Span",
     "Summary",
+    "Wanted",
     "Written",
     "first_time",
     "is_segment",
@@ -37,10 +43,12 @@ __all__ = [
     "message_time",
     "newest",
     "open_session",
+    "read_page",
     "recover",
     "run_info",
     "segment_name",
     "summarise",
     "topic_counts",
     "trim",
+    "without",
 ]

@@ -26,14 +26,14 @@ LARGEST_RECORD = 1 << 28
 """Far above the length of any valid record; a larger one is a flipped bit [bytes]."""
 LARGEST_CHUNK = 1 << 26
 """The same for the unpacked records of a chunk, half a second of messages [bytes]."""
-_CHUNK, _MESSAGE, _MESSAGE_INDEX, _DATA_END, _FOOTER = 0x06, 0x05, 0x07, 0x0F, 0x02
+CHUNK, _MESSAGE, _MESSAGE_INDEX, _DATA_END, _FOOTER = 0x06, 0x05, 0x07, 0x0F, 0x02
 _KNOWN = frozenset(range(0x01, 0x10))
-_RECORD = struct.Struct("<BQ")
+RECORD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _U64 = struct.Struct("<Q")
 _U32 = struct.Struct("<I")
 _ZSTD = b"\x04\x00\x00\x00zstd"
-_BEFORE_ZSTD = _RECORD.size + _CHUNK_HEAD.size - 4
+_BEFORE_ZSTD = RECORD.size + _CHUNK_HEAD.size - 4
 _STEP = 1 << 20
 
 
@@ -54,7 +54,7 @@ class Damage:
     reason: str
 
 
-class _DamagedError(Exception):
+class DamagedError(Exception):
     """The defect of the current record."""
 
 
@@ -101,29 +101,29 @@ def scan(path: Path) -> Iterator[Chunk | Damage]:
 def _scan_records(file: BinaryIO, magic: bytes, size: int) -> Iterator[Chunk | Damage]:
     offset = len(magic)
     if problem := magic_problem(magic):
-        offset = _next_chunk(file, 0, size)
+        offset = next_chunk(file, 0, size)
         yield Damage(0, offset, problem)
         file.seek(offset)
     unpacker = zstandard.ZstdDecompressor()
     unread = offset
     while offset < size:
-        head = file.read(_RECORD.size)
+        head = file.read(RECORD.size)
         if head == MAGIC and offset + len(MAGIC) == size:
             return
         try:
             body = _body(file, head, size - offset)
-            end = offset + _RECORD.size + len(body)
-            if head[0] == _CHUNK:
-                yield Chunk(offset, _records(body, unpacker))
+            end = offset + RECORD.size + len(body)
+            if head[0] == CHUNK:
+                yield Chunk(offset, unpacked(body, unpacker))
                 unread = end
             else:
                 _check_other(head[0], body)
                 _check_length(file, offset, body, size)
             offset = end
-        except _DamagedError as damage:
+        except DamagedError as damage:
             # No checksum protects what lies between chunks: a record there may end too late.
-            unread = offset + 1 if head[0] == _CHUNK else unread
-            found = _next_chunk(file, unread, size)
+            unread = offset + 1 if head[0] == CHUNK else unread
+            found = next_chunk(file, unread, size)
             start = offset if found > offset else unread
             yield Damage(start, found - start, str(damage))
             file.seek(found)
@@ -131,30 +131,30 @@ def _scan_records(file: BinaryIO, magic: bytes, size: int) -> Iterator[Chunk | D
 
 
 def _body(file: BinaryIO, head: bytes, left: int) -> bytes:
-    if len(head) < _RECORD.size:
-        raise _DamagedError("truncated")
-    length = _RECORD.unpack(head)[1]
-    if length > left - _RECORD.size:
-        raise _DamagedError("truncated, or a damaged length")
+    if len(head) < RECORD.size:
+        raise DamagedError("truncated")
+    length = RECORD.unpack(head)[1]
+    if length > left - RECORD.size:
+        raise DamagedError("truncated, or a damaged length")
     if length > LARGEST_RECORD:
-        raise _DamagedError("a damaged length")
+        raise DamagedError("a damaged length")
     return file.read(length)
 
 
-def _records(body: bytes, unpacker: zstandard.ZstdDecompressor) -> bytes:
+def unpacked(body: bytes, unpacker: zstandard.ZstdDecompressor) -> bytes:
     """The unpacked, checked records of a chunk."""
     if not _is_chunk(body):
-        raise _DamagedError("a chunk whose lengths disagree, or not packed with zstd")
+        raise DamagedError("a chunk whose lengths disagree, or not packed with zstd")
     _, _, raw_size, crc, _ = _CHUNK_HEAD.unpack_from(body)
     packed = memoryview(body)[_CHUNK_HEAD.size + 12 :]
     try:
         if raw_size > LARGEST_CHUNK or zstandard.frame_content_size(packed) != raw_size:
-            raise _DamagedError("a chunk of the wrong size")
+            raise DamagedError("a chunk of the wrong size")
         records = unpacker.decompress(packed)
     except zstandard.ZstdError as error:
-        raise _DamagedError("a chunk that cannot be unpacked") from error
+        raise DamagedError("a chunk that cannot be unpacked") from error
     if zlib.crc32(records) != crc:
-        raise _DamagedError("a chunk with a wrong checksum")
+        raise DamagedError("a chunk with a wrong checksum")
     return records
 
 
@@ -170,31 +170,31 @@ def _is_chunk(body: bytes) -> bool:
 def _check_other(opcode: int, body: bytes) -> None:
     """Raise if a record other than a chunk contradicts its opcode."""
     if opcode not in _KNOWN:
-        raise _DamagedError(f"a record of unknown kind {opcode:#04x}")
+        raise DamagedError(f"a record of unknown kind {opcode:#04x}")
     if _is_chunk(body):
-        raise _DamagedError("a chunk with a damaged opcode")
+        raise DamagedError("a chunk with a damaged opcode")
     if opcode == _MESSAGE:
-        raise _DamagedError("a message outside of chunks, which no checksum protects")
+        raise DamagedError("a message outside of chunks, which no checksum protects")
     if opcode == _DATA_END and len(body) != 4:
-        raise _DamagedError("a damaged end of data")
+        raise DamagedError("a damaged end of data")
     if opcode == _FOOTER and len(body) != 20:
-        raise _DamagedError("a damaged footer")
+        raise DamagedError("a damaged footer")
     if opcode == _MESSAGE_INDEX and not (
         len(body) >= 6 and _U32.unpack_from(body, 2)[0] == len(body) - 6
     ):
-        raise _DamagedError("a damaged index")
+        raise DamagedError("a damaged index")
 
 
 def _check_length(file: BinaryIO, offset: int, body: bytes, size: int) -> None:
     """Raise if a whole chunk begins within a record, which its length must not span."""
-    inside = list(_candidates(body, offset + _RECORD.size))
+    inside = list(_candidates(body, offset + RECORD.size))
     if any(_chunk_at(file, candidate, size) for candidate in inside if candidate > offset):
-        raise _DamagedError("a record of a damaged length")
+        raise DamagedError("a record of a damaged length")
     if inside:
-        file.seek(offset + _RECORD.size + len(body))
+        file.seek(offset + RECORD.size + len(body))
 
 
-def _next_chunk(file: BinaryIO, start: int, size: int) -> int:
+def next_chunk(file: BinaryIO, start: int, size: int) -> int:
     """Offset of the next complete chunk from `start` on; `size` if there is none."""
     position = start
     overlap = len(_ZSTD) - 1
@@ -219,7 +219,7 @@ def _candidates(data: bytes, offset: int) -> Iterator[int]:
 def _chunk_at(file: BinaryIO, offset: int, size: int) -> bool:
     file.seek(offset)
     head = file.read(_BEFORE_ZSTD + len(_ZSTD) + 8)
-    opcode, length = _RECORD.unpack_from(head)
+    opcode, length = RECORD.unpack_from(head)
     inner = _U64.unpack_from(head, len(head) - 8)[0]
-    whole = length == inner + _CHUNK_HEAD.size + 12 and offset + _RECORD.size + length <= size
-    return bool(opcode == _CHUNK and whole)
+    whole = length == inner + _CHUNK_HEAD.size + 12 and offset + RECORD.size + length <= size
+    return bool(opcode == CHUNK and whole)

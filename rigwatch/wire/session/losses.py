@@ -8,7 +8,7 @@ from bisect import bisect_left
 from collections.abc import Iterable
 from itertools import pairwise
 
-from rigwatch.wire.messages import RUN, Gap, SampleBlock
+from rigwatch.wire.messages import RECORDERS, Gap, SampleBlock
 
 Span = tuple[int, int]
 
@@ -56,7 +56,7 @@ class Losses:
                 span = message.seq, message.seq + len(message) - 1
                 _extend(self._present.setdefault(message.boot, []), span)
         elif message.topic:
-            if message.reporter == RUN.publisher:
+            if message.reporter in RECORDERS:
                 place = message.topic, message.boot
                 self._messages.setdefault(place, []).append((message.first, message.last))
         elif message.last < message.first:

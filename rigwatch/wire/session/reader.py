@@ -26,11 +26,11 @@ from rigwatch.wire.messages import (
     Topic,
     blocks,
     decode,
+    decode_block,
     topic,
 )
 from rigwatch.wire.session.chunk_reader import ChunkReader
 from rigwatch.wire.session.chunks import Damage, ends_closed, scan
-from rigwatch.wire.session.packed import decode_block
 from rigwatch.wire.session.segment import SUFFIX
 from rigwatch.wire.session.statistics import topic_counts
 from rigwatch.wire.session.writer import message_time

@@ -1,9 +1,9 @@
 """Reads blocks of samples and estimates straight from their protobuf bytes, as numpy arrays.
 
 The general decoder makes a Python object of every number; here the packed doubles and integers are
-viewed in place. Blocks of one recording differ only in `seq` and the numbers, so their layout is
-determined once, and every other byte is compared for each further block. Anything that this module
-does not recognise is left to `protobuf.decode`, which reports the error.
+viewed in place. Blocks of one device differ only in `boot`, `seq` and the numbers, so their layout
+is determined once, and every other byte is compared for each further block. Anything that this
+module does not recognise is left to `protobuf.decode`, which reports the error.
 """
 
 from collections.abc import Set
@@ -12,8 +12,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rigwatch.wire.messages import ByteArray, Column, EstimateBlock, SampleBlock, decode
 from rigwatch.wire.messages import protobuf_schema as schema
+from rigwatch.wire.messages.message_types import ByteArray, Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages.protobuf import decode
 
 _NO_QUALITY: ByteArray = np.zeros(0, np.uint8)
 _F8, _I8, _U1 = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
@@ -53,21 +54,21 @@ class _Layout:
 
     Attributes:
         samples: samples per block.
-        seq: offset of its number, None for 0.
+        boot, seq: offsets of these numbers, None for 0.
         times: offsets of its integer arrays.
-        fixed: all bytes that are neither seq nor numbers, with their offsets.
+        fixed: all other bytes, with their offsets.
     """
 
     samples: int
     device: str
-    boot: int
+    boot: Span | None
     seq: Span | None
     times: tuple[int, ...]
     columns: tuple[_ColumnPlace, ...]
     fixed: tuple[tuple[int, int, bytes], ...]
 
 
-_layouts: dict[tuple[type[Any], int], _Layout] = {}
+_layouts: dict[tuple[type[Any], int, bytes], _Layout] = {}
 
 
 def decode_block(kind: type[K], data: bytes) -> K:
@@ -85,19 +86,21 @@ def decode_block(kind: type[K], data: bytes) -> K:
 
 def _layout_of(kind: type[Any], data: bytes) -> _Layout:
     """The layout of `data`, computed unless an earlier block has the same."""
-    known = _layouts.get((kind, len(data)))
+    key = kind, len(data), data[: 2 + data[1]]  # which holds the device's name
+    known = _layouts.get(key)
     if known is not None and _fits(known, data):
         return known
     layout = _layout(kind, data)
     if len(_layouts) >= _MOST_LAYOUTS:
         _layouts.clear()
-    _layouts[kind, len(data)] = layout
+    _layouts[key] = layout
     return layout
 
 
 def _fits(layout: _Layout, data: bytes) -> bool:
-    if layout.seq is not None and _varint(data, layout.seq[0])[1] != layout.seq[1]:
-        return False
+    for span in (layout.boot, layout.seq):
+        if span is not None and _varint(data, span[0])[1] != span[1]:
+            return False
     return all(data[start:stop] == part for start, stop, part in layout.fixed)
 
 
@@ -114,9 +117,9 @@ def _read(kind: type[K], layout: _Layout, data: bytes) -> K:
             for place in layout.columns
         ]
     )
-    seq = 0 if layout.seq is None else _integer(data, layout.seq)
+    boot, seq = (0 if at is None else _integer(data, at) for at in (layout.boot, layout.seq))
     times = [read(data, _I8, n, start) for start in layout.times]
-    return kind(layout.device, layout.boot, seq, *times, columns)  # type: ignore[call-arg, arg-type]
+    return kind(layout.device, boot, seq, *times, columns)  # type: ignore[call-arg, arg-type]
 
 
 def _layout(kind: type[Any], data: bytes) -> _Layout:
@@ -127,14 +130,14 @@ def _layout(kind: type[Any], data: bytes) -> _Layout:
     if rest or any(stop - start != n * _I8.itemsize for start, stop in times):
         raise _UnfamiliarError
     columns = [_column(data, span, n) for span in fields.get(_COLUMNS[kind], ())]
-    seq = _only(fields[_SEQ]) if _SEQ in fields else None
-    variable = [seq] if seq else []
+    boot, seq = (_only(fields[tag]) if tag in fields else None for tag in (_BOOT, _SEQ))
+    variable = [span for span in (boot, seq) if span]
     variable += times + [(place.values, place.values + n * _F8.itemsize) for place in columns]
     variable += [(place.quality, place.quality + n) for place in columns if place.quality >= 0]
     return _Layout(
         n,
         _text(data, fields.get(_DEVICE)),
-        _integer(data, _only(fields[_BOOT])) if _BOOT in fields else 0,
+        boot,
         seq,
         tuple(start for start, _ in times),
         tuple(columns),

@@ -1,0 +1,91 @@
+"""The live page of many rigs: one look for all pages that are open, and events for each."""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncGenerator, AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+import msgspec
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from rigwatch.browser.server.access import Access, Guard
+from rigwatch.browser.server.application import STATIC, style
+from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
+from rigwatch.fleet import RigState, as_live_page, as_part, summary
+
+BETWEEN = 2.0
+"""Time between two looks at the rigs [s]."""
+STILL_EVERY = 10.0
+"""Time after which a page without news is told that the server is there [s]."""
+Look = Callable[[], list[RigState]]
+
+
+class FleetPages:
+    """State of the server.
+
+    Args:
+        look: returns the present state of the rigs, the worst first; may take seconds.
+
+    Attributes:
+        states: as last seen.
+        stopping: set when the server is about to stop.
+    """
+
+    def __init__(self, look: Look) -> None:
+        self.states: list[RigState] = []
+        self.stopping = asyncio.Event()
+        self._look = look
+        self._news = asyncio.Condition()
+
+    async def follow(self) -> None:
+        """Look again and again, and tell the open pages."""
+        while True:
+            states = await asyncio.to_thread(self._look)
+            async with self._news:
+                self.states = states
+                self._news.notify_all()
+            await asyncio.sleep(BETWEEN)
+
+    async def events(self) -> AsyncGenerator[bytes, None]:
+        """The rigs now, and whenever something has changed."""
+        told = b""
+        while True:
+            content = msgspec.json.encode(
+                {"summary": summary(self.states), "html": as_part(self.states)}
+            )
+            yield STILL_HERE if content == told else event("rigs", content)
+            told = content
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(STILL_EVERY), self._news:
+                    await self._news.wait()
+
+
+def fleet_application(pages: FleetPages, access: Access) -> Starlette:
+    """The page and its events, for requests that `access` allows."""
+
+    @asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        following = asyncio.create_task(pages.follow())
+        yield
+        following.cancel()
+
+    async def fleet_page(_: Request) -> Response:
+        return HTMLResponse(as_live_page(pages.states), headers={"cache-control": "no-store"})
+
+    async def events(request: Request) -> Response:
+        return event_stream(request, pages.events())
+
+    routes = [
+        Route("/", fleet_page),
+        Route("/events", events),
+        Route("/static/page.css", style),
+        Mount("/static", StaticFiles(directory=STATIC)),
+    ]
+    app = Starlette(routes=routes, middleware=[Middleware(Guard, access=access)], lifespan=lifespan)
+    app.state.context = pages
+    return app

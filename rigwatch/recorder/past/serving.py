@@ -1,0 +1,89 @@
+"""Answers for the sessions of a rig: where the rings end, the recordings go on."""
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from rigwatch.recorder.folders import sessions_of
+from rigwatch.recorder.past.pages import PAGE_BYTES, PAST_KEY, Bookmark, Page, Question
+from rigwatch.wire.bus import Bus
+from rigwatch.wire.messages import topic
+from rigwatch.wire.session import SUFFIX, Place, Wanted, read_page
+
+BYTES_PER_SECOND = 4_000_000
+"""Rate of the answers, so that the recording goes on beside them: 25 rigs as they run [bytes/s]."""
+_MARGIN = 60.0
+
+
+class PastServer:
+    """Answers questions for the sessions of one rig.
+
+    Args:
+        bus: on which questions come.
+        root: folder of the sessions.
+        settled: returns the time before which everything is on the disk [ns].
+
+    Attributes:
+        bytes: bytes of the answers so far.
+    """
+
+    def __init__(self, bus: Bus, root: Path, settled: Callable[[], int]) -> None:
+        self.bytes = 0
+        self._rig, self._root, self._settled = bus.rig, root, settled
+        self._free_at = 0.0
+        self.close = bus.serve(PAST_KEY, self._answer)
+
+    def _answer(self, data: bytes) -> list[bytes]:
+        question = Question.from_bytes(data)
+        time.sleep(max(0.0, self._free_at - time.monotonic()))
+        page = self.page(question).to_bytes()
+        self.bytes += len(page)
+        self._free_at = time.monotonic() + len(page) / BYTES_PER_SECOND
+        return [page]
+
+    def page(self, question: Question) -> Page:
+        """The next page of an answer.
+
+        Raises:
+            KeyError: there is no such topic.
+            SessionError: a segment cannot be read.
+        """
+        # Read before the segments: what is on the disk now is found in them.
+        settled = self._settled()
+        segments = sorted(self._segments(question.start), key=_name)
+        topics = frozenset(map(topic, question.topics))
+        wanted = Wanted(topics, question.start, question.end, PAGE_BYTES)
+        parts, place = read_page(segments, wanted, _place(segments, question.bookmark))
+        return Page(tuple(parts), settled, _bookmark(segments, place))
+
+    def _segments(self, start: int) -> Iterator[Path]:
+        """Segments that were still written at `start` [ns]."""
+        for folder in sessions_of(self._root, self._rig):
+            for path in folder.glob(f"*{SUFFIX}"):
+                try:
+                    written = path.stat().st_mtime
+                except OSError:
+                    continue  # removed by retention
+                if written >= start / 1e9 - _MARGIN:
+                    yield path
+
+
+def _bookmark(segments: list[Path], place: Place | None) -> Bookmark | None:
+    if place is None:
+        return None
+    return Bookmark(_name(segments[place.segment]), place.offset, place.parts)
+
+
+def _name(path: Path) -> str:
+    return f"{path.parent.name}/{path.name}"
+
+
+def _place(segments: list[Path], bookmark: Bookmark | None) -> Place:
+    """The place of a bookmark; if its segment is gone, that of the next one."""
+    if bookmark is None:
+        return Place()
+    names = [*map(_name, segments)]
+    number = sum(name < bookmark.segment for name in names)
+    if number < len(names) and names[number] == bookmark.segment:
+        return Place(number, bookmark.offset, bookmark.parts)
+    return Place(number)

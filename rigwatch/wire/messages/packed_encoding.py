@@ -1,0 +1,82 @@
+"""Writes blocks of samples and estimates as protobuf bytes straight from their arrays.
+
+The bytes are those of `protobuf.encode`, which makes a Python object of every number. What this
+module does not recognise is left to it.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.wire.messages import protobuf_schema as schema
+from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.messages.protobuf import encode
+
+_TAGS = {kind: schema.field_tags(kind) for kind in (Column, SampleBlock, EstimateBlock)}
+_NAME, _UNIT, _VALUES, _QUALITY = (bytes([tag]) for tag in _TAGS[Column].values())
+_FLOAT, _INT, _BYTE = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
+_LARGEST = 1 << 63
+
+
+def encode_block(block: SampleBlock | EstimateBlock) -> bytes:
+    """Encode a block as protobuf bytes."""
+    samples = isinstance(block, SampleBlock)
+    columns = block.channels if isinstance(block, SampleBlock) else block.columns
+    times = [block.device_us, block.t_ns] if isinstance(block, SampleBlock) else [block.t_ns]
+    if not _is_plain(block, times, columns):
+        return encode(block)
+    device, boot, seq, *places = (bytes([tag]) for tag in _TAGS[type(block)].values())
+    parts = [
+        _part(device, block.device.encode()),
+        _number(boot, int(block.boot)),
+        _number(seq, int(block.seq)),
+        *(_part(tag, one.tobytes()) for tag, one in zip(places[: 1 + samples], times, strict=True)),
+    ]
+    parts += [_column(places[-1], column) for column in columns]
+    return b"".join(parts)
+
+
+def _is_plain(
+    block: SampleBlock | EstimateBlock, times: list[NDArray[np.int64]], columns: tuple[Column, ...]
+) -> bool:
+    return (
+        all(-_LARGEST <= number < _LARGEST for number in (block.boot, block.seq))
+        and all(one.dtype == _INT for one in times)
+        and all(c.values.dtype == _FLOAT and c.quality.dtype == _BYTE for c in columns)
+    )
+
+
+def _column(tag: bytes, column: Column) -> bytes:
+    body = (
+        _names(column.name, column.unit)
+        + _part(_VALUES, column.values.tobytes())
+        + _part(_QUALITY, column.quality.tobytes())
+    )
+    return tag + _varint(len(body)) + body
+
+
+@lru_cache(maxsize=4096)
+def _names(name: str, unit: str) -> bytes:
+    return _part(_NAME, name.encode()) + _part(_UNIT, unit.encode())
+
+
+def _part(tag: bytes, data: bytes) -> bytes:
+    """A field of bytes; nothing if it is empty."""
+    return tag + _varint(len(data)) + data if data else b""
+
+
+def _number(tag: bytes, value: int) -> bytes:
+    """A signed number; nothing for 0."""
+    return tag + _varint((value << 1) ^ (value >> 63)) if value else b""
+
+
+def _varint(value: int) -> bytes:
+    if value < 0x80:
+        return bytes((value,))
+    found = bytearray()
+    while value >= 0x80:
+        found.append(value & 0x7F | 0x80)
+        value >>= 7
+    found.append(value)
+    return bytes(found)

@@ -1,0 +1,165 @@
+"""A span of time of several segments, read page by page without what lies before it.
+
+Chunks carry the times of their messages, so those of other times are skipped without being
+unpacked. A page ends at a `Place`, from which the next one goes on.
+"""
+
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import zstandard
+
+from rigwatch.wire.errors import MessageError, SessionError
+from rigwatch.wire.messages import (
+    EstimateBlock,
+    SampleBlock,
+    Topic,
+    blocks,
+    decode,
+    decode_block,
+    encode,
+)
+from rigwatch.wire.session.chunk_reader import ChunkReader
+from rigwatch.wire.session.chunks import (
+    CHUNK,
+    MAGIC,
+    RECORD,
+    Chunk,
+    DamagedError,
+    next_chunk,
+    unpacked,
+)
+from rigwatch.wire.session.writer import message_time
+
+_TIMES = struct.Struct("<QQ")
+LONGEST_BLOCK_NS = 60_000_000_000
+"""A block that began earlier than this before a span holds no sample of it [ns]."""
+Part = tuple[Topic, bytes]
+"""A topic and the bytes of a message."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a page ends: segment, offset of a chunk, number of its messages already read."""
+
+    segment: int = 0
+    offset: int = 0
+    parts: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Which messages are read.
+
+    Attributes:
+        topics: of these topics.
+        start, end: with times in [start, end), and the samples of that time [ns].
+        size: bytes of a page, above which it ends.
+    """
+
+    topics: frozenset[Topic]
+    start: int
+    end: int
+    size: int
+
+
+def read_page(
+    segments: Sequence[Path], wanted: Wanted, place: Place
+) -> tuple[list[Part], Place | None]:
+    """The next messages from `place` on, in recorded order, and where the next page begins.
+
+    Args:
+        segments: in the order of their recording.
+        wanted: which messages.
+        place: `Place()` for the first page.
+
+    Returns:
+        The messages, cut into parts small enough for a page, and None at the end.
+    """
+    found: list[Part] = []
+    size = 0
+    for number in range(place.segment, len(segments)):
+        here = place if number == place.segment else Place(number)
+        for offset, index, part in _parts(segments[number], wanted, here):
+            if size + len(part[1]) > wanted.size and found:
+                return found, Place(number, offset, index)
+            found.append(part)
+            size += len(part[1])
+    return found, None
+
+
+def _parts(path: Path, wanted: Wanted, place: Place) -> Iterator[tuple[int, int, Part]]:
+    """Offset of the chunk, number in it, and each part of one segment."""
+    reader = ChunkReader(path, set())
+    for chunk in chunks_between(path, place.offset, wanted.start, wanted.end):
+        done = place.parts if chunk.offset == place.offset else 0
+        for index, part in enumerate(_of_chunk(reader, chunk, wanted)):
+            if index >= done:
+                yield chunk.offset, index, part
+
+
+def _of_chunk(reader: ChunkReader, chunk: Chunk, wanted: Wanted) -> Iterator[Part]:
+    for line, _, data in reader.messages(chunk.records):
+        if line not in wanted.topics:
+            continue
+        try:
+            if line.message in (SampleBlock, EstimateBlock):
+                yield from ((line, part) for part in _cut(line, data, wanted))
+            elif wanted.start <= message_time(decode(line.message, data)) < wanted.end:
+                yield line, data
+        except MessageError:
+            continue
+
+
+def _cut(line: Topic, data: bytes, wanted: Wanted) -> Iterator[bytes]:
+    """The samples of a block that lie in the span, in pieces that fit into a page."""
+    whole: Any = decode_block(line.message, data)  # type: ignore[type-var]
+    block: Any = blocks.between(whole, wanted.start, wanted.end)
+    if block is None:
+        return
+    if block is whole and len(data) <= wanted.size:
+        yield data
+        return
+    samples = max(1, wanted.size * len(whole) // len(data))
+    yield from map(encode, blocks.pieces(block, samples))
+
+
+def chunks_between(path: Path, offset: int, start: int, end: int) -> Iterator[Chunk]:
+    """The intact chunks of a file from `offset` on that may hold messages of [start, end) [ns].
+
+    Raises:
+        SessionError: the file cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            size = path.stat().st_size
+            yield from _walk(file, max(offset, len(MAGIC)), size, (start, end))
+    except OSError as error:
+        raise SessionError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _walk(file: BinaryIO, at: int, size: int, span: tuple[int, int]) -> Iterator[Chunk]:
+    unpacker = zstandard.ZstdDecompressor()
+    while at + RECORD.size < size:
+        file.seek(at)
+        head = file.read(RECORD.size + _TIMES.size)
+        kind, length = RECORD.unpack_from(head)
+        after = at + RECORD.size + length
+        if after > size:
+            # Still being written, or the recorder was killed there.
+            after = next_chunk(file, at + 1, size)
+        elif kind == CHUNK and length > _TIMES.size and _overlaps(head, span):
+            file.seek(at + RECORD.size)
+            try:
+                yield Chunk(at, unpacked(file.read(length), unpacker))
+            except DamagedError:
+                after = next_chunk(file, at + 1, size)
+        at = after
+
+
+def _overlaps(head: bytes, span: tuple[int, int]) -> bool:
+    first, last = _TIMES.unpack_from(head, RECORD.size)
+    return bool(last >= span[0] - LONGEST_BLOCK_NS and first < span[1])

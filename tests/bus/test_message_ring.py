@@ -1,0 +1,49 @@
+"""A ring of messages keeps at least its capacity, and gives back what was put in, bit by bit."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigwatch.wire.bus.message_ring import PACKED, MessageRing
+from rigwatch.wire.ordering import OPEN, UNKNOWN, Ask
+
+RUN = 7
+
+
+def everything(ring: MessageRing, first: int = 0) -> dict[int, bytes]:
+    """All messages from `first` on, reply by reply."""
+    found: dict[int, bytes] = {}
+    while (reply := ring.reply(Ask(RUN, first, OPEN))).blocks:
+        assert reply.settled == reply.blocks[-1].seq
+        found |= {message.seq: message.payload for message in reply.blocks}
+        first = reply.settled + 1
+    return found
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.lists(st.integers(0, 300), max_size=6 * PACKED),
+    st.integers(1, 40_000),
+    st.integers(0, 7 * PACKED),
+)
+def test_what_is_kept_is_the_newest_whole(sizes: list[int], capacity: int, first: int) -> None:
+    ring = MessageRing(RUN, capacity)
+    sent = [bytes([n % 251]) * size for n, size in enumerate(sizes)]
+    for payload in sent:
+        ring.add(payload)
+    kept = everything(ring)
+    assert list(kept) == list(range(len(sent) - len(kept), len(sent)))
+    assert all(sent[number] == payload for number, payload in kept.items())
+    older = sent[: len(sent) - len(kept)]
+    if older:
+        assert sum(map(len, kept.values())) + len(older[-1]) > capacity
+    assert everything(ring, first) == {n: data for n, data in kept.items() if n >= first}
+
+
+def test_a_question_is_answered_to_its_last_number_and_for_its_run_only() -> None:
+    ring = MessageRing(RUN, 1 << 20)
+    for number in range(5 * PACKED):
+        assert ring.add(bytes([number % 251])).seq == number
+    reply = ring.reply(Ask(RUN, PACKED - 2, PACKED + 2))
+    assert [message.seq for message in reply.blocks] == list(range(PACKED - 2, PACKED + 3))
+    assert ring.reply(Ask(RUN + 1, 0, OPEN)).settled == UNKNOWN
+    assert ring.reply(Ask(RUN, 9 * PACKED, OPEN)).settled == 5 * PACKED - 1
