@@ -6,6 +6,8 @@ from rigwatch.wire.delivery import SampleReader
 from rigwatch.wire.messages import RUN, SAMPLES, TOPICS, Event, Gap, Message, SampleBlock
 
 _SUBSCRIBED = tuple(line for line in TOPICS if line.recorded and line not in (SAMPLES, RUN))
+CATCH_UP = 0.25
+"""Longest time in a turn for messages of the rings, which come a second's worth at a time [s]."""
 
 
 class Feed:
@@ -65,7 +67,11 @@ class Feed:
         return found
 
     def _drained(self, subscription: Subscription, *, own: bool = False) -> list[Message]:
-        return [message for message in subscription.drain() if own or not self._is_own(message)]
+        if isinstance(subscription, CompleteSubscription):
+            found = subscription.catch_up(CATCH_UP)
+        else:
+            found = subscription.drain()
+        return [message for message in found if own or not self._is_own(message)]
 
     def positions(self) -> Positions:
         """Positions in the numbered topics."""

@@ -2,8 +2,9 @@
 
     <recorder.folder>/<rig>-20260501T120000Z/000001.mcap, 000002.mcap, …
 
-A recorder that was killed and restarted continues in the same folder and queries the ring for
-missed samples.
+A recorder that was killed and restarted continues in the same folder, or after a long interruption
+in a new one, and queries the rings for what it missed. What they no longer have is a gap. After one
+that was stopped on purpose, a new session begins with the samples from then on.
 """
 
 import re
@@ -30,7 +31,7 @@ class Place:
     """The folder to record to, and its last messages.
 
     Attributes:
-        last: (boot, seq) of the last sample in it, None for a new one.
+        last: (boot, seq) of the last sample recorded, None to begin with the next one.
         positions: the same for numbered messages.
     """
 
@@ -54,11 +55,14 @@ def choose(root: Path, run: RunInfo, longest_break: float = LONGEST_BREAK) -> Pl
         run: description of the recording.
         longest_break: interruption after which a new session starts [s].
     """
-    going_on = _interrupted(root, run, longest_break)
-    if going_on is not None:
-        return going_on
+    before = _interrupted(root, run)
+    if before is not None and abs(run.t_ns - before.ended_ns) <= longest_break * 1e9:
+        return before.place
     stamp = datetime.fromtimestamp(run.t_ns // 1_000_000_000, UTC).strftime("%Y%m%dT%H%M%SZ")
-    return Place(_unused(root / f"{run.rig}-{stamp}"))
+    folder = _unused(root / f"{run.rig}-{stamp}")
+    if before is None or before.stopped:
+        return Place(folder)
+    return Place(folder, before.place.last, before.place.positions)
 
 
 def _unused(folder: Path) -> Path:
@@ -70,8 +74,23 @@ def _unused(folder: Path) -> Path:
     return found
 
 
-def _interrupted(root: Path, run: RunInfo, longest_break: float) -> Place | None:
-    """The newest session of this rig if it is recent and has the same configuration."""
+@dataclass(frozen=True, slots=True)
+class _Interrupted:
+    """The newest session of a rig.
+
+    Attributes:
+        place: its end.
+        ended_ns: time of its last sample [ns].
+        stopped: it was closed in order; a recorder that was killed misses what came since.
+    """
+
+    place: Place
+    ended_ns: int
+    stopped: bool
+
+
+def _interrupted(root: Path, run: RunInfo) -> _Interrupted | None:
+    """The newest session of this rig if it has samples and the same configuration."""
     try:
         folders = [path for path in sessions_of(root, run.rig) if any(path.glob(f"*{SUFFIX}"))]
         newest = max(folders, key=lambda path: max(f.stat().st_mtime for f in path.iterdir()))
@@ -82,9 +101,8 @@ def _interrupted(root: Path, run: RunInfo, longest_break: float) -> Place | None
         return None
     if last is None:
         return None
-    recent = abs(run.t_ns - int(last.t_ns[-1])) <= longest_break * 1e9
-    end = last.boot, last.seq + len(last) - 1
-    return Place(newest, end, load_positions(newest)) if recent else None
+    place = Place(newest, (last.boot, last.seq + len(last) - 1), load_positions(newest))
+    return _Interrupted(place, int(last.t_ns[-1]), session.segments[-1] not in session.unclosed)
 
 
 def last_block(session: Session, topic: Topic) -> Block | None:

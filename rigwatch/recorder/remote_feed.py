@@ -13,7 +13,7 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from queue import Empty, SimpleQueue
 
-from rigwatch.recorder.feed import Feed
+from rigwatch.recorder.feed import CATCH_UP, Feed
 from rigwatch.recorder.folders import Place, last_block
 from rigwatch.recorder.past import (
     MARGIN_NS,
@@ -141,7 +141,7 @@ class RemoteFeed(Feed):
         if name == SAMPLES.name:
             found: list[Message] = [*self._reader.read(0.0)]
         else:
-            found = [*self._numbered[name].drain(), *self._numbered[name].reports()]
+            found = [*self._numbered[name].catch_up(CATCH_UP), *self._numbered[name].reports()]
         return self._reported(stream.add(found))
 
     # ---- from the recordings ------------------------------------------------------------

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.bus.message_ring import MessageRing
+from rigwatch.wire.bus.message_ring import REPLY_BYTES, MessageRing
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.messages import ALARMS, GAPS, Alarm, encode
@@ -45,6 +45,25 @@ def test_what_is_lost_on_the_way_is_fetched_once_and_in_order():
     network.up = True
     say(monitor, range(60, 62))
     assert heard(listener, 61) == list(range(62))
+
+
+def test_what_takes_many_answers_of_the_ring_is_caught_up_with_in_one_call():
+    network = MemoryNetwork()
+    monitor, listener = network.bus("r", "monitor"), network.bus("r", "listener").listen(ALARMS)
+    network.up = False
+    said = range(6 * REPLY_BYTES // len(encode(alarm(0))))
+    say(monitor, said)
+    network.up = True
+    found = [message.seq for message in listener.drain()]
+    assert not found, "no answer has been asked for yet"
+    say(monitor, range(said.stop, said.stop + 1))
+
+    def begun() -> bool:
+        found.extend(message.seq for message in listener.catch_up(PATIENCE))
+        return bool(found)
+
+    eventually(begun, "the first answer")
+    assert found == list(range(said.stop + 1))
 
 
 def test_the_last_word_before_a_silence_is_received_too():

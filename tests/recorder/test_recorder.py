@@ -1,5 +1,6 @@
 """The recorder on a real bus: what is said is kept, and a killed recorder leaves no hole."""
 
+import dataclasses
 import json
 import os
 import signal
@@ -79,8 +80,8 @@ def alarm(seq: int) -> Alarm:
 class Source:
     """Stands where the acquisition stands: ring and publisher on the bus."""
 
-    def __init__(self, bus: Bus) -> None:
-        self.bus, self.ring, self.next = bus, SampleRing(bus, 65536), 0
+    def __init__(self, bus: Bus, kept: int = 65536) -> None:
+        self.bus, self.ring, self.next = bus, SampleRing(bus, kept), 0
 
     def send(self, count: int) -> None:
         for _ in range(count):
@@ -173,6 +174,34 @@ def test_a_session_goes_on_after_a_short_break_only(tmp_path: Path, config: Path
     other = run_info("bench1", 256.0, t_ns=run.t_ns, configuration_sha256="changed")
     assert choose(tmp_path / "sessions", other).folder != folder
     assert choose(tmp_path / "nowhere", run).last is None
+
+
+def test_after_a_kill_and_a_long_break_a_new_session_has_what_the_ring_kept_and_a_gap(
+    tmp_path: Path, config: Path
+) -> None:
+    network = MemoryNetwork()
+    source = Source(network.bus("bench1", "daq"), kept=100)
+    rig = load_rig(config)
+    run = describe_run(config, rig)
+    killed = Recorder(rig, run, network.bus("bench1", "recorder"))
+    source.send(30)
+    killed.turn(0.0, time.time_ns())
+    killed.feed.close()
+    source.send(170)
+    later = dataclasses.replace(run, t_ns=run.t_ns + 10**12)
+    recorder = Recorder(rig, later, network.bus("bench1", "recorder"))
+    assert recorder.store.folder != killed.store.folder
+    source.send(5)
+
+    def complete() -> bool:
+        recorder.turn(0.0, time.time_ns())
+        return recorder.feed.samples >= 100
+
+    eventually(complete, "what the ring kept is recorded")
+    recorder.close(1.0, time.time_ns())
+    assert recorded(recorder.store.folder) == list(range(105, 205))
+    told = [item.message for item in open_session(recorder.store.folder).messages(["gaps"])]
+    assert [(gap.first, gap.last) for gap in told if isinstance(gap, Gap)] == [(30, 104)]
 
 
 def test_a_recorder_started_again_keeps_what_was_said_meanwhile(config: Path) -> None:

@@ -68,6 +68,7 @@ class CompleteSubscription(Subscription):
         self._inbox: SimpleQueue[Any] = SimpleQueue()
         self._ready: deque[Any] = deque()
         self._reports: list[Gap | Event] = []
+        self._behind = False
         self._looked_at = time.monotonic()
         self._questions = RingQuestions(bus, self._answered)
         self._start(dict(resume_after or {}))
@@ -125,6 +126,20 @@ class CompleteSubscription(Subscription):
         count = len(self._ready) if most is None else min(most, len(self._ready))
         return [self._ready.popleft() for _ in range(count)]
 
+    def catch_up(self, longest: float) -> list[Any]:
+        """The waiting messages, and those of the rings as long as each answer brings more.
+
+        Args:
+            longest: time after which the rest is left to the next call [s].
+        """
+        until = time.monotonic() + longest
+        found = self.drain()
+        while self._behind and (left := until - time.monotonic()) > 0:
+            with contextlib.suppress(Empty):
+                self._take(self._inbox.get(timeout=left))
+            found += self.drain()
+        return found
+
     def reports(self) -> list[Gap | Event]:
         """Reports of losses that this subscriber has published since the last call."""
         found, self._reports = self._reports, []
@@ -168,7 +183,9 @@ class CompleteSubscription(Subscription):
             process, ask, replies, _ = incoming
             known = _read(replies, ask.boot)
             best = max(known, key=lambda reply: reply.settled, default=None)
-            self._handle(process, self._senders[process].replied(ask, best))
+            outcomes = self._senders[process].replied(ask, best)
+            self._behind = {Numbered, Ask} <= set(map(type, outcomes))
+            self._handle(process, outcomes)
 
     def _take_token(self, token: "Token", alive: bool) -> None:
         process, run, since_ns, sender = token
