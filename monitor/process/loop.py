@@ -14,6 +14,7 @@ from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
 from monitor.pipeline import RigMonitor, compile_kernels
+from monitor.process.both_clocks import both_clocks
 from monitor.process.cursor import Cursor
 from monitor.process.health import HealthBook
 from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_reports
@@ -261,8 +262,7 @@ class MonitorProcess:
             heard=self.reader.heard,
         )
         return Seen(
-            time.time_ns(),
-            time.monotonic_ns(),
+            *both_clocks(),
             silent,
             self._daq_trouble if daq_there else "the daq process is not there",
             self.reader.heard,
