@@ -1,4 +1,4 @@
-"""A process that is interrupted between two readings of its clocks sees no step of the wall clock."""
+"""A process interrupted between two readings of its clocks sees no step of the wall clock."""
 
 from monitor.process.both_clocks import both_clocks
 
