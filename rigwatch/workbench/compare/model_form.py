@@ -24,7 +24,7 @@ from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free, with_values
 from rigwatch.workbench.study import Study, varied
 
-BEGINNING = 3072
+BEGINNING = 2048
 """Samples of the healthy recording to which variants are fitted."""
 AS_GOOD = 1.1
 """Largest ratio of the errors on the healthy recording at which a variant counts."""

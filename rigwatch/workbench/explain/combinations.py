@@ -178,6 +178,8 @@ def _exchanged(
 ) -> Iterator[Combination]:
     """Each set with one of its effects exchanged for one that resembles it, at any port.
 
+    As only sets that reach the noise are used, it must explain a share of what is above the noise.
+
     Args:
         bench: the study.
         best: the set.
@@ -189,8 +191,9 @@ def _exchanged(
             continue
         study = with_rows(bench.study, rest.rows)
         every = scored(study, bench.data, rest.fitted, candidates(study, bench.data.train))
+        least = _least_share(bench, rest)
         for other in _substitutes(row, every):
-            if rest.labels | {other.label} in tried:
+            if rest.labels | {other.label} in tried or other.explained < least:
                 continue
             _fit_with(bench, rest.rows, rest.fitted, other)
             if other.fitted is not None:
@@ -221,7 +224,7 @@ def _extended(
     """
     found: dict[frozenset[str], Combination] = {}
     for known in level:
-        least = AGAIN * floor_of(bench, known.fitted).above(known.fitted.held_out) if last else 0.0
+        least = _least_share(bench, known) if last else 0.0
         for row in next_candidates(bench, known):
             if known.labels | {row.label} in found or known.free + row.free > free:
                 continue
@@ -234,6 +237,11 @@ def _extended(
             if _lowers(larger, known.search_error):
                 found[larger.labels] = larger
     return list(found.values())
+
+
+def _least_share(bench: Bench, known: Combination) -> float:
+    """Share of the error's energy that an effect must explain for a set to come near the noise."""
+    return AGAIN * floor_of(bench, known.fitted).above(known.fitted.held_out)
 
 
 def next_candidates(bench: Bench, known: Combination) -> list[Ranked]:
