@@ -8,7 +8,6 @@ and Sen), which ignores the seconds in which the host slept. A jump of the devic
 within one sample: its microseconds disagree with its sample numbers and with the host's clock.
 """
 
-import time
 from collections import deque
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from daq.adapter import RawBlock
 from rigwatch.wire.arrays import IntArray
+from rigwatch.wire.host import both_clocks
 
 _BIN_US = 250_000
 _BINS = 240
@@ -147,4 +147,5 @@ def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
 
 def host_offset_ns() -> int:
     """Unix time less monotonic time of the host [ns]."""
-    return time.time_ns() - time.monotonic_ns()
+    wall, steady = both_clocks()
+    return wall - steady

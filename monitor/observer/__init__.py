@@ -39,7 +39,7 @@ from monitor.observer.model_signals import (
     layout_of,
     remainder_signals,
 )
-from monitor.observer.observer_decision import decide
+from monitor.observer.observer_decision import decide, friction_limit
 from monitor.observer.prediction import (
     SETTLING,
     SUBSTEPS,
@@ -91,6 +91,7 @@ __all__ = [
     "fit_remainder",
     "force_port",
     "friction_at",
+    "friction_limit",
     "high_pass",
     "layout_of",
     "levels",

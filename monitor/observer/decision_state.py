@@ -30,6 +30,9 @@ OUTPUTS = (
     VERDICT, SENSORS, SPREAD, DEPARTED, AMPLITUDE, DEVIATIONS,
 ) = range(len(OUTPUTS))  # fmt: skip
 
+USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION = range(4)
+"""Rows of the healthy residual's extremes at the present motion, see `usual_error.Extremes`."""
+
 ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, SPEED, LEVELS = range(8)
 """Columns of the history; from `LEVELS` on, the levels on which the healthy variance depends."""
 

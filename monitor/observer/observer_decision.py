@@ -47,6 +47,10 @@ from monitor.observer.decision_state import (
     SPREAD,
     STICKING,
     UNNAMED,
+    USUAL_FRICTION,
+    USUAL_LASTING,
+    USUAL_MEDIUM,
+    USUAL_SHORT,
     VERDICT,
     VISCOUS,
     WAKE,
@@ -177,6 +181,19 @@ def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatA
     kept.counts[FILLED] = min(kept.counts[FILLED] + 1, HISTORY)
 
 
+def friction_limit(usual: FloatArray, rules: DecisionRules) -> FloatArray:
+    """Coulomb estimate at which the rig has departed, in standard deviations.
+
+    Args:
+        usual: the largest of the healthy rig at the present motion, one or several.
+        rules: of the decision.
+    """
+    return np.minimum(rules.friction, usual * np.sqrt(rules.lasting))
+
+
+_friction_limit = njit()(friction_limit)
+
+
 @njit()
 def _one(  # noqa: PLR0917 -- a kernel
     k: int,
@@ -200,11 +217,13 @@ def _one(  # noqa: PLR0917 -- a kernel
     )
     out[SENSORS, k] = mean_square(kept, DISAGREE, MEDIUM) / sensor_variance / rules.sensor
     margin = rules.lasting
-    short = mean_square(kept, ERROR, SHORT) / spread**2 / min(rules.short, usual[1] * margin)
-    medium = mean_square(kept, ERROR, MEDIUM) / spread**2 / min(rules.medium, usual[2] * margin)
-    friction_limit = min(rules.friction, usual[3] * np.sqrt(margin))
-    largest = max(np.sqrt(short), np.sqrt(medium), deviations / friction_limit)
-    lasting = lasting_energy(kept, spread**2 * usual[0] * margin)
+    short_limit = min(rules.short, usual[USUAL_SHORT] * margin)
+    medium_limit = min(rules.medium, usual[USUAL_MEDIUM] * margin)
+    short = mean_square(kept, ERROR, SHORT) / spread**2 / short_limit
+    medium = mean_square(kept, ERROR, MEDIUM) / spread**2 / medium_limit
+    allowed = _friction_limit(usual[USUAL_FRICTION], rules)
+    largest = max(np.sqrt(short), np.sqrt(medium), deviations / allowed)
+    lasting = lasting_energy(kept, spread**2 * usual[USUAL_LASTING] * margin)
     out[DEVIATION, k] = max(largest, np.sqrt(out[SENSORS, k]), np.sqrt(lasting))
     away = out[DEVIATION, k] > 1.0
     count[QUIET] = 0 if away else count[QUIET] + 1

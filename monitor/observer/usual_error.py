@@ -28,7 +28,10 @@ STEADY = 0.9
 
 
 class Extremes(NamedTuple):
-    """Largest values of a healthy residual: energies of three windows, and of the friction."""
+    """Largest values of a healthy residual: energies of three windows, and of the friction.
+
+    In the order of `USUAL_LASTING` and so on in `decision_state.py`.
+    """
 
     lasting: float
     short: float = np.inf

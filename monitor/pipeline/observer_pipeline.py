@@ -18,7 +18,6 @@ from monitor.observer import (
     PREDICTED,
     ChannelJumps,
     E,
-    Extremes,
     Observed,
     ObserverSignals,
     RangeSeen,
@@ -26,6 +25,7 @@ from monitor.observer import (
     base_model,
     decide,
     drive_energy,
+    friction_limit,
     levels,
 )
 from monitor.observer import decision_state as d
@@ -105,7 +105,7 @@ class ObserverMonitor:
         )  # fmt: skip
         conditions = self._conditions(admitted, seen, far, out)
         sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))
-        limit = self._force_limit(out, usual[Extremes._fields.index("friction")])
+        limit = self._force_limit(out, usual[d.USUAL_FRICTION])
         return Result(self._estimates(block, admitted, seen, out, limit), (*conditions, *sensors))
 
     def _jump_conditions(
@@ -165,8 +165,7 @@ class ObserverMonitor:
         """Coulomb force at which the rig has departed [N]; 0 at rest."""
         sizes = np.abs(out[d.DEVIATIONS])
         with np.errstate(divide="ignore", invalid="ignore"):
-            allowed = np.minimum(self.rules.friction, usual * np.sqrt(self.rules.lasting))
-            found = np.abs(out[d.FORCE]) / sizes * allowed
+            found = np.abs(out[d.FORCE]) / sizes * friction_limit(usual, self.rules)
         return np.where(sizes > 0.0, found, 0.0)
 
     def _conditions(

@@ -14,7 +14,6 @@ from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
 from monitor.pipeline import RigMonitor, compile_kernels
-from monitor.process.both_clocks import both_clocks
 from monitor.process.cursor import Cursor
 from monitor.process.health import HealthBook
 from monitor.process.link_watch import LinkWatch, Seen, device_reports, disk_reports
@@ -29,6 +28,7 @@ from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import (
     MONITOR,
     Heartbeat,
+    both_clocks,
     prepare_for_real_time,
     raise_priority,
     set_at_signal,

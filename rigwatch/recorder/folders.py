@@ -102,7 +102,8 @@ def _interrupted(root: Path, run: RunInfo) -> _Interrupted | None:
     if last is None:
         return None
     place = Place(newest, (last.boot, last.seq + len(last) - 1), load_positions(newest))
-    return _Interrupted(place, int(last.t_ns[-1]), session.segments[-1] not in session.unclosed)
+    end = Session(newest, session.segments[-1:])
+    return _Interrupted(place, int(last.t_ns[-1]), not end.unclosed)
 
 
 def last_block(session: Session, topic: Topic) -> Block | None:

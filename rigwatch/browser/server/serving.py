@@ -38,7 +38,7 @@ class Listening:
     behind_proxy: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Options(Listening):
     """How the pages of a folder are served.
 
@@ -48,7 +48,7 @@ class Options(Listening):
         most_upload: largest upload of a recording [bytes].
     """
 
-    folder: Path = Path()
+    folder: Path
     rig: Path | None = None
     most_upload: int = 1 << 30
 

@@ -6,6 +6,7 @@ from rigwatch.commands.common.log_arguments import add_log_columns
 from rigwatch.commands.common.many import add_many, add_on, add_where, run_many, the_one
 from rigwatch.commands.common.many_studies import add_studies, run_studies, the_study
 from rigwatch.commands.common.marks import marks_of
+from rigwatch.commands.common.served_page import tell_address
 from rigwatch.commands.common.session_files import (
     add_session_and_target,
     add_span,
@@ -41,6 +42,7 @@ __all__ = [
     "show_until_closed",
     "span_between",
     "span_of",
+    "tell_address",
     "the_one",
     "the_study",
     "unix_time",

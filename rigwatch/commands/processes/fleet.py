@@ -1,14 +1,12 @@
 """`rigwatch fleet`: the state of many rigs at a glance, the worst first."""
 
 import argparse
-import json
 import sys
 import time
-import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.commands.common import check_folder, print_json
+from rigwatch.commands.common import check_folder, print_json, tell_address
 
 if TYPE_CHECKING:
     from rigwatch.fleet import Fleet, RigState
@@ -69,9 +67,7 @@ def _serve(arguments: argparse.Namespace, fleet: "Fleet") -> int:
         ) from None
 
     def ready(address: str) -> None:
-        print(json.dumps({"address": address}) if arguments.json else address, flush=True)
-        if arguments.open:
-            webbrowser.open(address)
+        tell_address(arguments, address)
 
     serve_fleet(fleet.look, Listening(port=arguments.port), ready)
     return 0

@@ -1,11 +1,9 @@
 """`rigwatch workbench`: the studies of a folder in a browser."""
 
 import argparse
-import json
-import webbrowser
 from pathlib import Path
 
-from rigwatch.commands.common import say
+from rigwatch.commands.common import say, tell_address
 
 HELP = "open the studies of a folder in a browser: see, add what is missing, watch the error fall"
 EXAMPLE = """\
@@ -54,18 +52,15 @@ def run(arguments: argparse.Namespace) -> int:
         folder.mkdir(exist_ok=True)
 
     def ready(address: str) -> None:
-        if arguments.json:
-            print(json.dumps({"address": address}), flush=True)
-        else:
-            print(f"workbench: {address}", flush=True)
+        tell_address(arguments, address, "workbench: ")
+        if not arguments.json:
             say("Ctrl-C ends")
-        if arguments.open:
-            webbrowser.open(address)
 
     serve(
         Options(
             arguments.address, arguments.port, arguments.certificate, arguments.key,
-            tuple(arguments.behind_proxy), folder, arguments.rig, arguments.most_upload << 20,
+            tuple(arguments.behind_proxy), folder=folder, rig=arguments.rig,
+            most_upload=arguments.most_upload << 20,
         ),
         ready,
     )  # fmt: skip

@@ -10,13 +10,12 @@ adds alarms, events and all others; neither has a clock, thread or bus.
 
 from rigwatch.recorder.past.asking import Answer, PastQuestions
 from rigwatch.recorder.past.outage import MARGIN_NS, Outage
-from rigwatch.recorder.past.pages import PAST_KEY, Page, Question
+from rigwatch.recorder.past.pages import Page, Question
 from rigwatch.recorder.past.serving import PastServer
 from rigwatch.recorder.past.streams import BlockStream, Hole
 
 __all__ = [
     "MARGIN_NS",
-    "PAST_KEY",
     "Answer",
     "BlockStream",
     "Hole",

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from queue import Queue, SimpleQueue
 
-from rigwatch.recorder.past.pages import PAST_KEY, Page, Question
+from rigwatch.recorder.past.pages import Page, Question
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.errors import BusError, MessageError
+from rigwatch.wire.messages import PAST_KEY
 from rigwatch.wire.session import Part
 
 REPLY_TIMEOUT = 5.0

@@ -15,8 +15,6 @@ from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import TOPICS, Topic
 from rigwatch.wire.session import Part
 
-PAST_KEY = "recorder/past"
-"""Key at which a recorder answers for its sessions."""
 PAGE_BYTES = MAX_PAYLOAD // 2
 LARGEST_QUESTION = 4096
 _HEAD = struct.Struct("<I")

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from rigwatch.recorder.folders import sessions_of
-from rigwatch.recorder.past.pages import PAGE_BYTES, PAST_KEY, Bookmark, Page, Question
+from rigwatch.recorder.past.pages import PAGE_BYTES, Bookmark, Page, Question
 from rigwatch.wire.bus import Bus
-from rigwatch.wire.messages import topic
+from rigwatch.wire.messages import PAST_KEY, topic
 from rigwatch.wire.session import SUFFIX, Place, Wanted, read_page
 
 BYTES_PER_SECOND = 4_000_000
@@ -22,13 +22,9 @@ class PastServer:
         bus: on which questions come.
         root: folder of the sessions.
         settled: returns the time before which everything is on the disk [ns].
-
-    Attributes:
-        bytes: bytes of the answers so far.
     """
 
     def __init__(self, bus: Bus, root: Path, settled: Callable[[], int]) -> None:
-        self.bytes = 0
         self._rig, self._root, self._settled = bus.rig, root, settled
         self._free_at = 0.0
         self.close = bus.serve(PAST_KEY, self._answer)
@@ -37,7 +33,6 @@ class PastServer:
         question = Question.from_bytes(data)
         time.sleep(max(0.0, self._free_at - time.monotonic()))
         page = self.page(question).to_bytes()
-        self.bytes += len(page)
         self._free_at = time.monotonic() + len(page) / BYTES_PER_SECOND
         return [page]
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rigwatch.wire.messages import Block, EstimateBlock, Gap, Message, SampleBlock, cut, unseen
+from rigwatch.wire.messages import Block, Gap, Message, cut, unseen
 from rigwatch.wire.session import Span, without
 
 
@@ -89,7 +89,7 @@ class BlockStream:
     def rest(self) -> list[Message]:
         """Give up what waits: a later run begins before the gap."""
         held, self._held, self.hole = self._held, [], None
-        return [item for item in held if not isinstance(item, SampleBlock | EstimateBlock | Gap)]
+        return [item for item in held if not isinstance(item, Block | Gap)]
 
     def _due(self) -> Iterator[Message]:
         while self._held:
@@ -97,7 +97,7 @@ class BlockStream:
             if isinstance(item, Gap) and self._last is not None:
                 self._open()
                 return
-            if isinstance(item, SampleBlock | EstimateBlock):
+            if isinstance(item, Block):
                 self._note(item)
             yield self._held.pop(0)
 
@@ -110,8 +110,7 @@ class BlockStream:
 
     def _next(self) -> Block | None:
         """The first block that waits."""
-        kinds = SampleBlock | EstimateBlock
-        return next((item for item in self._held if isinstance(item, kinds)), None)
+        return next((item for item in self._held if isinstance(item, Block)), None)
 
     def _gaps(self) -> int:
         """Number of waiting messages before the first block."""

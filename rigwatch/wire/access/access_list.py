@@ -17,6 +17,7 @@ from rigwatch.wire.messages import (
     GAPS,
     HEALTH,
     MODELS,
+    PAST_KEY,
     RING_KEY,
     RUN,
     SAMPLES,
@@ -36,13 +37,13 @@ _SAYS: dict[str, tuple[str, ...]] = {
 }
 _ANSWERS = {
     "daq": (RING_KEY,),
-    "recorder": ("recorder/past",),
+    "recorder": (PAST_KEY,),
     "monitor": ("ring/**", "monitor/standing", "monitor/receiver", "monitor/model"),
     "witness": ("ring/witness/**", "monitor/standing", "monitor/receiver"),
 }
 _TOKENS = {"daq": ("source/**",), "monitor": ("said/**",), "witness": ("said/witness/**",)}
 _ASKS = {"operator": ("monitor/receiver", "monitor/model")}
-_EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing", "recorder/past")
+_EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing", PAST_KEY)
 
 LINKED = "router"
 """The role of routers, also of those of other sites."""

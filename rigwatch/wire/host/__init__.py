@@ -1,5 +1,6 @@
-"""Services of the system: notifications, priority, threads of rigs, ports, signals, files."""
+"""The host: notifications, priority, threads of rigs, ports, signals, files, clocks."""
 
+from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
 from rigwatch.wire.host.heartbeat import Heartbeat
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
@@ -16,6 +17,7 @@ __all__ = [
     "Pulse",
     "RigPulse",
     "Work",
+    "both_clocks",
     "endpoint_address",
     "free_port",
     "free_ports",

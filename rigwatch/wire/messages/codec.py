@@ -3,7 +3,7 @@
 from typing import TypeVar, cast
 
 from rigwatch.wire.messages import protobuf
-from rigwatch.wire.messages.blocks import owned
+from rigwatch.wire.messages.blocks import Block, owned
 from rigwatch.wire.messages.message_types import EstimateBlock, Message, SampleBlock
 from rigwatch.wire.messages.packed import decode_block
 from rigwatch.wire.messages.packed_encoding import encode_block
@@ -13,7 +13,7 @@ M = TypeVar("M", bound=Message)
 
 def encode(message: Message) -> bytes:
     """Encode a message as protobuf bytes."""
-    if isinstance(message, SampleBlock | EstimateBlock):
+    if isinstance(message, Block):
         return encode_block(message)
     return protobuf.encode(message)
 

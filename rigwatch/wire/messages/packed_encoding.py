@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.wire.messages import protobuf_schema as schema
+from rigwatch.wire.messages.blocks import Block
 from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.messages.protobuf import encode
 
@@ -19,7 +20,7 @@ _FLOAT, _INT, _BYTE = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
 _LARGEST = 1 << 63
 
 
-def encode_block(block: SampleBlock | EstimateBlock) -> bytes:
+def encode_block(block: Block) -> bytes:
     """Encode a block as protobuf bytes."""
     samples = isinstance(block, SampleBlock)
     columns = block.channels if isinstance(block, SampleBlock) else block.columns
@@ -37,9 +38,7 @@ def encode_block(block: SampleBlock | EstimateBlock) -> bytes:
     return b"".join(parts)
 
 
-def _is_plain(
-    block: SampleBlock | EstimateBlock, times: list[NDArray[np.int64]], columns: tuple[Column, ...]
-) -> bool:
+def _is_plain(block: Block, times: list[NDArray[np.int64]], columns: tuple[Column, ...]) -> bool:
     return (
         all(-_LARGEST <= number < _LARGEST for number in (block.boot, block.seq))
         and all(one.dtype == _INT for one in times)

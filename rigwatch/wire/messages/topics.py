@@ -70,6 +70,8 @@ RECORDERS = (RUN.publisher, "headquarters")
 """The recorder of a rig at its own site, and one at another."""
 RING_KEY = "daq/ring"
 """Key of the adapter's ring of recent samples, queried by readers that missed some."""
+PAST_KEY = "recorder/past"
+"""Key at which a recorder answers for its sessions."""
 ALIVE_KEY = "alive"
 """Liveliness tokens are at `alive/<process>`."""
 

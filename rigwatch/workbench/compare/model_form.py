@@ -47,13 +47,14 @@ def variances_between_bases(
     part, own = beginning(healthy.train, BEGINNING), study.file.variants
     moved: dict[str, FloatArray] = {}
     try:
-        base = _tried(study, own, part, bare)
+        known = with_kept_free(_along(study, own))
+        base = _tried(study, own, part, bare, known)
         before = _strengths(study, data, base.model, fitted)
     except RigwatchError:
         return {}
     for names in neighbours(study.model, own):
         try:
-            other = _tried(study, names, part, bare)
+            other = _tried(study, names, part, bare, known)
             if other.error > AS_GOOD * base.error:
                 continue
             difference = _strengths(study, data, other.model, fitted) - before
@@ -73,12 +74,21 @@ class _Tried:
     error: float
 
 
-def _tried(study: Study, names: Sequence[str], healthy: Recording, bare: Fitted) -> _Tried:
-    """The base with these variants, fitted from the parameters that it shares with the study's."""
+def _tried(
+    study: Study, names: Sequence[str], healthy: Recording, bare: Fitted, known: Model
+) -> _Tried:
+    """The base with these variants, fitted from the parameters that it shares with the study's.
+
+    Args:
+        study: prepared, with parameters from the healthy recording.
+        names: of the variants.
+        healthy: what it is fitted to.
+        bare: the study's base, fitted to the healthy recording.
+        known: that base as its file has it.
+    """
     model = _along(study, names)
     loose = with_kept_free(model)
-    before = with_kept_free(_along(study, study.file.variants)).parameters
-    shared = [n for n, p in loose.parameters.items() if before.get(n) == p]
+    shared = [n for n, p in loose.parameters.items() if known.parameters.get(n) == p]
     compiled = compile_system(compose(loose, ()))
     start = compiled.vector({n: study.model.parameters[n].value for n in shared})
     scale, steps = bare.train.scale, study.file.substeps

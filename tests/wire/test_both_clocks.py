@@ -1,6 +1,6 @@
 """A process interrupted between two readings of its clocks sees no step of the wall clock."""
 
-from monitor.process.both_clocks import both_clocks
+from rigwatch.wire.host.both_clocks import both_clocks
 
 WALL_NS, SECOND = 1_800_000_000 * 10**9, 10**9
 
