@@ -3,9 +3,11 @@
     t = origin + (us - us0)·1000·(1 + drift) + offset
 
 Line and host delay a sample, and never make it early. So the least delayed sample of every quarter
-second counts, and a line is fitted through those of the last minute by the median of slopes (Theil
-and Sen), which ignores the seconds in which the host slept. A jump of the device's clock shows
-within one sample: its microseconds disagree with its sample numbers and with the host's clock.
+second counts, and a line touches those of the last minute from below. Its slope is the median of
+slopes (Theil and Sen), which ignores the seconds in which the host slept. Where delays scatter too
+much to tell it, as those of samples that waited in the line's buffer at the start, the clocks are
+taken to agree. A jump of the device's clock shows within one sample: its microseconds disagree with
+its sample numbers and with the host's clock.
 """
 
 from collections import deque
@@ -21,6 +23,8 @@ _BIN_US = 250_000
 _BINS = 240
 _BINS_FOR_LINE = 8
 _BINS_FOR_DRIFT = 80
+_USUAL_DRIFT = 1e-3
+"""Standard deviation of a drift that is not measured yet."""
 _JUMP_PERIODS = 2.5
 _WALL_STEP_NS = 500_000_000
 
@@ -132,11 +136,20 @@ class DeviceClock:
         if len(self._bins) <= _BINS_FOR_LINE:
             return
         relative, late = np.array(self._bins)[:-1].T
-        self._slope = _median_slope(relative, late)
+        self._slope = _likely_slope(relative, late / self._ns_per_us) * self._ns_per_us
         self._centre = float(relative[-1])
-        self._offset = float(np.median(late - self._slope * (relative - self._centre)))
+        self._offset = float(np.min(late - self._slope * (relative - self._centre)))
         if len(self._bins) > _BINS_FOR_DRIFT:
             self.drift_ppm = 1e6 * (self._ns_per_us / (self._ns_per_us + self._slope) - 1.0)
+
+
+def _likely_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Median slope, the nearer to none the less the points tell of it."""
+    slope = _median_slope(x, y)
+    rest = y - slope * x
+    scatter = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
+    deviation = scatter * (12.0 / len(x)) ** 0.5 / (x[-1] - x[0])
+    return float(slope / (1.0 + (deviation / _USUAL_DRIFT) ** 2))
 
 
 def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:

@@ -33,6 +33,15 @@ def test_drift_is_found_and_followed(drift: float) -> None:
     assert np.abs(error[2560:]).max() < 200_000
 
 
+def test_what_waited_in_the_lines_buffer_at_the_start_does_not_stretch_time() -> None:
+    waited = np.clip(700e6 - np.arange(2560) * PERIOD_NS, 0.0, None).astype(np.int64)
+    late = waited + np.random.default_rng(2).exponential(1e6, 2560).astype(np.int64)
+    stamps, _ = DeviceClock(256.0).stamp(run_of(2560, late_ns=late))
+    after = np.diff(stamps[256:])[: 4 * 256]
+    assert 256 * PERIOD_NS / np.convolve(after, np.ones(256), "valid").max() > 0.99
+    assert after.max() < 2 * PERIOD_NS
+
+
 @pytest.mark.parametrize("seconds", [0.05, 0.5, -0.5, 100.0])
 def test_a_jump_is_seen_at_its_first_sample(seconds: float) -> None:
     clock = DeviceClock(256.0, unix_minus_monotonic_ns=UNIX_NS)
