@@ -327,6 +327,8 @@ def test_pneumatic_cylinder(tmp_path: Path, bar: int, pressure: float) -> None:
     [
         '{"t": [0, 1, 2], "qm": [1.0, 2.0, 3.0], "gain": 2, "rig": {"name": "a"}}',
         '[{"t": 0, "qm": 1.0}, {"t": 1, "qm": 2.0}, {"t": 2, "qm": 3.0}]',
+        '{"kp": 8, "log": [{"t": 0, "qm": 1.0}, {"t": 1, "qm": 2.0}, {"t": 2, "qm": 3.0}]}',
+        '{"kp": 8, "log": {"t": [0, 1, 2], "qm": [1.0, 2.0, 3.0]}}',
     ],
 )
 def test_json_of_columns_or_of_rows_is_read(tmp_path: Path, text: str) -> None:
@@ -342,6 +344,8 @@ def test_json_of_columns_or_of_rows_is_read(tmp_path: Path, text: str) -> None:
     [
         ('{"t": [0, 1', "run.json: not readable as JSON"),
         ("3", "run.json: found no table"),
+        ('{"a": [{"t": 0}], "b": [{"t": 1}]}', "run.json: found the tables a, b, expected one"),
+        ('{"a":' * 10_000 + "1" + "}" * 10_000, "run.json: not readable as JSON"),
         ('{"t": [0, 1], "qm": [1, null]}', "run.json, row 2, column qm: found 'nan'"),
     ],
 )

@@ -1,6 +1,8 @@
 """`rigwatch study new`: makes a study of logs and a model, or from a template."""
 
 import argparse
+import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,10 +11,12 @@ from rigwatch.commands.common import add_log_columns, file_or_name, print_json, 
 if TYPE_CHECKING:
     from rigwatch.workbench.steps import Logs
 
+_NUMBER = re.compile(r"[A-Za-z_][\w.]*(\s*\[[^\]]+\])?")
 HELP = "make a study of logs and a model, or from a template"
 EXAMPLE = """\
   rigwatch study new drive --data run1.csv run2.csv --model motor --set R=2.0 --set K=0.06
   rigwatch study new drive --data a.csv b.csv --model motor --set a:J=2e-4 --set b:J=5e-4
+  rigwatch study new servo --data *.json --model servo.toml --set kp=kp --set m=mass[kg]
   rigwatch study new drive --data log.csv --model motor --map 'speed=n[rpm]' --time 't[ms]'
   rigwatch study new emps --template emps --sessions recordings/"""
 
@@ -42,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="[LOG:]NAME=VALUE",
-        help="a parameter of the model that you know, in its unit; of one log alone if it is named",
+        help="a parameter of the model that you know, in its unit; of one log alone if it is named;"
+        " or the name of a number that each log states beside its columns, such as m=mass[g]",
     )
     add_log_columns(parser)
 
@@ -83,36 +88,50 @@ def _logs(arguments: argparse.Namespace) -> "Logs":
         rate=arguments.rate,
         columns=columns,
     )
+    known = _known(arguments.set)
     return Logs(
         tuple(arguments.data),
         arguments.model,
         tuple(arguments.healthy),
         mapping,
-        *_known(arguments.set),
+        known.start,
+        known.of_log,
+        known.stated,
     )
 
 
-def _known(given: list[str]) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
-    """Known parameters of all logs, and of single ones by the log's name."""
-    start: dict[str, float] = {}
-    of_log: dict[str, dict[str, float]] = {}
-    for text in given:
-        log, name, value = _value(text)
-        (of_log.setdefault(log, {}) if log else start)[name] = value
-    return start, of_log
+@dataclass
+class _Known:
+    """Values of `--set`.
+
+    Attributes:
+        start: of all logs, by parameter.
+        of_log: by the log's name and parameter.
+        stated: parameter = "number" or "number[unit]" that each log states.
+    """
+
+    start: dict[str, float] = field(default_factory=dict)
+    of_log: dict[str, dict[str, float]] = field(default_factory=dict)
+    stated: dict[str, str] = field(default_factory=dict)
 
 
-def _value(text: str) -> tuple[str, str, float]:
-    """A log or "", a parameter and its value.
+def _known(given: list[str]) -> "_Known":
+    """The values of `--set`.
 
     Raises:
-        ModelError: the text is not NAME=VALUE or LOG:NAME=VALUE.
+        ModelError: a text is not NAME=VALUE, LOG:NAME=VALUE or NAME=NUMBER[UNIT].
     """
     from rigwatch.wire.errors import ModelError
 
-    name, _, value = text.partition("=")
-    log, _, name = name.rpartition(":")
-    try:
-        return log.strip(), name.strip(), float(value)
-    except ValueError:
-        raise ModelError(f"--set: found {text!r}, expected NAME=VALUE such as R=2.0") from None
+    known = _Known()
+    for text in given:
+        name, _, value = (part.strip() for part in text.partition("="))
+        log, _, name = (part.strip() for part in name.rpartition(":"))
+        try:
+            (known.of_log.setdefault(log, {}) if log else known.start)[name] = float(value)
+        except ValueError:
+            if log or not _NUMBER.fullmatch(value):
+                expected = "NAME=VALUE such as R=2.0, or the name of a number that each log states"
+                raise ModelError(f"--set: found {text!r}, expected {expected}") from None
+            known.stated[name] = value
+    return known

@@ -6,12 +6,14 @@ from rigwatch.wire.exchange.headers import Header, read_header
 from rigwatch.wire.exchange.importing import Imported, import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option, parse_source
 from rigwatch.wire.exchange.table_files import columns_of, read_table
+from rigwatch.wire.exchange.tables import Table
 
 __all__ = [
     "AMBIGUOUS",
     "Header",
     "ImportMapping",
     "Imported",
+    "Table",
     "columns_of",
     "conversion",
     "export_session",

@@ -2,15 +2,15 @@
 
 import csv
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from rigwatch.wire.errors import ImportDataError, MissingExtraError
 from rigwatch.wire.exchange.budget import Budget
+from rigwatch.wire.exchange.json_table import read_json
 from rigwatch.wire.exchange.mapping import ImportMapping
 from rigwatch.wire.exchange.mat5 import MatError, Value, read_mat5
 from rigwatch.wire.exchange.tables import Table
@@ -143,23 +143,7 @@ def _titles(found: Value | None, arrays: dict[str, Any]) -> dict[str, str]:
 
 
 def _read_json(path: Path, _: ImportMapping) -> Table:
-    """Columns and scalars of an object of columns, or of a list of row objects."""
-    try:
-        found = msgspec.json.decode(path.read_bytes())
-    except msgspec.DecodeError as error:
-        raise ImportDataError(f"{path}: not readable as JSON: {error}") from error
-    if isinstance(found, list) and found and all(isinstance(row, dict) for row in found):
-        names = list(dict.fromkeys(name for row in found for name in row))
-        found = {name: [row.get(name) for row in found] for name in names}
-    if not isinstance(found, dict):
-        raise ImportDataError(f"{path}: found no table, expected columns by name or a list of rows")
-    columns: dict[str, Sequence[str] | np.ndarray[Any, Any]] = {
-        name: np.array([np.nan if cell is None else cell for cell in value])
-        for name, value in found.items()
-        if isinstance(value, list) and not any(isinstance(cell, list | dict) for cell in value)
-    }
-    scalars = {n: float(v) for n, v in found.items() if isinstance(v, int | float)}
-    return Table(path, columns, scalars)
+    return read_json(path)
 
 
 def _read_parquet(path: Path, _: ImportMapping) -> Table:

@@ -10,6 +10,9 @@ import numpy as np
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import ImportDataError
 
+Cells = Sequence[str] | np.ndarray[Any, Any]
+"""A column as it was read, text or numbers."""
+
 
 @dataclass
 class Table:
@@ -23,7 +26,7 @@ class Table:
     """
 
     path: Path
-    cells: dict[str, Sequence[str] | np.ndarray[Any, Any]]
+    cells: dict[str, Cells]
     scalars: dict[str, float] = field(default_factory=dict)
     first_line: int | None = None
 
@@ -61,9 +64,7 @@ class Table:
             )
         return values
 
-    def _numbers_one_by_one(
-        self, column: str, cells: Sequence[str] | np.ndarray[Any, Any], allow_missing: bool
-    ) -> FloatArray:
+    def _numbers_one_by_one(self, column: str, cells: Cells, allow_missing: bool) -> FloatArray:
         values = np.empty(len(cells))
         for row, cell in enumerate(cells):
             text = str(cell).strip()

@@ -79,6 +79,8 @@ class Study:
         time: str = "",
         rate: float | None = None,
         start: Mapping[str, float] | None = None,
+        known: Mapping[str, Mapping[str, float]] | None = None,
+        stated: Mapping[str, str] | None = None,
     ) -> "Study":
         """Create a study from recordings and a model (`rigwatch study new --data`).
 
@@ -92,6 +94,8 @@ class Study:
             time: column of the time, with its unit, if it is not called time.
             rate: sample rate [Hz], without a time.
             start: known parameters of the model, in their units.
+            known: those that hold for one recording alone, by its name.
+            stated: those that each file states beside its columns, such as "mass" or "mass[g]".
 
         Raises:
             ConfigError: the folder holds a study already.
@@ -102,7 +106,7 @@ class Study:
         with tempfile.TemporaryDirectory() as place:
             logs = Logs(
                 _files(data, Path(place)), model, _files(healthy, Path(place)), mapping,
-                dict(start or {}),
+                start or {}, known or {}, stated or {},
             )  # fmt: skip
             study_from_logs(Path(folder), logs)
         return cls(folder)

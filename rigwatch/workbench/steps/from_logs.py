@@ -6,7 +6,7 @@ The study file records the choices: training and held-out parts, sample rate, lo
 
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from msgspec import structs
@@ -23,6 +23,7 @@ from rigwatch.workbench.data import (
     read_columns,
 )
 from rigwatch.workbench.steps.log_columns import Matched, matched
+from rigwatch.workbench.steps.stated_values import stated_values, unused_numbers
 from rigwatch.workbench.study import Span, Study, check_new, discard, start_study
 
 SAMPLES_PER_PERIOD = 2.5
@@ -44,6 +45,8 @@ class Logs:
         mapping: columns, time and rate, if headers are not sufficient.
         start: known values of the model's parameters, in their units.
         known: values that hold for one log alone, by its file name without suffix.
+        stated: parameters whose value each log states, as a single number beside its columns:
+            "mass" or "mass[g]".
     """
 
     data: tuple[Path, ...]
@@ -52,6 +55,7 @@ class Logs:
     mapping: ImportMapping = field(default_factory=ImportMapping)
     start: Mapping[str, float] = field(default_factory=dict)
     known: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    stated: Mapping[str, str] = field(default_factory=dict)
 
 
 def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
@@ -70,7 +74,9 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
     model, made_folder, written = model_named(logs.model), not folder.exists(), list[Path]()
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        reading, remarks = _imported(folder, logs, model, written)
+        reading, remarks, stated = _imported(folder, logs, model, written)
+        known = {log: values | dict(logs.known.get(log, {})) for log, values in stated.items()}
+        logs = replace(logs, known={**logs.known, **known})
         text, choices = _file(folder, logs, model, reading)
         study = start_study(folder, text)
         return study, [*remarks, *choices, *prepare(study).remarks]
@@ -85,8 +91,11 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
 
 def _imported(
     folder: Path, logs: Logs, model: Model, written: list[Path]
-) -> tuple[Matched, list[str]]:
-    """Imports logs as sessions into the study's folder; `written` collects their paths."""
+) -> tuple[Matched, list[str], dict[str, dict[str, float]]]:
+    """Imports logs as sessions into the study's folder; `written` collects their paths.
+
+    Returns the columns, remarks, and the parameters that each log states, by its name.
+    """
     names = [path.stem for path in (*logs.data, *logs.healthy)]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ModelError(f"--data: found {min(twice)} twice, expected files of different names")
@@ -94,7 +103,7 @@ def _imported(
         raise ModelError(
             f"--set: found log {min(other)!r}{nearest(min(other), dict.fromkeys(names))}"
         )
-    reading, remarks = None, list[tuple[str, str]]()
+    reading, remarks, stated = None, list[tuple[str, str]](), dict[str, dict[str, float]]()
     for path in (*logs.data, *logs.healthy):
         target = folder / f"{path.stem}.mcap"
         if path.suffix == ".mcap":
@@ -117,9 +126,11 @@ def _imported(
         )
         made = import_file(path, target, mapping)
         written.append(target)
-        remarks += [(path.name, remark) for remark in (*found.remarks, *made.remarks[1:])]
+        stated[path.stem] = stated_values(table, logs.stated, model)
+        told = (*found.remarks, *made.remarks[1:], *unused_numbers(table, logs.stated))
+        remarks += [(path.name, remark) for remark in told]
         reading = reading or found
-    return reading or Matched({}, "", {}, ()), _each_once(remarks)
+    return reading or Matched({}, "", {}, ()), _each_once(remarks), stated
 
 
 def _each_once(remarks: list[tuple[str, str]]) -> list[str]:

@@ -1,5 +1,7 @@
 """Parameters that are known of each recording: a load that was changed between two runs."""
 
+import json
+import re
 import shutil
 from pathlib import Path
 
@@ -123,3 +125,47 @@ def test_logs_with_known_loads_become_a_study(tmp_path: Path, capsys) -> None:
     shutil.rmtree(folder)
     assert main([*begin, "--set", "ful:m=1"]) == 2
     assert "--set: found log 'ful'; did you mean 'full'?" in capsys.readouterr().err
+
+
+def stating(folder: Path, factor: float = 1.0) -> list[str]:
+    """The logs of the loads as JSON with a header that states each load."""
+    template(folder)
+    paths = []
+    for name, load in LOADS.items():
+        _, *rest = (folder / f"{name}.csv").read_text().splitlines()
+        rows = [[0.01 * i, *map(float, row.split(","))] for i, row in enumerate(rest)]
+        entries = [dict(zip(("time", "push", "v"), row, strict=True)) for row in rows]
+        header = {"rig": {"load": load * factor}, "driver": "x"}
+        path = folder / f"{name}.json"
+        path.write_text(json.dumps({**header, "entries": entries}))
+        paths.append(str(path))
+    return paths
+
+
+@pytest.mark.parametrize(("text", "factor"), [("m=rig.load[kg]", 1.0), ("m=rig.load", 1e3)])
+def test_a_parameter_is_a_number_that_each_log_states(
+    tmp_path: Path, text: str, factor: float
+) -> None:
+    begin = ["study", "new", str(tmp_path / "study"), "--data", *stating(tmp_path, factor=factor)]
+    assert main([*begin, "--model", str(tmp_path / "model.toml"), "--set", text]) == 0
+    file = open_study(tmp_path / "study").file
+    given = {span.session: span.parameters["m"] for span in (*file.train, *file.held_out)}
+    assert given == {f"{name}.mcap": pytest.approx(load) for name, load in LOADS.items()}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("m=rig.lod", "--set m=rig.lod: .*: found no number 'rig.lod'; did you mean 'rig.load'?"),
+        ("q=rig.load", "--set q=rig.load: found 'q', expected one of"),
+        ("m=rig.load[s]", r"--set m=rig.load\[s\]: found s, expected a unit like g"),
+        ("full:m=rig.load", "--set: found 'full:m=rig.load', expected NAME=VALUE"),
+    ],
+)
+def test_a_number_that_a_log_does_not_state_is_reported(
+    tmp_path: Path, capsys, text: str, said: str
+) -> None:
+    begin = ["study", "new", str(tmp_path / "study"), "--data", *stating(tmp_path)]
+    assert main([*begin, "--model", str(tmp_path / "model.toml"), "--set", text]) == 2
+    assert re.search(said, capsys.readouterr().err)
+    assert not (tmp_path / "study").exists()
