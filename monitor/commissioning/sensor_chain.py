@@ -22,6 +22,7 @@ from rigwatch.physics.engine.equations import (
     balanced_states,
     compose,
     names_in,
+    names_reached,
     spelt_out,
 )
 from rigwatch.wire.arrays import FloatArray
@@ -38,11 +39,12 @@ TRIES = 5
 def sensor_parameters(model: Model) -> frozenset[str]:
     """Parameters used only in equations of states that no other state needs."""
     model = spelt_out(model)
-    needed = [(name, _named(state.derivative)) for name, state in model.states.items()]
+    needed = [(name, _reached(model, state.derivative)) for name, state in model.states.items()]
     sinks = {n for n, _ in needed if not any(n in used for other, used in needed if other != n)}
     sinks -= {state.name for state in balanced_states(model)}
     elsewhere = set().union(*(used for name, used in needed if name not in sinks))
-    elsewhere |= set().union(*(_named(output.expression) for output in model.outputs.values()))
+    outputs = (_reached(model, output.expression) for output in model.outputs.values())
+    elsewhere |= set().union(*outputs)
     own = set().union(*(used for name, used in needed if name in sinks))
     return frozenset((own & set(model.parameters)) - elsewhere)
 
@@ -137,3 +139,7 @@ def _terms(node: ast.expr, sign: str) -> list[tuple[str, ast.expr]]:
 
 def _named(text: str) -> frozenset[str]:
     return names_in(text, "model")
+
+
+def _reached(model: Model, text: str) -> frozenset[str]:
+    return names_reached(model, text, "model")

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.signal import detrend
 
 from rigwatch.physics.engine.compile import evaluated
-from rigwatch.physics.engine.equations import Model, Port, compose, spelt_out
+from rigwatch.physics.engine.equations import Model, Port, arriving, compose, spelt_out
 from rigwatch.physics.engine.fit import Recording, initial_states
 from rigwatch.physics.engine.score import sizes_at_port
 from rigwatch.wire.arrays import FloatArray
@@ -24,13 +24,23 @@ def port_sizes(model: Model, recording: Recording) -> dict[str, Sizes]:
 
 
 def _measured(model: Model, recording: Recording) -> dict[str, FloatArray]:
-    states = initial_states(compose(model), recording)
-    found = dict(zip(model.states, states.T, strict=True))
+    system = compose(model)
+    found = dict(zip(model.states, initial_states(system, recording).T, strict=True))
     found |= dict(zip(model.inputs, recording.inputs.T, strict=True))
     found |= dict(zip(model.outputs, recording.outputs.T, strict=True))
-    for name, port in model.ports.items():
-        found[name] = found[port.signal] if port.signal else np.zeros(len(recording))
+    for name in system.ports:
+        found[name] = _signal(model.ports[name], model, found)
     return found
+
+
+def _signal(port: Port, model: Model, signals: dict[str, FloatArray]) -> FloatArray:
+    """What arrives at a port, as measured or computed from what is measured; 0 at a force port."""
+    if port.kind == "force":
+        return np.zeros(len(next(iter(signals.values()))))
+    if port.signal in signals:
+        return signals[port.signal]
+    values = {name: p.value for name, p in model.parameters.items()}
+    return evaluated(arriving(model, port), signals, values, f"port signal {port.signal}")
 
 
 def _sizes(port: Port, model: Model, signals: dict[str, FloatArray], recording: Recording) -> Sizes:
@@ -39,7 +49,7 @@ def _sizes(port: Port, model: Model, signals: dict[str, FloatArray], recording: 
         name: evaluated(variable.expression, signals, values, f"port variable {name}")
         for name, variable in port.variables.items()
     }
-    signal = signals[port.signal] if port.signal else None
+    signal = _signal(port, model, signals) if port.signal else None
     if "v" in variables and "x" not in variables:
         variables["x"] = _travel(variables["v"], recording)
     return sizes_at_port(variables, signal, recording.dt)

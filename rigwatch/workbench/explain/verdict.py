@@ -194,6 +194,9 @@ def _same_shift(best: Ranked, row: Ranked) -> bool:
     if not shifts or best.fitted is None or row.port == best.port:
         return False
     model = best.fitted.compiled.system.model
+    signals = {model.ports[each.port].signal for each in (best, row)}
+    if signals & model.quantities.keys():
+        return False
     return len(model.driving()) == len(model.outputs) == 1 and best.cosines[row.label] > SIMILAR
 
 

@@ -41,7 +41,13 @@ from rigwatch.physics.engine.equations.model import (
     shipped_models,
 )
 from rigwatch.physics.engine.equations.model_check import check_model, check_variants, unused_ports
-from rigwatch.physics.engine.equations.quantities import spelt_out
+from rigwatch.physics.engine.equations.quantities import (
+    arriving,
+    delay_at,
+    hold_at,
+    names_reached,
+    spelt_out,
+)
 from rigwatch.physics.engine.equations.scope import symbol
 from rigwatch.physics.engine.equations.system import (
     LEFT,
@@ -84,11 +90,14 @@ __all__ = [
     "Variable",
     "Variant",
     "along_measured_motion",
+    "arriving",
     "balanced_states",
     "check_model",
     "check_variants",
     "compose",
+    "delay_at",
     "has_hidden_states",
+    "hold_at",
     "library",
     "load_effects",
     "load_model",
@@ -96,6 +105,7 @@ __all__ = [
     "model_named",
     "model_text",
     "names_in",
+    "names_reached",
     "neighbours",
     "offered",
     "parse",

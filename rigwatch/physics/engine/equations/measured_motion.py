@@ -22,14 +22,13 @@ wherever the state does, so the transformed model has no port for it; the workbe
 effect from the recording instead.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.equations.expression import names_in
 from rigwatch.physics.engine.equations.model import Input, Model, Output
-from rigwatch.physics.engine.equations.quantities import spelt_out
+from rigwatch.physics.engine.equations.quantities import names_reached, spelt_out
 from rigwatch.wire.errors import ModelError
 
 RATE_SUFFIX = "_rate"
@@ -124,21 +123,16 @@ def _outputs(model: Model) -> dict[str, Output]:
 
 def _with_unused_fixed(model: Model) -> Model:
     """Fix the parameters that are no longer used in any equation."""
-    used = _all_named(
-        [
-            *(state.derivative for state in model.states.values()),
-            *(output.expression for output in model.outputs.values()),
-        ]
-    )
+    texts = [
+        *(state.derivative for state in model.states.values()),
+        *(output.expression for output in model.outputs.values()),
+    ]
+    used = {name for text in texts for name in names_reached(model, text, "model")}
     parameters = {
         name: p if name in used else replace(p, fixed=True, kept=False)
         for name, p in model.parameters.items()
     }
     return replace(model, parameters=parameters)
-
-
-def _all_named(texts: Iterable[str]) -> set[str]:
-    return {name for text in texts for name in _named(text)}
 
 
 def _named(text: str) -> frozenset[str]:

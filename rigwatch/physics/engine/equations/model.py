@@ -12,8 +12,8 @@
 
 Numbers are given in the unit next to them (mm, bar, kN/mm) and converted to SI when read; equations
 compute in SI. `[quantities]` names expressions shared by equations. Equations refer to ports by
-name. A force port is a sum of effects, 0 without effects; an actuator port is its input as applied
-to the plant, and a sensor port is an output as read.
+name. A force port is a sum of effects, 0 without effects; an actuator port is its input, or a
+quantity, as applied to the plant, and a sensor port is an output as read.
 """
 
 import math
@@ -159,7 +159,9 @@ class Port(Section, frozen=True, kw_only=True):
 
     kind: Annotated[Literal["force", "actuator", "sensor"], Meta(description="how it enters")]
     unit: Annotated[str, Meta(description="unit of what effects add or change here")] = ""
-    signal: Annotated[str, Meta(description="input or output of an actuator or sensor port")] = ""
+    signal: Annotated[
+        str, Meta(description="input or quantity of an actuator port, output of a sensor port")
+    ] = ""
     passive: Annotated[
         bool, Meta(description="only effects driven by its variables enter, as through a leak")
     ] = False

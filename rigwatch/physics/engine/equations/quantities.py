@@ -5,7 +5,8 @@
     acceleration = { expression = "(push - c*v + load)/m", unit = "m/s^2" }
 
 They are not states: a quantity is replaced by its expression, and kernels compute common
-subexpressions once.
+subexpressions once. One that is the signal of an actuator port, such as the voltage that a
+controller computes, keeps its name, by which the port refers to it.
 """
 
 import re
@@ -15,7 +16,7 @@ from graphlib import CycleError, TopologicalSorter
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.equations.expression import check_size, names_in, renamed
-from rigwatch.physics.engine.equations.model import Model
+from rigwatch.physics.engine.equations.model import Hold, Input, Model, Output, Port, Quantity
 from rigwatch.physics.engine.equations.syntax_tree import LONGEST
 from rigwatch.wire.errors import ModelError
 
@@ -38,7 +39,7 @@ def in_order(model: Model) -> tuple[str, ...]:
 
 
 def spelt_out(model: Model) -> Model:
-    """The model with its quantities replaced by their expressions.
+    """The model with its quantities replaced by their expressions; signals of ports remain.
 
     Raises:
         ModelError: their definitions are circular, or the expanded text is too long.
@@ -66,7 +67,62 @@ def spelt_out(model: Model) -> Model:
         )
         for name, port in model.ports.items()
     }
-    return replace(model, states=states, outputs=outputs, ports=ports, quantities={})
+    signals = {port.signal for port in ports.values() if port.kind == "actuator"}
+    quantities = {
+        n: replace(q, expression=texts[n][1:-1])
+        for n, q in model.quantities.items()
+        if n in signals
+    }
+    return replace(model, states=states, outputs=outputs, ports=ports, quantities=quantities)
+
+
+def signals_at(model: Model, port: Port) -> dict[str, Input | Quantity | Output]:
+    """What may be the signal of an actuator or sensor port, by name."""
+    return {**model.inputs, **model.quantities} if port.kind == "actuator" else {**model.outputs}
+
+
+def arriving(model: Model, port: Port) -> str:
+    """The signal that arrives at an actuator or sensor port, as an expression."""
+    own = signals_at(model, port)[port.signal]
+    return port.signal if isinstance(own, Input) else own.expression
+
+
+def names_reached(model: Model, text: str, where: str) -> frozenset[str]:
+    """Names in an expression, and in the quantities at the actuator ports that it names."""
+    found, reached = names_in(text, where), frozenset[str]()
+    while found - reached:
+        ports = [model.ports[name] for name in found - reached if name in model.ports]
+        reached = found
+        texts = [arriving(model, port) for port in ports if port.kind == "actuator"]
+        found = found.union(*(names_in(each, where) for each in texts))
+    return found
+
+
+def hold_at(model: Model, port: Port) -> Hold:
+    """Hold of the signal at a port between samples.
+
+    At an actuator that of its input; a quantity is held if only held inputs enter it.
+    """
+    driving = _driving(model, port)
+    return "zero" if driving and all(model.held(n) == "zero" for n in driving) else "linear"
+
+
+def delay_at(model: Model, port: Port) -> float:
+    """Delay of held signals at a port, as a share of a sample; zero except at an actuator."""
+    return max((model.inputs[n].late for n in _driving(model, port)), default=0.0)
+
+
+def _driving(model: Model, port: Port) -> frozenset[str]:
+    """Inputs that alone determine the signal at an actuator; none if a state does, too."""
+    if port.kind != "actuator":
+        return frozenset()
+    if port.signal in model.inputs:
+        return frozenset({port.signal})
+    alone = spelt_out(model)
+    names = names_reached(alone, alone.quantities[port.signal].expression, "signal")
+    forces = {n for n, own in model.ports.items() if own.kind == "force"}
+    changing = {*model.states, *forces, "t"}
+    return frozenset() if names & changing else names & model.inputs.keys()
 
 
 def _spelt(text: str, texts: Mapping[str, str], where: str) -> str:

@@ -12,8 +12,8 @@ import sympy
 
 from rigwatch.physics.engine.equations.effect import Effect
 from rigwatch.physics.engine.equations.expression import names_in
-from rigwatch.physics.engine.equations.model import Input, Model, Output, Parameter, Port, State
-from rigwatch.physics.engine.equations.quantities import in_order, spelt_out
+from rigwatch.physics.engine.equations.model import Model, Parameter, Port, State
+from rigwatch.physics.engine.equations.quantities import hold_at, in_order, signals_at, spelt_out
 from rigwatch.physics.engine.equations.scope import Scope, symbol
 from rigwatch.wire.errors import ModelError
 
@@ -127,7 +127,7 @@ class _Composer:
 
     Inputs and states come first, then actuators, forces, equations and outputs, and finally
     sensors. Each is read in a scope that contains everything it may use. A quantity is added as
-    soon as everything that it uses is defined.
+    soon as everything that it uses is defined, and the actuator that it drives after it.
     """
 
     def __init__(self, model: Model, placements: tuple[Placement, ...]) -> None:
@@ -145,7 +145,7 @@ class _Composer:
 
     def system(self) -> System:
         self._join(self._known())
-        ports = self._entered("actuator") | self._entered("force")
+        ports = self._entered("actuator", "force")
         self._join(self._waiting)
         model_rates = {
             name: self._scope.read(state.derivative, f"({state.unit})/s", f"state {name}")
@@ -189,25 +189,44 @@ class _Composer:
             self._scope.define(name, meaning, own.shown or own.unit)
         self._waiting = [name for name in self._waiting if name not in names]
 
-    def _entered(self, kind: str) -> dict[str, sympy.Expr]:
-        """The ports of one kind with their effects; each is added to the scope."""
+    def _entered(self, *kinds: str) -> dict[str, sympy.Expr]:
+        """The ports of some kinds with their effects, in order of dependence."""
+        ports = self._model.ports
+        waiting = [name for kind in kinds for name, port in ports.items() if port.kind == kind]
         values = {}
-        for name, port in self._model.ports.items():
-            if port.kind == kind:
-                probe = symbol(PROBE + name) if kind != "sensor" else sympy.Integer(0)
-                self._variables[name] = self._port_variables(name, port)
-                values[name] = self._port_value(name, port) + probe
-                self._scope.define(name, values[name], self._port_unit(name, port))
-                self._join(self._known())
+        while waiting:
+            name = next((n for n in waiting if self._is_ready(ports[n], waiting)), waiting[0])
+            values[name] = self._enter(name, ports[name])
+            waiting.remove(name)
         return values
+
+    def _is_ready(self, port: Port, waiting: list[str]) -> bool:
+        """Whether all that a port's signal and variables use is defined."""
+        texts = [own.expression for own in port.variables.values()]
+        names = {port.signal}.union(*(names_in(text, "variable") for text in texts))
+        return not names & {*self._waiting, *waiting}
+
+    def _enter(self, name: str, port: Port) -> sympy.Expr:
+        """A port with its effects, added to the scope."""
+        probe = symbol(PROBE + name) if port.kind != "sensor" else sympy.Integer(0)
+        self._variables[name] = self._port_variables(name, port)
+        value = self._port_value(name, port) + probe
+        self._scope.define(name, value, self._port_unit(name, port))
+        self._join(self._known())
+        return value
 
     def _port_unit(self, name: str, port: Port) -> str:
         if port.kind == "force":
             return port.unit
-        table = self._model.inputs if port.kind == "actuator" else self._model.outputs
+        table = signals_at(self._model, port)
         if port.signal not in table:
             raise ModelError(
                 f"port {name}: found signal {port.signal!r}, expected one of {', '.join(table)}"
+            )
+        if port.signal in self._waiting:
+            raise ModelError(
+                f"port {name}: found signal {port.signal!r}, which depends on what enters at {name}"
+                " or at a port behind it, expected what does not"
             )
         return table[port.signal].unit
 
@@ -245,7 +264,8 @@ class _Composer:
             scope.define(name, meaning, port.variables[name].unit)
         if port.kind != "force":
             scope.define("u", arriving, unit)
-            scope.define(LEFT, symbol(UNTIL), "s")
+            held = port.kind == "sensor" or hold_at(self._model, port) == "zero"
+            scope.define(LEFT, symbol(UNTIL) if held else sympy.Integer(0), "s")
         self._adopt(placement)
         for name in (*placement.effect.parameters, *placement.effect.states):
             label = placement.prefix + name
@@ -288,9 +308,7 @@ class _Composer:
 def units_at(model: Model, name: str) -> dict[str, str]:
     """Units of a port as written, by the names that effects use in braces."""
     port = model.ports[name]
-    own: Port | Input | Output = port
-    if port.kind != "force":
-        own = model.inputs[port.signal] if port.kind == "actuator" else model.outputs[port.signal]
+    own = port if port.kind == "force" else signals_at(model, port)[port.signal]
     units = {"F" if port.kind == "force" else "u": own.shown or own.unit}
     units |= {name: v.shown or v.unit for name, v in port.variables.items()}
     # A distance is a speed times a time, even if no equation uses it.

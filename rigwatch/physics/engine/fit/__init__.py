@@ -4,7 +4,7 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 """
 
 from rigwatch.physics.engine.fit.decimation import Thinning
-from rigwatch.physics.engine.fit.effect_states import EffectStates, hold_at
+from rigwatch.physics.engine.fit.effect_states import EffectStates
 from rigwatch.physics.engine.fit.measured_recording import (
     motion_lateness,
     motion_recording,
@@ -45,7 +45,6 @@ __all__ = [
     "evaluate",
     "filled",
     "fit",
-    "hold_at",
     "initial_states",
     "joined",
     "motion_lateness",

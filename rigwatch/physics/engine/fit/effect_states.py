@@ -35,7 +35,7 @@ class EffectStates:
         effect: with states; its parameters remain parameters of the kernel, compiled once.
         signals: signals the effect may use, by name, each of shape (nodes,); may include time.
         spacing: between the nodes [s].
-        hold: hold of the signals between nodes, see `hold_at`.
+        hold: hold of the signals between nodes, see `equations.hold_at`.
         rows: number of nodes per change of a held signal.
         late: delay of held signals, as a share of the spacing.
     """
@@ -103,18 +103,6 @@ def _used(effect: Effect) -> set[str]:
     """Names in the equations of an effect's states."""
     texts = [state.derivative or state.update for state in effect.states.values()]
     return {name for text in texts for name in names_in(text, "state")}
-
-
-def hold_at(model: Model, port: str) -> Hold:
-    """Hold of the signals at a port between samples; at an actuator that of its input."""
-    place = model.ports[port]
-    return model.held(place.signal) if place.kind == "actuator" else "linear"
-
-
-def delay_at(model: Model, port: str) -> float:
-    """Delay of held signals at a port, as a share of a sample; zero except at an actuator."""
-    place = model.ports[port]
-    return model.inputs[place.signal].late if place.kind == "actuator" else 0.0
 
 
 def _alone(effect: Effect, inputs: list[str], hold: Hold, late: float) -> System:

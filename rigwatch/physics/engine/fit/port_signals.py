@@ -10,6 +10,7 @@ from rigwatch.physics.engine.equations import (
     TIME,
     Placement,
     System,
+    arriving,
 )
 from rigwatch.wire.arrays import FloatArray
 
@@ -38,17 +39,18 @@ def port_signals(  # noqa: PLR0917 -- they belong together
     known: Signals = {TIME: dt * np.arange(len(inputs), dtype=np.float64)}
     known |= dict(zip(system.states, states.T, strict=True))
     known |= dict(zip(system.model.inputs, inputs.T, strict=True))
-    for name, other in system.model.ports.items():
-        if other.kind != "sensor":
-            known[name] = known.get(other.signal, np.zeros(len(inputs)))
 
     def along(text: str) -> FloatArray:
         return evaluated(text, known, values, f"port {placement.port}")
 
+    # In the system's order each port comes after those that its signal depends on.
+    for name in system.ports:
+        other = system.model.ports[name]
+        if other.kind != "sensor":
+            force = other.kind == "force"
+            known[name] = np.zeros(len(inputs)) if force else along(arriving(system.model, other))
     found = {name: along(variable.expression) for name, variable in port.variables.items()}
     if port.kind != "force":
-        sensor = port.kind == "sensor"
-        text = system.model.outputs[port.signal].expression if sensor else port.signal
-        found["u"] = along(text)
+        found["u"] = along(arriving(system.model, port))
         found[RATE] = np.asarray(np.gradient(found["u"], dt), np.float64)
     return {TIME: known[TIME], **found}

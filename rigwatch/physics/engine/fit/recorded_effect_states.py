@@ -2,8 +2,8 @@
 
 The deflection of a contact or the position of a valve within its play is unknown at the first
 sample of a window, and the window may not determine it. It is computed from the signals at the
-effect's port since the start of the recording: exactly at an actuator, whose input is known;
-elsewhere as accurately as the channels measure the signals.
+effect's port since the start of the recording: exactly at the actuator of an input, which
+is known; elsewhere as accurately as the channels measure the signals.
 """
 
 from collections.abc import Mapping
@@ -16,9 +16,11 @@ from rigwatch.physics.engine.equations import (
     RATE,
     Placement,
     System,
+    delay_at,
+    hold_at,
     signal_order,
 )
-from rigwatch.physics.engine.fit.effect_states import EffectStates, delay_at, hold_at
+from rigwatch.physics.engine.fit.effect_states import EffectStates
 from rigwatch.physics.engine.fit.port_signals import Signals, port_signals
 from rigwatch.wire.arrays import FloatArray
 
@@ -84,7 +86,7 @@ class RecordedEffectStates:
 
     Attributes:
         columns: of the effect states.
-        exact: those at actuators, whose input is known.
+        exact: those at the actuators of inputs, which are known.
     """
 
     def __init__(
@@ -101,19 +103,20 @@ class RecordedEffectStates:
         self._placed = []
         for placement in (each for each in system.placements if each.effect.states):
             signals = port_signals(system, placement, inputs, states, dt, values)
+            port = system.model.ports[placement.port]
             own = EffectStates(
-                placement.effect, signals, dt, hold_at(system.model, placement.port),
-                late=delay_at(system.model, placement.port),
+                placement.effect, signals, dt, hold_at(system.model, port),
+                late=delay_at(system.model, port),
             )  # fmt: skip
             columns = [order.index(placement.prefix + name) for name in placement.effect.states]
             before = _before(system, placement)
             self._placed.append(_PlacedStates(placement, own, columns, signals, before))
-        kinds = {name: port.kind for name, port in system.model.ports.items()}
+        known = {n for n, port in system.model.ports.items() if port.signal in system.model.inputs}
         self.columns = [c for placed in self._placed for c in placed.columns]
         self.exact = [
             c
             for placed in self._placed
-            if kinds[placed.placement.port] == "actuator" and not placed.after_effect_with_states
+            if placed.placement.port in known and not placed.after_effect_with_states
             for c in placed.columns
         ]
 

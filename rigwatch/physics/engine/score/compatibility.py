@@ -3,7 +3,7 @@
 import re
 from string import Formatter
 
-from rigwatch.physics.engine.equations import LEFT, RATE, Effect, Model, Port, names_in
+from rigwatch.physics.engine.equations import LEFT, RATE, Effect, Model, Port, hold_at, names_in
 from rigwatch.physics.engine.score.candidates import Candidate
 
 
@@ -13,7 +13,7 @@ def suits(effect: Effect, port: Port, model: Model) -> bool:
         return False
     if effect.states and port.kind != "force" and not model.states:
         return False
-    if effect.sampled and port.kind == "actuator" and model.held(port.signal) != "zero":
+    if effect.sampled and port.kind == "actuator" and hold_at(model, port) != "zero":
         return False
     if port.passive and not _named(effect) & set(port.variables):
         return False

@@ -31,10 +31,11 @@ from rigwatch.physics.engine.equations import (
     TIME,
     UNTIL,
     System,
+    hold_at,
     parse,
     symbol,
 )
-from rigwatch.physics.engine.fit import EffectStates, hold_at
+from rigwatch.physics.engine.fit import EffectStates
 from rigwatch.physics.engine.score.candidates import Candidate
 from rigwatch.wire.arrays import BoolArray, FloatArray, IntArray
 from rigwatch.wire.kernel import kernel
@@ -98,7 +99,9 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
         pushes = np.stack([_push(at, c, seen[c.port]) for c in inner], axis=-1)
         columns = np.array([_probe_column(system, c.port) for c in inner])
         places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
-        held = np.array([hold_at(system.model, c.port) == "zero" for c in inner])
+        held = np.array(
+            [hold_at(system.model, system.model.ports[c.port]) == "zero" for c in inner]
+        )
         found[..., places] = _propagated(run, len(system.free), pushes, columns, held)
     for index, candidate in enumerate(candidates):
         if kinds[candidate.port] == "sensor":
@@ -153,7 +156,8 @@ def _signals(at: Trajectory, port_name: str) -> dict[str, FloatArray]:
         signals["u"] = _along(at, system.ports[port_name])
         signals[RATE] = np.gradient(signals["u"], at.run.spacing, axis=1)
         signals[STEP] = _step(signals["u"], at.run.substeps)
-        signals[LEFT] = _left(at)
+        held = port.kind == "sensor" or hold_at(system.model, port) == "zero"
+        signals[LEFT] = held * _left(at)
     return signals
 
 
@@ -200,7 +204,8 @@ def _memory(
     """
     more = ((0, 0), (0, at.run.substeps - 1))
     along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
-    hold = hold_at(at.compiled.system.model, candidate.port)
+    model = at.compiled.system.model
+    hold = hold_at(model, model.ports[candidate.port])
     states = EffectStates(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
     found = states.run(_neutral_values(candidate))
     windows, nodes = at.time.shape
