@@ -7,7 +7,7 @@ from msgspec import structs
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.model import Model, shipped_models
 from rigwatch.physics.engine.equations.system import compose
-from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.physics.engine.fit.recording import Recording, initial_states, joined
 from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.physics.engine.search.convergence import promise
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
@@ -99,6 +99,22 @@ def test_without_an_accelerometer_the_rate_of_the_position_is_balanced():
     seen = compile_system(compose(parse(SEEN_BY_POSITION, Model, "mass")))
     starts = equation_error_starts(seen, alone, np.ones(3))
     best = min(starts, key=lambda each: abs(each[0] - 1.0))
+    assert best == pytest.approx(PLANT.values, rel=0.1)
+
+
+def test_where_recordings_join_no_rate_of_change_is_made_up():
+    first, second = recorded(seed=1)[0], recorded(seed=2)[0]
+    peak = SAMPLES // 2 + int(np.argmax(first.outputs[SAMPLES // 2 :, 0]))
+    apart = [
+        Recording(DT, first.inputs[:peak], first.outputs[:peak, :1]),
+        Recording(DT, second.inputs, second.outputs[:, :1]),
+    ]
+    whole = joined(apart)
+    seen = compile_system(compose(parse(SEEN_BY_POSITION, Model, "mass")))
+    for one in (0, 1):
+        alone = initial_states(seen.system, apart[one])
+        np.testing.assert_array_equal(initial_states(seen.system, whole)[whole.slices[one]], alone)
+    best = min(equation_error_starts(seen, whole, np.ones(3)), key=lambda each: abs(each[0] - 1.0))
     assert best == pytest.approx(PLANT.values, rel=0.1)
 
 

@@ -15,6 +15,7 @@ from rigwatch.page.svg import Plot
 from rigwatch.workbench.explain.verdict_calibration import LATER_COUNTS, later_probability_wrong
 from rigwatch.workbench.report.html_report import gather
 from rigwatch.workbench.report.sections import headline
+from rigwatch.workbench.report.text_report import doubt_of
 from rigwatch.workbench.study.study import Study
 from tests.report.style import COLOURS, WORDS
 
@@ -131,6 +132,21 @@ def test_the_doubt_of_a_later_step_is_that_of_later_steps(study: Study) -> None:
     found = gather(study).explanation
     assert found.like_this == LATER_COUNTS
     assert found.wrong_probability == later_probability_wrong()
+
+
+@pytest.mark.parametrize(
+    ("probability", "cases", "said"),
+    [
+        (1e-5, (8, 0), "wrong below 0.1%: of 8 similar simulated cases 0 were wrong"),
+        (0.059, (15, 1), "wrong 5.9%: of 15 similar simulated cases 1 was wrong"),
+        (0.5, (0, 0), "no simulated case is similar"),
+    ],
+)
+def test_a_doubt_is_stated_no_finer_than_simulated_cases_support(
+    study: Study, probability: float, cases: tuple[int, int], said: str
+) -> None:
+    found = gather(study).explanation
+    assert said in doubt_of(replace(found, wrong_probability=probability, like_this=cases))
 
 
 def test_an_output_that_cannot_be_written(

@@ -105,17 +105,7 @@ def _in_words(found: Explanation) -> str:
 
 def doubt(state: State) -> str:
     """How often similar verdicts were wrong."""
-    found = state.explanation
-    if found is None:
-        return ""
-    cases, wrong = found.like_this
-    if found.wrong_probability is not None and cases:
-        were = "was" if wrong == 1 else "were"
-        return (
-            f"{wrong} of {cases} simulated cases like this {were} wrong"
-            f" (probability {found.wrong_probability:.1%})"
-        )
-    return doubt_of(found)
+    return doubt_of(state.explanation) if state.explanation else ""
 
 
 def candidates(state: State) -> list[Candidate]:

@@ -6,6 +6,7 @@ be white noise, gives a lower limit.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,8 @@ METHODS = {
 ALLOWED = {"periods": 1.1, "healthy": 1.1, "healthy motion": 1.05, "quiet band": 1.25}
 """Largest ratio of error to noise floor at which nothing remains to be explained, by method."""
 BANDS = 8
+SHORTEST = 64
+"""Valid samples of a recording from which its spectrum counts beside those of longer ones."""
 FEWEST_PERIODS = 3
 REPEATED = 2e-4
 """Mean square difference of an input one period later, relative to its own; rms 1 % of each."""
@@ -87,7 +90,7 @@ def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int
             return NoiseFloor(_between(series, samples // factor, count), "periods")
     rate = 1 / (recording.dt * factor)
     top = 0.38 if factor > 1 else 0.5
-    return NoiseFloor(np.array([_quiet(c, rate, top) for c in series.T]), "quiet band")
+    return NoiseFloor(np.array([_quiet([c], rate, top) for c in series.T]), "quiet band")
 
 
 def find_period(recording: Recording) -> int:
@@ -109,9 +112,14 @@ def _between(series: FloatArray, samples: int, count: int) -> FloatArray:
     return np.array([float(np.sqrt(v[k].mean())) for v, k in zip(variance.T, known.T, strict=True)])
 
 
-def _quiet(series: FloatArray, rate: float, top: float) -> float:
-    clean = series[np.isfinite(series)]
-    frequencies, density = welch(clean, rate, nperseg=min(256, max(len(clean) // 4, 8)))
+def _quiet(parts: Sequence[FloatArray], rate: float, top: float) -> float:
+    """Noise of a channel by its quietest band, of each recording: where they join, it steps."""
+    clean = [part[np.isfinite(part)] for part in parts]
+    clean = [part for part in clean if len(part) >= SHORTEST] or clean
+    length = min(256, max(min(map(len, clean)) // 4, 8))
+    found = [welch(part, rate, nperseg=length) for part in clean]
+    density = np.average([one for _, one in found], axis=0, weights=[len(part) for part in clean])
+    frequencies = found[0][0]
     inside = density[(frequencies > 0) & (frequencies <= top * rate)]
     levels = [float(np.mean(band)) for band in np.array_split(inside, BANDS) if band.size]
     return math.sqrt(min(levels) * rate / 2)
@@ -120,6 +128,11 @@ def _quiet(series: FloatArray, rate: float, top: float) -> float:
 def quiet_scale(recording: Recording) -> FloatArray:
     """Noise of each channel from its own quietest band, used as weight of the channel."""
     sizes = np.nanstd(recording.outputs, axis=0)
-    quiet = np.array([_quiet(c, 1 / recording.dt, 0.5) for c in recording.outputs.T])
+    quiet = np.array(
+        [
+            _quiet([channel[part] for part in recording.slices], 1 / recording.dt, 0.5)
+            for channel in recording.outputs.T
+        ]
+    )
     least: FloatArray = 1e-6 * np.where(sizes > 0, sizes, 1.0)
     return np.asarray(np.maximum(quiet, least), np.float64)

@@ -5,7 +5,7 @@ linearly between samples. Confusing the two shifts the input by half a sample, w
 slow sensor. The model is fitted with both, and with zero-order holds delayed by a fraction of a
 sample, as when the converter is written after the sensors are read. A hold other than linear
 requires an error that falls, over blocks, by more than chance, on held-out recordings if there are
-any.
+any, and in training: recordings that contradict each other show another defect of the model.
 
 A healthy recording is used if available, as a fault cannot be mistaken for a hold there.
 """
@@ -140,21 +140,28 @@ def _refined(try_late: "partial[_Tried]", kept: _Tried) -> _Tried | None:
             found[late] = try_late(late, start, kept.fitted)
         except ModelError:
             return float("inf")
-        return float(np.nanmean(block_errors(found[late].fitted.train)))
+        return _size(found[late])
 
     sizes = [size(late) for late in DELAYS]
     if not found:
         return None
     # If no coarse step improves the error, no fine one does.
-    if min(sizes) < float(np.nanmean(block_errors(kept.fitted.train))):
+    if min(sizes) < _size(kept):
         near = DELAYS[int(np.argmin(sizes))]
         ends = (max(near - 0.25, 1e-3), min(near + 0.25, 1.0))
         minimize_scalar(size, bounds=ends, method="bounded", options={"xatol": FINE})
-    return min(found.values(), key=lambda each: float(np.nanmean(block_errors(each.fitted.train))))
+    return min(found.values(), key=_size)
+
+
+def _size(tried: _Tried) -> float:
+    """Mean squared error over the blocks of the training."""
+    return float(np.nanmean(block_errors(tried.fitted.train)))
 
 
 def _better(one: _Tried, other: _Tried) -> bool:
-    """Whether the error falls by more than chance from the other to the one."""
+    """Whether the error falls by more than chance from the other to the one, in training too."""
+    if _size(one) > _size(other):
+        return False
     before = _blocks(other.fitted)
     fall = block_differences(other.fitted.held_out, one.fitted.held_out)
     spread = float(np.std(fall, ddof=1) / np.sqrt(len(fall))) if len(fall) > 1 else 0.0

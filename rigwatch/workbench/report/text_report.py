@@ -16,6 +16,9 @@ VERDICTS = {
     "model_inadequate": "the model is inadequate for this recording: no effect is named",
 }
 
+LEAST_DOUBT = 1e-3
+"""Smallest probability of being wrong that is stated: simulated cases support no smaller one."""
+
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of aligned columns; numbers are right-aligned."""
@@ -133,10 +136,10 @@ def doubt_of(found: Explanation) -> str:
         )
     if not cases:
         return "the probability of being wrong is unknown: no simulated case is similar to this one"
-    return (
-        f"probability of being wrong {found.wrong_probability:.1%}: of {cases} similar simulated"
-        f" cases {wrong} were wrong"
-    )
+    doubt = found.wrong_probability
+    stated = "below 0.1%" if doubt < LEAST_DOUBT else f"{doubt:.1%}"
+    were = f"{wrong} {'was' if wrong == 1 else 'were'} wrong"
+    return f"probability of being wrong {stated}: of {cases} similar simulated cases {were}"
 
 
 def _ranked(row: Row) -> list[str]:

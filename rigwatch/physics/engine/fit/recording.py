@@ -33,6 +33,12 @@ class Recording:
     def __len__(self) -> int:
         return len(self.inputs)
 
+    @property
+    def slices(self) -> list[slice]:
+        """Samples of each of the concatenated recordings."""
+        ends = np.cumsum(self.parts or (len(self),)).tolist()
+        return [slice(start, end) for start, end in zip([0, *ends], ends, strict=False)]
+
 
 @dataclass(frozen=True, eq=False)
 class Windows:
@@ -122,11 +128,17 @@ def initial_states(system: System, recording: Recording, smoothed: int = 11) -> 
         if state.measured in channels:
             found[:, index] = filled(channels[state.measured])
         elif state.rate_of in channels:
-            signal = filled(channels[state.rate_of])
-            width = min(smoothed, len(signal) - 1 + len(signal) % 2)
-            if width >= 5:
-                found[:, index] = savgol_filter(signal, width, 3, deriv=1, delta=recording.dt)
+            for part in recording.slices:
+                found[part, index] = _rate(channels[state.rate_of][part], smoothed, recording.dt)
     return found
+
+
+def _rate(channel: FloatArray, smoothed: int, dt: float) -> FloatArray:
+    """Rate of change over an odd number of samples; zeros for a channel too short for it."""
+    width = min(smoothed, len(channel) - 1 + len(channel) % 2)
+    if width < 5:
+        return np.zeros(len(channel))
+    return np.asarray(savgol_filter(filled(channel), width, 3, deriv=1, delta=dt))
 
 
 def shown_states(system: System) -> set[int]:

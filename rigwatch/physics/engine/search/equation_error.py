@@ -9,7 +9,7 @@ Identification, 1999, 7.3). Noise of the motion biases it, so it only provides i
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import sympy
@@ -25,7 +25,7 @@ from rigwatch.physics.engine.fit import (
     filled,
     initial_states,
 )
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 
 TARGET = "target_"
 WIDTHS = (7, 15, 41)
@@ -121,18 +121,32 @@ def _balances(system: System, recording: Recording, width: int) -> list[Balance]
         channel = state.measured if order == 1 else state.rate_of
         if channel in channels and _has(system.derivatives[name], system.free):
             signal = recording.outputs[:, channels[channel]]
-            target = _smooth(signal, width, order, recording.dt)
+            target = _smooth(signal, recording, width, order)
             found.append(_balance(system, name, system.derivatives[name], target, rate=True))
-    return found
+    inner = _inner(recording)
+    found = [replace(each, target=np.where(inner, each.target, np.nan)) for each in found]
+    return [each for each in found if np.any(np.isfinite(each.target))]
+
+
+def _inner(recording: Recording) -> BoolArray:
+    """Samples not next to a recording's ends, where smoothed rates are poor."""
+    edge, inner = max(WIDTHS), np.zeros(len(recording), bool)
+    for part in recording.slices:
+        inner[part.start + edge : part.stop - edge] = True
+    return inner
 
 
 def _has(expression: sympy.Expr, names: Sequence[str]) -> bool:
     return bool(expression.free_symbols & {symbol(name) for name in names})
 
 
-def _smooth(signal: FloatArray, width: int, order: int, dt: float) -> FloatArray:
+def _smooth(signal: FloatArray, recording: Recording, width: int, order: int) -> FloatArray:
     """A derivative of a signal; NaN next to gaps."""
-    made = savgol_filter(filled(signal), width, 3, deriv=order, delta=dt)
+    made = np.full(len(signal), np.nan)
+    for part in recording.slices:
+        if part.stop - part.start > 2 * width:
+            whole = filled(signal[part])
+            made[part] = savgol_filter(whole, width, 3, deriv=order, delta=recording.dt)
     gaps = np.convolve(~np.isfinite(signal), np.ones(width), "same") > 0.5
     return np.where(gaps, np.nan, made)
 
@@ -183,8 +197,6 @@ def _along(
             before = np.concatenate([signals[name][:1], signals[name][:-1]])
             seen[name] = 0.5 * (before + signals[name])
     good = np.flatnonzero(np.isfinite(balance.target))
-    edge = max(WIDTHS)
-    good = good[(good >= edge) & (good < len(balance.target) - edge)]
     rows = good[:: max(1, len(good) // MOST)]
     return {name: signal[rows] for name, signal in seen.items()}
 
