@@ -42,7 +42,7 @@ from rigwatch.wire.several_rigs import check_own, valid_rigs
 
 TURN = 0.005
 """Time from one turn to the next: samples wait for half of it on average [s]."""
-LOOK_EVERY = 0.05
+LOOK_EVERY = 0.1
 """Time from one look at a rig's commands, link and silence to the next [s]."""
 MOST_BLOCKS = 4
 """Blocks of one rig in a turn while it catches up, so that the others go on."""
