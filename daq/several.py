@@ -11,7 +11,7 @@ from pathlib import Path
 
 from daq.__main__ import acquire
 from daq.adapters import adapter_for
-from rigwatch.wire.bus import joined
+from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import (
     DAQ,
     Heartbeat,
@@ -28,17 +28,17 @@ from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.several_rigs import valid_rigs
 from rigwatch.wire.typed_files import Section
 
-TURN = 0.0125
+TURN = 0.03
 """Time from one reading of a device to the next: a sample waits for half of it on average [s]."""
 
 
-def work_of(path: Path) -> Work:
+def work_of(path: Path, links: SharedLinks) -> Work:
     """The acquisition of one rig."""
 
     def work(stop: threading.Event, pulse: RigPulse) -> None:
         config = load_rig(path)
         adapter = adapter_for(config.daq.device, config.channels)
-        with joined(config, "daq", stop, pulse.say) as bus:
+        with joined(config, "daq", stop, pulse.say, links) as bus:
             if bus is not None:
                 acquire(config, adapter, bus, stop, pulse, turn=TURN)
 
@@ -61,6 +61,8 @@ def run_several(paths: list[Path]) -> int:
     valid_rigs(paths)  # a wrong file is named by its rig's thread
     raise_priority(DAQ)
     prepare_for_real_time()
-    parts = [Part(str(path), work_of(path), partial(used, path)) for path in paths]
+    links = SharedLinks(len(paths))
+    parts = [Part(str(path), work_of(path, links), partial(used, path)) for path in paths]
     run_side_by_side(parts, Heartbeat("daq"), stop, set_at_hangup())
+    links.close()
     return 0

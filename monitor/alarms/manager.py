@@ -58,6 +58,7 @@ class AlarmManager:
         self._flood = FloodWatch()
         self._first_out = ""
         self._next: tuple[int, int] | None = None
+        self._due_ns: int | None = 0
         self._said: list[Announcement] = []
         self._changes: list[AlarmRecord] = []
 
@@ -98,9 +99,19 @@ class AlarmManager:
         and do not apply here.
         """
         self._advance(at.t_ns)
-        if self._alarm(name).active != active:
+        if self.holds(name) != active:
             self._set(name, at, active=active)
         return self._take_announcements()
+
+    def pass_to(self, t_ns: int) -> list[Announcement]:
+        """Process what is due by `t_ns` [ns], such as the end of a shelving."""
+        self._advance(t_ns)
+        return self._take_announcements()
+
+    def holds(self, name: str) -> bool:
+        """Whether the condition of `name` was last known to hold."""
+        known = self._alarms.get(name)
+        return known is not None and known.active
 
     def command(self, command: AlarmCommand, identity: Identity = NOT_PROVED) -> list[Announcement]:
         """Execute an operator's command, or return an event with the reason for its refusal.
@@ -110,6 +121,7 @@ class AlarmManager:
             identity: whether its user is proved by a signature.
         """
         self._advance(command.t_ns)
+        self._due_ns = 0
         found = addressed(command, self._alarms.values())
         why_not = refusal(command, found)
         if why_not:
@@ -138,6 +150,7 @@ class AlarmManager:
             records: the newest of each alarm.
             now_ns: Unix time; shelving ends at most one shelf life after it [ns].
         """
+        self._due_ns = 0
         for record in records:
             self._restore_one(record)
         if now_ns is not None:
@@ -186,6 +199,7 @@ class AlarmManager:
 
     def _set(self, name: str, at: Occasion, *, active: bool) -> None:
         """Set the condition of `name`."""
+        self._due_ns = 0
         alarm = self._alarm(name)
         alarm.active = active
         if not alarm.settings.enabled or alarm.shelved_until_ns:
@@ -280,7 +294,9 @@ class AlarmManager:
             self._set(ALARM_FLOOD, at, active=True)
 
     def _advance(self, to_ns: int) -> None:
-        """Process everything due by `to_ns` [ns]."""
+        """Process everything due by `to_ns` [ns]; looks for it only where something has changed."""
+        if self._due_ns is None or to_ns < self._due_ns:
+            return
         while due := [when for when in self._deadlines() if when[0] <= to_ns]:
             t_ns, name = min(due)
             if name == ALARM_FLOOD:
@@ -289,6 +305,7 @@ class AlarmManager:
                 self._end_series(self._alarms[name], t_ns)
             else:
                 self._unshelve(self._alarms[name], t_ns, _SHELF_TIME_OVER)
+        self._due_ns = min((when for when, _ in self._deadlines()), default=None)
 
     def _deadlines(self) -> list[tuple[int, str]]:
         shelved = [

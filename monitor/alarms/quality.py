@@ -6,13 +6,13 @@ row.
 """
 
 from collections import deque
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from monitor.alarms.debounce import is_zero
-from monitor.signals import Condition
+from monitor.signals import Condition, level
 from rigwatch.wire.messages import SampleBlock
 from rigwatch.wire.messages import quality_flags as quality
 
@@ -31,6 +31,14 @@ Flags = NDArray[np.uint8]
 @cache
 def _names(channel: str) -> tuple[tuple[int, str], ...]:
     return tuple((bit, f"{kind}.{channel}") for bit, kind in SENSOR_CONDITIONS.items())
+
+
+@lru_cache(maxsize=1024)
+def _none(n: int) -> Flags:
+    """No flag in n samples, read only."""
+    found = np.zeros(n, np.uint8)
+    found.setflags(write=False)
+    return found
 
 
 class SensorFlags:
@@ -52,7 +60,7 @@ class SensorFlags:
         """
         if block.boot != self._boot:
             self._boot, self._spikes = block.boot, {}
-        none, no_limit = np.zeros(len(block), np.uint8), np.full(len(block), np.nan)
+        none, no_limit = _none(len(block)), level(len(block), np.nan)
         conditions = []
         for channel in block.channels:
             if len(channel.quality) != len(block):

@@ -5,7 +5,7 @@ import numpy as np
 from monitor.clipping.flat_top import NEVER, judge_flat_tops, new_flat_tops, reset_flat_tops
 from monitor.decision import rules_for
 from monitor.model import RigModel
-from monitor.signals import SENSOR_CLIPPED, Admitted, Condition
+from monitor.signals import SENSOR_CLIPPED, Admitted, Condition, level
 
 
 class Clipping:
@@ -39,7 +39,7 @@ class Clipping:
             admitted.signals, admitted.good, self._chance, self._limit, self._state, score
         )
         kept = score[admitted.padding :]
-        none, limit = np.full(len(kept), -np.inf), np.full(len(kept), self._limit)
+        none, limit = level(len(kept), -np.inf), level(len(kept), float(self._limit))
         return tuple(
             Condition(
                 name,

@@ -17,7 +17,14 @@ import numpy as np
 from monitor.diagnosis.ranking_job import ask
 from monitor.model import RigModel
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.messages import PROBABLY_MISSING, Alarm, EstimateBlock, Event, SampleBlock
+from rigwatch.wire.messages import (
+    PROBABLY_MISSING,
+    Alarm,
+    Column,
+    EstimateBlock,
+    Event,
+    SampleBlock,
+)
 
 NAMED = ("departure", "dry_friction", "other_fault")
 """Alarms that request an explanation; stiction already has its name."""
@@ -108,9 +115,12 @@ class Explainer:
 
 def _needed(block: EstimateBlock) -> EstimateBlock:
     """The estimates that a ranking uses: all of them take several megabytes."""
-    columns = (column for column in block.columns if column.name == "change")
-    kept = tuple(replace(column, values=column.values.copy()) for column in columns)
-    return replace(block, columns=kept)
+    kept = tuple(
+        Column(column.name, column.unit, column.values.copy(), column.quality)
+        for column in block.columns
+        if column.name == "change"
+    )
+    return EstimateBlock(block.device, block.boot, block.seq, block.t_ns, kept)
 
 
 def _arrays(judged: Sequence[Judged], channels: Sequence[str]) -> tuple[FloatArray, FloatArray]:

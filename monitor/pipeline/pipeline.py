@@ -7,8 +7,6 @@ It uses no clock, bus or file, and every stage works sample by sample with carri
 samples give the same numbers to the last bit, live or in replay, for any division into blocks.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,10 +24,11 @@ from monitor.signals import (
     InertiaResidual,
     TransferResidual,
     above,
-    below,
+    level,
 )
 from monitor.signals import conditions as kinds
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
 
 PUBLISHED: tuple[tuple[str, str, int], ...] = (
@@ -54,6 +53,7 @@ PUBLISHED: tuple[tuple[str, str, int], ...] = (
     ("together", "", w.TOGETHER),
 )
 """Columns of an estimate block: name, unit, index in the kernel's output."""
+_NO_QUALITY = np.zeros(0, np.uint8)
 
 
 class Monitor:
@@ -118,7 +118,7 @@ class Monitor:
         result = self._result(block, admitted, out)
         reset = self._residual.reset[admitted.padding :]
         resets = above(kinds.MONITOR_RESET, reset, reset.astype(np.float64), 0.0)
-        return replace(result, conditions=(*result.conditions, resets, *clipping))
+        return Result(result.estimates, (*result.conditions, resets, *clipping))
 
     def _result(self, block: SampleBlock, admitted: Admitted, out: FloatArray) -> Result:
         kept = out[:, admitted.padding :]
@@ -128,7 +128,9 @@ class Monitor:
             boot=block.boot,
             seq=int(admitted.seq[admitted.padding]),
             t_ns=block.t_ns[len(block) - kept.shape[1] :],
-            columns=tuple(Column(name, unit, kept[k]) for name, unit, k in PUBLISHED),
+            columns=tuple(
+                [Column(name, unit, kept[k], _NO_QUALITY) for name, unit, k in PUBLISHED]
+            ),
         )
         return Result(estimates, self._conditions(kept, run, admitted.missing))
 
@@ -136,49 +138,69 @@ class Monitor:
         self, out: FloatArray, run: NDArray[np.int64], missing: int
     ) -> tuple[Condition, ...]:
         rules, decision = self.rules, self.model.decision
-        armed = out[w.ARMED_FLAG] > 0.0
-        verdict = out[w.VERDICT]
-        lost = np.zeros(out.shape[1])
-        lost[0] = missing
-        invalid = run.astype(np.float64)
-        sticks = verdict == w.STICKING
-        moving = ~armed | (out[w.SPEED_RMS] >= decision.least_velocity)
-        return (
-            above(
-                kinds.DEPARTURE,
-                armed & (out[w.DEVIATION] > rules.factor),
-                out[w.DEVIATION],
-                rules.factor,
-            ),
-            above(
-                kinds.DRY_FRICTION, armed & ((verdict == w.FRICTION) | sticks), out[w.THETA1], 0.0
-            ),
-            above(kinds.STICTION, armed & sticks, out[w.REST], 0.5),
-            above(kinds.OTHER_FAULT, armed & (verdict == w.OTHER), out[w.EXPLAINED], np.inf),
-            above(
-                kinds.EXCITATION_CHANGED,
-                armed & (verdict == w.NEW_EXCITATION),
-                out[w.MOVED_VOLTAGE],
-                0.1,
-            ),
-            above(
-                kinds.REFERENCE_LEARNT,
-                armed & (out[w.LEARNT_HERE] > 0.0),
-                out[w.LEARNT_HERE] / self.model.sample_rate,
-                0.0,
-            ),
-            below(kinds.NOT_OBSERVABLE, ~moving, out[w.SPEED_RMS], decision.least_velocity),
-            above(
-                kinds.ILL_CONDITIONED,
-                armed & (out[w.CONDITION] > decision.worst_condition),
-                out[w.CONDITION],
-                decision.worst_condition,
-            ),
-            above(kinds.GAP, lost != 0.0, lost, 0.0),
-            above(
-                kinds.SENSOR_INVALID, run > decision.longest_hold, invalid, decision.longest_hold
-            ),
+        n = out.shape[1]
+        flags = np.zeros((len(_FLAGS), n), np.uint8)
+        rules_of = (rules.factor, decision.least_velocity, decision.worst_condition)
+        _flag(out, run, missing, decision.longest_hold, *rules_of, flags)
+        lost = level(n, 0.0)
+        if missing:
+            lost = lost.copy()
+            lost[0] = missing
+        high = (rules.factor, 0.0, 0.5, np.inf, 0.1, 0.0, np.inf, decision.worst_condition)
+        rows = [*(out[k] for _, k in _FLAGS[:_GAP]), lost, run.astype(np.float64)]
+        rows[_LEARNT] = rows[_LEARNT] / self.model.sample_rate
+        highs = (*high, 0.0, float(decision.longest_hold))
+        below = [-np.inf] * len(_FLAGS)
+        below[_STANDS] = decision.least_velocity
+        return tuple(
+            Condition(name, flag, value, level(n, float(low)), level(n, float(limit)))
+            for (name, _), flag, value, low, limit in zip(
+                _FLAGS, flags, rows, below, highs, strict=True
+            )
         )
+
+
+_FLAGS: tuple[tuple[str, int], ...] = (
+    (kinds.DEPARTURE, w.DEVIATION),
+    (kinds.DRY_FRICTION, w.THETA1),
+    (kinds.STICTION, w.REST),
+    (kinds.OTHER_FAULT, w.EXPLAINED),
+    (kinds.EXCITATION_CHANGED, w.MOVED_VOLTAGE),
+    (kinds.REFERENCE_LEARNT, w.LEARNT_HERE),
+    (kinds.NOT_OBSERVABLE, w.SPEED_RMS),
+    (kinds.ILL_CONDITIONED, w.CONDITION),
+    (kinds.GAP, -1),
+    (kinds.SENSOR_INVALID, -1),
+)
+"""Conditions in the order of `_flag`, each with the output that is judged."""
+_LEARNT, _STANDS, _GAP = 5, 6, 8
+
+
+@kernel()
+def _flag(  # noqa: PLR0917
+    out: FloatArray,
+    run: NDArray[np.int64],
+    missing: int,
+    longest_hold: int,
+    factor: float,
+    least_velocity: float,
+    worst_condition: float,
+    flags: NDArray[np.uint8],
+) -> None:
+    """Where each of the conditions `_FLAGS` holds, shape (10, n)."""
+    for i in range(out.shape[1]):
+        armed, verdict = out[w.ARMED_FLAG, i] > 0.0, out[w.VERDICT, i]
+        sticks = verdict == w.STICKING
+        flags[0, i] = armed and out[w.DEVIATION, i] > factor
+        flags[1, i] = armed and (sticks or verdict == w.FRICTION)
+        flags[2, i] = armed and sticks
+        flags[3, i] = armed and verdict == w.OTHER
+        flags[4, i] = armed and verdict == w.NEW_EXCITATION
+        flags[5, i] = armed and out[w.LEARNT_HERE, i] > 0.0
+        flags[6, i] = armed and not out[w.SPEED_RMS, i] >= least_velocity
+        flags[7, i] = armed and out[w.CONDITION, i] > worst_condition
+        flags[8, i] = i == 0 and missing != 0
+        flags[9, i] = run[i] > longest_hold
 
 
 def _arming_rules(model: RigModel) -> ReferenceRules:

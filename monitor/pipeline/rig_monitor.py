@@ -147,7 +147,7 @@ def _silenced(condition: Condition, wrong: BoolArray) -> Condition:
     """The condition, inactive while the wiring is wrong; conditions of samples are unchanged."""
     if condition.name.partition(".")[0] in OF_SAMPLES:
         return condition
-    return replace(condition, active=np.where(wrong, 0, condition.active).astype(np.uint8))
+    return condition._replace(active=np.where(wrong, 0, condition.active).astype(np.uint8))
 
 
 def scheme_of(model: RigModel) -> Monitor | ObserverMonitor:

@@ -6,10 +6,10 @@ commands ─▶ alarms ─┘          link, silence, losses ─▶ alarms
 
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from monitor.alarms import AlarmJournal, Announcement, just_returned
+from monitor.alarms import AlarmJournal, Announcement, Occasion, just_returned
 from monitor.detectors import FRICTION, detectors_of
 from monitor.diagnosis import Explainer
 from monitor.model import RigModel, load_model
@@ -140,19 +140,23 @@ class MonitorProcess:
         for event in self._explainer.results():
             self.bus.publish(EVENTS, event)
         seen = self._seen()
-        for name, occasion, holds in self._links.reports(seen):
-            self.say(self.rig.alarms.report(name, occasion, active=holds))
-        unjudged = self._delivered_s - self._estimated_s
-        for name, occasion, holds in device_reports(seen, self._daq, unjudged, self._unsuitable):
-            self.say(self.rig.alarms.report(name, occasion, active=holds))
-        failure = self._journal.failure if self._journal else ""
-        recorder_there = self._recorder_presence.holds(time.monotonic())
-        for name, occasion, holds in disk_reports(seen, self._recorder, recorder_there, failure):
-            self.say(self.rig.alarms.report(name, occasion, active=holds))
+        self.say(self.rig.alarms.pass_to(seen.t_ns))
+        for name, occasion, holds in self._reports(seen):
+            if self.rig.alarms.holds(name) != holds:
+                self.say(self.rig.alarms.report(name, occasion, active=holds))
         self._announce_router(seen)
         self._announce_clock_step(seen)
         if self._health.is_due(seen.monotonic_ns):
             self._tell_health(seen)
+
+    def _reports(self, seen: Seen) -> Iterator[tuple[str, Occasion, bool]]:
+        """Name, occasion and state of the alarms that no sample raises."""
+        yield from self._links.reports(seen)
+        unjudged = self._delivered_s - self._estimated_s
+        yield from device_reports(seen, self._daq, unjudged, self._unsuitable)
+        failure = self._journal.failure if self._journal else ""
+        recorder_there = self._recorder_presence.holds(time.monotonic())
+        yield from disk_reports(seen, self._recorder, recorder_there, failure)
 
     def _announce_router(self, seen: Seen) -> None:
         """Report to subscribers that the router was unavailable."""

@@ -3,9 +3,10 @@
     rigs ──turn──▶ every sample that has come since ─▶ judged together ─▶ estimates, alarms
 
 Most of the cost of a sample is that of a call, and results do not depend on how samples are divided
-into blocks: the samples of a turn are judged as one block. Under load turns get longer, blocks with
-them, and a sample costs less. A rig joins when its files are right and its router answers; one that
-fails is left alone for a while and starts anew, as its process would.
+into blocks: the samples of a turn are judged as one block. A turn is short, since daq has already
+waited for a block; a rig of which nothing came costs a look at its queue. Under load turns get
+longer, blocks with them, and a sample costs less. A rig joins when its files are right and its
+router answers; one that fails is left alone for a while and starts anew, as its process would.
 """
 
 import contextlib
@@ -16,6 +17,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from monitor.model import RigModel
@@ -24,7 +26,7 @@ from monitor.process.loop import (
     MonitorProcess,
     prepared,
 )
-from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus import Bus, SharedLinks, connect
 from rigwatch.wire.delivery import Item
 from rigwatch.wire.errors import RigwatchError, line_about
 from rigwatch.wire.host import (
@@ -38,8 +40,10 @@ from rigwatch.wire.messages import SampleBlock, pieces
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.several_rigs import check_own, valid_rigs
 
-TURN = 0.025
+TURN = 0.005
 """Time from one turn to the next: samples wait for half of it on average [s]."""
+LOOK_EVERY = 0.1
+"""Time from one look at a rig's commands, link and silence to the next [s]."""
 MOST_BLOCKS = 4
 """Blocks of one rig in a turn while it catches up, so that the others go on."""
 FIRST_PAUSE, LONGEST_PAUSE = 1.0, 30.0
@@ -77,6 +81,7 @@ class Seat:
         self._joined: queue.SimpleQueue[Joined] = queue.SimpleQueue()
         self._pause, self._again_at = FIRST_PAUSE, float("inf")
         self._before = 0
+        self._look_at = 0.0
         self._connect()
 
     @property
@@ -101,13 +106,20 @@ class Seat:
             self._fail(error)
 
     def _work(self, process: MonitorProcess) -> None:
+        now = time.monotonic()
+        if not self._due and not len(process.reader) and now < self._look_at:
+            return
         if not self._due:
             self._due.extend(_divided(process.reader.read(0.0)))
         for _ in range(min(MOST_BLOCKS, len(self._due))):
             process.take(self._due.popleft())
-        if not self._due:  # only then all that was read has been judged
-            process.look_around()
-            self._pause = FIRST_PAUSE
+        if self._due:  # only afterwards all that was read has been judged
+            return
+        if now < self._look_at:
+            process.keep_position()
+            return
+        process.look_around()
+        self._look_at, self._pause = now + LOOK_EVERY, FIRST_PAUSE
 
     def _connect(self) -> None:
         """Read the rig's files and wait for its router in a thread: it may never answer."""
@@ -191,12 +203,14 @@ def run_several(paths: list[Path]) -> int:
     raise_priority(MONITOR)
     heartbeat = Heartbeat("monitor")
     prepare_for_real_time()
-    seats = [Seat(path, _log.warning) for path in paths]
+    links = SharedLinks(len(paths))
+    seats = [Seat(path, _log.warning, partial(connect, links=links)) for path in paths]
     heartbeat.ready()
     take_turns(seats, stop, heartbeat)
     heartbeat.stopping()
     for seat in seats:
         seat.close()
+    links.close()
     return 0
 
 

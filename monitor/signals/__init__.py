@@ -25,6 +25,7 @@ from monitor.signals.conditions import (
     Condition,
     above,
     below,
+    level,
 )
 from monitor.signals.inertia import InertiaResidual, commission_inertia
 from monitor.signals.recordings import Recording, Role, joined
@@ -75,6 +76,7 @@ __all__ = [
     "commission_inertia",
     "conditions",
     "joined",
+    "level",
     "modelled_acceleration",
     "usable",
 ]

@@ -14,7 +14,17 @@ from numpy.typing import NDArray
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
-from rigwatch.wire.messages import NON_FINITE, SATURATED, SPIKE, STALE, Column, SampleBlock, valid
+from rigwatch.wire.messages import (
+    NON_FINITE,
+    SATURATED,
+    SPIKE,
+    STALE,
+    ByteArray,
+    Column,
+    SampleBlock,
+    quality_flags,
+    valid,
+)
 
 LARGEST = 1e9
 """Magnitude in SI units that no signal of a rig has; a larger reading is none."""
@@ -22,6 +32,8 @@ GOOD, HELD, DEAD, RESTART, NEW_BOOT = 0, 1, 2, 3, 4
 """Codes: good; held; nothing to feed; good after a dead stretch; good and the first of a new boot.
 """
 
+INVALID, POSITION_INVALID = quality_flags.INVALID, STALE | SATURATED | NON_FINITE | SPIKE
+"""Flags that make a reading invalid, and a position: that it is constant may be stiction."""
 JUMP = 2.5
 """Deviation of a device's clock from its sample numbers that is a jump [periods]."""
 PROVEN = 16
@@ -98,11 +110,11 @@ class Admission:
             self._run[0] = self._hold + max(missing, 1)
         values, good = self._columns(block, seen, padding)
         broken = np.zeros(len(values), np.bool_)
-        broken[padding:] = self._clock_breaks(block.device_us[seen:], missing, new_boot)
-        code = np.empty(len(values), np.int64)
-        run = np.empty(len(values), np.int64)
-        needed_good = np.asarray(good[:, self._needed].all(axis=1))
-        _classify(values, good, needed_good, broken, self._last, self._run, self._hold, code, run)
+        clock = np.array([missing, new_boot, self._us, self._even], np.int64)
+        _find_breaks(block.device_us[seen:], self._period_us, clock, broken[padding:])
+        self._us, self._even = int(clock[2]), int(clock[3])
+        code, run = np.empty((2, len(values)), np.int64)
+        _classify(values, good, self._needed, broken, self._last, self._run, self._hold, code, run)
         self._fresh = self._fresh or new_boot
         self._mark_new_boot(code)
         missing = -1 if new_boot and self._boot is not None else missing
@@ -112,23 +124,6 @@ class Admission:
         seq = np.arange(first, first + len(values), dtype=np.int64)
         valid_position = position_valid.astype(np.uint8)
         return Admitted(values, code, valid_position, seq, padding, missing, run, good)
-
-    def _clock_breaks(self, device_us: Codes, missing: int, new_boot: bool) -> NDArray[np.bool_]:
-        """Where the device's clock does not follow the sample numbers, as it did before."""
-        steps = np.diff(device_us, prepend=self._us)
-        expected = np.full(len(steps), self._period_us)
-        expected[0] *= missing + 1
-        even = np.abs(steps - expected) <= JUMP * self._period_us
-        even[0] &= not new_boot
-        self._us = int(device_us[-1])
-        broken = np.zeros(len(steps), np.bool_)
-        if not self._period_us or even.all():
-            self._even += len(steps)
-            return broken
-        for k, follows in enumerate(even):
-            broken[k] = not follows and self._even >= PROVEN and not (k == 0 and new_boot)
-            self._even = self._even + 1 if follows else 0
-        return broken
 
     def _mark_new_boot(self, code: Codes) -> None:
         """The first good sample of a boot restarts more than the filters."""
@@ -142,13 +137,45 @@ class Admission:
     ) -> tuple[FloatArray, NDArray[np.bool_]]:
         n = len(block) - seen + padding
         values = np.zeros((n, len(self._channels)))
-        good = np.zeros((n, len(self._channels)), np.bool_)
+        flags = np.zeros(values.shape, np.uint8)
         for place, name in enumerate(self._channels):
             column = block.channel(name)
             values[padding:, place] = column.values[seen:]
-            good[padding:, place] = usable(column, stuck_counts=place != 1)[seen:]
-        values[~good] = 0.0
+            if column.quality.size:
+                flags[padding:, place] = column.quality[seen:]
+        good = np.zeros(values.shape, np.bool_)
+        _find_good(values, flags, padding, good)
         return values, good
+
+
+@kernel()
+def _find_good(values: FloatArray, flags: ByteArray, padding: int, good: NDArray[np.bool_]) -> None:
+    """Mark the readings that `usable` accepts, and set the others to 0."""
+    for k in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            bad = flags[k, c] & (POSITION_INVALID if c == 1 else INVALID)
+            good[k, c] = k >= padding and bad == 0 and abs(values[k, c]) <= LARGEST
+            if not good[k, c]:
+                values[k, c] = 0.0
+
+
+@kernel()
+def _find_breaks(device_us: Codes, period: float, clock: Codes, broken: NDArray[np.bool_]) -> None:
+    """Mark where the device's clock does not follow the sample numbers, as it did before.
+
+    `clock` holds the samples missing before the block and whether a boot begins with it, and
+    carries the clock's last value [µs] and the number of even steps before it.
+    """
+    for k in range(device_us.size):
+        expected = period * (clock[0] + 1) if k == 0 else period
+        first = k == 0 and clock[1] != 0
+        follows = not first and abs(device_us[k] - clock[2] - expected) <= JUMP * period
+        clock[2] = device_us[k]
+        if period > 0.0 and not follows:
+            broken[k] = clock[3] >= PROVEN and not first
+            clock[3] = 0
+        else:
+            clock[3] += 1
 
 
 def usable(column: Column, stuck_counts: bool) -> NDArray[np.bool_]:
@@ -158,14 +185,14 @@ def usable(column: Column, stuck_counts: bool) -> NDArray[np.bool_]:
         return finite
     if stuck_counts:
         return np.asarray(finite & valid(column.quality))
-    return np.asarray(finite & ((column.quality & (STALE | SATURATED | NON_FINITE | SPIKE)) == 0))
+    return np.asarray(finite & ((column.quality & POSITION_INVALID) == 0))
 
 
 @kernel()
 def _classify(  # noqa: PLR0917
     values: FloatArray,
     good: NDArray[np.bool_],
-    needed_good: NDArray[np.bool_],
+    needed: NDArray[np.bool_],
     broken: NDArray[np.bool_],
     last: FloatArray,
     run: Codes,
@@ -178,8 +205,11 @@ def _classify(  # noqa: PLR0917
         if broken[k]:
             run[0] = longest_hold + 1
         was = run[0]
-        run[0] = 0 if needed_good[k] else was + 1
-        if needed_good[k]:
+        all_good = True
+        for c in range(last.size):
+            all_good &= good[k, c] or not needed[c]
+        run[0] = 0 if all_good else was + 1
+        if all_good:
             code[k] = RESTART if was > longest_hold else GOOD
         else:
             code[k] = HELD if run[0] <= longest_hold else DEAD

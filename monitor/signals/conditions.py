@@ -5,6 +5,8 @@ delayed, held or latched here; `monitor.alarms` does that.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,8 +122,7 @@ CONDITION_KINDS: tuple[ConditionKind, ...] = (
 )
 
 
-@dataclass(frozen=True)
-class Condition:
+class Condition(NamedTuple):
     """One condition over a block of n samples.
 
     Args:
@@ -142,18 +143,22 @@ class Condition:
 def above(
     name: str, active: NDArray[np.bool_], value: NDArray[np.float64], high: float
 ) -> Condition:
-    """A condition that holds above an upper limit."""
+    """A condition that holds above an upper limit; its arrays are read only."""
     n = active.size
-    return Condition(
-        name, active.astype(np.uint8), value.copy(), np.full(n, -np.inf), np.full(n, float(high))
-    )
+    return Condition(name, active.view(np.uint8), value, level(n, -np.inf), level(n, float(high)))
 
 
 def below(
     name: str, active: NDArray[np.bool_], value: NDArray[np.float64], low: float
 ) -> Condition:
-    """A condition that holds below a lower limit."""
+    """A condition that holds below a lower limit; its arrays are read only."""
     n = active.size
-    return Condition(
-        name, active.astype(np.uint8), value.copy(), np.full(n, low), np.full(n, np.inf)
-    )
+    return Condition(name, active.view(np.uint8), value, level(n, float(low)), level(n, np.inf))
+
+
+@lru_cache(maxsize=1024)
+def level(n: int, value: float) -> NDArray[np.float64]:
+    """The same limit for n samples, read only: blocks of a rig have few lengths and limits."""
+    found = np.full(n, value)
+    found.setflags(write=False)
+    return found

@@ -38,6 +38,11 @@ class RigState:
     alarms: tuple[Alarm, ...] = ()
     figures: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def reachable(self) -> bool:
+        """Whether its router answers."""
+        return self.rank != UNREACHABLE
+
 
 def unreachable(rig: str, config: str, why: str) -> RigState:
     """The state of a rig of which nothing is known."""

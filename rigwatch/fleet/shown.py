@@ -50,17 +50,17 @@ def as_page(states: Sequence[RigState], every_s: float = 0.0) -> str:
         states: the worst first.
         every_s: time after which a browser loads the page again [s]; 0 for never.
     """
-    return page(__package__, "fleet.html", every_s=every_s, **_values(states))
+    return page(__package__, "fleet.html", every_s=every_s, live=False, **_values(states))
 
 
 def as_live_page(states: Sequence[RigState]) -> str:
-    """The same as a page that follows the server; style and code come from there."""
-    return page(__package__, "live.html", **_values(states))
+    """The same as a page that follows the server, with links to the rigs' dashboards there."""
+    return page(__package__, "live.html", live=True, **_values(states))
 
 
 def as_part(states: Sequence[RigState]) -> str:
     """What changes in a live page: everything below its head."""
-    return page(__package__, "rigs.html", **_values(states))
+    return page(__package__, "rigs.html", live=True, **_values(states))
 
 
 def _values(states: Sequence[RigState]) -> dict[str, object]:

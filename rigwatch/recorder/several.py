@@ -8,18 +8,18 @@ from functools import partial
 from pathlib import Path
 
 from rigwatch.recorder.process import PROCESS, describe_run, process_name, record
-from rigwatch.wire.bus import joined
+from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import Heartbeat, Part, RigPulse, Work, run_side_by_side, set_at_hangup
 from rigwatch.wire.rig_config import load_rig, rig_text
 from rigwatch.wire.several_rigs import valid_rigs
 
 
-def work_of(path: Path, notes: str, folders: dict[Path, Path]) -> Work:
+def work_of(path: Path, notes: str, folders: dict[Path, Path], links: SharedLinks) -> Work:
     """The recording of one rig; it writes its session's folder into `folders` at its end."""
 
     def work(stop: threading.Event, pulse: RigPulse) -> None:
         config = load_rig(path)
-        with joined(config, process_name(config), stop, pulse.say) as bus:
+        with joined(config, process_name(config), stop, pulse.say, links) as bus:
             if bus is not None:
                 run = describe_run(path, config, notes)
                 folders[path] = record(config, run, bus, stop, pulse)
@@ -41,6 +41,10 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
     """
     folders: dict[Path, Path] = {}
     valid_rigs(paths)  # a wrong file is named by its rig's thread
-    parts = [Part(str(path), work_of(path, notes, folders), partial(used, path)) for path in paths]
+    links = SharedLinks(len(paths))
+    parts = [
+        Part(str(path), work_of(path, notes, folders, links), partial(used, path)) for path in paths
+    ]
     run_side_by_side(parts, Heartbeat(PROCESS), stop, set_at_hangup())
+    links.close()
     return [folders[path] for path in paths if path in folders]

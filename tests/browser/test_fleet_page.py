@@ -102,8 +102,32 @@ def test_the_page_is_accessible_with_and_without_alarms(
         assert page.violations(dark=dark) == []
 
 
+def opened(page: Page, path: str) -> tuple[str, str]:
+    """The address and the text of a page to which the served one leads."""
+    head = {"authorization": page.served.bearer}
+    with urllib.request.urlopen(
+        urllib.request.Request(page.served.address + path, headers=head)
+    ) as found:
+        return found.url, found.read().decode()
+
+
+def test_a_click_on_a_rig_opens_its_own_dashboard(page: Page, rigs: dict[str, Rig]) -> None:
+    until(page, rigs, ["away", "left", "right"])
+    link = "return document.getElementById('to-left')"
+    assert page.run(f"{link}.pathname") == "/dashboard/left"
+    assert page.run(f"{link}.target") == "_blank"
+    first, text = opened(page, "/dashboard/left")
+    assert not first.startswith(page.served.address)
+    assert "rerun" in text.lower()
+    assert opened(page, "/dashboard/left")[0] == first  # it goes on
+    for rig, status in (("away", 503), ("nobody", 404)):
+        with pytest.raises(urllib.error.HTTPError, match=str(status)) as refused:
+            opened(page, f"/dashboard/{rig}")
+        assert refused.value.read().decode().count("\n") == 1
+
+
 def test_without_the_token_nobody_sees_the_rigs(page: Page) -> None:
-    for path in ("/", "/events"):
+    for path in ("/", "/events", "/dashboard/left"):
         with pytest.raises(urllib.error.HTTPError, match="403"):
             urllib.request.urlopen(page.served.address + path)
 

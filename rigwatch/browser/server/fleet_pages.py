@@ -9,14 +9,15 @@ import msgspec
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, Response
+from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from rigwatch.browser.server.access import Access, Guard
 from rigwatch.browser.server.application import STATIC, style
 from rigwatch.browser.server.event_streams import STILL_HERE, event, event_stream
-from rigwatch.fleet import RigState, as_live_page, as_part, summary
+from rigwatch.fleet import Dashboards, RigState, as_live_page, as_part, summary
+from rigwatch.wire.errors import RigwatchError
 
 BETWEEN = 2.0
 """Time between two looks at the rigs [s]."""
@@ -33,6 +34,7 @@ class FleetPages:
 
     Attributes:
         states: as last seen.
+        dashboards: of single rigs, those that were opened.
         stopping: set when the server is about to stop.
     """
 
@@ -40,6 +42,7 @@ class FleetPages:
         self.states: list[RigState] = []
         self.stopping = asyncio.Event()
         self._look = look
+        self.dashboards = Dashboards()
         self._news = asyncio.Condition()
 
     async def follow(self) -> None:
@@ -73,6 +76,7 @@ def fleet_application(pages: FleetPages, access: Access) -> Starlette:
         following = asyncio.create_task(pages.follow())
         yield
         following.cancel()
+        pages.dashboards.close()
 
     async def fleet_page(_: Request) -> Response:
         return HTMLResponse(as_live_page(pages.states), headers={"cache-control": "no-store"})
@@ -80,8 +84,21 @@ def fleet_application(pages: FleetPages, access: Access) -> Starlette:
     async def events(request: Request) -> Response:
         return event_stream(request, pages.events())
 
+    async def dashboard(request: Request) -> Response:
+        wanted = request.path_params["rig"]
+        state = next((state for state in pages.states if state.rig == wanted), None)
+        if state is None:
+            return PlainTextResponse(f"rigwatch: {wanted}: no such rig here\n", 404)
+        if not state.reachable:
+            return PlainTextResponse(f"rigwatch: {wanted}: {state.state}\n", 503)
+        try:
+            return RedirectResponse(await asyncio.to_thread(pages.dashboards.address, state), 303)
+        except RigwatchError as error:
+            return PlainTextResponse(f"{error}\n", 503)
+
     routes = [
         Route("/", fleet_page),
+        Route("/dashboard/{rig:path}", dashboard),
         Route("/events", events),
         Route("/static/page.css", style),
         Mount("/static", StaticFiles(directory=STATIC)),

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.errors import ConfigError, RigwatchError
 
 if TYPE_CHECKING:
     from rigwatch.dashboard.board import Facts
@@ -25,6 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("auto", "native", "web", "connect", "headless"),
         help="kind of viewer; default: dashboard.viewer of the configuration",
     )
+    help_ = "port of the page of the viewer `web`, whose data then take a free one; default: "
+    parser.add_argument(
+        "--port", type=int, metavar="PORT", help=help_ + "dashboard.web_port and grpc_port"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -33,14 +37,20 @@ def run(arguments: argparse.Namespace) -> int:
     from rigwatch.wire.rig_config import DashboardSection, load_rig
 
     config = load_rig(arguments.config)
+    if arguments.port is not None and not 0 < arguments.port <= 65535:
+        raise RigwatchError(f"--port: found {arguments.port}, expected 1 to 65535")
     require_rerun()
     # Plain messages replace Rerun's own lines about a lost viewer.
     os.environ.setdefault("RUST_LOG", "off")
+    from msgspec.structs import replace
+
     from rigwatch.dashboard.process import LiveDashboard
     from rigwatch.wire.bus import connect
-    from rigwatch.wire.host import set_at_signal
+    from rigwatch.wire.host import free_port, set_at_signal
 
     settings = config.dashboard or DashboardSection()
+    if arguments.port is not None:
+        settings = replace(settings, web_port=arguments.port, grpc_port=free_port())
     bus = connect(config, "dashboard")
     choice = arguments.viewer or settings.viewer
     live = LiveDashboard(bus, settings, choice, _say_json if arguments.json else _say)

@@ -12,7 +12,13 @@ from rigwatch.wire.bus.alarm_list import ask_alarm_list, serve_alarm_list
 from rigwatch.wire.bus.bus import Bus, unique_process
 from rigwatch.wire.bus.command_check import CommandCheck, Verdict, command_mark, proved_here
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
-from rigwatch.wire.bus.connection import connect, joined, log_refusals, open_router
+from rigwatch.wire.bus.connection import (
+    SharedLinks,
+    connect,
+    joined,
+    log_refusals,
+    open_router,
+)
 from rigwatch.wire.bus.model_change import KEY, PATIENCE, ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
@@ -34,6 +40,7 @@ __all__ = [
     "ModelRequest",
     "Place",
     "RingQuestions",
+    "SharedLinks",
     "Subscription",
     "Verdict",
     "ask_alarm_list",

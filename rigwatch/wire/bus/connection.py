@@ -6,6 +6,7 @@ Zenoh is slow to import and not needed for a bus in memory, so it is imported on
 import contextlib
 import threading
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 from rigwatch.wire.access import (
     access_settings,
@@ -19,11 +20,69 @@ from rigwatch.wire.bus.transport import Close
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.rig_config import RigConfig
 
+if TYPE_CHECKING:
+    from rigwatch.wire.bus.zenoh_transport import ZenohTransport
+
 ATTEMPT = 2.0
 """Longest that `joined` waits for a router before it looks at its event [s]."""
+RINGS_MEGABYTES, LEAST_RING = 64.0, 4.0
+"""Rings of the rigs of one process: of all together, and of each at least [MB]."""
 
 
-def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bus:
+class SharedLinks:
+    """Links to routers that the rigs of one process use together: one for each router.
+
+    A session has threads and buffers of its own, here and in the router, some megabytes for each.
+
+    Args:
+        rigs: number of rigs of the process, which share the memory of rings.
+    """
+
+    def __init__(self, rigs: int) -> None:
+        self.ring_megabytes = max(LEAST_RING, RINGS_MEGABYTES / max(rigs, 1))
+        self._lock = threading.Lock()
+        self._places: dict[str, _Place] = {}
+
+    def transport(
+        self, endpoint: str, timeout: float | None, lease: float, tls: dict[str, Any]
+    ) -> "ZenohTransport":
+        """A transport over the router's link, which is made if there is none.
+
+        Raises:
+            BusError: the router was not reached within `timeout` [s], or its endpoint is invalid.
+        """
+        with self._lock:
+            place = self._places.setdefault(repr((endpoint, lease, sorted(tls.items()))), _Place())
+        if not place.lock.acquire(timeout=-1 if timeout is None else timeout):
+            raise BusError(f"no router answers at {endpoint}: another rig of this process waits")
+        try:
+            if place.link is None:
+                place.link = _client(endpoint, timeout, lease, tls)
+            return place.link.beside()
+        finally:
+            place.lock.release()
+
+    def close(self) -> None:
+        """Close the links, after all transports over them."""
+        for place in self._places.values():
+            if place.link is not None:
+                place.link.close()
+
+
+class _Place:
+    """The link to one router, and who may make it."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.link: ZenohTransport | None = None
+
+
+def connect(
+    config: RigConfig,
+    process: str,
+    timeout: float | None = None,
+    links: SharedLinks | None = None,
+) -> Bus:
     """Join the bus of a rig as `process`.
 
     Args:
@@ -31,25 +90,39 @@ def connect(config: RigConfig, process: str, timeout: float | None = None) -> Bu
         process: name of the process, such as "daq".
         timeout: longest wait for the router [s]; None waits indefinitely, so processes can be
             started in any order. A router lost later is reconnected in the background.
+        links: those of the process, if it serves several rigs.
 
     Raises:
         BusError: the router was not reached within `timeout`, or its endpoint is invalid.
     """
+    name = certificate_name(config.bus, process)
+    tls = dict(tls_settings(config.bus, name))
+    made = links.transport if links else _client
+    transport = made(config.bus.router, timeout, config.bus.lease, tls)
+    signer = signer_of(config.bus.security, name)
+    megabytes = config.bus.ring_megabytes
+    if links:
+        megabytes = min(megabytes, links.ring_megabytes)
+    return Bus(transport, config.rig.id, process, signer, round(megabytes * (1 << 20)))
+
+
+def _client(
+    endpoint: str, timeout: float | None, lease: float, tls: dict[str, Any]
+) -> "ZenohTransport":
     from rigwatch.wire.bus.zenoh_transport import (
         ZenohTransport,  # slow to import, not needed in memory
     )
 
-    name = certificate_name(config.bus, process)
-    tls = tls_settings(config.bus, name)
-    transport = ZenohTransport.client(config.bus.router, timeout, config.bus.lease, tls)
-    signer = signer_of(config.bus.security, name)
-    ring_bytes = round(config.bus.ring_megabytes * (1 << 20))
-    return Bus(transport, config.rig.id, process, signer, ring_bytes)
+    return ZenohTransport.client(endpoint, timeout, lease, tls)
 
 
 @contextlib.contextmanager
 def joined(
-    config: RigConfig, process: str, stop: threading.Event, say: Callable[[str], None]
+    config: RigConfig,
+    process: str,
+    stop: threading.Event,
+    say: Callable[[str], None],
+    links: SharedLinks | None = None,
 ) -> Iterator[Bus | None]:
     """The bus of a rig, left at the end; None if `stop` is set before the router answers.
 
@@ -58,11 +131,12 @@ def joined(
         process: name of the process, such as "daq".
         stop: ends the wait.
         say: called once with one line if the router does not answer.
+        links: those of the process, if it serves several rigs.
     """
     bus = None
     while bus is None and not stop.is_set():
         try:
-            bus = connect(config, process, ATTEMPT)
+            bus = connect(config, process, ATTEMPT, links)
         except BusError as error:
             say(str(error))
             say = _say_nothing

@@ -150,10 +150,16 @@ def _reach(endpoint: str, timeout: float | None, lease: float, secured: Mapping[
 
 
 class ZenohTransport:
-    """One process's Zenoh session."""
+    """What one process does on one bus, over a Zenoh session.
 
-    def __init__(self, session: Any) -> None:
-        self._session = session
+    Args:
+        session: connected to the router.
+        leave: closes the session; None if it is not this transport's alone, which then takes back
+            what it has declared.
+    """
+
+    def __init__(self, session: Any, leave: Close | None = None) -> None:
+        self._session, self._leave = session, leave
         self._publishers: dict[str, Any] = {}
         self._lock = threading.Lock()
         self._kept: list[Any] = []
@@ -174,7 +180,12 @@ class ZenohTransport:
         Raises:
             BusError: the endpoint is not well formed, or no router answers there.
         """
-        return cls(_reach(endpoint, timeout, lease, secured or {}))
+        session = _reach(endpoint, timeout, lease, secured or {})
+        return cls(session, session.close)
+
+    def beside(self) -> "ZenohTransport":
+        """Another transport over the same session, which it leaves open when it is closed."""
+        return ZenohTransport(self._session)
 
     @property
     def identity(self) -> str:
@@ -253,8 +264,17 @@ class ZenohTransport:
         return not self._session.is_closed() and bool(self._session.info.routers_zid())
 
     def close(self) -> None:
-        """Close the session and everything declared in it."""
-        self._session.close()
+        """Take back everything declared, with the session if it is this transport's alone."""
+        if self._leave is not None:
+            self._leave()
+            return
+        with self._lock:
+            declared = [*self._kept, *(publisher for publisher, _ in self._publishers.values())]
+            self._kept.clear()
+            self._publishers.clear()
+        for entity in declared:
+            with contextlib.suppress(zenoh.ZError):
+                entity.undeclare()
 
     def _keep(self, entity: Any) -> Close:
         # Zenoh undeclares an entity as soon as Python forgets it.

@@ -47,22 +47,27 @@ def _is_plain(block: Block, times: list[NDArray[np.int64]], columns: tuple[Colum
 
 
 def _column(tag: bytes, column: Column) -> bytes:
-    body = (
-        _names(column.name, column.unit)
-        + _part(_VALUES, column.values.tobytes())
-        + _part(_QUALITY, column.quality.tobytes())
-    )
-    return tag + _varint(len(body)) + body
+    values, quality = column.values.tobytes(), column.quality.tobytes()
+    head, middle = _around(tag, column.name, column.unit, len(values), len(quality))
+    return head + values + middle + quality
 
 
 @lru_cache(maxsize=4096)
-def _names(name: str, unit: str) -> bytes:
-    return _part(_NAME, name.encode()) + _part(_UNIT, unit.encode())
+def _around(tag: bytes, name: str, unit: str, values: int, quality: int) -> tuple[bytes, bytes]:
+    """The bytes before a column's values, and those between its values and its quality."""
+    first = _part(_NAME, name.encode()) + _part(_UNIT, unit.encode()) + _head(_VALUES, values)
+    middle = _head(_QUALITY, quality)
+    return tag + _varint(len(first) + values + len(middle) + quality) + first, middle
+
+
+def _head(tag: bytes, size: int) -> bytes:
+    """What precedes a field of so many bytes; nothing if it is empty."""
+    return tag + _varint(size) if size else b""
 
 
 def _part(tag: bytes, data: bytes) -> bytes:
     """A field of bytes; nothing if it is empty."""
-    return tag + _varint(len(data)) + data if data else b""
+    return _head(tag, len(data)) + data
 
 
 def _number(tag: bytes, value: int) -> bytes:
