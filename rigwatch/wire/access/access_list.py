@@ -41,9 +41,10 @@ _ANSWERS = {
     "monitor": ("ring/**", "monitor/standing", "monitor/receiver", "monitor/model"),
     "witness": ("ring/witness/**", "monitor/standing", "monitor/receiver"),
 }
-_TOKENS = {"daq": ("source/**",), "monitor": ("said/**",), "witness": ("said/witness/**",)}
+_TOKENS = {"daq": ("source/*",), "monitor": ("said/**",), "witness": ("said/witness/*",)}
+"""Tokens with names, which their holder also sends and answers with."""
 _ASKS = {"operator": ("monitor/receiver", "monitor/model")}
-_EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing", PAST_KEY)
+_EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing", PAST_KEY, "source/*", "said/**")
 
 LINKED = "router"
 """The role of routers, also of those of other sites."""
@@ -87,9 +88,10 @@ def access_list(register: Register, rig: str) -> dict[str, Any]:
 
 def _role_rules(role: str, rig: str) -> list[dict[str, Any]]:
     """Rules for what a client of this role may send to the router."""
-    said = (*_EVERYBODY, *_SAYS[role])
+    named = _TOKENS.get(role, ())
+    said = (*_EVERYBODY, *_SAYS[role], *named)
     asked = (*_EVERYBODY_ASKS, *_ASKS.get(role, ()))
-    tokens = (f"{ALIVE_KEY}/**", *_TOKENS.get(role, ()))
+    tokens = (f"{ALIVE_KEY}/**", *named)
     rules = [
         _rule(f"{role} says", ["put"], rig, said),
         _rule(f"{role} asks", ["query"], rig, asked),
@@ -101,7 +103,7 @@ def _role_rules(role: str, rig: str) -> list[dict[str, Any]]:
             ("**",),
         ),
     ]
-    if answered := _ANSWERS.get(role):
+    if answered := (*_ANSWERS.get(role, ()), *named):
         rules.append(_rule(f"{role} answers", ["declare_queryable", "reply"], rig, answered))
     return rules
 

@@ -17,6 +17,7 @@ from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
 from rigwatch.wire.bus.message_ring import LARGEST_NUMBERED, RING_BYTES, Outlet
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
+from rigwatch.wire.bus.tokens import Changed, NamedToken, NamedTokens
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Transport
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import ALIVE_KEY, Message, Topic, bus_key, encode
@@ -48,8 +49,9 @@ class Bus:
         self._ring_bytes = ring_bytes
         self._outlet: Outlet | None = None
         self._lock = threading.Lock()
-        self._at_close: list[Close] = []
-        transport.declare_token(self.key(f"{ALIVE_KEY}/{process}"))
+        self._names = NamedTokens(transport)
+        self._at_close: list[Close] = [self._names.close]
+        transport.declare_token(self.key(f"{ALIVE_KEY}/{_token_name(process)}"))
 
     def key(self, key: str) -> str:
         """The full bus key of `key` within the rig."""
@@ -131,6 +133,23 @@ class Bus:
             self.key(pattern), lambda key, alive: changed(key[head:], alive)
         )
 
+    def named_token(self, place: str) -> NamedToken:
+        """A token of this process at `place`, to be declared with a name."""
+        return NamedToken(self.transport, self.key(place))
+
+    def names(self, places: str, timeout: float = 1.0) -> list[tuple[str, str | None]]:
+        """Place and name of each token with a name; None for one that is not known."""
+        head = len(self.key(""))
+        found = self._names.names(self.key(places), timeout)
+        return [(place[head:], name) for place, name in found]
+
+    def watch_names(self, places: str, changed: Changed) -> Close:
+        """Follow tokens with names, in another thread (`tokens/watching.py`)."""
+        head = len(self.key(""))
+        return self._names.watch(
+            self.key(places), lambda place, *rest: changed(place[head:], *rest)
+        )
+
     def connected(self) -> bool:
         """Whether the router is currently connected."""
         return self.transport.connected()
@@ -153,4 +172,13 @@ class Bus:
 
 def unique_process(name: str) -> str:
     """A unique process name, for tools of which several may run at once."""
-    return f"{name}-{os.getpid()}"
+    return f"{name}{_own_number()}"
+
+
+def _own_number() -> str:
+    return f"-{os.getpid()}"
+
+
+def _token_name(process: str) -> str:
+    """Tools share a token: Zenoh never forgets the key of one (`tokens`)."""
+    return process.removesuffix(_own_number())

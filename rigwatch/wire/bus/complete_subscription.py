@@ -20,6 +20,7 @@ from rigwatch.wire.bus.message_ring import SAID_KEY, ring_key
 from rigwatch.wire.bus.ring_questions import REPLY_TIMEOUT, RingQuestions
 from rigwatch.wire.bus.sender import Sender
 from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
+from rigwatch.wire.bus.tokens import EarlyMessages
 from rigwatch.wire.bus.transport import MAX_PAYLOAD
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import EVENTS, GAPS, Event, Gap, Topic, decode
@@ -65,6 +66,8 @@ class CompleteSubscription(Subscription):
         self._bus, self._gaps_in_place = bus, gaps_in_place
         self._senders: dict[str, Sender] = {}
         self._runs: dict[int, str] = {}
+        self._assumed: dict[str, int] = {}
+        self._early = EarlyMessages()
         self._inbox: SimpleQueue[Any] = SimpleQueue()
         self._ready: deque[Any] = deque()
         self._reports: list[Gap | Event] = []
@@ -74,8 +77,10 @@ class CompleteSubscription(Subscription):
         self._start(dict(resume_after or {}))
 
     def _start(self, resume_after: dict[str, Place]) -> None:
-        pattern = f"{SAID_KEY}/*/*/*/*"
-        there = sorted(filter(None, map(_parsed, self._bus.tokens(pattern))), key=lambda t: t[2])
+        places = f"{SAID_KEY}/*"
+        found = [_parsed(*one) for one in self._bus.names(places)]
+        unnamed = {process for process, token in found if token is None}
+        there = sorted((token for _, token in found if token), key=lambda token: token[2])
         for process, run, _, _ in there:
             resume_after.setdefault(process, (run, self._newest(process, run)))
         for process, place in resume_after.items():
@@ -83,11 +88,12 @@ class CompleteSubscription(Subscription):
         for token in there:
             self._take_token(token, alive=True)
         for process, place in resume_after.items():
-            # Assumed alive until the existing tokens have been listed.
-            peer = self._senders[process]
-            self._handle(process, peer.vanished(place[0], 0))
+            # Assumed alive until the names of the existing tokens are known.
+            self._assumed[process] = place[0]
+            if process not in unnamed:
+                self._end_assumed(process)
         closers = [
-            self._bus.watch_tokens(pattern, self._token),
+            self._bus.watch_names(places, self._token),
             self._bus.transport.listen_from(self._bus.key(self.topic.key), self._receive),
         ]
         self._closers = [*closers, self._questions.close]
@@ -165,9 +171,8 @@ class CompleteSubscription(Subscription):
         else:
             self._inbox.put((payload, sender, mark))
 
-    def _token(self, key: str, alive: bool) -> None:
-        if token := _parsed(key):
-            self._inbox.put((token, alive))
+    def _token(self, place: str, name: str | None, alive: bool) -> None:
+        self._inbox.put((*_parsed(place, name), alive, name is not None))
 
     def _answered(self, key: str, ask: Ask, replies: list[bytes]) -> None:
         self._inbox.put((key.split("/")[1], ask, replies, None))
@@ -175,9 +180,9 @@ class CompleteSubscription(Subscription):
     # ---- called in the subscriber's thread ----------------------------------------------
 
     def _take(self, incoming: Any) -> None:
-        if len(incoming) == 2:
-            self._take_token(*incoming)
-        elif len(incoming) == 3:
+        if isinstance(incoming[2], bool):
+            self._take_name(*incoming)
+        elif isinstance(incoming[0], bytes):
             self._take_message(*incoming)
         else:
             process, ask, replies, _ = incoming
@@ -186,6 +191,24 @@ class CompleteSubscription(Subscription):
             outcomes = self._senders[process].replied(ask, best)
             self._behind = {Numbered, Ask} <= set(map(type, outcomes))
             self._handle(process, outcomes)
+
+    def _take_name(self, process: str, token: "Token | None", alive: bool, named: bool) -> None:
+        self._early.token(process, named=named, alive=alive)
+        if token is not None:
+            self._take_token(token, alive)
+        if named or not alive:
+            self._end_assumed(process)
+            self._take_early()
+
+    def _end_assumed(self, process: str) -> None:
+        run = self._assumed.pop(process, None)
+        if run is not None:
+            self._handle(process, self._senders[process].vanished(run, 0))
+
+    def _take_early(self) -> None:
+        for message, sender in self._early.taken():
+            self._take_numbered(message, sender)
+        self._early.settle()
 
     def _take_token(self, token: "Token", alive: bool) -> None:
         process, run, since_ns, sender = token
@@ -211,12 +234,27 @@ class CompleteSubscription(Subscription):
         except MessageError:
             self.rejected += 1
             return
+        self._take_numbered(message, sender)
+
+    def _take_numbered(self, message: Numbered, sender: str) -> None:
         process = self._runs.get(message.boot, "")
-        outcomes = self._senders[process].received(message, sender) if process else None
-        if outcomes is None:
-            self.foreign += 1
-        else:
+        if not process and self._early.keep(message, sender):
+            return
+        peer = self._senders.get(process)
+        outcomes = peer.received(message, sender) if peer else None
+        if outcomes is not None:
             self._handle(process, outcomes)
+        elif not process and self._early.ended:
+            self._miss_unknown(message)
+        else:
+            self.foreign += 1
+
+    def _miss_unknown(self, message: Numbered) -> None:
+        """A process has ended before its name was known, perhaps the one that sent the message."""
+        first = message.seq
+        reason = "the process ended before it could say who it was"
+        self._runs[message.boot] = self._early.ended
+        self._miss(self._early.ended, Loss(message.boot, first, first - 1, reason))
 
     def _look_for_more(self) -> None:
         now = time.monotonic()
@@ -265,12 +303,13 @@ class CompleteSubscription(Subscription):
 Token = tuple[str, int, int, str]
 
 
-def _parsed(key: str) -> Token | None:
-    """Process, run, start time and identity from a token; None if it is not of this form."""
+def _parsed(place: str, name: str | None) -> tuple[str, Token | None]:
+    """Process, and its token with run, start time and identity; None if it is not of this form."""
+    process = place.rpartition("/")[2]
     with contextlib.suppress(ValueError):
-        _, process, run, since_ns, sender = key.split("/")
-        return process, int(run), int(since_ns), sender
-    return None
+        run, since_ns, sender = (name or "").split("/")
+        return process, (process, int(run), int(since_ns), sender)
+    return process, None
 
 
 def _read(replies: list[bytes], run: int) -> list[RingReply[Numbered]]:

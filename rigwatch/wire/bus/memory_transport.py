@@ -6,7 +6,7 @@ All transports of one `MemoryNetwork` are connected. Payloads are delivered in t
 import fnmatch
 import itertools
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from rigwatch.wire.access import CommandSigner
@@ -35,7 +35,7 @@ class MemoryNetwork:
     def deliver(self, key: str, payload: bytes, sender: str, mark: bytes) -> None:
         """Deliver a payload to all subscribers, unless it is too large or the network is down."""
         with self.lock:
-            receivers = tuple(self.listeners.get(key, ()))
+            receivers = [one for at in _with(self.listeners, key) for one in self.listeners[at]]
         if self.up and len(payload) <= MAX_PAYLOAD:
             for receive in receivers:
                 receive(payload, sender, mark)
@@ -74,7 +74,8 @@ class MemoryTransport:
     def ask(self, key: str, question: bytes, timeout: float) -> list[bytes]:  # noqa: ARG002
         """The replies of all that serve `key`; a failing one does not reply."""
         with self._network.lock:
-            servers = tuple(self._network.servers.get(key, ()))
+            table = self._network.servers
+            servers = [one for at in tuple(table) if matches(at, key) for one in table[at]]
         replies: list[bytes] = []
         for answer in servers if self._network.up else ():
             replies += answered(answer, question)
@@ -128,6 +129,11 @@ class MemoryTransport:
 
         self._closers.append(close)
         return close
+
+
+def _with(patterns: Iterable[str], key: str) -> list[str]:
+    """The patterns that a key matches."""
+    return [one for one in tuple(patterns) if one == key or ("*" in one and matches(key, one))]
 
 
 def matches(key: str, pattern: str) -> bool:

@@ -2,8 +2,8 @@
 
 Every message of a numbered topic is stored in the ring before it is published, with the run of its
 process (a random number drawn at the start) and its number within the run. A liveliness token at
-`said/<process>/<run>/<since>/<identity>` identifies the sender; queries to `ring/<process>/<topic>`
-return stored messages.
+`said/<process>`, named `<run>/<since>/<identity>`, identifies the sender; queries to
+`ring/<process>/<topic>` return stored messages.
 """
 
 import secrets
@@ -17,6 +17,7 @@ from itertools import chain
 
 import zstandard
 
+from rigwatch.wire.bus.tokens import NamedToken
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Transport
 from rigwatch.wire.messages import TOPICS, Topic, bus_key
 from rigwatch.wire.ordering import UNKNOWN, Ask, Numbered, RingReply
@@ -143,8 +144,8 @@ class Outlet:
         for topic in TOPICS:
             if topic.numbered:
                 self._serve(bus_key(rig, ring_key(process, topic)), self._rings[topic.name])
-        said = f"{SAID_KEY}/{process}/{self.run}/{time.time_ns()}/{transport.identity}"
-        transport.declare_token(bus_key(rig, said))
+        self._token = NamedToken(transport, bus_key(rig, f"{SAID_KEY}/{process}"))
+        self._token.declare(f"{self.run}/{time.time_ns()}")
 
     def _serve(self, key: str, ring: MessageRing) -> None:
         self._transport.serve(

@@ -11,12 +11,12 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.wire.bus import Bus, Close
+from rigwatch.wire.bus import Bus
 from rigwatch.wire.messages import RING_KEY, Column, SampleBlock
 from rigwatch.wire.ordering import UNKNOWN, Ask, RingReply
 
 SOURCE_KEY = "source"
-"""Key of source tokens: `source/<boot>/<start as Unix time in ns>/<identity on the bus>`."""
+"""Place of source tokens, named `<boot>/<start as Unix time in ns>/<identity on the bus>`."""
 SAMPLES_PER_REPLY = 1024
 RUNS_PER_REPLY = 64
 """Largest number of samples in a reply, so that replying never delays the publishing of samples."""
@@ -107,11 +107,10 @@ class SampleRing:
     """
 
     def __init__(self, bus: Bus, capacity: int) -> None:
-        self._bus = bus
         self._capacity = capacity
         self._stores: list[RingStore] = []
         self._lock = threading.Lock()
-        self._withdraw: Close = lambda: None
+        self._token = bus.named_token(SOURCE_KEY)
         self._close = bus.serve(RING_KEY, self._answer)
 
     def add(self, block: SampleBlock) -> None:
@@ -126,11 +125,10 @@ class SampleRing:
             self._stores[-1].add(block)
 
     def _start(self, head: SampleBlock) -> None:
-        self._withdraw()
+        self._token.close()
         with self._lock:
             self._stores = [*self._stores[-1:], RingStore(head, self._capacity)]
-        place = f"{SOURCE_KEY}/{head.boot}/{time.time_ns()}/{self._bus.identity}"
-        self._withdraw = self._bus.declare_token(place)
+        self._token.declare(f"{head.boot}/{time.time_ns()}")
 
     def _answer(self, question: bytes) -> list[bytes]:
         ask = Ask.from_bytes(question)
@@ -141,5 +139,5 @@ class SampleRing:
 
     def close(self) -> None:
         """Stop serving and give up control."""
-        self._withdraw()
+        self._token.close()
         self._close()

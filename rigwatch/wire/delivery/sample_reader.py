@@ -92,6 +92,7 @@ class SampleReader:
         self._owners = Owners()
         self._refused_boot: int | None = None
         self._impostor_at: float | None = None
+        self._assumed: int | None = None
         self._capacity = capacity
         self._inbox: SimpleQueue[_Incoming] = SimpleQueue()
         self._questions = RingQuestions(bus, self._answered)
@@ -102,12 +103,15 @@ class SampleReader:
         self._start(resume_after)
 
     def _start(self, resume_after: tuple[int, int] | None) -> None:
-        for key in self._bus.tokens(f"{SOURCE_KEY}/*/*/*"):
-            self._token(key, True)
+        there = self._bus.names(SOURCE_KEY)
+        for place, name in there:
+            self._token(place, name, True)
         if resume_after is not None:
-            self._inbox.put((resume_after[0], 0, None))
+            self._assumed = resume_after[0]
+            if all(name is not None for _, name in there):
+                self._end_assumed()
         self._closers = [
-            self._bus.watch_tokens(f"{SOURCE_KEY}/*/*/*", self._token),
+            self._bus.watch_names(SOURCE_KEY, self._token),
             self._bus.transport.listen_from(self._bus.key(SAMPLES.key), self._receive),
         ]
 
@@ -174,10 +178,19 @@ class SampleReader:
         if sender in self.rejected_by or len(self.rejected_by) < MOST_REJECTED:
             self.rejected_by[sender] += 1
 
-    def _token(self, key: str, alive: bool) -> None:
-        with contextlib.suppress(ValueError):
-            _, boot, since_ns, sender = key.split("/")
-            self._inbox.put((int(boot), int(since_ns), sender if alive else None))
+    def _token(self, _place: str, name: str | None, alive: bool) -> None:
+        if name is not None:
+            with contextlib.suppress(ValueError):
+                boot, since_ns, sender = name.split("/")
+                self._inbox.put((int(boot), int(since_ns), sender if alive else None))
+        if name is not None or not alive:
+            self._end_assumed()
+
+    def _end_assumed(self) -> None:
+        """Once the names of the sources are known: one that is not among them is gone."""
+        boot, self._assumed = self._assumed, None
+        if boot is not None:
+            self._inbox.put((boot, 0, None))
 
     # ---- called in the reader's thread --------------------------------------------------
 
