@@ -21,7 +21,7 @@ from rigwatch.wire.exchange.table_files import read_table
 from rigwatch.wire.session import open_session
 from rigwatch.wire.session.chunks import MAGIC
 from rigwatch.wire.typed_files import parse
-from tests.wire.test_exchange_import import made, simple
+from tests.exchange.test_exchange_import import made, simple
 from tests.wire.test_session_damage import intact
 
 MEMORY = 300 << 20
