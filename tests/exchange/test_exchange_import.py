@@ -132,7 +132,7 @@ def test_g_has_to_say_whether_it_is_gravity_or_the_gram() -> None:
         (GOOD.replace("2.0", "nan"), {}, "run.csv:3, column qm: found 'nan', expected a finite"),
         (GOOD.replace("3.0", "inf"), {}, "run.csv:4, column qm: found 'inf', expected a finite"),
         (GOOD.replace("2.0", "2,0"), {}, "run.csv:3: found 4 cells, expected 3"),
-        (GOOD.replace("\n2,", "\n1,"), {}, "run.csv:4, column t: found 0.001 s after 0.001 s"),
+        (GOOD.replace("\n2,", "\n0,"), {}, "run.csv:4, column t: found 0 s after 0.001 s"),
         ("t,t,u\n0,1,2\n", {}, "found the columns ['t', 't', 'u'], expected different names"),
         ("", {}, "the file is empty"),
         ("t,qm,u\n", {}, "found no rows of data"),
@@ -385,3 +385,23 @@ def test_files_that_would_become_one_session_are_refused(tmp_path, capsys):
     assert f"both become {tmp_path}/run.mcap" in capsys.readouterr().err
     assert main(["import", *given, str(tmp_path / "none")]) == 2
     assert "found no such folder" in capsys.readouterr().err
+
+
+def test_a_record_written_twice_counts_once(tmp_path: Path) -> None:
+    text = "t,qm,u\n0,1.0,5\n1,2.0,6\n1,2.0,6\n2,3.0,7\n3,4.0,8\n"
+    block, result = made(tmp_path, text, simple())
+    np.testing.assert_allclose(block.channels[0].values, [1e-3, 2e-3, 3e-3, 4e-3])
+    assert "1 rows repeat the row before and count once" in result.remarks
+
+
+def test_a_clock_coarser_than_the_samples_is_spread(tmp_path: Path) -> None:
+    rows = "".join(f"{10 * (k // 2)},{k}.0,0\n" for k in range(8))
+    block, result = made(tmp_path, "t,qm,u\n" + rows, simple())
+    assert result.rate_hz == pytest.approx(200.0)
+    np.testing.assert_allclose(block.channels[0].values, 1e-3 * np.arange(8))
+    assert "4 rows with the time of the row before are spread to the next" in result.remarks
+
+
+def test_time_that_stands_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ImportDataError, match=r"found 0\.005 s in every row"):
+        made(tmp_path, "t,qm,u\n5,1,5\n5,2,6\n5,3,7\n", simple())

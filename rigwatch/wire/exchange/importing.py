@@ -12,6 +12,7 @@ from rigwatch.wire.errors import ImportDataError
 from rigwatch.wire.exchange.column_units import conversion
 from rigwatch.wire.exchange.grid import Grid, fit_grid
 from rigwatch.wire.exchange.mapping import ImportMapping, Source, parse_source
+from rigwatch.wire.exchange.repeated_stamps import Stamps, increasing
 from rigwatch.wire.exchange.session_columns import is_native, native_blocks
 from rigwatch.wire.exchange.table_files import read_table
 from rigwatch.wire.exchange.tables import Table
@@ -73,10 +74,10 @@ def import_file(source: Path, target: Path, mapping: ImportMapping, start_ns: in
 
 @dataclass(frozen=True, slots=True)
 class _TimeBase:
-    """The uniform grid, and the recording's own times [s]."""
+    """The uniform grid, and the rows that count with their own times [s]."""
 
     grid: Grid
-    times: FloatArray
+    stamps: Stamps
 
 
 def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str, ...]]:
@@ -84,18 +85,21 @@ def _time_base(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[s
     if not mapping.time:
         return _counted(table, mapping)
     source = _source("time", mapping.time, table, mapping)
-    times = _in_si("time", source, table, structs.replace(mapping, flag_missing=False))
-    _check_increasing(table, source.column, times)
+    written = _in_si("time", source, table, structs.replace(mapping, flag_missing=False))
+    columns = [_source(*each, table, mapping).column for each in mapping.channels.items()]
+    stamps = increasing(table, source.column, written, columns)
+    times = stamps.times
     grid = fit_grid(times, mapping.rate, mapping.max_hole)
     if not grid.jittered:
-        return _TimeBase(grid, times), ()
+        return _TimeBase(grid, stamps), stamps.remarks
     shortest, longest = grid.steps_s
     holes = int(np.count_nonzero(grid.in_hole))
     remark = (
         f"time stamps in steps of {shortest * 1e3:.3g} to {longest * 1e3:.3g} ms: "
         f"{len(times)} samples resampled to {len(grid.times)} at {grid.rate_hz:g} Hz"
     )
-    return _TimeBase(grid, times), (
+    return _TimeBase(grid, stamps), (
+        *stamps.remarks,
         remark,
         *([f"{holes} samples in holes are flagged stale"] * bool(holes)),
     )
@@ -117,15 +121,8 @@ def _counted(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str
     first = _source(*next(iter(mapping.channels.items())), table, mapping)
     count = len(table.cells[first.column])
     times = np.arange(count) / mapping.rate
-    return _TimeBase(Grid(mapping.rate, times, False, np.zeros(count, bool), (0.0, 0.0)), times), ()
-
-
-def _check_increasing(table: Table, column: str, times: FloatArray) -> None:
-    back = np.flatnonzero(np.diff(times) <= 0)
-    if len(back):
-        row = int(back[0]) + 1
-        found = f"found {times[row]:.9g} s after {times[row - 1]:.9g} s, expected increasing time"
-        raise ImportDataError(f"{table.place(row, column)}: {found}")
+    grid = Grid(mapping.rate, times, False, np.zeros(count, bool), (0.0, 0.0))
+    return _TimeBase(grid, Stamps(times, np.ones(count, bool))), ()
 
 
 def _in_si(channel: str, source: Source, table: Table, mapping: ImportMapping) -> FloatArray:
@@ -148,12 +145,14 @@ def _channel(name: str, text: str, table: Table, base: _TimeBase, mapping: Impor
     source = _source(name, text, table, mapping)
     unit = conversion(source.unit, name, any_unit=mapping.any_unit).unit
     values = _in_si(name, source, table, mapping)
-    if len(values) != len(base.times):
-        found = f"found {len(values)} values, expected {len(base.times)} as there are times"
+    kept, times = base.stamps.kept, base.stamps.times
+    if len(values) != len(kept):
+        found = f"found {len(values)} values, expected {len(kept)} as there are times"
         raise ImportDataError(f"{table.path}: {name}: {found}")
+    values = values[kept]
     flags = np.where(np.isfinite(values), quality.GOOD, quality.NON_FINITE).astype(np.uint8)
     column = Column(name, unit, values, flags)
-    return _resampled(column, base.grid, base.times) if base.grid.jittered else column
+    return _resampled(column, base.grid, times) if base.grid.jittered else column
 
 
 def _resampled(column: Column, grid: Grid, times: FloatArray) -> Column:

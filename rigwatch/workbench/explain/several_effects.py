@@ -13,6 +13,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.combinations import (
     UNLIMITED,
     Combination,
@@ -30,6 +31,7 @@ from rigwatch.workbench.ranking import (
     EXPLAINED,
     Progress,
     Ranked,
+    in_order,
     left_over,
     rank,
     refit,
@@ -162,8 +164,8 @@ def _judge_each(
         if rest is None:
             continue
         progress(f"judging {row.label} together with {_joined(rest.labels)}")
-        study, floor = with_rows(bench.study, rest.rows), floor_of(bench, best.fitted)
-        found = judge(rest.fitted, rank(study, bench.data, rest.fitted, floor), floor)
+        floor = floor_of(bench, best.fitted)
+        found = judge(rest.fitted, _ranked_with(bench, rest, row, floor), floor)
         other = found.best
         if other is not None and other.label != row.label:
             better = Combination((*rest.rows, other))
@@ -171,6 +173,16 @@ def _judge_each(
                 return better, []
         parts.append(_Member(row, found))
     return None, parts
+
+
+def _ranked_with(bench: Bench, rest: Combination, row: Ranked, floor: NoiseFloor) -> list[Ranked]:
+    """All effects beside the rest of a set; the set's own is fitted, whichever it looks like."""
+    study = with_rows(bench.study, rest.rows)
+    rows = rank(study, bench.data, rest.fitted, floor)
+    for own in rows:
+        if own.label == row.label and own.fitted is None and not own.failure:
+            refit(study, bench.data, rest.fitted, own)
+    return in_order(rows)
 
 
 def _with_alternatives(part: _Member, best: Combination, others: Sequence[Combination]) -> _Member:

@@ -10,7 +10,7 @@ from rigwatch.workbench.ranking.candidates import candidates, shapes_of
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import AGAIN, rank
-from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from
+from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
 from rigwatch.workbench.ranking.refinements import with_refinements
 from rigwatch.workbench.ranking.refitting import Progress, no_progress, refit
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
@@ -27,6 +27,7 @@ __all__ = [
     "accepted_from",
     "candidates",
     "difference",
+    "in_order",
     "judge_fit",
     "left_over",
     "no_progress",

@@ -6,7 +6,7 @@ produces, and is corrected for the number of candidates. The best candidates are
 full. An effect is accepted only if the held-out error falls, over blocks, by more than chance.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
@@ -67,16 +67,32 @@ def _substitute_of_failed(rows: Sequence[Ranked]) -> Ranked | None:
 
 
 def _unfitted_similar(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:
-    """An unfitted row similar to the best to first order; only a fit can decide between them.
+    """An unfitted row similar to the best; only a fit can decide between them.
 
-    A row parallel to the best is fitted only if the best's residual is above the noise floor.
+    Similar are those whose directions are nearly the best's, to first order. Above the noise floor
+    also those parallel to it, and those that are similar to it on many recordings.
     """
     accepted = [row for row in rows if row.accepted]
     if not accepted:
         return None
     best = in_order(accepted)[0]
     waiting = {row.label: row for row in rows if row.fitted is None and not row.failure}
-    alike = (waiting[label] for label in best.alike if label in waiting)
+    alike = [waiting[label] for label in best.alike if label in waiting]
     assert best.fitted is not None
-    enough = floor.reached(best.fitted.held_out)
-    return next((row for row in alike if best.cosines[row.label] <= SAME or not enough), None)
+    if floor.reached(best.fitted.held_out):
+        return next((row for row in alike if best.cosines[row.label] <= SAME), None)
+    return next(iter(alike + _usually_similar(best, accepted, waiting)), None)
+
+
+def _usually_similar(
+    best: Ranked, accepted: Sequence[Ranked], waiting: Mapping[str, Ranked]
+) -> list[Ranked]:
+    """Unfitted rows that the library calls similar to the best, of which a similar one is accepted.
+
+    Directions are to first order in a strength: where an effect decides most of the motion, that of
+    its relatives may differ although they fit as well.
+    """
+    labels = [f"{name}@{best.port}" for name in best.placement.effect.confused_with]
+    instead = {row.label for row in accepted}
+    found = (waiting[label] for label in labels if label in waiting)
+    return [row for row in found if row.fitted_instead in instead]

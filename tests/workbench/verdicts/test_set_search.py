@@ -1,13 +1,24 @@
-"""Which sets of effects the search extends."""
+"""Which sets of effects the search extends, and which effects their members are compared with."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rigwatch.physics.engine.equations.system import Placement
-from rigwatch.workbench.explain.combinations import Combination, _best_in_training, _substitutes
+from rigwatch.workbench.compare import open_bench
+from rigwatch.workbench.explain.combinations import (
+    Combination,
+    _best_in_training,
+    _substitutes,
+    with_rows,
+)
+from rigwatch.workbench.explain.several_effects import _ranked_with
+from rigwatch.workbench.ranking import rank
 from rigwatch.workbench.ranking.ranked import Ranked
+from tests.workbench.dampers import damper
 
 
 def effect(label: str, alike: tuple[str, ...] = (), family: str = "") -> Ranked:
@@ -47,3 +58,28 @@ def test_an_effect_is_exchanged_for_what_resembles_it_at_any_port_or_is_of_its_f
     assert _substitutes(offset, every) == [smoothing, force]
     assert _substitutes(presliding, every) == [coulomb]
     assert _substitutes(other, every) == []
+
+
+def test_an_effect_of_a_set_is_compared_though_it_looks_like_another(tmp_path: Path) -> None:
+    study = damper(tmp_path, lambda x, v: 4 * np.tanh(v / 0.002) + 2e6 * x**3)
+    bench = open_bench(study)
+    stiffer = {row.label: row for row in rank(study, bench.data, bench.base, bench.floor)}
+    rest = Combination((stiffer["cubic_stiffness@load"],))
+    beside = rank(with_rows(study, rest.rows), bench.data, rest.fitted, bench.floor)
+    own = next(row for row in beside if row.fitted_instead and row.fitted is None)
+    found = {row.label: row for row in _ranked_with(bench, rest, own, bench.floor)}
+    assert found[own.label].fitted is not None
+    assert found["coulomb@load"].accepted
+
+
+def test_a_relative_of_the_best_is_fitted_though_it_looks_like_another(tmp_path: Path) -> None:
+    def slider(x: np.ndarray, _: np.ndarray) -> np.ndarray:
+        force = np.zeros(len(x))
+        for k in range(1, len(x)):
+            force[k] = np.clip(force[k - 1] + 4000 * (x[k] - x[k - 1]), -8, 8)
+        return force
+
+    study = damper(tmp_path, slider)
+    bench = open_bench(study)
+    best, second = rank(study, bench.data, bench.base, bench.floor)[:2]
+    assert (best.effect, second.effect) == ("jenkins", "bouc_wen")
