@@ -27,6 +27,8 @@ TURN = 0.005
 """Time from one turn of the monitor to the next, unless it takes longer [s]."""
 LIMIT = 0.05
 """Bar of the 99 % of the time from a sample's sending to its estimate's receipt [s]."""
+DRAWN = (2, 4, 8, 12, 16, 20, 22, 24, 26, 28, 29, 30, 31)
+"""Rigs of the picture at today's costs."""
 SECONDS, SETTLE = 6.0, 2.0
 """Simulated time, and what of it is not counted [s]."""
 BYTES = 53 + 203
@@ -197,7 +199,31 @@ def run(quick: bool) -> list[Row]:
     plans = [Plan(16, 16, 16), Plan(10_000, 16, 160), Plan(10_000, 24, 120)]
     if not quick:
         plans += [Plan(10_000, 20, site) for site in (100, 120, 140, 160)]
-    return [_row(plan) for plan in plans]
+    return [_queue_check(), _idle_check(), *(_row(plan) for plan in plans)]
+
+
+def _queue_check() -> Row:
+    """The queue's recursion against a plain loop."""
+    rng = np.random.default_rng(3)
+    arrived, work = rng.uniform(0, 1, 200), rng.uniform(0, 0.02, 200)
+    free, expected = 0.0, np.empty(200)
+    for place, one in enumerate(np.argsort(arrived)):
+        free = max(free, arrived[one]) + work[place]
+        expected[one] = free
+    off = float(np.abs(_served(arrived, work) - expected).max())
+    return Row(
+        "simulated queue against a plain loop", f"{off:.0e} s", "< 1e-9 s", "", "", off < 1e-9
+    )
+
+
+def _idle_check() -> Row:
+    """Without work a sample waits for the end of its block and a turn of the monitor."""
+    idle = Costs(daq=1e-9, router=1e-9, turn=1e-9, sample=0.0, recorder=1e-9)
+    late, most = simulate(Plan(4, 4, 4), idle).p99, BLOCK + TURN
+    told = f"{1e3 * late:.1f} ms"
+    return Row(
+        "simulated bus without work: p99", told, f"≤ {1e3 * most:.0f} ms", "", "", late < most
+    )
 
 
 def _row(plan: Plan) -> Row:
@@ -236,7 +262,7 @@ def draw(path: Path) -> None:
     figure, axes = plt.subplots(figsize=(7.0, 3.6), layout="constrained")
     for share in (1.0, 0.5, 0.2, 0.1):
         costs, rigs, late = _scaled(share), [], []
-        for number in sorted({round(x / share) for x in (2, 4, 8, 12, 16, 20, 22, 24, 26, 28, 29, 30, 31)}):
+        for number in sorted({round(x / share) for x in DRAWN}):
             found = simulate(Plan(number, number, number, threads=64), costs)
             rigs.append(number)
             late.append(1e3 * found.p99)
