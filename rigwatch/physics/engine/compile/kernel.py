@@ -4,6 +4,7 @@ Functions of a system, each void(double t, double* a, u, p, out, slopes), with n
 of sensitivities and q probes; u holds the inputs followed by the time until each changes, if held:
 
     rates        a = [x | S], out = [dx/dt | dS/dt]
+    step         a = [x | S] or x before and after a step of `rates` or `plain`: `step_function`
     read         a = [x | S], out = y, slopes = ∂y of shape (outputs, m)
     plain        a = x, out = dx/dt
     pace         a = x, out = required steps per second
@@ -26,6 +27,7 @@ import sympy
 from rigwatch.physics.engine.compile import integrator as driver
 from rigwatch.physics.engine.compile.derivatives import Differentiated, differentiated
 from rigwatch.physics.engine.compile.llvm import Function, literal, machine_code
+from rigwatch.physics.engine.compile.runge_kutta_step import step_function
 from rigwatch.physics.engine.compile.step_size import Pace, pace
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
 
@@ -62,9 +64,9 @@ class Equations:
 
 
 class Jacobians(NamedTuple):
-    """Addresses of a system's functions: rates alone; outputs, rates and updates with Jacobians."""
+    """Addresses of functions: a step of the rates; outputs, rates and updates with Jacobians."""
 
-    plain: int
+    step: int
     reads: int
     rates: int
     updates: int
@@ -103,11 +105,11 @@ class NativeKernel:
         self._updates = differentiated(system.updates, *by)
         self._kept, self._along = list[Any](), (0, 0, 0, 0, 0)
         self._slopes: Jacobians | None = None
-        self._sweeps: dict[int, tuple[int, int]] = {}
+        self._sweeps: dict[int, tuple[int, int, int]] = {}
         self._crossing = np.array(system.pace.crossing, np.int64)
 
-    def _compiled(self, functions: Sequence[Function]) -> Any:
-        kept, address = machine_code(functions)
+    def _compiled(self, functions: Sequence[Function], step: str = "") -> Any:
+        kept, address = machine_code(functions, step)
         self._kept.append(kept)
         return address
 
@@ -125,8 +127,8 @@ class NativeKernel:
                 _with_sensitivities(
                     self._system, "update", self._updates, self._columns, behind=True
                 ),
-            ])  # fmt: skip
-            names = ("rates", "read", "plain", "pace", "update")
+            ], self._step(self._columns))  # fmt: skip
+            names = ("step", "read", "plain", "pace", "update")
             self._along = tuple(address(name) for name in names)
         kernel = partial(
             driver.simulate, *self._along, bool(self._system.updates), len(asked),
@@ -145,6 +147,11 @@ class NativeKernel:
             for each in running:
                 each.result()
 
+    def _step(self, columns: int) -> str:
+        rates = "rates" if columns else "plain"
+        inputs = len(self._system.inputs) + 1
+        return step_function("step", rates, len(self._system.states), columns, inputs)
+
     def _sensitive(self, columns: int) -> tuple[Function, Function]:
         return (
             _with_sensitivities(self._system, "rates", self._rates, columns, behind=True),
@@ -156,9 +163,16 @@ class NativeKernel:
 
         For custom loops; they are called through `integrator.call`.
         """
+        return self._swept(columns)[:2]
+
+    def step(self, columns: int) -> int:
+        """Address of a whole step of the same, for `integrator.across`."""
+        return self._swept(columns)[2]
+
+    def _swept(self, columns: int) -> tuple[int, int, int]:
         if columns not in self._sweeps:
-            address = self._compiled(self._sensitive(columns))
-            self._sweeps[columns] = (address("rates"), address("read"))
+            address = self._compiled(self._sensitive(columns), self._step(columns))
+            self._sweeps[columns] = (address("rates"), address("read"), address("step"))
         return self._sweeps[columns]
 
     def jacobians(self) -> Jacobians:
@@ -169,9 +183,9 @@ class NativeKernel:
                 _jacobian(self._system, "read_slopes", self._reads),
                 _jacobian(self._system, "rate_slopes", self._rates),
                 _jacobian(self._system, "update_slopes", self._updates),
-            ])  # fmt: skip
+            ], self._step(0))  # fmt: skip
             self._slopes = Jacobians(
-                plain=address("plain"),
+                step=address("step"),
                 reads=address("read_slopes"),
                 rates=address("rate_slopes"),
                 updates=address("update_slopes"),

@@ -96,7 +96,9 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
     seen = {port: _signals(at, port) for port in {c.port for c in candidates}}
     found = np.zeros((*run.outputs.shape, len(candidates)))
     if inner:
-        pushes = np.stack([_push(at, c, seen[c.port]) for c in inner], axis=-1)
+        pushes = np.empty((len(inner), *at.time.shape))
+        for index, candidate in enumerate(inner):
+            pushes[index] = _push(at, candidate, seen[candidate.port])
         columns = np.array([_probe_column(system, c.port) for c in inner])
         places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
         held = np.array(
@@ -223,84 +225,69 @@ def _propagated(
 ) -> FloatArray:
     """Change of outputs by pushes at probes, shape (windows, samples, outputs, candidates).
 
-    A `held` push changes only at samples: up to there it keeps its value of the previous node.
+    `pushes` has shape (candidates, windows, nodes), `columns` and `held` (candidates,). A `held`
+    push changes only at samples: up to there it keeps its value of the previous node.
     """
-    n = run.states.shape[2]
-    if n == 0:
+    if run.states.shape[2] == 0:
         direct = run.read_slopes[..., columns]
-        return np.asarray(direct * pushes[:, :: run.substeps, None, :])
-    along = np.ascontiguousarray(run.rate_slopes[..., free : free + n])
-    across = np.ascontiguousarray(run.rate_slopes[..., columns])
-    reads = np.ascontiguousarray(run.read_slopes[..., free : free + n])
-    direct = np.ascontiguousarray(run.read_slopes[..., columns])
-    carried = np.ascontiguousarray(run.update_slopes[..., free : free + n])
-    renewed = np.ascontiguousarray(run.update_slopes[..., columns])
-    moved = np.empty((*run.outputs.shape, len(columns)))
-    ending = pushes.copy()
-    at = np.arange(run.substeps, pushes.shape[1], run.substeps)
-    ending[:, at] = np.where(held, pushes[:, at - 1], pushes[:, at])
+        return np.asarray(direct * np.moveaxis(pushes[..., :: run.substeps], 0, -1)[:, :, None])
+    moved = np.empty((len(columns), *run.outputs.shape))
     _propagate(
-        along, across, reads, direct, carried, renewed, pushes, ending, run.spacing, run.substeps,
-        moved,
+        run.rate_slopes, run.read_slopes, run.update_slopes, free, columns, held, pushes,
+        run.spacing, run.substeps, moved,
     )  # fmt: skip
-    return moved
+    return np.moveaxis(moved, 0, -1)
 
 
-@kernel()
+@kernel(nogil=True)
 def _propagate(  # noqa: C901, PLR0917 -- a kernel
-    along: FloatArray,
-    across: FloatArray,
-    reads: FloatArray,
-    direct: FloatArray,
-    carried: FloatArray,
-    renewed: FloatArray,
-    pushes: FloatArray,
-    ending: FloatArray,
-    h: float,
-    substeps: int,
-    moved: FloatArray,
-) -> None:
-    """Heun's method over the nodes; the outputs are read at the samples."""
-    windows, nodes, n, candidates = across.shape
-    response, ahead = np.empty((n, candidates)), np.empty((n, candidates))
-    slope, next_slope = np.empty((n, candidates)), np.empty((n, candidates))
-    for w in range(windows):
-        response[:] = 0.0
-        for node in range(nodes):
-            if node % substeps == 0:
-                k = node // substeps
-                if carried.shape[1] > 0 and k > 0:
-                    _slopes(carried[w, k], renewed[w, k], pushes[w, node], response, ahead)
-                    response[:] = ahead
-                for o in range(moved.shape[2]):
-                    for c in range(candidates):
-                        value = direct[w, k, o, c] * pushes[w, node, c]
+    rates: FloatArray, reads: FloatArray, updates: FloatArray, free: int, columns: IntArray,
+    held: BoolArray, pushes: FloatArray, h: float, substeps: int, moved: FloatArray,
+) -> None:  # fmt: skip
+    """Heun's method over the nodes, candidate by candidate; the outputs are read at the samples.
+
+    The last axis of the slopes is (free parameters, states, probes).
+    """
+    candidates, windows, nodes = pushes.shape
+    n = rates.shape[2]
+    response, ahead = np.empty(n), np.empty(n)
+    slope, next_slope = np.empty(n), np.empty(n)
+    for c in range(candidates):
+        column = columns[c]
+        for w in range(windows):
+            for i in range(n):
+                response[i] = 0.0
+            for node in range(nodes):
+                push = pushes[c, w, node]
+                if node % substeps == 0:
+                    k = node // substeps
+                    if updates.shape[1] > 0 and k > 0:
+                        _slopes(updates[w, k], free, column, push, response, ahead)
+                        for i in range(n):
+                            response[i] = ahead[i]
+                    for o in range(moved.shape[3]):
+                        value = reads[w, k, o, column] * push
                         for j in range(n):
-                            value += reads[w, k, o, j] * response[j, c]
-                        moved[w, k, o, c] = value
-            if node + 1 < nodes:
-                _slopes(along[w, node], across[w, node], pushes[w, node], response, slope)
-                for i in range(n):
-                    for c in range(candidates):
-                        ahead[i, c] = response[i, c] + h * slope[i, c]
-                following = node + 1
-                _slopes(
-                    along[w, following], across[w, following], ending[w, following], ahead,
-                    next_slope,
-                )  # fmt: skip
-                for i in range(n):
-                    for c in range(candidates):
-                        response[i, c] += 0.5 * h * (slope[i, c] + next_slope[i, c])
+                            value += reads[w, k, o, free + j] * response[j]
+                        moved[c, w, k, o] = value
+                if node + 1 < nodes:
+                    _slopes(rates[w, node], free, column, push, response, slope)
+                    for i in range(n):
+                        ahead[i] = response[i] + h * slope[i]
+                    following = node + 1
+                    jumps = held[c] and following % substeps == 0
+                    ending = push if jumps else pushes[c, w, following]
+                    _slopes(rates[w, following], free, column, ending, ahead, next_slope)
+                    for i in range(n):
+                        response[i] += 0.5 * h * (slope[i] + next_slope[i])
 
 
-@kernel()
-def _slopes(
-    along: FloatArray, across: FloatArray, push: FloatArray, at: FloatArray, out: FloatArray
+@kernel(nogil=True)
+def _slopes(  # noqa: PLR0917 -- a kernel
+    by: FloatArray, free: int, column: int, push: float, at: FloatArray, out: FloatArray
 ) -> None:
-    n, candidates = at.shape
-    for i in range(n):
-        for c in range(candidates):
-            value = across[i, c] * push[c]
-            for j in range(n):
-                value += along[i, j] * at[j, c]
-            out[i, c] = value
+    for i in range(at.size):
+        value = by[i, column] * push
+        for j in range(at.size):
+            value += by[i, free + j] * at[j]
+        out[i] = value
