@@ -5,8 +5,8 @@ from ctypes import CFUNCTYPE, c_double, c_void_p
 import numpy as np
 import pytest
 
+from rigwatch.physics.engine.compile import all_cores, llvm
 from rigwatch.physics.engine.compile import kernel as native
-from rigwatch.physics.engine.compile import llvm
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
@@ -29,7 +29,7 @@ def test_cores_that_share_windows_give_the_numbers_of_one(monkeypatch, cores):
     compiled = compile_system(compose(MODEL, [Placement("coulomb", FRICTION, "load")]))
     alone = simulated(compiled, 7)
     monkeypatch.setattr(native, "LARGE", 0)
-    monkeypatch.setattr(native, "cores", lambda: cores)
+    monkeypatch.setattr(all_cores, "cores", lambda: cores)
     shared = simulated(compiled, 7)
     np.testing.assert_array_equal(shared.outputs, alone.outputs)
     np.testing.assert_array_equal(shared.slopes, alone.slopes)

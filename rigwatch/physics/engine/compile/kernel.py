@@ -14,30 +14,26 @@ of sensitivities and q probes; u holds the inputs followed by the time until eac
     update_slopes  a = x, out = x after the sample, slopes = ∂ of it, of shape (n, m + q)
 """
 
-import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
 import sympy
 
 from rigwatch.physics.engine.compile import integrator as driver
+from rigwatch.physics.engine.compile.all_cores import on_all_cores, shares
 from rigwatch.physics.engine.compile.derivatives import Differentiated, differentiated
 from rigwatch.physics.engine.compile.llvm import Function, literal, machine_code
 from rigwatch.physics.engine.compile.runge_kutta_step import step_function
 from rigwatch.physics.engine.compile.step_size import Pace, pace
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
 
-LARGE = 5_000_000
+LARGE = 300_000
 """Steps times integrated numbers above which a simulation is distributed over all cores."""
-
-
-def cores() -> int:
-    """Number of cores available to this process."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+_COMPILING = Lock()
 
 
 @dataclass(frozen=True)
@@ -113,39 +109,42 @@ class NativeKernel:
         self._kept.append(kept)
         return address
 
+    def _compiled_along(self) -> tuple[int, int, int, int, int]:
+        """The functions of `simulate`, compiled by the first thread that asks."""
+        # SymPy is not made for several threads at once.
+        with _COMPILING:
+            if not all(self._along):
+                address = self._compiled([
+                    *self._sensitive(self._columns),
+                    _plain(self._system, "plain", self._rates.values),
+                    _plain(self._system, "pace", self._system.pace.asked),
+                    _with_sensitivities(
+                        self._system, "update", self._updates, self._columns, behind=True
+                    ),
+                ], self._step(self._columns))  # fmt: skip
+                names = ("step", "read", "plain", "pace", "update")
+                step, read, plain, pace, update = (address(name) for name in names)
+                self._along = (step, read, plain, pace, update)
+        return self._along
+
     def simulate(  # noqa: PLR0917 -- they stand in the order of the driver's
         self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, y: Any,
         dy: Any, last: Any, rows: int, finest: int,
     ) -> None:  # fmt: skip
         """Fill outputs (windows, samples, outputs), their slopes (…, m) and the last states."""
-        asked = self._system.pace.asked
-        if not all(self._along):
-            address = self._compiled([
-                *self._sensitive(self._columns),
-                _plain(self._system, "plain", self._rates.values),
-                _plain(self._system, "pace", asked),
-                _with_sensitivities(
-                    self._system, "update", self._updates, self._columns, behind=True
-                ),
-            ], self._step(self._columns))  # fmt: skip
-            names = ("step", "read", "plain", "pace", "update")
-            self._along = tuple(address(name) for name in names)
         kernel = partial(
-            driver.simulate, *self._along, bool(self._system.updates), len(asked),
-            self._crossing, self._columns, rows, u, dt, substeps, finest, hold,
+            driver.simulate, *self._compiled_along(), bool(self._system.updates),
+            len(self._system.pace.asked), self._crossing, self._columns, rows, u, dt, substeps,
+            finest, hold,
         )  # fmt: skip
         numbers = x0.shape[1] * (1 + self._columns)
         # Starting threads costs more than a small simulation.
-        if starts.size * y.shape[1] * substeps * numbers < LARGE:
-            kernel(starts, x0, p, y, dy, last)
-            return
-        parts = np.array_split(np.arange(starts.size), min(cores(), starts.size))
-        cuts = [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
+        large = starts.size * y.shape[1] * substeps * numbers >= LARGE
         # Windows are independent, so every distribution over cores gives the same numbers.
-        with ThreadPoolExecutor(len(cuts)) as pool:
-            running = [pool.submit(kernel, starts[c], x0[c], p, y[c], dy[c], last[c]) for c in cuts]
-            for each in running:
-                each.result()
+        on_all_cores(
+            lambda c: kernel(starts[c], x0[c], p, y[c], dy[c], last[c]),
+            shares(starts.size) if large else [slice(None)],
+        )
 
     def _step(self, columns: int) -> str:
         rates = "rates" if columns else "plain"

@@ -9,7 +9,7 @@ which is one linear equation for all candidates and needs no further compilation
 sensor the effect changes only its own output.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -22,6 +22,8 @@ from rigwatch.physics.engine.compile import (
     Linearisation,
     derivative,
     numpy_function,
+    on_all_cores,
+    shares,
 )
 from rigwatch.physics.engine.equations import (
     LEFT,
@@ -96,21 +98,36 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
     seen = {port: _signals(at, port) for port in {c.port for c in candidates}}
     found = np.zeros((*run.outputs.shape, len(candidates)))
     if inner:
-        pushes = np.empty((len(inner), *at.time.shape))
-        for index, candidate in enumerate(inner):
-            pushes[index] = _push(at, candidate, seen[candidate.port])
+        pushes = _pushes(at, inner, seen)
         columns = np.array([_probe_column(system, c.port) for c in inner])
         places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
         held = np.array(
             [hold_at(system.model, system.model.ports[c.port]) == "zero" for c in inner]
         )
         found[..., places] = _propagated(run, len(system.free), pushes, columns, held)
-    for index, candidate in enumerate(candidates):
-        if kinds[candidate.port] == "sensor":
-            signal = list(system.outputs).index(system.model.ports[candidate.port].signal)
-            found[..., signal, index] = _push(at, candidate, seen[candidate.port])[
-                :, :: run.substeps
-            ]
+    outer = [i for i, c in enumerate(candidates) if kinds[c.port] == "sensor"]
+    pushes = _pushes(at, [candidates[index] for index in outer], seen)
+    for index, push in zip(outer, pushes, strict=True):
+        signal = list(system.outputs).index(system.model.ports[candidates[index].port].signal)
+        found[..., signal, index] = push[:, :: run.substeps]
+    return found
+
+
+def _pushes(
+    at: Trajectory, candidates: Sequence[Candidate], seen: Mapping[str, dict[str, FloatArray]]
+) -> FloatArray:
+    """e(t) of candidates at the nodes, shape (candidates, windows, nodes).
+
+    `seen` holds the signals at each port.
+    """
+    found = np.empty((len(candidates), *at.time.shape))
+    # Only numbers are left to the threads.
+    ready = [_ready(at, each, seen[each.port]) for each in candidates]
+
+    def fill(index: int) -> None:
+        found[index] = ready[index]()
+
+    on_all_cores(fill, range(len(candidates)))
     return found
 
 
@@ -118,18 +135,23 @@ def _probe_column(system: System, port: str) -> int:
     return len(system.free) + len(system.states) + system.probes.index(PROBE + port)
 
 
-def _push(at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]) -> FloatArray:
-    """e(t) of one candidate at the nodes, shape (windows, nodes)."""
+def _ready(
+    at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]
+) -> Callable[[], Any]:
+    """A function that returns e(t) of one candidate at the nodes, of shape (windows, nodes)."""
     names = {name: symbol(name) for name in (*signals, *candidate.effect.states)}
     names |= {name: symbol(name) for name in candidate.effect.parameters}
     effect, values = candidate.effect, _neutral_values(candidate)
     text = (effect.expression, effect.direction, effect.strength)
     function, used = _push_function(*text, tuple(names))
-    if used & set(effect.states):
-        signals = signals | _memory(at, candidate, signals)
-    known = {**dict.fromkeys(names, 0.0), **signals, **values}
-    pushed = function(*(known[name] for name in names))
-    return np.broadcast_to(np.asarray(pushed, np.float64), at.time.shape)
+    states = _memory(at, candidate, signals) if used & set(effect.states) else None
+
+    def pushed() -> Any:
+        memory = _at_nodes(at, states.run(values)) if states else {}
+        known = {**dict.fromkeys(names, 0.0), **signals, **memory, **values}
+        return function(*(known[name] for name in names))
+
+    return pushed
 
 
 @cache
@@ -196,9 +218,7 @@ def _left(at: Trajectory) -> FloatArray:
     return np.broadcast_to(kept * at.run.spacing * (at.run.substeps - substep), at.time.shape)
 
 
-def _memory(
-    at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]
-) -> dict[str, FloatArray]:
+def _memory(at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]) -> EffectStates:
     """The effect's own states at strength zero, driven by the signals at its port.
 
     One run covers all windows: each window continues from the end of the previous one, whose last
@@ -208,8 +228,10 @@ def _memory(
     along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
     model = at.compiled.system.model
     hold = hold_at(model, model.ports[candidate.port])
-    states = EffectStates(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
-    found = states.run(_neutral_values(candidate))
+    return EffectStates(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
+
+
+def _at_nodes(at: Trajectory, found: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     windows, nodes = at.time.shape
     return {name: state.reshape(windows, -1)[:, :nodes] for name, state in found.items()}
 
@@ -232,10 +254,14 @@ def _propagated(
         direct = run.read_slopes[..., columns]
         return np.asarray(direct * np.moveaxis(pushes[..., :: run.substeps], 0, -1)[:, :, None])
     moved = np.empty((len(columns), *run.outputs.shape))
-    _propagate(
-        run.rate_slopes, run.read_slopes, run.update_slopes, free, columns, held, pushes,
-        run.spacing, run.substeps, moved,
-    )  # fmt: skip
+    slopes = run.rate_slopes, run.read_slopes, run.update_slopes
+
+    def propagate(c: slice) -> None:
+        _propagate(
+            *slopes, free, columns[c], held[c], pushes[c], run.spacing, run.substeps, moved[c]
+        )
+
+    on_all_cores(propagate, shares(len(columns)))
     return np.moveaxis(moved, 0, -1)
 
 
