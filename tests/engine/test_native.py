@@ -1,8 +1,11 @@
 """A system's kernel: one for equal equations, the same numbers however windows are shared out."""
 
+from ctypes import CFUNCTYPE, c_double, c_void_p
+
 import numpy as np
 import pytest
 
+from rigwatch.physics.engine.compile import all_cores, llvm
 from rigwatch.physics.engine.compile import kernel as native
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.effect_files import library
@@ -26,7 +29,7 @@ def test_cores_that_share_windows_give_the_numbers_of_one(monkeypatch, cores):
     compiled = compile_system(compose(MODEL, [Placement("coulomb", FRICTION, "load")]))
     alone = simulated(compiled, 7)
     monkeypatch.setattr(native, "LARGE", 0)
-    monkeypatch.setattr(native, "cores", lambda: cores)
+    monkeypatch.setattr(all_cores, "cores", lambda: cores)
     shared = simulated(compiled, 7)
     np.testing.assert_array_equal(shared.outputs, alone.outputs)
     np.testing.assert_array_equal(shared.slopes, alone.slopes)
@@ -37,3 +40,36 @@ def test_equal_equations_share_a_kernel_and_others_do_not():
     other = compile_system(compose(MODEL, [Placement("coulomb", FRICTION, "load")])).kernel
     assert first is again
     assert other is not first
+
+
+@pytest.mark.parametrize("inlined", [0, 1000])
+def test_a_step_in_machine_code_is_the_classical_one_bit_for_bit(monkeypatch, inlined):
+    monkeypatch.setattr(llvm, "INLINED", inlined)
+    native._kernel.cache_clear()
+    compiled = compile_system(compose(MODEL, [Placement("coulomb", FRICTION, "load")]))
+    size, columns = 2 * (1 + compiled.columns), compiled.columns
+    rates, _ = map(as_function, compiled.kernel.with_sensitivities(columns))
+    z, p = np.random.default_rng(1).normal(size=size), compiled.parameters
+    us, h = np.array([[0.3, 0.0], [0.4, 0.0], [0.5, 0.0]]), 0.01
+
+    def slope(t, at, u):
+        out = np.zeros(size)
+        rates(t, *addresses(at, u, p, out, out))
+        return out
+
+    k1 = slope(1.0, z, us[0])
+    k2 = slope(1.005, z + 0.5 * h * k1, us[1])
+    k3 = slope(1.005, z + 0.5 * h * k2, us[1])
+    k4 = slope(1.01, z + h * k3, us[2])
+    expected = z + (((h / 6 * k1 + h / 3 * k2) + h / 3 * k3) + h / 6 * k4)
+    times = np.array([1.0, 1.005, 1.01, h])
+    as_function(compiled.kernel.step(columns))(0.0, *addresses(z, us, p, times, times))
+    np.testing.assert_array_equal(z, expected)
+
+
+def as_function(address):
+    return CFUNCTYPE(None, c_double, *[c_void_p] * 5)(address)
+
+
+def addresses(*arrays):
+    return [array.ctypes.data for array in arrays]

@@ -130,8 +130,8 @@ class Sweeper:
     ) -> FloatArray:
         """Advance the states x by a sample, in place; slopes by free parameters and old states."""
         slopes = np.empty((len(x), self.compiled.columns))
-        rates, _ = self.compiled.kernel.with_sensitivities(self.compiled.columns)
-        kernel.forward(rates, inputs, dt, row, substeps, self.compiled.hold, x, parameters, slopes)
+        step = self.compiled.kernel.step(self.compiled.columns)
+        kernel.forward(step, inputs, dt, row, substeps, self.compiled.hold, x, parameters, slopes)
         return slopes
 
 

@@ -117,19 +117,17 @@ def slopes_along(  # noqa: PLR0917 -- a kernel
 
 @kernel(error_model="numpy")
 def forward(  # noqa: PLR0917 -- a kernel
-    rates: int, u: FloatArray, dt: float, row: int, substeps: int, hold: FloatArray,
+    step: int, u: FloatArray, dt: float, row: int, substeps: int, hold: FloatArray,
     x: FloatArray, p: FloatArray, s: FloatArray,
 ) -> None:  # fmt: skip
     """Advance x by a sample; s becomes its derivative by free parameters and the old state."""
     n, m = s.shape
-    size = n * (1 + m)
-    z, zs, dz, acc = np.zeros(size), np.empty(size), np.empty(size), np.empty(size)
-    us = np.empty(u.shape[1] + 1)
+    z, us, times = np.zeros(n * (1 + m)), np.empty((3, u.shape[1] + 1)), np.empty(4)
     for i in range(n):
         z[i] = x[i]
         z[n + i * m + m - n + i] = 1.0
     late = lateness(hold)
-    across(rates, u, row, substeps, late, hold, 1, dt, p.ctypes.data, z, zs, dz, acc, us)
+    across(step, u, row, substeps, late, hold, 1, dt, p.ctypes.data, z, us, times)
     for i in range(n):
         x[i] = z[i]
         for j in range(m):

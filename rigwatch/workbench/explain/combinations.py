@@ -10,6 +10,7 @@ The search ends when a set reduces the residual to noise.
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.errors import ModelError
@@ -38,6 +39,8 @@ BRANCHES = 3
 """Number of effects fitted with each of these sets."""
 MAX_EFFECTS = 3
 """Largest number of effects in a set."""
+_SCORED: WeakKeyDictionary[Fitted, list[Ranked]] = WeakKeyDictionary()
+"""Scores of all effects by the fit they were scored along; sets share the fits of their parts."""
 UNLIMITED = 1000
 """More parameters than any set can have."""
 
@@ -189,8 +192,7 @@ def _exchanged(
         rest = without(bench, best, row)
         if rest is None:
             continue
-        study = with_rows(bench.study, rest.rows)
-        every = scored(study, bench.data, rest.fitted, candidates(study, bench.data.train))
+        every = _scored_with(bench, rest)
         least = _least_share(bench, rest)
         for other in _substitutes(row, every):
             if rest.labels | {other.label} in tried or other.explained < least:
@@ -246,9 +248,18 @@ def _least_share(bench: Bench, known: Combination) -> float:
 
 def next_candidates(bench: Bench, known: Combination) -> list[Ranked]:
     """The effects that match the residual of a set best."""
-    study = with_rows(bench.study, known.rows)
-    every = scored(study, bench.data, known.fitted, candidates(study, bench.data.train))
-    return select_for_fit(every, "dynamic" if study.model.states else "static")[:BRANCHES]
+    every = _scored_with(bench, known)
+    return select_for_fit(every, "dynamic" if bench.study.model.states else "static")[:BRANCHES]
+
+
+def _scored_with(bench: Bench, known: Combination) -> list[Ranked]:
+    """All other effects, scored with a set in the model; computed once for each fit."""
+    if known.fitted not in _SCORED:
+        study = with_rows(bench.study, known.rows)
+        found = candidates(study, bench.data.train)
+        _SCORED[known.fitted] = scored(study, bench.data, known.fitted, found)
+    # A fit and its reasons are stored in a row.
+    return [replace(row) for row in _SCORED[known.fitted]]
 
 
 def _fit_with(bench: Bench, rows: Sequence[Ranked], fitted: Fitted, row: Ranked) -> None:
@@ -257,10 +268,14 @@ def _fit_with(bench: Bench, rows: Sequence[Ranked], fitted: Fitted, row: Ranked)
 
 
 def without(bench: Bench, whole: Combination, left_out: Ranked) -> Combination | None:
-    """A set without one of its effects; None if the rest cannot be fitted."""
-    rest = [row for row in whole.rows if row is not left_out]
-    fitted, rows = bench.base, list[Ranked]()
-    for row in rest:
+    """A set without one of its effects; None if the rest cannot be fitted.
+
+    The effects before it were fitted without it.
+    """
+    at = whole.rows.index(left_out)
+    rows = [*whole.rows[:at]]
+    fitted = Combination(tuple(rows)).fitted if rows else bench.base
+    for row in whole.rows[at + 1 :]:
         own = replace(row)
         _fit_with(bench, rows, fitted, own)
         if own.fitted is None:

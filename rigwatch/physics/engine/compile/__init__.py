@@ -6,6 +6,7 @@ The rest of the engine calls `CompiledSystem`; `step_size` gives the integration
 interval.
 """
 
+from rigwatch.physics.engine.compile.all_cores import on_all_cores, shares
 from rigwatch.physics.engine.compile.compiled_system import (
     CompiledSystem,
     Linearisation,
@@ -30,6 +31,8 @@ __all__ = [
     "even_substeps",
     "lateness",
     "numpy_function",
+    "on_all_cores",
     "place",
     "resolved",
+    "shares",
 ]

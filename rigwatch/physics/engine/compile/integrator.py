@@ -4,9 +4,9 @@ The state is z = [x | S], the states followed by the rows of their sensitivities
 
     dz/dt = rates(t, z, u, p)
 
-is integrated by the classical fourth-order Runge-Kutta method with fixed steps. The equations are
-passed as addresses of functions void(double t, double* a, u, p, out, slopes), so these loops are
-compiled once for all systems.
+is integrated by the classical fourth-order Runge-Kutta method with fixed steps. The equations, and
+a whole step of them (`runge_kutta_step`), are passed as addresses of functions void(double t,
+double* a, u, p, out, slopes), so these loops are compiled once for all systems.
 """
 
 import math
@@ -71,33 +71,24 @@ def place(  # noqa: PLR0917 -- a kernel
 
 @kernel(error_model="numpy")
 def advance(  # noqa: PLR0917 -- a kernel
-    rates: int, u: FloatArray, row: int, start: float, end: float, hold: FloatArray, rows: int,
-    dt: float, pp: int,
-    z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
+    step: int, u: FloatArray, row: int, start: float, end: float, hold: FloatArray, rows: int,
+    dt: float, pp: int, z: FloatArray, us: FloatArray, times: FloatArray,
 ) -> None:  # fmt: skip
-    """One Runge-Kutta step between two fractions of a sample; updates z in place."""
-    h, middle = dt * (end - start), 0.5 * (start + end)
-    zp, dp, up, size = zs.ctypes.data, dz.ctypes.data, us.ctypes.data, z.size
+    """One Runge-Kutta step between two fractions of a sample; updates z in place.
+
+    `us` holds the inputs at the start, in the middle and at the end, `times` what `step` expects.
+    """
+    middle = 0.5 * (start + end)
     # Inputs at both ends are chosen as inside the step: a jump at an end is not part of it.
-    # `acc` sums the weighted slopes, since z is needed unchanged by every stage.
-    place(u, row, start, middle, hold, rows, dt, us)
-    call(rates, (row + start) * dt, z.ctypes.data, up, pp, dp, dp)
-    for i in range(size):
-        acc[i] = h / 6.0 * dz[i]
-        zs[i] = z[i] + 0.5 * h * dz[i]
-    place(u, row, middle, middle, hold, rows, dt, us)
-    call(rates, (row + middle) * dt, zp, up, pp, dp, dp)
-    for i in range(size):
-        acc[i] += h / 3.0 * dz[i]
-        zs[i] = z[i] + 0.5 * h * dz[i]
-    call(rates, (row + middle) * dt, zp, up, pp, dp, dp)
-    for i in range(size):
-        acc[i] += h / 3.0 * dz[i]
-        zs[i] = z[i] + h * dz[i]
-    place(u, row, end, middle, hold, rows, dt, us)
-    call(rates, (row + end) * dt, zp, up, pp, dp, dp)
-    for i in range(size):
-        z[i] += acc[i] + h / 6.0 * dz[i]
+    place(u, row, start, middle, hold, rows, dt, us[0])
+    place(u, row, middle, middle, hold, rows, dt, us[1])
+    place(u, row, end, middle, hold, rows, dt, us[2])
+    times[0] = (row + start) * dt
+    times[1] = (row + middle) * dt
+    times[2] = (row + end) * dt
+    times[3] = dt * (end - start)
+    tp = times.ctypes.data
+    call(step, 0.0, z.ctypes.data, us.ctypes.data, pp, tp, tp)
 
 
 @kernel(error_model="numpy")
@@ -111,21 +102,20 @@ def lateness(hold: FloatArray) -> float:
 
 @kernel(error_model="numpy")
 def across(  # noqa: PLR0917 -- a kernel
-    rates: int, u: FloatArray, row: int, steps: int, late: float, hold: FloatArray, rows: int,
-    dt: float, pp: int,
-    z: FloatArray, zs: FloatArray, dz: FloatArray, acc: FloatArray, us: FloatArray,
+    step: int, u: FloatArray, row: int, steps: int, late: float, hold: FloatArray, rows: int,
+    dt: float, pp: int, z: FloatArray, us: FloatArray, times: FloatArray,
 ) -> None:  # fmt: skip
     """Integrate from one sample to the next, in steps that end where an input changes."""
     # A step across the jump of a held input would reduce the method to first order.
     first = math.ceil(steps * late) if late < 1.0 else steps
-    for step in range(first):
-        start, end = late * step / first, late * (step + 1) / first
-        advance(rates, u, row, start, end, hold, rows, dt, pp, z, zs, dz, acc, us)
+    for k in range(first):
+        start, end = late * k / first, late * (k + 1) / first
+        advance(step, u, row, start, end, hold, rows, dt, pp, z, us, times)
     second = math.ceil(steps * (1.0 - late))
-    for step in range(second):
-        start = late + (1.0 - late) * step / second
-        end = late + (1.0 - late) * (step + 1) / second
-        advance(rates, u, row, start, end, hold, rows, dt, pp, z, zs, dz, acc, us)
+    for k in range(second):
+        start = late + (1.0 - late) * k / second
+        end = late + (1.0 - late) * (k + 1) / second
+        advance(step, u, row, start, end, hold, rows, dt, pp, z, us, times)
 
 
 @kernel(error_model="numpy")
@@ -187,7 +177,7 @@ def needed(  # noqa: PLR0917 -- a kernel
 
 @kernel(error_model="numpy", nogil=True)
 def simulate(  # noqa: PLR0917 -- a kernel
-    rates: int, read: int, plain: int, pace: int, update: int, updated: bool, asked: int,
+    step: int, read: int, plain: int, pace: int, update: int, updated: bool, asked: int,
     crossing: IntArray, m: int, rows: int, u: FloatArray, dt: float, substeps: int, finest: int,
     hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray, y: FloatArray,
     dy: FloatArray, last: FloatArray,
@@ -199,7 +189,8 @@ def simulate(  # noqa: PLR0917 -- a kernel
     """
     n, size = x0.shape[1], x0.shape[1] * (1 + m)
     dx, end, near, rate = np.empty(n), np.empty(n), np.empty(n), np.empty(asked)
-    z, zs, dz, acc = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    z, dz, times = np.empty(size), np.empty(size), np.empty(4)
+    between = np.empty((3, u.shape[1] + 1))
     us, wanted, late = np.empty(u.shape[1] + 1), y.shape[2], lateness(hold)
     pp, out, slopes = p.ctypes.data, np.empty(wanted), np.empty(wanted * m)
     for w in range(starts.size):
@@ -223,7 +214,7 @@ def simulate(  # noqa: PLR0917 -- a kernel
                         us,
                     )  # fmt: skip
                     steps = int(min(float(finest), max(float(substeps), math.ceil(wanted_steps))))
-                across(rates, u, row, steps, late, hold, rows, dt, pp, z, zs, dz, acc, us)
+                across(step, u, row, steps, late, hold, rows, dt, pp, z, between, times)
                 # Sampled states change together with the held signals.
                 if updated and (row + 1) % rows == 0:
                     renew(update, u, row + 1, hold, rows, dt, pp, z, dz, us)
@@ -233,13 +224,14 @@ def simulate(  # noqa: PLR0917 -- a kernel
 
 @kernel(error_model="numpy", nogil=True)
 def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
-    rates: int, read_slopes: int, rate_slopes: int, update_slopes: int, u: FloatArray, dt: float,
+    plain_step: int, read_slopes: int, rate_slopes: int, update_slopes: int, u: FloatArray,
+    dt: float,
     substeps: int, hold: FloatArray, starts: IntArray, x0: FloatArray, p: FloatArray,
     nodes: FloatArray, slopes: FloatArray, y: FloatArray, dy: FloatArray, jumps: FloatArray,
 ) -> None:  # fmt: skip
     """The trajectory without sensitivities, and the Jacobians at its nodes."""
     n, wide = x0.shape[1], slopes.shape[3]
-    z, zs, dz, acc = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    z, times, between = np.empty(n), np.empty(4), np.empty((3, u.shape[1] + 1))
     us, wanted, pp = np.empty(u.shape[1] + 1), y.shape[2], p.ctypes.data
     out, flat = np.empty(max(wanted, n)), np.empty(max(wanted, n) * wide)
     zp, up, op, fp = z.ctypes.data, us.ctypes.data, out.ctypes.data, flat.ctypes.data
@@ -265,7 +257,9 @@ def linearise(  # noqa: C901, PLR0912, PLR0917 -- a kernel
                         slopes[w, node, i, j] = flat[i * wide + j]
                 if not last:
                     following = (step + 1) / substeps
-                    advance(rates, u, row, share, following, hold, 1, dt, pp, z, zs, dz, acc, us)
+                    advance(
+                        plain_step, u, row, share, following, hold, 1, dt, pp, z, between, times
+                    )
             if jumps.shape[1] > 0 and not last:
                 place(u, row + 1, 0.0, 0.0, hold, 1, dt, us)
                 call(update_slopes, (row + 1) * dt, zp, up, pp, op, fp)

@@ -4,6 +4,7 @@ Functions of a system, each void(double t, double* a, u, p, out, slopes), with n
 of sensitivities and q probes; u holds the inputs followed by the time until each changes, if held:
 
     rates        a = [x | S], out = [dx/dt | dS/dt]
+    step         a = [x | S] or x before and after a step of `rates` or `plain`: `step_function`
     read         a = [x | S], out = y, slopes = ∂y of shape (outputs, m)
     plain        a = x, out = dx/dt
     pace         a = x, out = required steps per second
@@ -13,29 +14,26 @@ of sensitivities and q probes; u holds the inputs followed by the time until eac
     update_slopes  a = x, out = x after the sample, slopes = ∂ of it, of shape (n, m + q)
 """
 
-import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
 import sympy
 
 from rigwatch.physics.engine.compile import integrator as driver
+from rigwatch.physics.engine.compile.all_cores import on_all_cores, shares
 from rigwatch.physics.engine.compile.derivatives import Differentiated, differentiated
 from rigwatch.physics.engine.compile.llvm import Function, literal, machine_code
+from rigwatch.physics.engine.compile.runge_kutta_step import step_function
 from rigwatch.physics.engine.compile.step_size import Pace, pace
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
 
-LARGE = 5_000_000
+LARGE = 300_000
 """Steps times integrated numbers above which a simulation is distributed over all cores."""
-
-
-def cores() -> int:
-    """Number of cores available to this process."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+_COMPILING = Lock()
 
 
 @dataclass(frozen=True)
@@ -62,9 +60,9 @@ class Equations:
 
 
 class Jacobians(NamedTuple):
-    """Addresses of a system's functions: rates alone; outputs, rates and updates with Jacobians."""
+    """Addresses of functions: a step of the rates; outputs, rates and updates with Jacobians."""
 
-    plain: int
+    step: int
     reads: int
     rates: int
     updates: int
@@ -103,47 +101,55 @@ class NativeKernel:
         self._updates = differentiated(system.updates, *by)
         self._kept, self._along = list[Any](), (0, 0, 0, 0, 0)
         self._slopes: Jacobians | None = None
-        self._sweeps: dict[int, tuple[int, int]] = {}
+        self._sweeps: dict[int, tuple[int, int, int]] = {}
         self._crossing = np.array(system.pace.crossing, np.int64)
 
-    def _compiled(self, functions: Sequence[Function]) -> Any:
-        kept, address = machine_code(functions)
+    def _compiled(self, functions: Sequence[Function], step: str = "") -> Any:
+        kept, address = machine_code(functions, step)
         self._kept.append(kept)
         return address
+
+    def _compiled_along(self) -> tuple[int, int, int, int, int]:
+        """The functions of `simulate`, compiled by the first thread that asks."""
+        # SymPy is not made for several threads at once.
+        with _COMPILING:
+            if not all(self._along):
+                address = self._compiled([
+                    *self._sensitive(self._columns),
+                    _plain(self._system, "plain", self._rates.values),
+                    _plain(self._system, "pace", self._system.pace.asked),
+                    _with_sensitivities(
+                        self._system, "update", self._updates, self._columns, behind=True
+                    ),
+                ], self._step(self._columns))  # fmt: skip
+                names = ("step", "read", "plain", "pace", "update")
+                step, read, plain, pace, update = (address(name) for name in names)
+                self._along = (step, read, plain, pace, update)
+        return self._along
 
     def simulate(  # noqa: PLR0917 -- they stand in the order of the driver's
         self, u: Any, dt: Any, substeps: Any, hold: Any, starts: Any, x0: Any, p: Any, y: Any,
         dy: Any, last: Any, rows: int, finest: int,
     ) -> None:  # fmt: skip
         """Fill outputs (windows, samples, outputs), their slopes (…, m) and the last states."""
-        asked = self._system.pace.asked
-        if not all(self._along):
-            address = self._compiled([
-                *self._sensitive(self._columns),
-                _plain(self._system, "plain", self._rates.values),
-                _plain(self._system, "pace", asked),
-                _with_sensitivities(
-                    self._system, "update", self._updates, self._columns, behind=True
-                ),
-            ])  # fmt: skip
-            names = ("rates", "read", "plain", "pace", "update")
-            self._along = tuple(address(name) for name in names)
         kernel = partial(
-            driver.simulate, *self._along, bool(self._system.updates), len(asked),
-            self._crossing, self._columns, rows, u, dt, substeps, finest, hold,
+            driver.simulate, *self._compiled_along(), bool(self._system.updates),
+            len(self._system.pace.asked), self._crossing, self._columns, rows, u, dt, substeps,
+            finest, hold,
         )  # fmt: skip
         numbers = x0.shape[1] * (1 + self._columns)
         # Starting threads costs more than a small simulation.
-        if starts.size * y.shape[1] * substeps * numbers < LARGE:
-            kernel(starts, x0, p, y, dy, last)
-            return
-        parts = np.array_split(np.arange(starts.size), min(cores(), starts.size))
-        cuts = [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
+        large = starts.size * y.shape[1] * substeps * numbers >= LARGE
         # Windows are independent, so every distribution over cores gives the same numbers.
-        with ThreadPoolExecutor(len(cuts)) as pool:
-            running = [pool.submit(kernel, starts[c], x0[c], p, y[c], dy[c], last[c]) for c in cuts]
-            for each in running:
-                each.result()
+        on_all_cores(
+            lambda c: kernel(starts[c], x0[c], p, y[c], dy[c], last[c]),
+            shares(starts.size) if large else [slice(None)],
+        )
+
+    def _step(self, columns: int) -> str:
+        rates = "rates" if columns else "plain"
+        inputs = len(self._system.inputs) + 1
+        return step_function("step", rates, len(self._system.states), columns, inputs)
 
     def _sensitive(self, columns: int) -> tuple[Function, Function]:
         return (
@@ -156,9 +162,16 @@ class NativeKernel:
 
         For custom loops; they are called through `integrator.call`.
         """
+        return self._swept(columns)[:2]
+
+    def step(self, columns: int) -> int:
+        """Address of a whole step of the same, for `integrator.across`."""
+        return self._swept(columns)[2]
+
+    def _swept(self, columns: int) -> tuple[int, int, int]:
         if columns not in self._sweeps:
-            address = self._compiled(self._sensitive(columns))
-            self._sweeps[columns] = (address("rates"), address("read"))
+            address = self._compiled(self._sensitive(columns), self._step(columns))
+            self._sweeps[columns] = (address("rates"), address("read"), address("step"))
         return self._sweeps[columns]
 
     def jacobians(self) -> Jacobians:
@@ -169,9 +182,9 @@ class NativeKernel:
                 _jacobian(self._system, "read_slopes", self._reads),
                 _jacobian(self._system, "rate_slopes", self._rates),
                 _jacobian(self._system, "update_slopes", self._updates),
-            ])  # fmt: skip
+            ], self._step(0))  # fmt: skip
             self._slopes = Jacobians(
-                plain=address("plain"),
+                step=address("step"),
                 reads=address("read_slopes"),
                 rates=address("rate_slopes"),
                 updates=address("update_slopes"),

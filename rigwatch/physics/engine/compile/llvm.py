@@ -18,6 +18,8 @@ from rigwatch.wire.errors import ModelError
 
 FUNCTIONS = ("tanh", "exp", "log", "sin", "cos", "atan", "pow")
 """Functions called from the C mathematics library."""
+INLINED = 1000
+"""Most instructions of a function that is inlined where it is called."""
 _RELATIONS: dict[type[sympy.Basic], str] = {
     sympy.StrictGreaterThan: "ogt",
     sympy.GreaterThan: "oge",
@@ -33,7 +35,7 @@ _DECLARED = "".join(
         *(f"declare double @llvm.{name}.f64(double)\n" for name in ("fabs", "floor", "sqrt")),
     ]
 )
-_ARGUMENTS = "double %t, " + ", ".join(
+ARGUMENTS = "double %t, " + ", ".join(
     f"ptr noalias captures(none) %{name}" for name in ("a", "u", "p", "out", "slopes")
 )
 
@@ -59,7 +61,8 @@ class Function:
     def text(self) -> str:
         """The whole function."""
         body = "\n".join(f"  {line}" for line in self._lines)
-        return f"define void @{self._name}({_ARGUMENTS}) {{\n{body}\n  ret void\n}}\n"
+        inlined = " alwaysinline" if len(self._lines) <= INLINED else ""
+        return f"define void @{self._name}({ARGUMENTS}){inlined} {{\n{body}\n  ret void\n}}\n"
 
     def let(self, name: sympy.Symbol, expression: sympy.Expr) -> None:
         """Name a value for reuse."""
@@ -243,9 +246,16 @@ def _machine() -> Any:
     return target.create_target_machine(cpu=processor, features=features, opt=2, jit=True)
 
 
-def machine_code(functions: Sequence[Function]) -> tuple[Any, Callable[[str], int]]:
-    """The object that keeps the code alive, and the address of each function by name."""
-    text = _DECLARED + "".join(function.text() for function in functions)
+def machine_code(
+    functions: Sequence[Function], further: str = ""
+) -> tuple[Any, Callable[[str], int]]:
+    """The object that keeps the code alive, and the address of each function by name.
+
+    Args:
+        functions: of the module.
+        further: code of others, which may call them.
+    """
+    text = _DECLARED + "".join(function.text() for function in functions) + further
     module = llvm.parse_assembly(text)
     builder = llvm.create_pass_builder(
         _machine(), llvm.create_pipeline_tuning_options(speed_level=2)

@@ -95,6 +95,7 @@ def renamed(text: str, names: Mapping[str, str]) -> str:
     return re.sub(r"\b[A-Za-z_]\w*", lambda name: names.get(name[0], name[0]), text)
 
 
+@lru_cache(maxsize=4096)
 def names_in(text: str, where: str) -> frozenset[str]:
     """All names in the expression `text` except functions.
 

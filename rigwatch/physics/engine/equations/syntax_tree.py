@@ -39,6 +39,8 @@ def _is_deep(tree: ast.AST) -> bool:
     for _ in range(DEEPEST):
         if any(calls > DEEPEST_CALLS for _, calls in level):
             return True
+        if not level:
+            return False
         level = [
             (child, calls + isinstance(node, ast.Call))
             for node, calls in level

@@ -1,6 +1,7 @@
 """The states of one effect, simulated along the signals at its port."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -54,13 +55,14 @@ class EffectStates:
         wanted = signals if LEFT in used else used
         inputs = [name for name in signals if name not in {TIME, LEFT} and name in wanted]
         self._driving = _side_by_side([signals[name] for name in inputs], signals)
-        self._system = _alone(effect, inputs, hold, late)
-        self._compiled: CompiledSystem = compile_system(self._system)
+        equations = tuple((n, s.derivative, s.update) for n, s in effect.states.items())
+        self._compiled = _alone(equations, tuple(effect.parameters), tuple(inputs), hold, late)
+        self._system = self._compiled.system
         self._first = np.array([[state.start for state in effect.states.values()]])
         self._spacing, self._rows = spacing, rows
         # Systems with the same equations and names share a kernel.
-        equations = (self._compiled.kernel, spacing, rows, hold, late, self._first.tobytes())
-        self._key = (*equations, self._driving.shape, digest(self._driving))
+        made_by = (self._compiled.kernel, spacing, rows, hold, late, self._first.tobytes())
+        self._key = (*made_by, self._driving.shape, digest(self._driving))
 
     def run(self, values: Mapping[str, float], arriving: Signals | None = None) -> Signals:
         """Each state by name, shape (nodes,).
@@ -105,24 +107,36 @@ def _used(effect: Effect) -> set[str]:
     return {name for text in texts for name in names_in(text, "state")}
 
 
-def _alone(effect: Effect, inputs: list[str], hold: Hold, late: float) -> System:
-    """The states of one effect as a system of their own."""
-    own = (*inputs, TIME, *effect.states, *effect.parameters)
+@lru_cache(maxsize=512)
+def _alone(
+    equations: tuple[tuple[str, str, str], ...],
+    parameters: tuple[str, ...],
+    inputs: tuple[str, ...],
+    hold: Hold,
+    late: float,
+) -> CompiledSystem:
+    """The states of one effect as a system of their own.
+
+    Args:
+        equations: name, rate of change and value after each sample of every state.
+        parameters: of the effect, by name.
+        inputs, hold, late: the signals that drive it.
+    """
+    states = [name for name, _, _ in equations]
+    own = (*inputs, TIME, *states, *parameters)
     names = {LEFT: symbol(UNTIL)} | {name: symbol(name) for name in own}
     model = Model(
         name="states of an effect",
         summary="the states of one effect",
         hold=hold,
         inputs={name: Input(unit="1", late=late) for name in inputs},
-        parameters={n: Parameter(value=0.0, unit="1", fixed=True) for n in effect.parameters},
-        outputs={name: Output(unit="1", expression=name) for name in effect.states},
+        parameters={n: Parameter(value=0.0, unit="1", fixed=True) for n in parameters},
+        outputs={name: Output(unit="1", expression=name) for name in states},
     )
-    states = {
-        n: State(unit="1", derivative=s.derivative or s.update) for n, s in effect.states.items()
-    }
-    rates = {n: parse(s.derivative or "0", names, f"state {n}") for n, s in effect.states.items()}
-    updates = {
-        n: parse(s.update, names, f"state {n}") for n, s in effect.states.items() if s.update
-    }
-    read = {name: symbol(name) for name in effect.states}
-    return System(model, (), states, model.parameters, rates, read, {}, (), updates)
+    own_states = {n: State(unit="1", derivative=rate or update) for n, rate, update in equations}
+    rates = {n: parse(rate or "0", names, f"state {n}") for n, rate, _ in equations}
+    updates = {n: parse(update, names, f"state {n}") for n, _, update in equations if update}
+    read = {name: symbol(name) for name in states}
+    return compile_system(
+        System(model, (), own_states, model.parameters, rates, read, {}, (), updates)
+    )

@@ -9,7 +9,7 @@ which is one linear equation for all candidates and needs no further compilation
 sensor the effect changes only its own output.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -22,6 +22,8 @@ from rigwatch.physics.engine.compile import (
     Linearisation,
     derivative,
     numpy_function,
+    on_all_cores,
+    shares,
 )
 from rigwatch.physics.engine.equations import (
     LEFT,
@@ -96,19 +98,36 @@ def directions(at: Trajectory, candidates: Sequence[Candidate]) -> FloatArray:
     seen = {port: _signals(at, port) for port in {c.port for c in candidates}}
     found = np.zeros((*run.outputs.shape, len(candidates)))
     if inner:
-        pushes = np.stack([_push(at, c, seen[c.port]) for c in inner], axis=-1)
+        pushes = _pushes(at, inner, seen)
         columns = np.array([_probe_column(system, c.port) for c in inner])
         places = [i for i, c in enumerate(candidates) if kinds[c.port] != "sensor"]
         held = np.array(
             [hold_at(system.model, system.model.ports[c.port]) == "zero" for c in inner]
         )
         found[..., places] = _propagated(run, len(system.free), pushes, columns, held)
-    for index, candidate in enumerate(candidates):
-        if kinds[candidate.port] == "sensor":
-            signal = list(system.outputs).index(system.model.ports[candidate.port].signal)
-            found[..., signal, index] = _push(at, candidate, seen[candidate.port])[
-                :, :: run.substeps
-            ]
+    outer = [i for i, c in enumerate(candidates) if kinds[c.port] == "sensor"]
+    pushes = _pushes(at, [candidates[index] for index in outer], seen)
+    for index, push in zip(outer, pushes, strict=True):
+        signal = list(system.outputs).index(system.model.ports[candidates[index].port].signal)
+        found[..., signal, index] = push[:, :: run.substeps]
+    return found
+
+
+def _pushes(
+    at: Trajectory, candidates: Sequence[Candidate], seen: Mapping[str, dict[str, FloatArray]]
+) -> FloatArray:
+    """e(t) of candidates at the nodes, shape (candidates, windows, nodes).
+
+    `seen` holds the signals at each port.
+    """
+    found = np.empty((len(candidates), *at.time.shape))
+    # Only numbers are left to the threads.
+    ready = [_ready(at, each, seen[each.port]) for each in candidates]
+
+    def fill(index: int) -> None:
+        found[index] = ready[index]()
+
+    on_all_cores(fill, range(len(candidates)))
     return found
 
 
@@ -116,18 +135,23 @@ def _probe_column(system: System, port: str) -> int:
     return len(system.free) + len(system.states) + system.probes.index(PROBE + port)
 
 
-def _push(at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]) -> FloatArray:
-    """e(t) of one candidate at the nodes, shape (windows, nodes)."""
+def _ready(
+    at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]
+) -> Callable[[], Any]:
+    """A function that returns e(t) of one candidate at the nodes, of shape (windows, nodes)."""
     names = {name: symbol(name) for name in (*signals, *candidate.effect.states)}
     names |= {name: symbol(name) for name in candidate.effect.parameters}
     effect, values = candidate.effect, _neutral_values(candidate)
     text = (effect.expression, effect.direction, effect.strength)
     function, used = _push_function(*text, tuple(names))
-    if used & set(effect.states):
-        signals = signals | _memory(at, candidate, signals)
-    known = {**dict.fromkeys(names, 0.0), **signals, **values}
-    pushed = function(*(known[name] for name in names))
-    return np.broadcast_to(np.asarray(pushed, np.float64), at.time.shape)
+    states = _memory(at, candidate, signals) if used & set(effect.states) else None
+
+    def pushed() -> Any:
+        memory = _at_nodes(at, states.run(values)) if states else {}
+        known = {**dict.fromkeys(names, 0.0), **signals, **memory, **values}
+        return function(*(known[name] for name in names))
+
+    return pushed
 
 
 @cache
@@ -194,9 +218,7 @@ def _left(at: Trajectory) -> FloatArray:
     return np.broadcast_to(kept * at.run.spacing * (at.run.substeps - substep), at.time.shape)
 
 
-def _memory(
-    at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]
-) -> dict[str, FloatArray]:
+def _memory(at: Trajectory, candidate: Candidate, signals: dict[str, FloatArray]) -> EffectStates:
     """The effect's own states at strength zero, driven by the signals at its port.
 
     One run covers all windows: each window continues from the end of the previous one, whose last
@@ -206,8 +228,10 @@ def _memory(
     along = {name: np.pad(signal, more, mode="edge").ravel() for name, signal in signals.items()}
     model = at.compiled.system.model
     hold = hold_at(model, model.ports[candidate.port])
-    states = EffectStates(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
-    found = states.run(_neutral_values(candidate))
+    return EffectStates(candidate.effect, along, at.run.spacing, hold, at.run.substeps)
+
+
+def _at_nodes(at: Trajectory, found: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     windows, nodes = at.time.shape
     return {name: state.reshape(windows, -1)[:, :nodes] for name, state in found.items()}
 
@@ -223,84 +247,73 @@ def _propagated(
 ) -> FloatArray:
     """Change of outputs by pushes at probes, shape (windows, samples, outputs, candidates).
 
-    A `held` push changes only at samples: up to there it keeps its value of the previous node.
+    `pushes` has shape (candidates, windows, nodes), `columns` and `held` (candidates,). A `held`
+    push changes only at samples: up to there it keeps its value of the previous node.
     """
-    n = run.states.shape[2]
-    if n == 0:
+    if run.states.shape[2] == 0:
         direct = run.read_slopes[..., columns]
-        return np.asarray(direct * pushes[:, :: run.substeps, None, :])
-    along = np.ascontiguousarray(run.rate_slopes[..., free : free + n])
-    across = np.ascontiguousarray(run.rate_slopes[..., columns])
-    reads = np.ascontiguousarray(run.read_slopes[..., free : free + n])
-    direct = np.ascontiguousarray(run.read_slopes[..., columns])
-    carried = np.ascontiguousarray(run.update_slopes[..., free : free + n])
-    renewed = np.ascontiguousarray(run.update_slopes[..., columns])
-    moved = np.empty((*run.outputs.shape, len(columns)))
-    ending = pushes.copy()
-    at = np.arange(run.substeps, pushes.shape[1], run.substeps)
-    ending[:, at] = np.where(held, pushes[:, at - 1], pushes[:, at])
-    _propagate(
-        along, across, reads, direct, carried, renewed, pushes, ending, run.spacing, run.substeps,
-        moved,
-    )  # fmt: skip
-    return moved
+        return np.asarray(direct * np.moveaxis(pushes[..., :: run.substeps], 0, -1)[:, :, None])
+    moved = np.empty((len(columns), *run.outputs.shape))
+    slopes = run.rate_slopes, run.read_slopes, run.update_slopes
+
+    def propagate(c: slice) -> None:
+        _propagate(
+            *slopes, free, columns[c], held[c], pushes[c], run.spacing, run.substeps, moved[c]
+        )
+
+    on_all_cores(propagate, shares(len(columns)))
+    return np.moveaxis(moved, 0, -1)
 
 
-@kernel()
+@kernel(nogil=True)
 def _propagate(  # noqa: C901, PLR0917 -- a kernel
-    along: FloatArray,
-    across: FloatArray,
-    reads: FloatArray,
-    direct: FloatArray,
-    carried: FloatArray,
-    renewed: FloatArray,
-    pushes: FloatArray,
-    ending: FloatArray,
-    h: float,
-    substeps: int,
-    moved: FloatArray,
-) -> None:
-    """Heun's method over the nodes; the outputs are read at the samples."""
-    windows, nodes, n, candidates = across.shape
-    response, ahead = np.empty((n, candidates)), np.empty((n, candidates))
-    slope, next_slope = np.empty((n, candidates)), np.empty((n, candidates))
-    for w in range(windows):
-        response[:] = 0.0
-        for node in range(nodes):
-            if node % substeps == 0:
-                k = node // substeps
-                if carried.shape[1] > 0 and k > 0:
-                    _slopes(carried[w, k], renewed[w, k], pushes[w, node], response, ahead)
-                    response[:] = ahead
-                for o in range(moved.shape[2]):
-                    for c in range(candidates):
-                        value = direct[w, k, o, c] * pushes[w, node, c]
+    rates: FloatArray, reads: FloatArray, updates: FloatArray, free: int, columns: IntArray,
+    held: BoolArray, pushes: FloatArray, h: float, substeps: int, moved: FloatArray,
+) -> None:  # fmt: skip
+    """Heun's method over the nodes, candidate by candidate; the outputs are read at the samples.
+
+    The last axis of the slopes is (free parameters, states, probes).
+    """
+    candidates, windows, nodes = pushes.shape
+    n = rates.shape[2]
+    response, ahead = np.empty(n), np.empty(n)
+    slope, next_slope = np.empty(n), np.empty(n)
+    for c in range(candidates):
+        column = columns[c]
+        for w in range(windows):
+            for i in range(n):
+                response[i] = 0.0
+            for node in range(nodes):
+                push = pushes[c, w, node]
+                if node % substeps == 0:
+                    k = node // substeps
+                    if updates.shape[1] > 0 and k > 0:
+                        _slopes(updates[w, k], free, column, push, response, ahead)
+                        for i in range(n):
+                            response[i] = ahead[i]
+                    for o in range(moved.shape[3]):
+                        value = reads[w, k, o, column] * push
                         for j in range(n):
-                            value += reads[w, k, o, j] * response[j, c]
-                        moved[w, k, o, c] = value
-            if node + 1 < nodes:
-                _slopes(along[w, node], across[w, node], pushes[w, node], response, slope)
-                for i in range(n):
-                    for c in range(candidates):
-                        ahead[i, c] = response[i, c] + h * slope[i, c]
-                following = node + 1
-                _slopes(
-                    along[w, following], across[w, following], ending[w, following], ahead,
-                    next_slope,
-                )  # fmt: skip
-                for i in range(n):
-                    for c in range(candidates):
-                        response[i, c] += 0.5 * h * (slope[i, c] + next_slope[i, c])
+                            value += reads[w, k, o, free + j] * response[j]
+                        moved[c, w, k, o] = value
+                if node + 1 < nodes:
+                    _slopes(rates[w, node], free, column, push, response, slope)
+                    for i in range(n):
+                        ahead[i] = response[i] + h * slope[i]
+                    following = node + 1
+                    jumps = held[c] and following % substeps == 0
+                    ending = push if jumps else pushes[c, w, following]
+                    _slopes(rates[w, following], free, column, ending, ahead, next_slope)
+                    for i in range(n):
+                        response[i] += 0.5 * h * (slope[i] + next_slope[i])
 
 
-@kernel()
-def _slopes(
-    along: FloatArray, across: FloatArray, push: FloatArray, at: FloatArray, out: FloatArray
+@kernel(nogil=True)
+def _slopes(  # noqa: PLR0917 -- a kernel
+    by: FloatArray, free: int, column: int, push: float, at: FloatArray, out: FloatArray
 ) -> None:
-    n, candidates = at.shape
-    for i in range(n):
-        for c in range(candidates):
-            value = across[i, c] * push[c]
-            for j in range(n):
-                value += along[i, j] * at[j, c]
-            out[i, c] = value
+    for i in range(at.size):
+        value = by[i, column] * push
+        for j in range(at.size):
+            value += by[i, free + j] * at[j]
+        out[i] = value
