@@ -18,6 +18,7 @@ from monitor.decision.kernel_state import (  # fmt: skip
     DEVIATION,
     HIGH1,
     HIGH2,
+    LONG,
     LOW1,
     LOW2,
     OBSERVABLE,
@@ -35,6 +36,8 @@ from monitor.reference import (
     Reference,
 )
 
+STANDING = 2 * LONG
+"""Samples at rest after which a rig with an aperiodic drive stands still."""
 LEAST_FILL = 8
 """Minimum number of samples to estimate two parameters."""
 _APERIODIC_VARIANCE = 9.0
@@ -52,6 +55,18 @@ def spread_of_change(ref: Reference) -> float:
 
 
 @njit(inline="always")
+def _stands(ref: Reference, state: WatchState) -> bool:
+    """Whether the rig is at rest: the velocity is then what its filter keeps of the motion before.
+
+    A periodic drive has moved it within any window, which spans whole periods.
+    """
+    length = state.window.place[LENGTH]
+    if ref.counts.source == APERIODIC:
+        length = min(length, STANDING)
+    return state.counts.still >= length
+
+
+@njit(inline="always")
 def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
     """Write θ, its limits, D and the observability of friction to `state.held`."""
     held, s = state.held, state.sums
@@ -59,7 +74,8 @@ def estimate(rules: Rules, ref: Reference, state: WatchState) -> None:
     theta1, theta2, condition = solve_two(s)
     speed = np.sqrt(energy(state.energies, S) / max(state.energies.place[FILL], 1))
     held[CONDITION], held[SPEED_RMS] = condition, speed
-    observable = speed >= rules.least_velocity and state.window.place[FILL] >= LEAST_FILL
+    moves = speed >= rules.least_velocity and not _stands(ref, state)
+    observable = moves and state.window.place[FILL] >= LEAST_FILL
     held[OBSERVABLE] = 1.0 if observable else 0.0
     if not observable:
         held[CONDITION] = 1.0

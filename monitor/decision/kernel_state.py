@@ -38,6 +38,7 @@ _COUNTS = np.dtype(
         ("agreed", np.int64),  # consecutive tests that found friction
         ("hop", np.int64),  # samples since the last estimate
         ("excited", np.int64),  # consecutive tests that found another excitation
+        ("still", np.int64),  # samples since the position last moved
     ]
 )
 Y, X, V, A, S = range(5)
@@ -95,7 +96,7 @@ def new_watch_state(
         new_history(friction_b, friction_a),
         new_record(_COUNTS),
         np.zeros(OUTPUTS),
-        np.zeros(8),
+        np.zeros(10),
         np.zeros(5),
         np.zeros(3),
         np.zeros(6),
@@ -110,5 +111,6 @@ def clear(state: WatchState, window: int) -> None:
     state.history.rows[:, :] = 0.0
     counts = state.counts
     counts.episode = counts.quiet = counts.agreed = counts.hop = counts.excited = 0
+    counts.still = 0
     state.held[:] = 0.0
     state.recent[:] = 0.0

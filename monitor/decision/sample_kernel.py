@@ -161,6 +161,7 @@ def _take(
     row[0], row[1], row[2] = data[G1], data[G2], y
     push(state.window, row)
     rest = _at_rest(data, ref, state)
+    _count_still(data[POSITION], rest, ref, state)
     store_sample(state.history, y, data[G1], data[G2], data[VELOCITY], rest, signals[V])
     state.held[CHANGE] = y
 
@@ -183,6 +184,19 @@ def _at_rest(data: FloatArray, ref: Reference, state: WatchState) -> float:
     weak = abs(recent[7]) < 0.15 * ref.levels.acceleration_swing + 5.0 * ref.levels.noise
     still = spread < 6.0 * ref.levels.position_noise and shaken < 10.0 * ref.levels.noise and weak
     return 1.0 if still else 0.0
+
+
+@njit(inline="always")
+def _count_still(position: float, rest: float, ref: Reference, state: WatchState) -> None:
+    """Count the samples at rest in one place, within ten standard deviations of the position."""
+    place = state.recent
+    lowest, highest = min(place[8], position), max(place[9], position)
+    if rest > 0.0 and highest - lowest < 10.0 * ref.levels.position_noise:
+        state.counts.still += 1
+        place[8], place[9] = lowest, highest
+    else:
+        state.counts.still = 0
+        place[8] = place[9] = position
 
 
 @njit(inline="always")

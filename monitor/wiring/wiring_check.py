@@ -4,7 +4,8 @@
                                                      └▶ failed, after two windows in a row
 
 One good window passes until the device or the monitor starts again. After a failure nothing is
-judged until then: a reference learned with wrong wiring would count as healthy.
+judged until then: a reference learned with wrong wiring would count as healthy. From the first bad
+window on nothing is judged either, until a good one; it takes the second to be told.
 """
 
 import numpy as np
@@ -48,7 +49,7 @@ class WiringCheck:
         self._gain = self._phase = np.nan
 
     def update(self, block: SampleBlock) -> tuple[BoolArray, tuple[Condition, ...]]:
-        """Whether the wiring is wrong at each sample, shape (n,), and conditions with the reason.
+        """Whether the wiring is in doubt or wrong at each sample, shape (n,), and conditions.
 
         Args:
             block: new samples; a gap before it discards the window.
@@ -58,10 +59,10 @@ class WiringCheck:
         elif block.seq != self._next:
             self._window = []
         self._boot, self._next = block.boot, block.seq + len(block)
-        wrong = np.zeros(len(block), np.bool_)
+        doubted, wrong = np.zeros((2, len(block)), np.bool_)
         if not self._passed:
-            wrong[self._first_failed(block) :] = True
-        return wrong, tuple(
+            wrong[self._first_failed(block, doubted) :] = True
+        return doubted | wrong, tuple(
             above(name, wrong & (name == self._failed), np.full(len(block), value), limit)
             for name, value, limit in (
                 (SIGN, abs(self._phase), 180 - REVERSED),
@@ -71,8 +72,11 @@ class WiringCheck:
             if self._failed == name
         )
 
-    def _first_failed(self, block: SampleBlock) -> int:
-        """The first sample at which the wiring counts as wrong; the block's length if none."""
+    def _first_failed(self, block: SampleBlock, doubted: BoolArray) -> int:
+        """The first sample at which the wiring counts as wrong; the block's length if none.
+
+        `doubted` is set where the last window was bad.
+        """
         if self._failed:
             return 0
         signals = self._signals(block)
@@ -81,6 +85,7 @@ class WiringCheck:
             return len(block)
         known: BoolArray = np.isfinite(signals.sum(axis=1))
         for at, valid in enumerate(known):
+            doubted[at] = self._fails > 0
             if not valid:
                 self._window = []
                 continue
@@ -88,6 +93,7 @@ class WiringCheck:
             if len(self._window) == self._length:
                 self._judge(np.array(self._window))
                 self._window = []
+                doubted[at] = self._fails > 0
                 if self._passed or self._failed:
                     return len(block) if self._passed else at
         return len(block)

@@ -306,8 +306,7 @@ def test_36_a_rig_that_is_driven_and_stands_still(rig: Field, device: SerialDevi
     # The window, and the decay of the velocity's filter to the least velocity.
     assert 0 <= remark.seq - (first + held.moved) <= 3 * RATE
     assert estimated(rig, boot, remark.seq, remark.seq, "armed").tolist() == [1.0]
-    # The velocity's filter decays from the last swing to the least velocity that is judged.
-    frozen(rig, boot, first + held.moved + round(1.5 * RATE), first + 1270)
+    frozen(rig, boot, first + held.moved + round(RATE), first + 1270)
     rig.cleared("not_observable")
 
 

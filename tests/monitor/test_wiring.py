@@ -70,16 +70,15 @@ def in_millimetres(c: Channels) -> None:
         (in_millimetres, "wiring_scale"),
     ],
 )
-def test_wrong_wiring_is_reported_and_nothing_is_judged_after_it(
+def test_wrong_wiring_is_reported_and_nothing_is_judged(
     scheme: str, tamper: Callable[[Channels], None], alarm: str
 ) -> None:
     channels = run(SINE, 12.0, friction(8.0))
     tamper(channels)
     times, estimates = watched(channels, SCHEMES[scheme]())
     assert times[alarm] <= 2.0
-    assert not {name for name in JUDGED & times.keys() if times[name] > times[alarm]}
-    armed = np.concatenate([block.column("armed").values for block in estimates])
-    assert not armed[round(times[alarm] * RATE) :].any()
+    assert not JUDGED & times.keys()
+    assert not any(block.column("armed").values.any() for block in estimates)
 
 
 @pytest.mark.parametrize(

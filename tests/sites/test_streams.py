@@ -1,5 +1,6 @@
 """What recordings fill in, without clock or bus: in order, and none twice."""
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigwatch.recorder.past import BlockStream, Outage, Page, PastServer, Question
+from rigwatch.recorder.past import BlockStream, Outage, Page, PastServer, Question, serving
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import (
@@ -162,6 +163,31 @@ def test_pages_hold_each_message_of_the_span_once(server: PastServer) -> None:
     assert at == list(range(1000, 6500))
     assert sum(isinstance(m, Event) for m in both) == 6500 // 128 - 1000 // 128
     assert asked(server, Question((SAMPLES.name,), 10**15, 2 * 10**15))[0] == []
+
+
+def test_a_page_that_finds_little_ends_in_time_and_the_next_goes_on(
+    server: PastServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serving, "PAGE_TIME", 0.0)
+    question = Question((EVENTS.name,), 1000 * PERIOD_NS, 6500 * PERIOD_NS)
+    found, pages = asked(server, question)
+    assert sum(isinstance(m, Event) for m in found) == 6500 // 128 - 1000 // 128
+    assert pages > 30, "a page for each chunk"
+
+
+def test_whoever_asks_without_end_gets_no_more_than_the_rate_and_keeps_nobody_waiting(
+    server: PastServer,
+) -> None:
+    question = Question((SAMPLES.name,), 0, 6500 * PERIOD_NS).to_bytes()
+    began, answered, refused, longest = time.monotonic(), 0, 0, 0.0
+    while refused < 1000:
+        at = time.monotonic()
+        found = server.answer(question)
+        longest = max(longest, time.monotonic() - at if not found else 0.0)
+        answered, refused = answered + sum(map(len, found)), refused + (not found)
+    spent = time.monotonic() - began
+    assert 0 < answered <= (spent + 1.1) * serving.BYTES_PER_SECOND
+    assert longest < serving.AHEAD, "a refusal waits for nothing"
 
 
 def test_what_is_no_question_gets_no_answer(server: PastServer) -> None:

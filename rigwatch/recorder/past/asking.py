@@ -14,9 +14,9 @@ from rigwatch.wire.messages import PAST_KEY
 from rigwatch.wire.session import Part
 
 REPLY_TIMEOUT = 5.0
-"""Longest time for a page [s]; a page waits for its share of the sender's rate."""
+"""Longest time for a page [s]."""
 PAUSE = 0.25
-"""Time between two attempts [s]."""
+"""Time between two attempts [s]; one fails as well if answers are ahead of the sender's rate."""
 PATIENCE = 60.0
 """Time without a page, while the site can be reached, after which an answer is given up [s]."""
 MOST_PAGES = 8

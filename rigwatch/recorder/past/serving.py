@@ -12,6 +12,10 @@ from rigwatch.wire.session import SUFFIX, Place, Wanted, read_page
 
 BYTES_PER_SECOND = 4_000_000
 """Rate of the answers, so that the recording goes on beside them: 25 rigs as they run [bytes/s]."""
+AHEAD = 1.0
+"""How far answers may be ahead of that rate; a question beyond gets none, and is repeated [s]."""
+PAGE_TIME, SHARE = 0.05, 0.5
+"""Time after which a page ends, however little was found [s], and share of the time for pages."""
 _MARGIN = 60.0
 
 
@@ -27,13 +31,19 @@ class PastServer:
     def __init__(self, bus: Bus, root: Path, settled: Callable[[], int]) -> None:
         self._rig, self._root, self._settled = bus.rig, root, settled
         self._free_at = 0.0
-        self.close = bus.serve(PAST_KEY, self._answer)
+        self.close = bus.serve(PAST_KEY, self.answer)
 
-    def _answer(self, data: bytes) -> list[bytes]:
-        question = Question.from_bytes(data)
-        time.sleep(max(0.0, self._free_at - time.monotonic()))
+    def answer(self, data: bytes) -> list[bytes]:
+        """A page; none while answers are too far ahead of their rate, whoever asks.
+
+        It never waits: what waits here delays the end of the recorder.
+        """
+        question, began = Question.from_bytes(data), time.monotonic()
+        if self._free_at > began + AHEAD:
+            return []
         page = self.page(question).to_bytes()
-        self._free_at = time.monotonic() + len(page) / BYTES_PER_SECOND
+        taken = max(len(page) / BYTES_PER_SECOND, (time.monotonic() - began) / SHARE)
+        self._free_at = max(self._free_at, began) + taken
         return [page]
 
     def page(self, question: Question) -> Page:
@@ -48,7 +58,13 @@ class PastServer:
         segments = sorted(self._segments(question.start), key=_name)
         topics = frozenset(map(topic, question.topics))
         wanted = Wanted(topics, question.start, question.end, PAGE_BYTES)
-        parts, place = read_page(segments, wanted, _place(segments, question.bookmark))
+        until = time.monotonic() + PAGE_TIME
+        parts, place = read_page(
+            segments,
+            wanted,
+            _place(segments, question.bookmark),
+            lambda: time.monotonic() >= until,
+        )
         return Page(tuple(parts), settled, _bookmark(segments, place))
 
     def _segments(self, start: int) -> Iterator[Path]:

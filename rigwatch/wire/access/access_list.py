@@ -43,8 +43,9 @@ _ANSWERS = {
 }
 _TOKENS = {"daq": ("source/*",), "monitor": ("said/**",), "witness": ("said/witness/*",)}
 """Tokens with names, which their holder also sends and answers with."""
-_ASKS = {"operator": ("monitor/receiver", "monitor/model")}
-_EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing", PAST_KEY, "source/*", "said/**")
+_ASKS = {"operator": ("monitor/receiver", "monitor/model", PAST_KEY)}
+"""The recorder of a headquarters has the certificate of an operator."""
+_EVERYBODY_ASKS = (RING_KEY, "ring/**", "monitor/standing", "source/*", "said/**")
 
 LINKED = "router"
 """The role of routers, also of those of other sites."""

@@ -5,8 +5,9 @@ unpacked. A page ends at a `Place`, from which the next one goes on.
 """
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -67,7 +68,10 @@ class Wanted:
 
 
 def read_page(
-    segments: Sequence[Path], wanted: Wanted, place: Place
+    segments: Sequence[Path],
+    wanted: Wanted,
+    place: Place,
+    enough: Callable[[], bool] = lambda: False,
 ) -> tuple[list[Part], Place | None]:
     """The next messages from `place` on, in recorded order, and where the next page begins.
 
@@ -75,30 +79,35 @@ def read_page(
         segments: in the order of their recording.
         wanted: which messages.
         place: `Place()` for the first page.
+        enough: whether the page shall end with the chunk that has been read, however little it had.
 
     Returns:
         The messages, cut into parts small enough for a page, and None at the end.
     """
     found: list[Part] = []
     size = 0
-    for number in range(place.segment, len(segments)):
-        here = place if number == place.segment else Place(number)
-        for offset, index, part in _parts(segments[number], wanted, here):
+    for here, parts in _chunks(segments, wanted, place):
+        if here != place and enough():
+            return found, here
+        for index, part in parts:
             if size + len(part[1]) > wanted.size and found:
-                return found, Place(number, offset, index)
+                return found, Place(here.segment, here.offset, index)
             found.append(part)
             size += len(part[1])
     return found, None
 
 
-def _parts(path: Path, wanted: Wanted, place: Place) -> Iterator[tuple[int, int, Part]]:
-    """Offset of the chunk, number in it, and each part of one segment."""
-    reader = ChunkReader(path, set())
-    for chunk in chunks_between(path, place.offset, wanted.start, wanted.end):
-        done = place.parts if chunk.offset == place.offset else 0
-        for index, part in enumerate(_of_chunk(reader, chunk, wanted)):
-            if index >= done:
-                yield chunk.offset, index, part
+def _chunks(
+    segments: Sequence[Path], wanted: Wanted, place: Place
+) -> Iterator[tuple[Place, Iterator[tuple[int, Part]]]]:
+    """The place of each chunk, and the number and content of its parts from `place` on."""
+    for number in range(place.segment, len(segments)):
+        begin = place if number == place.segment else Place(number)
+        reader = ChunkReader(segments[number], set())
+        for chunk in chunks_between(segments[number], begin.offset, wanted.start, wanted.end):
+            done = begin.parts if chunk.offset == begin.offset else 0
+            parts = enumerate(_of_chunk(reader, chunk, wanted))
+            yield Place(number, chunk.offset, done), islice(parts, done, None)
 
 
 def _of_chunk(reader: ChunkReader, chunk: Chunk, wanted: Wanted) -> Iterator[Part]:
