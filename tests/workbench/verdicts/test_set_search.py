@@ -17,6 +17,7 @@ from rigwatch.workbench.explain.combinations import (
 )
 from rigwatch.workbench.explain.several_effects import _ranked_with
 from rigwatch.workbench.ranking import rank
+from rigwatch.workbench.ranking.rank import _unfitted_similar
 from rigwatch.workbench.ranking.ranked import Ranked
 from tests.workbench.dampers import damper
 
@@ -72,14 +73,16 @@ def test_an_effect_of_a_set_is_compared_though_it_looks_like_another(tmp_path: P
     assert found["coulomb@load"].accepted
 
 
-def test_a_relative_of_the_best_is_fitted_though_it_looks_like_another(tmp_path: Path) -> None:
-    def slider(x: np.ndarray, _: np.ndarray) -> np.ndarray:
-        force = np.zeros(len(x))
-        for k in range(1, len(x)):
-            force[k] = np.clip(force[k - 1] + 4000 * (x[k] - x[k - 1]), -8, 8)
-        return force
-
-    study = damper(tmp_path, slider)
-    bench = open_bench(study)
-    best, second = rank(study, bench.data, bench.base, bench.floor)[:2]
-    assert (best.effect, second.effect) == ("jenkins", "bouc_wen")
+@pytest.mark.parametrize(("reached", "fitted_next"), [(False, "jenkins@load"), (True, None)])
+def test_above_the_floor_a_relative_of_the_best_is_fitted_though_it_looks_like_another(
+    reached: bool, fitted_next: str | None
+) -> None:
+    best, third, waiting = (effect(f"{name}@load") for name in ("bouc_wen", "dahl", "jenkins"))
+    best.placement.effect.confused_with = ("jenkins", "linear_stiffness")  # type: ignore[misc]
+    waiting.fitted_instead = third.label
+    for row, error in ((best, 2.4), (third, 4.0)):
+        fit: Any = SimpleNamespace(held_out=None, held_out_error=error)
+        row.fitted, row.accepted = fit, True
+    floor: Any = SimpleNamespace(reached=lambda _: reached)
+    found = _unfitted_similar([best, third, waiting], floor)
+    assert (found and found.label) == fitted_next
