@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.fit.smoothing import smoothed
-from rigwatch.physics.transfer import lateness
+from rigwatch.physics.transfer import lateness, sensor_phase
 from rigwatch.wire.arrays import FloatArray
 
 RATE, SECONDS = 256.0, 24.0
@@ -41,6 +41,26 @@ def test_a_late_position_is_found_behind_an_accelerometer(late: float) -> None:
     found = lateness([(position, acceleration)], 1.0 / RATE, 2)
 
     assert found == pytest.approx(late, abs=1.5e-4)
+
+
+@pytest.mark.parametrize("corner", [0.0, 0.4, 0.9])
+def test_the_corner_of_an_accelerometer_shows_in_the_motion_alone(corner: float) -> None:
+    acceleration = high_passed(motion(0.0, order=2), corner) + noise(0.05, 1)
+    position = motion(0.8e-3) + noise(5e-6, 2)
+
+    found = sensor_phase([(position, acceleration)], 1.0 / RATE, 2)
+
+    assert found is not None
+    assert found.is_late_known
+    assert found.known_corner == pytest.approx(2.0 * np.pi * corner, abs=0.15)
+
+
+def test_a_noisy_position_leaves_the_corner_open() -> None:
+    acceleration = high_passed(motion(0.0, order=2), 0.4) + noise(0.05, 1)
+
+    found = sensor_phase([(motion(0.0) + noise(1e-3, 2), acceleration)], 1.0 / RATE, 2)
+
+    assert found is None or found.known_corner is None
 
 
 def test_channels_that_agree_are_left_alone() -> None:

@@ -7,7 +7,7 @@ excitation.
 
 from rigwatch.physics.transfer.frequency_fit import fit_transfer_function
 from rigwatch.physics.transfer.frequency_response import FrequencyResponse, frequency_response
-from rigwatch.physics.transfer.lateness import lateness
+from rigwatch.physics.transfer.lateness import SensorPhase, lateness, sensor_phase
 from rigwatch.physics.transfer.output_error import (
     OutputErrorFit,
     OutputErrorOrders,
@@ -21,6 +21,7 @@ __all__ = [
     "FrequencyResponse",
     "OutputErrorFit",
     "OutputErrorOrders",
+    "SensorPhase",
     "TransferFunction",
     "filter_sample",
     "fit_output_error",
@@ -28,6 +29,7 @@ __all__ = [
     "frequency_response",
     "lateness",
     "period_by_correlation",
+    "sensor_phase",
     "shortest_period",
     "velocity_filter",
 ]

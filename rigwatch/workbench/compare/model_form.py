@@ -99,9 +99,11 @@ def _tried(
 
 
 def _along(study: Study, names: Sequence[str]) -> Model:
-    """The model with these variants along the measured motion, with the study's holds."""
-    model = along_measured_motion(varied(study, names).model)
-    return structs.replace(model, inputs=study.model.inputs)
+    """The model with these variants along the measured motion, with the study's sensors, holds."""
+    model, known = along_measured_motion(varied(study, names).model), study.model.parameters
+    sensors = [n for o in model.outputs.values() for n in (o.late, o.corner) if n in known]
+    parameters = model.parameters | {n: known[n] for n in sensors if not known[n].kept}
+    return structs.replace(model, inputs=study.model.inputs, parameters=parameters)
 
 
 def _strengths(study: Study, data: Data, model: Model, fitted: Fitted) -> FloatArray:

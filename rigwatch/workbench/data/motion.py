@@ -6,11 +6,14 @@ windows. This form is used if channels measure some but not all of a model's sta
 output remains to be predicted; a study can request either form (`prediction`).
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 
 from rigwatch.physics.engine.equations import (
+    Model,
     along_measured_motion,
     has_hidden_states,
     measured_states,
@@ -18,10 +21,11 @@ from rigwatch.physics.engine.equations import (
 )
 from rigwatch.physics.engine.fit import (
     Recording,
-    motion_lateness,
+    motion_phases,
     motion_recording,
     motion_widths,
 )
+from rigwatch.physics.transfer import SensorPhase
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.data.signals import Data, MotionSensor
 from rigwatch.workbench.study import Study
@@ -66,7 +70,9 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     # One width for all recordings: the smoothing is part of the fitted model.
     shown_by = data.healthy or data.train
     widths = motion_widths(study.model, shown_by)
-    late = motion_lateness(study.model, data.healthy) if data.healthy is not None else {}
+    phases = motion_phases(study.model, data.healthy) if data.healthy is not None else {}
+    late = {channel: phase.shift for channel, phase in phases.items() if phase.shift}
+    model = with_sensor_chain(model, phases)
     slow = SLOW * _rms(motion_recording(study.model, shown_by, widths=widths).inputs)
 
     def made(recording: Recording) -> Recording:
@@ -91,6 +97,32 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
         telling=telling,
     )  # fmt: skip
     return replace(study, model=model), along
+
+
+def with_sensor_chain(model: Model, phases: Mapping[str, SensorPhase]) -> Model:
+    """The model with its sensors' parameters as the healthy motion alone determines them.
+
+    Fitted with the others, the corner of an AC-coupled sensor or its lateness may stand in for what
+    the model describes poorly, and a force at the load then passes through a wrong sensor.
+
+    Args:
+        model: along its measured motion.
+        phases: between channels of the motion and the outputs that measure their rates.
+    """
+    known: dict[str, float] = {}
+    for phase in phases.values():
+        output = next(iter(model.outputs.values()))
+        if output.late and phase.is_late_known:
+            known[output.late] = 0.0
+        if output.corner and phase.known_corner is not None:
+            known[output.corner] = phase.known_corner
+    parameters = {
+        n: structs.replace(p, value=float(np.clip(known[n], p.low, p.high)), fixed=True, kept=False)
+        if n in known
+        else p
+        for n, p in model.parameters.items()
+    }
+    return structs.replace(model, parameters=parameters)
 
 
 def _lateness_remark(channel: str, late: float) -> str:

@@ -5,7 +5,7 @@ motion, so part of the residual is model error. Therefore:
 
 * residual no larger than on the healthy rig: nothing is missing, even if an effect lowers it;
 * residual slightly larger: an effect that fits it is not named, for a model of equations unless it
-  explains all of the rest;
+  explains all of a rest that is larger than at the noise floor;
 * best effect leaves much more than the healthy residual: another effect acts in addition to it or
   in its place, and it is not named with confidence, for any model;
 * best effect leaves more than the healthy residual: a nearly equal one may be the right one, as
@@ -71,7 +71,8 @@ def undetermined_if_little_and_unexplained(
     if found.word != "missing_effect" or best is None or floor.method != "healthy motion":
         return found
     little = floor.ratio(base.held_out) <= MOTION_ALLOWANCE
-    if not little or floor.left_over(base.held_out, best.held_out) <= REST:
+    explained = floor.left_over(base.held_out, best.held_out) <= REST
+    if not little or (explained and not floor.reached(base.held_out)):
         return found
     assert found.best is not None
     return replace(found, word="undetermined", text=_changed_motion(base, floor, found.best))

@@ -16,7 +16,7 @@ from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import Model, Parameter, compose
 from rigwatch.physics.engine.fit import evaluate
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.data import Data, repeat_along_motion
+from rigwatch.workbench.data import Data, quiet_scale, repeat_along_motion
 from rigwatch.workbench.fit.fitted import Fitted
 from rigwatch.workbench.fit.fitted_model import fit_model
 from rigwatch.workbench.fit.intervals import covariance
@@ -48,7 +48,9 @@ def with_healthy_parameters(study: Study, data: Data, scale: FloatArray | None =
     if healthy is None or not kept:
         return study
     loose = replace(study, model=with_kept_free(study.model))
-    found = fit_model(loose, healthy, (), study.file.start, scale, multi_start=True)
+    # The parameters depend on nothing but the healthy recording.
+    own = quiet_scale(healthy.train) if healthy.along_motion else scale
+    found = fit_model(loose, healthy, (), study.file.start, own, multi_start=True)
     places = [found.compiled.system.free.index(name) for name in kept]
     repeat = repeat_along_motion(healthy)
     uncertain = covariance(found.train, repeat)[0][np.ix_(places, places)]

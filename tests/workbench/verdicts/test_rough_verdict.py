@@ -11,6 +11,7 @@ from rigwatch.workbench.explain.adequacy import unchecked
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
     limited_verdict,
+    undetermined_if_little_and_unexplained,
     undetermined_if_much_left,
 )
 from rigwatch.workbench.explain.verdict import Verdict
@@ -72,6 +73,21 @@ def test_without_a_healthy_recording_little_is_claimed(best: float, method: str,
 
     assert found.word == word
     assert ("[[healthy]]" in found.text) == (word != "missing_effect")
+
+
+@pytest.mark.parametrize(
+    ("base", "best", "word"),
+    [
+        pytest.param(1.03, 1.0, "undetermined", id="nothing above the floor"),
+        pytest.param(1.15, 1.0, "missing_effect", id="a little, and all of it is explained"),
+        pytest.param(1.15, 1.08, "undetermined", id="a little, and a part of it is explained"),
+        pytest.param(1.5, 1.2, "missing_effect", id="more than a changed motion causes"),
+    ],
+)
+def test_a_little_more_than_healthy_is_named_if_explained(
+    base: float, best: float, word: str
+) -> None:
+    assert undetermined_if_little_and_unexplained(left(base), FLOOR, naming(best)).word == word
 
 
 def test_a_model_that_was_checked_keeps_its_verdict() -> None:

@@ -131,6 +131,12 @@ class Output(Section, frozen=True, kw_only=True):
         Text, Meta(description="what it is, in states, inputs, parameters and quantities")
     ]
     channel: Annotated[str, Meta(description="channel it is compared with, its name if empty")] = ""
+    late: Annotated[
+        str, Meta(description="parameter: how late its sensor is behind that of the motion")
+    ] = ""
+    corner: Annotated[
+        str, Meta(description="parameter: corner of its sensor's high-pass, in 1/s")
+    ] = ""
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
     def __post_init__(self) -> None:

@@ -31,6 +31,7 @@ def check_model(model: Model, where: str = "") -> System:
     try:
         _check_names(model)
         _check_channels(model)
+        _check_sensors(model)
         _check_quantities(model)
         _check_per_recording(model)
         system = compose(model)
@@ -106,6 +107,17 @@ def _check_channels(model: Model) -> None:
                 raise ModelError(
                     f"states.{name}.{key}: found channel {channel!r}, expected one of the model's:"
                     f" {', '.join(sorted(known))}"
+                )
+
+
+def _check_sensors(model: Model) -> None:
+    """Check that the parameters of an output's sensor exist."""
+    for name, output in model.outputs.items():
+        for key in ("late", "corner"):
+            named = getattr(output, key)
+            if named and named not in model.parameters:
+                raise ModelError(
+                    f"outputs.{name}.{key}: found {named!r}, expected a parameter of the model"
                 )
 
 

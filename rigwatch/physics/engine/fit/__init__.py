@@ -6,7 +6,7 @@ Recording ──windows──▶ Problem (initial states projected out) ──�
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.effect_states import EffectStates
 from rigwatch.physics.engine.fit.measured_recording import (
-    motion_lateness,
+    motion_phases,
     motion_recording,
     motion_widths,
 )
@@ -47,7 +47,7 @@ __all__ = [
     "fit",
     "initial_states",
     "joined",
-    "motion_lateness",
+    "motion_phases",
     "motion_recording",
     "motion_widths",
     "port_signals",

@@ -23,7 +23,7 @@ from rigwatch.physics.engine.equations import (
 from rigwatch.physics.engine.fit.decimation import Thinning
 from rigwatch.physics.engine.fit.recording import Recording, filled
 from rigwatch.physics.engine.fit.smoothing import best_width, flat_to, smoothed
-from rigwatch.physics.transfer import lateness
+from rigwatch.physics.transfer import SensorPhase, sensor_phase
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
 
@@ -48,7 +48,7 @@ def motion_recording(
         parts: lengths of the concatenated parts; the recording's own if empty.
         settling: time at the start of each part that does not count [s].
         widths: of the smoothing, by channel [samples]; chosen from the noise if None.
-        late: lateness of channels of the motion [s], see `motion_lateness`; none if None.
+        late: lateness of channels of the motion [s], see `motion_phases`; none if None.
 
     Raises:
         ModelError: no channel measures any of the model's states, or one has no valid sample.
@@ -87,10 +87,10 @@ def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ())
     return found
 
 
-def motion_lateness(
+def motion_phases(
     model: Model, recording: Recording, parts: Sequence[int] = ()
-) -> dict[str, float]:
-    """Lateness of each channel of the motion behind the output that measures its rate [s].
+) -> dict[str, SensorPhase]:
+    """Phase between each channel of the motion and the output that measures its rate.
 
     Args:
         model: the original model, not transformed.
@@ -102,12 +102,14 @@ def motion_lateness(
     if not outputs or recording.thinning is not None:
         return {}
     other = np.split(channels[model.outputs[outputs[0]].channel or outputs[0]], cut)
-    found: dict[str, float] = {}
+    found: dict[str, SensorPhase] = {}
     for state in balanced_states(model):
         own = np.split(channels[state.channel], cut)
         pairs = [(_longest(*pair)) for pair in zip(own, other, strict=True)]
-        found[state.channel] = lateness(pairs, recording.dt, state.order + 1)
-    return {channel: late for channel, late in found.items() if late}
+        phase = sensor_phase(pairs, recording.dt, state.order + 1)
+        if phase is not None:
+            found[state.channel] = phase
+    return found
 
 
 def _longest(own: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -30,6 +30,9 @@ OUTLIER = 2.0
 BACK = 0.8
 """Share of its squared error below which a window counts as recovered."""
 
+FOLLOWED = 4
+"""Ratio of a window to its part after which hidden states of an unknown start are settled."""
+
 SETTLED = 1e-6
 """Predicted reduction of a window's squared error below which its initial state is kept."""
 
@@ -158,18 +161,36 @@ class Problem:
     def recall(self, parameters: FloatArray) -> None:
         """Initialise effect states from the measured signals.
 
-        Windows start from the channels' states or, if better, from the given ones.
+        Windows start from the channels' states or, if better, from the given ones; a recording that
+        is one window and has no given ones starts, if better, from where its hidden states settle.
         """
         self._set_effect_states(parameters, self._effect_states.columns)
-        if self._given_initial is None or len(self._given_initial) != len(self.initial):
-            return
         rows, own = np.arange(len(self.initial)), len(self.system.model.states)
-        other = np.column_stack([self._given_initial[:, :own], self.initial[:, own:]])
+        if self._given_initial is not None and len(self._given_initial) == len(self.initial):
+            other = np.column_stack([self._given_initial[:, :own], self.initial[:, own:]])
+        elif len(self.hidden) and len(self.first_windows) == len(rows):
+            other = self._followed(parameters)
+        else:
+            return
         shown, offered = (
             np.sum(self.simulated(parameters, rows, each)[0] ** 2, axis=1)
             for each in (self.initial, other)
         )
         self.initial = np.where((offered < shown)[:, None], other, self.initial)
+
+    def _followed(self, parameters: FloatArray) -> FloatArray:
+        """Initial states, hidden ones as they are after a part of each window; (windows, states).
+
+        They forget their values in the model's file, which may be far from those of this machine.
+        """
+        run = self.compiled.simulate(
+            self._inputs, self.recording.dt, self._cut.starts,
+            max(self._cut.length // FOLLOWED, 2), initial=self.initial, parameters=parameters,
+            substeps=self._substeps,
+        )  # fmt: skip
+        found = self.initial.copy()
+        found[:, self.hidden] = np.clip(run.last, self._low, self._high)[:, self.hidden]
+        return np.where(np.isfinite(found), found, self.initial)
 
     def _follow_inputs(self, parameters: FloatArray) -> None:
         """Initialise effect states at actuators from the inputs; the first window's are fitted."""

@@ -34,11 +34,13 @@ SPREAD = 0.6
 STARTS = 5
 """Default number of further searches if the one from the given values ends above `GOOD`."""
 GOOD = 1.3
-"""Ratio of error to noise below which no other start is tried."""
+"""Default ratio of error to noise below which no other start is tried."""
 NEAR = 3.0
 """Ratio of error to noise above which another search must reach the same optimum."""
 LOOK, POLISH = 25, 60
 """Most simulations of a first search over a part of a recording, and of one over the whole."""
+CLOSE = 1.3
+"""Ratio of costs up to which a first search is continued over its part of the recording."""
 BRIEF = 15
 """Most simulations of a brief search."""
 ROUNDS = 3
@@ -83,7 +85,8 @@ class WholeRuns:
         initial: initial states, shape (recordings, states); from the channels if None.
         robust: transition of the robust loss to linear [standard deviations of noise].
         substeps: Runge-Kutta steps between samples.
-        starts: number of further searches if the one from the given values ends above `GOOD`.
+        starts: number of further searches if the one from the given values ends above `good`.
+        good: ratio of error to noise below which no other start is tried.
         brief: whether one search of `BRIEF` simulations is enough, where the values to start from
             are near.
     """
@@ -101,11 +104,12 @@ class WholeRuns:
         robust: float = ROBUST,
         substeps: int = 2,
         starts: int = STARTS,
+        good: float = GOOD,
         brief: bool = False,
     ) -> None:
         self._compiled, self._recordings, self._scale = compiled, recordings, scale
         self._robust, self._substeps = robust, substeps
-        self._starts = 0 if brief else starts
+        self._starts, self._good = 0 if brief else starts, good
         self._most, self._rounds = (BRIEF, 0) if brief else (POLISH, ROUNDS)
         self._begin = compiled.parameters if start is None else start
         self._problem = self._posed(initial)
@@ -143,7 +147,7 @@ class WholeRuns:
 
     def enough(self, found: Sequence[Attempt]) -> bool:
         """Whether the error is near the noise, or there is no free parameter."""
-        return found[0].error <= GOOD or not self._m
+        return found[0].error <= self._good or not self._m
 
     def near_noise(self, best: Attempt) -> bool:
         """Whether no other optimum could be much better."""
@@ -168,7 +172,10 @@ class WholeRuns:
         )  # fmt: skip
         spread = SPREAD * np.random.default_rng(0).standard_normal((self._starts, self._m))
         looks = [part._run(part._begun(z), LOOK) for z in spread]
-        return self._begun(min(looks, key=lambda look: look.cost).z[: self._m])
+        least = min(look.cost for look in looks)
+        # Along a curved valley a first search ends before it shows where it leads.
+        ends = [part._run(look.z, POLISH) for look in looks if look.cost <= CLOSE * least]
+        return self._begun(min([*ends, *looks], key=lambda look: look.cost).z[: self._m])
 
     def _begun(self, z: FloatArray) -> FloatArray:
         """Unknowns for these parameters, within their bounds, and the given initial states."""
