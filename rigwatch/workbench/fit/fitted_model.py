@@ -47,9 +47,6 @@ WELL_ABOVE = 1.5
 """Ratio of error to noise above which a fit may have ended in a local minimum."""
 MANY_PARAMETERS = 5
 """Number of free parameters above which a fit along the measured motion uses several starts."""
-GOOD = 1.1
-"""Ratio of error to noise along the measured motion below which no other start is tried: other
-optima, with parameters far from these, leave little more."""
 FAST, SLOWED = 1.0, 0.5
 """Eigenvalue times step above which a linearisation uses finer steps, and its value then."""
 LOOKED_AT = 20
@@ -178,7 +175,9 @@ def fit_model(
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
     search: ShortHorizons | WholeRuns | None = None
     if data.along_motion and len(compiled.system.free) >= MANY_PARAMETERS and scale is not None:
-        search = WholeRuns(compiled, [data.train], scale, start=begin, substeps=substeps, good=GOOD)
+        search = WholeRuns(
+            compiled, [data.train], scale, start=begin, substeps=substeps, thorough=True
+        )
     elif multi_start and not data.along_motion:
         noise = quiet_scale(data.train) if scale is None else scale
         search = ShortHorizons(compiled, data.train, horizon, begin, scale, noise, first, substeps)

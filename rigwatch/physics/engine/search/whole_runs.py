@@ -34,7 +34,9 @@ SPREAD = 0.6
 STARTS = 5
 """Default number of further searches if the one from the given values ends above `GOOD`."""
 GOOD = 1.3
-"""Default ratio of error to noise below which no other start is tried."""
+"""Ratio of error to noise below which no other start is tried."""
+NOISE = 1.1
+"""The same of a thorough search: other optima, with parameters far away, leave little more."""
 NEAR = 3.0
 """Ratio of error to noise above which another search must reach the same optimum."""
 LOOK, POLISH = 25, 60
@@ -85,8 +87,8 @@ class WholeRuns:
         initial: initial states, shape (recordings, states); from the channels if None.
         robust: transition of the robust loss to linear [standard deviations of noise].
         substeps: Runge-Kutta steps between samples.
-        starts: number of further searches if the one from the given values ends above `good`.
-        good: ratio of error to noise below which no other start is tried.
+        starts: number of further searches if the one from the given values ends above `GOOD`.
+        thorough: whether they begin above `NOISE` already, and each is searched to its end.
         brief: whether one search of `BRIEF` simulations is enough, where the values to start from
             are near.
     """
@@ -104,12 +106,12 @@ class WholeRuns:
         robust: float = ROBUST,
         substeps: int = 2,
         starts: int = STARTS,
-        good: float = GOOD,
+        thorough: bool = False,
         brief: bool = False,
     ) -> None:
         self._compiled, self._recordings, self._scale = compiled, recordings, scale
         self._robust, self._substeps = robust, substeps
-        self._starts, self._good = 0 if brief else starts, good
+        self._starts, self._thorough = 0 if brief else starts, thorough
         self._most, self._rounds = (BRIEF, 0) if brief else (POLISH, ROUNDS)
         self._begin = compiled.parameters if start is None else start
         self._problem = self._posed(initial)
@@ -147,7 +149,7 @@ class WholeRuns:
 
     def enough(self, found: Sequence[Attempt]) -> bool:
         """Whether the error is near the noise, or there is no free parameter."""
-        return found[0].error <= self._good or not self._m
+        return found[0].error <= (NOISE if self._thorough else GOOD) or not self._m
 
     def near_noise(self, best: Attempt) -> bool:
         """Whether no other optimum could be much better."""
@@ -172,10 +174,11 @@ class WholeRuns:
         )  # fmt: skip
         spread = SPREAD * np.random.default_rng(0).standard_normal((self._starts, self._m))
         looks = [part._run(part._begun(z), LOOK) for z in spread]
-        least = min(look.cost for look in looks)
-        # Along a curved valley a first search ends before it shows where it leads.
-        ends = [part._run(look.z, POLISH) for look in looks if look.cost <= CLOSE * least]
-        return self._begun(min([*ends, *looks], key=lambda look: look.cost).z[: self._m])
+        if self._thorough:
+            # Along a curved valley a first search ends before it shows where it leads.
+            least = CLOSE * min(look.cost for look in looks)
+            looks += [part._run(look.z, POLISH) for look in looks if look.cost <= least]
+        return self._begun(min(looks, key=lambda look: look.cost).z[: self._m])
 
     def _begun(self, z: FloatArray) -> FloatArray:
         """Unknowns for these parameters, within their bounds, and the given initial states."""
