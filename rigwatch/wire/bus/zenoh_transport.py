@@ -5,6 +5,7 @@ Reasons for the settings:
 * clients with an endpoint and no scouting: two peers behind one router silently exchange nothing;
 * endless retries after 100 to 200 ms: a restarted router is found again within that time;
 * congestion control DROP: with BLOCK one frozen reader stops the publisher for seconds;
+* queries and replies, which fetch what was dropped, have a queue of their own (`DATA_HIGH`);
 * `express` is off: with it, Zenoh lost a quarter of the messages at high rates;
 * a limit on payload size in the router: payloads larger than any valid message are not forwarded;
 * no shared memory: it would hold 16 MB for each process, left behind by a kill, and 2 to 8 MB more
@@ -20,6 +21,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import Any
 
 import zenoh
@@ -29,6 +31,14 @@ from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, ans
 from rigwatch.wire.errors import BusError
 
 RETRY_MS = (100, 200)
+BATCHES = 16
+"""Batches of 64 kB that wait for a slow link before messages are dropped: rigs share a link, and
+with two, Zenoh's own number, a reader that pauses for 80 ms loses messages of twenty-four.
+"""
+MOST_ASKED = 4
+"""Queries at a time over a link that rigs share: after a stall all ask at once, and answers that
+come too late would be asked for again, without end.
+"""
 LEASE = 10.0
 """Silence after which a link counts as broken [s]."""
 ACCEPT_MS, MOST_PENDING = 1000, 1000
@@ -57,6 +67,7 @@ def _common_settings(lease: float) -> dict[str, Any]:
         "connect/exit_on_failure": False,
         "connect/retry": retry,
         "transport/link/tx/lease": round(lease * 1e3),
+        "transport/link/tx/queue/size/data": BATCHES,
         "transport/shared_memory/enabled": False,
     }
 
@@ -156,10 +167,18 @@ class ZenohTransport:
         session: connected to the router.
         leave: closes the session; None if it is not this transport's alone, which then takes back
             what it has declared.
+        asking: held during a query.
     """
 
-    def __init__(self, session: Any, leave: Close | None = None) -> None:
+    def __init__(
+        self,
+        session: Any,
+        leave: Close | None = None,
+        asking: AbstractContextManager[object] | None = None,
+    ) -> None:
         self._session, self._leave = session, leave
+        self._asking = asking or contextlib.nullcontext()
+        self._shared = threading.BoundedSemaphore(MOST_ASKED)
         self._publishers: dict[str, Any] = {}
         self._lock = threading.Lock()
         self._kept: list[Any] = []
@@ -185,7 +204,7 @@ class ZenohTransport:
 
     def beside(self) -> "ZenohTransport":
         """Another transport over the same session, which it leaves open when it is closed."""
-        return ZenohTransport(self._session)
+        return ZenohTransport(self._session, asking=self._shared)
 
     @property
     def identity(self) -> str:
@@ -231,7 +250,7 @@ class ZenohTransport:
 
     def ask(self, key: str, question: bytes, timeout: float) -> list[bytes]:
         """The replies of all that serve `key` received within `timeout` [s]."""
-        try:
+        with self._asking, contextlib.suppress(zenoh.ZError):  # closed meanwhile
             replies = self._session.get(
                 key,
                 payload=question,
@@ -239,10 +258,10 @@ class ZenohTransport:
                 target=zenoh.QueryTarget.ALL,
                 consolidation=zenoh.ConsolidationMode.NONE,
                 congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.DATA_HIGH,
             )
-        except zenoh.ZError:
-            return []  # closed meanwhile
-        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+            return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+        return []
 
     def declare_token(self, key: str) -> Close:
         """Declare a token at `key`, valid until closed or until this process ends."""
