@@ -236,7 +236,9 @@ def draw(path: Path) -> None:
     figure, axes = plt.subplots(figsize=(7.0, 3.6), layout="constrained")
     for share in (1.0, 0.5, 0.2, 0.1):
         costs, rigs, late = _scaled(share), [], []
-        for number in sorted({round(x / share) for x in (2, 4, 8, 12, 16, 20, 22, 24, 26, 28, 29, 30, 31)}):
+        for number in sorted(
+            {round(x / share) for x in (2, 4, 8, 12, 16, 20, 22, 24, 26, 28, 29, 30, 31)}
+        ):
             found = simulate(Plan(number, number, number, threads=64), costs)
             rigs.append(number)
             late.append(1e3 * found.p99)
