@@ -34,6 +34,9 @@ DAYS, ALARM_DAYS = 60.0, 120.0
 MEMORY_PERCENT = 2.0
 IN_MEMORY = Path("/dev/shm")
 """Where the disk does not set the pace: it is no faster than usual."""
+STALE_S = 0.1
+"""Silence of the device that is told [s of the machine]: the machine's own pauses, 10 to 70 ms
+where it is busy, are no faster with a fast clock."""
 OFF_S = 2.0
 """Time from switching the rig off to the machine's sleep [s]."""
 
@@ -138,13 +141,14 @@ def _configure(rig: LiveRig, limit: float) -> None:
         "keep_alarm_days": ALARM_DAYS,
     }
     for key, value in settings.items():
-        text = _with(text, key, value)
+        text = _with(text, "recorder", key, value)
+    text = _with(text, "daq", "stale_after", STALE_S * RATE)
     rig.path.write_text(text + "\n[witness]\n", encoding="utf-8")
 
 
-def _with(text: str, key: str, value: float) -> str:
+def _with(text: str, section: str, key: str, value: float) -> str:
     kept = [line for line in text.splitlines() if not line.startswith(f"{key} =")]
-    at = kept.index("[recorder]") + 1
+    at = kept.index(f"[{section}]") + 1
     return "\n".join([*kept[:at], f"{key} = {value}", *kept[at:]])
 
 
