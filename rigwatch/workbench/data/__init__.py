@@ -18,11 +18,12 @@ from rigwatch.workbench.data.proposals import (
 from rigwatch.workbench.data.recorded_columns import read_columns
 from rigwatch.workbench.data.repeats import repeat_along_motion, repeat_of
 from rigwatch.workbench.data.signal_scales import port_sizes
-from rigwatch.workbench.data.signals import Data, MotionSensor, parameters_of, prepare
+from rigwatch.workbench.data.signals import UNFILLED, Data, MotionSensor, parameters_of, prepare
 
 __all__ = [
     "METHODS",
     "RATES_ALIKE",
+    "UNFILLED",
     "Columns",
     "Data",
     "MotionSensor",

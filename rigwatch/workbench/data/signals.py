@@ -23,6 +23,8 @@ from rigwatch.workbench.study import Span, Study, StudyFile
 
 USUAL = 0.5
 """Default horizon [s]."""
+UNFILLED = "since they fill no horizon"
+"""Words of the remark on ends that are not counted."""
 MOST_MISSING = 0.2
 """Largest share of samples that may be missing from an input."""
 
@@ -177,7 +179,7 @@ def _beyond(use: str, spans: Sequence[float], horizon: float) -> str:
     which = f"{spans[0]:.3g} s of a recording"
     if len(spans) > 1:
         which = f"{min(spans):.3g} to {max(spans):.3g} s of {len(spans)} recordings"
-    return f"{use}: the last {which} are not counted, since they fill no horizon of {horizon:g} s"
+    return f"{use}: the last {which} are not counted, {UNFILLED} of {horizon:g} s"
 
 
 def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:

@@ -43,6 +43,8 @@ MUCH_WORSE = 1.5
 """Ratio of held-out errors too large to be caused by other missing physics favouring one effect."""
 NEARLY = 0.8
 """Share of the best effect's gain above which another effect may be the right one."""
+CONTRADICTED = 2.0
+"""Ratio of the training energy explained by another effect above which the best is in doubt."""
 MOST_OF_IT = 0.75
 """Share of the best effect's gain that an effect of lower order needs to be named instead."""
 
@@ -107,8 +109,33 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
         floor.left_over(base.held_out, best.fitted.held_out), _margin(best, rows, members + rivals)
     )
     word, text = _word(base, best, rivals, floor)
+    elsewhere = () if trusted else _explaining_training(base, best, rows)
+    if word == "missing_effect" and elsewhere:
+        word, rivals = "undetermined", elsewhere
+        text = (
+            f"{best.label} lowers the held-out error most, but {', '.join(elsewhere)} explains more"
+            f" than {CONTRADICTED:g} times as much of the training error"
+        )
     text += remaining_error(base, best, floor) + other_accepted(rows, (*members, *rivals))
     return Verdict(word, best, members, rivals, text, evidence=evidence)
+
+
+def _explaining_training(base: Fitted, best: Ranked, rows: Sequence[Ranked]) -> tuple[str, ...]:
+    """Labels of effects that lower both errors and explain far more of the training than the best.
+
+    Training and held-out recordings then disagree on what is missing, as where several effects are
+    and one of them happens to matter in the recordings held out.
+    """
+    assert best.fitted is not None
+    least = CONTRADICTED * max(base.train_error**2 - best.fitted.train_error**2, 0.0)
+    return tuple(
+        row.label
+        for row in rows
+        if row is not best
+        and row.fitted is not None
+        and row.held_out_error < base.held_out_error
+        and base.train_error**2 - row.fitted.train_error**2 > least
+    )
 
 
 def _word(
@@ -194,8 +221,8 @@ def _same_shift(best: Ranked, row: Ranked) -> bool:
     if not shifts or best.fitted is None or row.port == best.port:
         return False
     model = best.fitted.compiled.system.model
-    signals = {model.ports[each.port].signal for each in (best, row)}
-    if signals & model.quantities.keys():
+    computed = {name for name, port in model.ports.items() if port.signal in model.quantities}
+    if computed & {best.port, row.port}:
         return False
     return len(model.driving()) == len(model.outputs) == 1 and best.cosines[row.label] > SIMILAR
 

@@ -16,6 +16,7 @@ from rigwatch.wire.errors import ModelError, RigwatchError, nearest
 from rigwatch.wire.exchange import ImportMapping, import_file, read_table
 from rigwatch.workbench.data import (
     RATES_ALIKE,
+    UNFILLED,
     Part,
     prepare,
     proposed_low_pass,
@@ -79,7 +80,9 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
         logs = replace(logs, known={**logs.known, **known})
         text, choices = _file(folder, logs, model, reading)
         study = start_study(folder, text)
-        return study, [*remarks, *choices, *prepare(study).remarks]
+        # A horizon is chosen when the study is fitted: what fills none is not known yet.
+        told = [remark for remark in prepare(study).remarks if UNFILLED not in remark]
+        return study, [*remarks, *choices, *told]
     except RigwatchError:
         discard(folder)
         for path in written:

@@ -1,5 +1,6 @@
 """The verdict on rankings whose errors are put in by hand: what is named, and what with it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -28,7 +29,8 @@ def leaving(squares: np.ndarray, outputs: int = 1) -> Fitted:
     """A fit that leaves these mean squares in the windows held out."""
     residuals = np.sqrt(squares)[:, None, None] * np.ones((1, 4, 1))
     unused: Any = None
-    model = SimpleNamespace(driving=lambda: ("u",), outputs=range(outputs))
+    known = {"ports": {}, "quantities": {}}
+    model = SimpleNamespace(driving=lambda: ("u",), outputs=range(outputs), **known)
     compiled: Any = SimpleNamespace(system=SimpleNamespace(model=model))
     fit = Fit(compiled, unused, unused, unused, residuals, np.ones(1), unused, unused)
     return Fitted((), fit, fit, 1, 1)
@@ -409,3 +411,18 @@ def test_a_late_input_is_a_late_output_where_there_is_one_of_each(
     found = judge(base(), [sensor, drive], PERIODS)
     assert found.word == "missing_effect"
     assert ("delay@drive" in found.members) is not told_apart
+
+
+def test_where_training_and_held_out_disagree_nothing_is_named_alone() -> None:
+    best, other = row("valve_hysteresis@drive", 2.0), row("stribeck@shaft", 2.8, accepted=False)
+    _with_training_error(best, 2.9)
+    _with_training_error(other, 1.5)
+    found = judge(base(), [best, other], QUIET)
+    assert (found.word, found.rivals) == ("undetermined", ("stribeck@shaft",))
+    _with_training_error(other, 2.9)
+    assert judge(base(), [best, other], QUIET).word == "missing_effect"
+
+
+def _with_training_error(of: Ranked, error: float) -> None:
+    assert of.fitted is not None
+    of.fitted = replace(of.fitted, train=base(error).train)
