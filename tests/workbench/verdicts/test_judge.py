@@ -29,7 +29,7 @@ def leaving(squares: np.ndarray, outputs: int = 1) -> Fitted:
     """A fit that leaves these mean squares in the windows held out."""
     residuals = np.sqrt(squares)[:, None, None] * np.ones((1, 4, 1))
     unused: Any = None
-    known = {"ports": {}, "quantities": {}}
+    known: dict[str, dict[str, Any]] = {"ports": {}, "quantities": {}}
     model = SimpleNamespace(driving=lambda: ("u",), outputs=range(outputs), **known)
     compiled: Any = SimpleNamespace(system=SimpleNamespace(model=model))
     fit = Fit(compiled, unused, unused, unused, residuals, np.ones(1), unused, unused)
