@@ -11,6 +11,7 @@ from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
+from rigwatch.wire.errors import ModelError
 
 MODEL = shipped_models()["mass-spring-damper"]
 FRICTION = library()["coulomb"].scaled({"x": 0.1, "v": 1.0})
@@ -65,6 +66,15 @@ def test_a_step_in_machine_code_is_the_classical_one_bit_for_bit(monkeypatch, in
     times = np.array([1.0, 1.005, 1.01, h])
     as_function(compiled.kernel.step(columns))(0.0, *addresses(z, us, p, times, times))
     np.testing.assert_array_equal(z, expected)
+
+
+def test_initial_states_that_do_not_suit_the_windows_are_refused():
+    compiled = compile_system(compose(MODEL))
+    with pytest.raises(ModelError, match="found 6 initial values, expected 2 for each of 4"):
+        compiled.linearise(
+            np.zeros((80, 1)), 1 / 256, np.arange(4) * 20, 20, initial=np.zeros((3, 2)),
+            parameters=compiled.parameters,
+        )  # fmt: skip
 
 
 def as_function(address):

@@ -277,9 +277,11 @@ def _fastest(fitted: Fitted, recording: Recording) -> float:
 def eigenvalues(fitted: Fitted, recording: Recording) -> ComplexArray:
     """Eigenvalues of the model at the start of its windows [1/s], shape (windows, states)."""
     cut = windows(fitted.compiled.system, len(recording), fitted.horizon)
+    starts = cut.starts[:LOOKED_AT]
+    # Without states of its own a model has an initial state for each recording, and one window.
     run = fitted.compiled.linearise(
-        recording.inputs, recording.dt, cut.starts[:LOOKED_AT], 2,
-        initial=fitted.train.initial[:LOOKED_AT], parameters=fitted.train.parameters,
+        recording.inputs, recording.dt, starts, 2,
+        initial=fitted.train.initial[: len(starts)], parameters=fitted.train.parameters,
         substeps=fitted.substeps,
     )  # fmt: skip
     free, n = len(fitted.compiled.system.free), run.states.shape[2]

@@ -167,7 +167,14 @@ class CompiledSystem:
             )
         if len(starts) and (starts.min() < 0 or starts.max() + length > len(inputs)):
             raise ModelError(f"{model.name}: found a window beyond the recording's end")
-        first = np.ascontiguousarray(initial, np.float64).reshape(len(starts), -1)
+        first = np.ascontiguousarray(initial, np.float64)
+        # The kernels check no index.
+        if first.size != len(starts) * len(self.system.states):
+            raise ModelError(
+                f"{model.name}: found {first.size} initial values, expected"
+                f" {len(self.system.states)} for each of {len(starts)} windows"
+            )
+        first = first.reshape(len(starts), len(self.system.states))
         values = np.ascontiguousarray(parameters, np.float64)
         driven = np.ascontiguousarray(inputs, np.float64)
         return (driven, dt, substeps, self.hold, starts, first, values)
