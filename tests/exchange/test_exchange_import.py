@@ -359,7 +359,7 @@ def test_json_that_is_no_table_is_reported(tmp_path: Path, text: str, message: s
 def test_json_with_a_name_that_is_no_text_is_reported(tmp_path: Path) -> None:
     source = tmp_path / "run.json"
     source.write_bytes(b'{"\xf4": [0.0, 4.0], "qm": [1, 2]}')
-    with pytest.raises(ImportDataError, match="run.json: not readable as JSON"):
+    with pytest.raises(ImportDataError, match=r"run\.json: not readable as JSON"):
         import_file(source, tmp_path / "run.mcap", simple())
 
 
