@@ -34,9 +34,9 @@ DAYS, ALARM_DAYS = 60.0, 120.0
 MEMORY_PERCENT = 2.0
 IN_MEMORY = Path("/dev/shm")
 """Where the disk does not set the pace: it is no faster than usual."""
-STALE_S = 0.1
-"""Silence of the device that is told [s of the machine]: the machine's own pauses, 10 to 70 ms
-where it is busy, are no faster with a fast clock."""
+STALE_S = 0.5
+"""Silence of the device that is told, as in the demonstration [s of the machine]: pauses of a busy
+machine, 70 to 140 ms long, are a second by a fast clock and no fault of the rig."""
 OFF_S = 2.0
 """Time from switching the rig off to the machine's sleep [s]."""
 

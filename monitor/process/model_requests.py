@@ -78,7 +78,7 @@ class ModelDesk:
         """In a thread of the bus: queue the request and wait."""
         try:
             request = msgspec.json.decode(question, type=ModelRequest)
-        except (msgspec.DecodeError, RecursionError) as error:
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             return [msgspec.json.encode(ModelReply(False, f"not a model request: {error}"))]
         verdict = self._check.judge(request)
         if verdict.refusal:

@@ -356,6 +356,13 @@ def test_json_that_is_no_table_is_reported(tmp_path: Path, text: str, message: s
         import_file(source, tmp_path / "run.mcap", simple())
 
 
+def test_json_with_a_name_that_is_no_text_is_reported(tmp_path: Path) -> None:
+    source = tmp_path / "run.json"
+    source.write_bytes(b'{"\xf4": [0.0, 4.0], "qm": [1, 2]}')
+    with pytest.raises(ImportDataError, match=r"run\.json: not readable as JSON"):
+        import_file(source, tmp_path / "run.mcap", simple())
+
+
 def test_several_files_become_sessions_of_a_folder(tmp_path, capsys):
     logs, target = tmp_path / "logs", tmp_path / "sessions"
     (logs / "more").mkdir(parents=True)

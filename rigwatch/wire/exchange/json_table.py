@@ -24,7 +24,7 @@ def read_json(path: Path) -> Table:
     """
     try:
         found = msgspec.json.decode(path.read_bytes())
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ImportDataError(f"{path}: not readable as JSON: {error}") from error
     header: Mapping[str, Any] = found if isinstance(found, dict) else {}
     columns = _columns(found) or _columns_below(path, header)
