@@ -87,6 +87,19 @@ def test_a_late_listener_gets_messages_from_then_on():
     assert heard(listener, 5) == [5]
 
 
+def test_a_listener_that_begins_while_the_router_is_gone_gets_no_old_messages():
+    network = MemoryNetwork()
+    monitor = network.bus("r", "monitor")
+    say(monitor, range(5))
+    hidden, network.tokens, network.up = network.tokens, [], False
+    listener = network.bus("r", "listener").subscribe(ALARMS)
+    network.tokens, network.up = hidden, True
+    for token in hidden:
+        network.tell(token, True)
+    say(monitor, range(5, 7))
+    assert heard(listener, 6) == [5, 6]
+
+
 def test_messages_of_a_restarted_process_arrive_from_the_first_on_and_the_break_is_reported():
     network = MemoryNetwork()
     gaps = network.bus("r", "observer").subscribe(GAPS)

@@ -72,6 +72,7 @@ class CompleteSubscription(Subscription):
         self._ready: deque[Any] = deque()
         self._reports: list[Gap | Event] = []
         self._behind = False
+        self._began_ns = time.time_ns()
         self._looked_at = time.monotonic()
         self._questions = RingQuestions(bus, self._answered)
         self._start(dict(resume_after or {}))
@@ -212,7 +213,7 @@ class CompleteSubscription(Subscription):
 
     def _take_token(self, token: "Token", alive: bool) -> None:
         process, run, since_ns, sender = token
-        if process not in self._senders and not (alive and self._follow(process, (run, -1))):
+        if process not in self._senders and not (alive and self._follow_new(token)):
             return
         peer = self._senders[process]
         if alive:
@@ -220,6 +221,15 @@ class CompleteSubscription(Subscription):
             self._handle(process, peer.appeared(run, since_ns, sender))
         else:
             self._handle(process, peer.vanished(run, since_ns))
+
+    def _follow_new(self, token: "Token") -> bool:
+        """Follow a process whose token was not seen at the start; an older run from now on."""
+        process, run, since_ns, _ = token
+        last = -1
+        if since_ns < self._began_ns:
+            early = self._early.first_of(run)
+            last = self._newest(process, run) if early is None else early - 1
+        return self._follow(process, (run, last))
 
     def _follow(self, process: str, place: Place) -> bool:
         """Follow a further process, unless the limit is reached."""

@@ -107,6 +107,7 @@ def _unused(model: Model, system: System) -> tuple[str, ...]:
         *(quantity.expression for quantity in model.quantities.values()),
     ]
     named = frozenset().union(*(names_in(text, "model") for text in texts))
+    named |= {port.signal for port in model.ports.values() if port.kind == "actuator"}
     spelt = (v.expression for port in system.model.ports.values() for v in port.variables.values())
     symbols |= frozenset().union(*(names_in(text, "model") for text in spelt))
     leaves = [n for n in (*model.parameters, *model.inputs) if n not in symbols]

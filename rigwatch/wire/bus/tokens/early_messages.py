@@ -40,6 +40,10 @@ class EarlyMessages:
         self._kept.append((message, sender))
         return True
 
+    def first_of(self, run: int) -> int | None:
+        """Number of the first kept message of a run; None without one."""
+        return min((one.seq for one, _ in self._kept if one.boot == run), default=None)
+
     def taken(self) -> list[tuple[Numbered, str]]:
         """The messages kept so far, which may be given back."""
         found, self._kept = [*self._kept], deque()
