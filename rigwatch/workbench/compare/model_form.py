@@ -8,13 +8,14 @@ difference from the base within a group of variants is a standard deviation of t
 are independent and add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from msgspec import structs
 
-from rigwatch.physics.engine.compile import compile_system
+from rigwatch.physics.engine.compile import compile_system, on_all_cores
 from rigwatch.physics.engine.equations import Model, along_measured_motion, compose, neighbours
 from rigwatch.physics.engine.fit import Recording, beginning
 from rigwatch.physics.engine.search import WholeRuns, multi_start_fit
@@ -45,18 +46,20 @@ def variances_between_bases(
     if bare is None or healthy is None or not (fitted.placements and study.model.variants):
         return {}
     part, own = beginning(healthy.train, BEGINNING), study.file.variants
+    every = [own, *neighbours(study.model, own)]
     moved: dict[str, FloatArray] = {}
     try:
         known = with_kept_free(_along(study, own))
-        base = _tried(study, own, part, bare, known)
+        base, *others = _all_fitted([_posed(study, names, part, bare, known) for names in every])
+        if base is None:
+            return {}
         before = _strengths(study, data, base.model, fitted)
     except RigwatchError:
         return {}
-    for names in neighbours(study.model, own):
+    for names, other in zip(every[1:], others, strict=True):
+        if other is None or other.error > AS_GOOD * base.error:
+            continue
         try:
-            other = _tried(study, names, part, bare, known)
-            if other.error > AS_GOOD * base.error:
-                continue
             difference = _strengths(study, data, other.model, fitted) - before
         except RigwatchError:
             continue
@@ -74,10 +77,38 @@ class _Tried:
     error: float
 
 
-def _tried(
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """A base along the motion, and the search for its parameters."""
+
+    model: Model
+    search: WholeRuns
+    scale: FloatArray
+
+    def fitted(self) -> _Tried:
+        """The base as the search leaves it."""
+        found, _ = multi_start_fit(self.search)
+        error = float(np.sqrt(np.mean((found.rms / self.scale) ** 2)))
+        return _Tried(with_values(self.model, found.values()), error)
+
+
+def _all_fitted(posed: Sequence[_Posed | None]) -> list[_Tried | None]:
+    """Each base fitted, side by side; None where that fails."""
+    found: list[_Tried | None] = [None] * len(posed)
+
+    def fit_one(index: int) -> None:
+        one = posed[index]
+        with contextlib.suppress(RigwatchError):
+            found[index] = one.fitted() if one else None
+
+    on_all_cores(fit_one, range(len(posed)))
+    return found
+
+
+def _posed(
     study: Study, names: Sequence[str], healthy: Recording, bare: Fitted, known: Model
-) -> _Tried:
-    """The base with these variants, fitted from the parameters that it shares with the study's.
+) -> _Posed | None:
+    """The base with these variants; its search starts from what it shares with the study's base.
 
     Args:
         study: prepared, with parameters from the healthy recording.
@@ -86,16 +117,17 @@ def _tried(
         bare: the study's base, fitted to the healthy recording.
         known: that base as its file has it.
     """
-    model = _along(study, names)
-    loose = with_kept_free(model)
-    shared = [n for n, p in loose.parameters.items() if known.parameters.get(n) == p]
-    compiled = compile_system(compose(loose, ()))
-    start = compiled.vector({n: study.model.parameters[n].value for n in shared})
-    scale, steps = bare.train.scale, study.file.substeps
-    search = WholeRuns(compiled, [healthy], scale, start=start, substeps=steps, brief=True)
-    found, _ = multi_start_fit(search)
-    error = float(np.sqrt(np.mean((found.rms / scale) ** 2)))
-    return _Tried(with_values(model, found.values()), error)
+    try:
+        model = _along(study, names)
+        loose = with_kept_free(model)
+        shared = [n for n, p in loose.parameters.items() if known.parameters.get(n) == p]
+        compiled = compile_system(compose(loose, ()))
+        start = compiled.vector({n: study.model.parameters[n].value for n in shared})
+        scale, steps = bare.train.scale, study.file.substeps
+        search = WholeRuns(compiled, [healthy], scale, start=start, substeps=steps, brief=True)
+    except RigwatchError:
+        return None
+    return _Posed(model, search, scale)
 
 
 def _along(study: Study, names: Sequence[str]) -> Model:

@@ -44,6 +44,9 @@ from rigwatch.workbench.ranking import (
 )
 from rigwatch.workbench.study import Study
 
+STRENGTH_TOLD = ("missing_effect", "undetermined")
+"""Verdicts of whose best effect the strength has its full uncertainty; fitting it takes time."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -115,6 +118,8 @@ def explain(study: Study, progress: Progress = no_progress) -> Explanation:
     progress("fitting the current model")
     bench = open_bench(study)
     rows, verdict = ranking(bench, progress)
+    if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
+        progress("finding what the healthy recording leaves open of the strength")
     return explanation(bench, rows, verdict)
 
 
@@ -202,7 +207,8 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         experiment = propose(bench, verdict.best, [row for row in rows if row.label in rivals])
     more: dict[str, float] = {}
     compared = comparison(bench)
-    if verdict.best is not None and verdict.best.fitted is not None:
+    named = verdict.word in STRENGTH_TOLD
+    if named and verdict.best is not None and verdict.best.fitted is not None:
         more = added_variances(bench.study, bench.data, bench.bare, verdict.best.fitted)
         told = unweighed(bench, verdict.best.placement, verdict.best.fitted, more)
         compared = replace(compared, remarks=[*compared.remarks, *told])
