@@ -139,41 +139,53 @@ class Monitor:
     ) -> tuple[Condition, ...]:
         rules, decision = self.rules, self.model.decision
         n = out.shape[1]
-        flags = np.zeros((len(_FLAGS), n), np.uint8)
+        flags = np.zeros((len(_JUDGED), n), np.uint8)
         rules_of = (rules.factor, decision.least_velocity, decision.worst_condition)
         _flag(out, run, missing, decision.longest_hold, *rules_of, flags)
-        lost = level(n, 0.0)
-        if missing:
-            lost = lost.copy()
-            lost[0] = missing
-        high = (rules.factor, 0.0, 0.5, np.inf, 0.1, 0.0, np.inf, decision.worst_condition)
-        rows = [*(out[k] for _, k in _FLAGS[:_GAP]), lost, run.astype(np.float64)]
-        rows[_LEARNT] = rows[_LEARNT] / self.model.sample_rate
-        highs = (*high, 0.0, float(decision.longest_hold))
-        below = [-np.inf] * len(_FLAGS)
-        below[_STANDS] = decision.least_velocity
-        return tuple(
-            Condition(name, flag, value, level(n, float(low)), level(n, float(limit)))
-            for (name, _), flag, value, low, limit in zip(
-                _FLAGS, flags, rows, below, highs, strict=True
+        lost = np.zeros(n)
+        lost[0] = missing
+        values = {
+            _LEARNT: out[w.LEARNT_HERE] / self.model.sample_rate,
+            _GAP: lost,
+            _INVALID: run.astype(np.float64),
+        }
+        low = {_STANDS: decision.least_velocity}
+        high = _HIGH | {
+            _DEPARTED: rules.factor,
+            _ILL: decision.worst_condition,
+            _INVALID: decision.longest_hold,
+        }
+        return tuple([
+            Condition(
+                name,
+                flags[row],
+                values[row] if row in values else out[k],
+                level(n, float(low.get(row, -np.inf))),
+                level(n, float(high.get(row, 0.0))),
             )
-        )
+            for row, (name, k) in enumerate(_JUDGED)
+        ])  # fmt: skip
 
 
-_FLAGS: tuple[tuple[str, int], ...] = (
+_JUDGED: tuple[tuple[str, int], ...] = (
     (kinds.DEPARTURE, w.DEVIATION),
     (kinds.DRY_FRICTION, w.THETA1),
     (kinds.STICTION, w.REST),
     (kinds.OTHER_FAULT, w.EXPLAINED),
     (kinds.EXCITATION_CHANGED, w.MOVED_VOLTAGE),
-    (kinds.REFERENCE_LEARNT, w.LEARNT_HERE),
+    (kinds.REFERENCE_LEARNT, -1),
     (kinds.NOT_OBSERVABLE, w.SPEED_RMS),
     (kinds.ILL_CONDITIONED, w.CONDITION),
     (kinds.GAP, -1),
     (kinds.SENSOR_INVALID, -1),
 )
-"""Conditions in the order of `_flag`, each with the output that is judged."""
-_LEARNT, _STANDS, _GAP = 5, 6, 8
+"""Conditions, each with the output that is judged; -1 if it is not one alone."""
+(
+    _DEPARTED, _RUBS, _STICKS, _OTHER, _EXCITED,
+    _LEARNT, _STANDS, _ILL, _GAP, _INVALID,
+) = range(len(_JUDGED))  # fmt: skip
+_HIGH = {_STICKS: 0.5, _OTHER: np.inf, _EXCITED: 0.1, _STANDS: np.inf}
+"""Upper limits that no rule of the model gives; 0 for the others."""
 
 
 @kernel()
@@ -187,20 +199,20 @@ def _flag(  # noqa: PLR0917
     worst_condition: float,
     flags: NDArray[np.uint8],
 ) -> None:
-    """Where each of the conditions `_FLAGS` holds, shape (10, n)."""
+    """Where each of the conditions `_JUDGED` holds, shape (conditions, n)."""
     for i in range(out.shape[1]):
         armed, verdict = out[w.ARMED_FLAG, i] > 0.0, out[w.VERDICT, i]
         sticks = verdict == w.STICKING
-        flags[0, i] = armed and out[w.DEVIATION, i] > factor
-        flags[1, i] = armed and (sticks or verdict == w.FRICTION)
-        flags[2, i] = armed and sticks
-        flags[3, i] = armed and verdict == w.OTHER
-        flags[4, i] = armed and verdict == w.NEW_EXCITATION
-        flags[5, i] = armed and out[w.LEARNT_HERE, i] > 0.0
-        flags[6, i] = armed and not out[w.SPEED_RMS, i] >= least_velocity
-        flags[7, i] = armed and out[w.CONDITION, i] > worst_condition
-        flags[8, i] = i == 0 and missing != 0
-        flags[9, i] = run[i] > longest_hold
+        flags[_DEPARTED, i] = armed and out[w.DEVIATION, i] > factor
+        flags[_RUBS, i] = armed and (sticks or verdict == w.FRICTION)
+        flags[_STICKS, i] = armed and sticks
+        flags[_OTHER, i] = armed and verdict == w.OTHER
+        flags[_EXCITED, i] = armed and verdict == w.NEW_EXCITATION
+        flags[_LEARNT, i] = armed and out[w.LEARNT_HERE, i] > 0.0
+        flags[_STANDS, i] = armed and not out[w.SPEED_RMS, i] >= least_velocity
+        flags[_ILL, i] = armed and out[w.CONDITION, i] > worst_condition
+        flags[_GAP, i] = i == 0 and missing != 0
+        flags[_INVALID, i] = run[i] > longest_hold
 
 
 def _arming_rules(model: RigModel) -> ReferenceRules:

@@ -23,7 +23,6 @@ from rigwatch.wire.messages import (
     Column,
     SampleBlock,
     quality_flags,
-    valid,
 )
 
 LARGEST = 1e9
@@ -183,9 +182,8 @@ def usable(column: Column, stuck_counts: bool) -> NDArray[np.bool_]:
     finite = np.abs(column.values) <= LARGEST  # also false for NaN
     if column.quality.size == 0:
         return finite
-    if stuck_counts:
-        return np.asarray(finite & valid(column.quality))
-    return np.asarray(finite & ((column.quality & POSITION_INVALID) == 0))
+    invalid = INVALID if stuck_counts else POSITION_INVALID
+    return np.asarray(finite & ((column.quality & invalid) == 0))
 
 
 @kernel()

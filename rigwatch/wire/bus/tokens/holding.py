@@ -2,21 +2,15 @@
 
 import secrets
 
+from rigwatch.wire.bus.tokens.names import ASK_TIMEOUT, said
 from rigwatch.wire.bus.transport import Close, Transport
 
 GROUPS, TURNS = 8, 4
 SLOTS = GROUPS * TURNS
 """Keys of a place. A process takes a group that is free, and its turns for one name after another,
 so that a token that appears is never mistaken for the one that has just vanished."""
-ASK_TIMEOUT = 0.5
-"""Longest wait for the holders of other tokens, at the start [s]."""
 ATTEMPTS = 5
 """Groups tried while another process takes the same one at the same moment."""
-
-
-def said(key: str, name: str) -> bytes:
-    """The bytes that name a token."""
-    return f"{key} {name}".encode()
 
 
 class NamedToken:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 
+from rigwatch.wire.bus.tokens.names import ASK_TIMEOUT, understood
 from rigwatch.wire.bus.transport import Close, Transport
 
 Changed = Callable[[str, str | None, bool], None]
@@ -21,13 +22,11 @@ Changed = Callable[[str, str | None, bool], None]
     place, name, False    it has vanished
     place, None, False    it has vanished before its name was known
 """
-ASK_TIMEOUT, END_TIMEOUT = 0.5, 2.0
+END_TIMEOUT = 2.0
 PAUSES = (0.02, 0.05, 0.1, 0.2, 0.4)
 """Delays before an unanswered question is repeated [s]."""
 MOST_TOLD = 1024
 """Names kept for tokens that have not appeared yet."""
-LONGEST_NAME = 256
-"""Longest answer that is taken for a name [bytes]."""
 
 
 @dataclass
@@ -69,7 +68,7 @@ class NamedTokens:
         """Place and name of each token there is; None for the name that nobody answers with."""
         keys = self._transport.tokens(f"{places}/*", timeout)
         answers = self._transport.ask(f"{places}/*", b"", ASK_TIMEOUT) if keys else []
-        found = dict(filter(None, map(_parsed, answers)))
+        found = dict(filter(None, map(understood, answers)))
         return [(_place(key), found.get(key)) for key in keys]
 
     def watch(self, places: str, changed: Changed) -> Close:
@@ -106,7 +105,7 @@ class NamedTokens:
 
     def _hear(self, watch: _Watch, payload: bytes, sender: str) -> None:
         """A holder names its token, which appears at about the same time; only for itself."""
-        key, name = _parsed(payload) or ("", "")
+        key, name = understood(payload) or ("", "")
         if name.rpartition("/")[2] != sender:
             return
         with watch.lock:
@@ -174,7 +173,7 @@ class NamedTokens:
         return max(0.0, min(found) - time.monotonic()) if found else None
 
     def _ask(self, watch: _Watch, key: str, token: _Token) -> None:
-        answers = map(_parsed, self._transport.ask(key, b"", ASK_TIMEOUT))
+        answers = map(understood, self._transport.ask(key, b"", ASK_TIMEOUT))
         names = [name for at, name in filter(None, answers) if at == key]
         with watch.lock:
             if watch.tokens.get(key) is not token:
@@ -191,9 +190,3 @@ class NamedTokens:
 
 def _place(key: str) -> str:
     return key.rpartition("/")[0]
-
-
-def _parsed(answer: bytes) -> tuple[str, str] | None:
-    """Key and name of a token; None if it is none."""
-    key, _, name = answer[: LONGEST_NAME + 1].decode(errors="replace").partition(" ")
-    return (key, name) if name and len(answer) <= LONGEST_NAME else None
