@@ -65,12 +65,18 @@ class Narrator:
 
     def samples(self, seq: int) -> None:
         """Report the changes up to this sample."""
-        if self._ended is not None and seq > self._ended.seq + self._rate:
-            self._tell_end()
         while self._next is not None and seq >= self._next.seq:
             self._last = self._next
             self._say(f"{self._time(self._last.seq)} the rig: {self._last.text}")
             self._next = next(self._acts, None)
+
+    def judged(self, seq: int) -> None:
+        """Report the end of an alarm once the monitor is a second of samples past it.
+
+        The monitor may lag behind the samples, and a name that follows a departure with it.
+        """
+        if self._ended is not None and seq > self._ended.seq + self._rate:
+            self._tell_end()
 
     def alarm(self, alarm: Alarm) -> None:
         """Report a change of an alarm."""

@@ -17,7 +17,7 @@ from rigwatch.demo.rig_file import relative
 from rigwatch.demo.verdict import ALARM, Recording, complaints, newest_session, read_recording
 from rigwatch.wire.bus import connect, unique_process
 from rigwatch.wire.errors import DeviceError
-from rigwatch.wire.messages import ALARMS, SAMPLES, Alarm, SampleBlock
+from rigwatch.wire.messages import ALARMS, ESTIMATES, SAMPLES, Alarm, EstimateBlock, SampleBlock
 from rigwatch.wire.rig_config import load_rig
 from sim_plant.scenario import load_scenario
 
@@ -85,7 +85,8 @@ class Show:
 
     def _watch(self, seconds: float, after_named: float) -> None:
         bus = connect(self._config, unique_process("demo"))
-        samples, alarms = bus.subscribe(SAMPLES), bus.subscribe(ALARMS)
+        samples, estimates = bus.subscribe(SAMPLES), bus.subscribe(ESTIMATES)
+        alarms = bus.subscribe(ALARMS)
         rate = self._config.rig.sample_rate
         give_up = time.monotonic() + START_TIMEOUT
         try:
@@ -95,6 +96,9 @@ class Show:
                 # A missing device is not reported before the simulated device is up.
                 if alarm is not None and self._seen:
                     self._narrator.alarm(alarm)
+                judged: list[EstimateBlock] = estimates.drain()
+                if judged and alarm is None:
+                    self._narrator.judged(judged[-1].seq + len(judged[-1]))
                 blocks: list[SampleBlock] = samples.drain()
                 if blocks:
                     self._take(blocks)

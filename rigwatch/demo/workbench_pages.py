@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
+from rigwatch.demo.rig_file import relative
+
 STOP_TIMEOUT = 10.0
 
 
@@ -42,6 +44,7 @@ def workbench_pages(folder: Path, rig: Path, say: Callable[[str], None]) -> Iter
             process.wait(STOP_TIMEOUT)
         except subprocess.TimeoutExpired:
             process.kill()
+        say(f"its studies:   rigwatch workbench {relative(studies)}")
 
 
 def _tell(process: "subprocess.Popen[str]", say: Callable[[str], None]) -> None:

@@ -123,13 +123,15 @@ def test_a_departure_that_gets_a_name_has_not_gone() -> None:
     narrator = Narrator(load_scenario(find_config("scenarios/demo.toml")), said.append)
     narrator.alarm(alarm("departure", 5200))
     narrator.alarm(alarm("departure", 5210, "normal"))
-    narrator.alarm(alarm("dry_friction", 5210))
     narrator.samples(7000)
+    narrator.judged(5300)
+    narrator.alarm(alarm("dry_friction", 5210))
+    narrator.judged(7000)
     assert not any("departure: the condition has gone" in line for line in said)
     narrator.alarm(alarm("dry_friction", 7100, "normal"))
     assert "dry friction: the condition has gone" in said[-1]
     narrator.alarm(alarm("departure", 8000, "normal"))
-    narrator.samples(8300)
+    narrator.judged(8300)
     assert "departure: the condition has gone" in said[-1]
 
 
