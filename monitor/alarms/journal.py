@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, get_type_hints
 
 from monitor.alarms.record import AlarmRecord
-from rigwatch.wire.errors import SessionError
+from rigwatch.wire.errors import SessionError, reason_of
 from rigwatch.wire.messages import Alarm
 
 _ALARM_TYPES = get_type_hints(Alarm)
@@ -56,7 +56,7 @@ class AlarmJournal:
             self._newest = _newest(self.path)
         except OSError as error:
             raise SessionError(
-                f"{path}: alarm journal cannot be opened: {error.strerror}"
+                f"{path}: alarm journal cannot be opened: {reason_of(error)}"
             ) from error
 
     def write(self, records: Iterable[AlarmRecord]) -> None:
@@ -72,7 +72,7 @@ class AlarmJournal:
             if os.fstat(self._file).st_size > self._largest:
                 self._rotate()
         except OSError as error:
-            self.failure = f"{self.path}: alarm journal cannot be written: {error.strerror}"
+            self.failure = f"{self.path}: alarm journal cannot be written: {reason_of(error)}"
             return
         self.failure = ""
 
@@ -137,7 +137,7 @@ def read_journal(path: Path | str) -> tuple[list[AlarmRecord], int]:
     except FileNotFoundError:
         return [], 0
     except OSError as error:
-        raise SessionError(f"{path}: alarm journal cannot be read: {error.strerror}") from error
+        raise SessionError(f"{path}: alarm journal cannot be read: {reason_of(error)}") from error
     records = [record for record in parsed if record is not None]
     return records, len(parsed) - len(records)
 

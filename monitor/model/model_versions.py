@@ -14,7 +14,7 @@ from pathlib import Path
 
 import msgspec
 
-from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.host import replace_file
 from rigwatch.wire.messages import NOT_PROVED, Identity
 
@@ -58,7 +58,7 @@ def history(path: Path) -> list[Version]:
     try:
         lines = file.read_bytes().splitlines() if file.exists() else []
     except OSError as error:
-        raise ConfigError(file, "", error.strerror or str(error), "a readable file") from error
+        raise ConfigError(file, "", reason_of(error), "a readable file") from error
     found = []
     for line in lines:
         with contextlib.suppress(msgspec.DecodeError):
@@ -87,7 +87,7 @@ def install(path: Path, text: str, t_ns: int, author: Author) -> None:
         replace_file(path, text)
         _note(path, "promote", text, t_ns, author)
     except OSError as error:
-        raise ConfigError(path, "", error.strerror or str(error), "a file to write") from error
+        raise ConfigError(path, "", reason_of(error), "a file to write") from error
 
 
 def version_before(path: Path) -> str:
@@ -101,7 +101,7 @@ def version_before(path: Path) -> str:
     try:
         return _version(path, max(numbers)).read_text(encoding="utf-8")
     except OSError as error:
-        raise ConfigError(path, "", error.strerror or str(error), "a readable file") from error
+        raise ConfigError(path, "", reason_of(error), "a readable file") from error
 
 
 def roll_back(path: Path, t_ns: int, author: Author) -> str:
@@ -118,7 +118,7 @@ def roll_back(path: Path, t_ns: int, author: Author) -> str:
         _version(path, max(_numbers(path))).unlink()
         _note(path, "rollback", text, t_ns, author)
     except OSError as error:
-        raise ConfigError(path, "", error.strerror or str(error), "a file to write") from error
+        raise ConfigError(path, "", reason_of(error), "a file to write") from error
     return text
 
 

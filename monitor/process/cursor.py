@@ -13,7 +13,7 @@ import zlib
 from pathlib import Path
 
 from rigwatch.wire.delivery import LARGEST_SEQ
-from rigwatch.wire.errors import SessionError
+from rigwatch.wire.errors import SessionError, reason_of
 
 _POSITION = struct.Struct("<qq")
 _CRC = struct.Struct("<I")
@@ -35,7 +35,7 @@ class Cursor:
                 file.truncate(_SIZE)
                 self._bytes = _mapped(file.fileno())
         except OSError as error:
-            raise SessionError(f"{path}: cannot be opened: {error.strerror}") from error
+            raise SessionError(f"{path}: cannot be opened: {reason_of(error)}") from error
 
     def read(self) -> tuple[int, int] | None:
         """The stored position; None if there is none."""

@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 
 from rigwatch.version import __version__
-from rigwatch.wire.errors import BatchError, RigwatchError
+from rigwatch.wire.errors import BatchError, RigwatchError, reason_of
 
 WORKER_DIED = "WorkerDied"
 """Kind of failure of a unit whose worker ended each time."""
@@ -92,7 +92,7 @@ def _settled(name: str, value: Any) -> Any:
             return ["file", content_hash(value)]
         msgspec.json.encode(value)
     except OSError as error:
-        raise BatchError(f"{value}: {error.strerror}, expected a file for {name}") from None
+        raise BatchError(f"{value}: {reason_of(error)}, expected a file for {name}") from None
     except (TypeError, NotImplementedError):
         kind = type(value).__name__
         raise BatchError(f"setting {name}: found {kind}, expected plain data or a path") from None
@@ -149,7 +149,7 @@ def _run_unit(job: Job, settings: Mapping[str, Any], path: str) -> Outcome:
     except RigwatchError as error:
         kind, text = type(error).__name__, str(error)
     except OSError as error:
-        kind, text = type(error).__name__, f"{error.filename or path}: {error.strerror or error}"
+        kind, text = type(error).__name__, f"{error.filename or path}: {reason_of(error)}"
     except Exception as error:  # one unit's failure is not that of the others
         kind, text = type(error).__name__, f"{path}: {error}"
     line = " ".join(text.split())

@@ -14,7 +14,7 @@ import msgspec
 
 from rigwatch.batch.job import Outcome
 from rigwatch.batch.parquet import lines_of, write_parquet
-from rigwatch.wire.errors import BatchError
+from rigwatch.wire.errors import BatchError, reason_of
 
 PARQUET = ".parquet"
 
@@ -81,7 +81,7 @@ class Journal:
                 beside.write_bytes(b"".join(lines_of(file)))
             opened = beside.open("a+b")
         except OSError as error:
-            raise BatchError(f"{file}: cannot be written: {error.strerror}") from None
+            raise BatchError(f"{file}: cannot be written: {reason_of(error)}") from None
         try:
             fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -134,7 +134,7 @@ class Journal:
             self._file.write(raw)
             self._file.flush()
         except OSError as error:
-            raise BatchError(f"{self.file}: cannot be written: {error.strerror}") from None
+            raise BatchError(f"{self.file}: cannot be written: {reason_of(error)}") from None
         self._lines[outcome.path] = at, len(raw)
 
     def outcomes(self, paths: Iterable[str]) -> Iterator[Outcome]:

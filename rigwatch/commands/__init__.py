@@ -24,7 +24,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from types import ModuleType
 
 from rigwatch.version import __version__
-from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.errors import RigwatchError, reason_of
 
 COMMANDS: dict[str, str] = {
     # name on the command line: module below rigwatch.commands
@@ -88,10 +88,13 @@ def main(argv: list[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_ERROR
     except OSError as error:
-        if error.errno not in _OUTPUT_LOST or error.filename is not None:
+        if error.filename is not None:
+            print(f"rigwatch: {error.filename}: {reason_of(error)}", file=sys.stderr)
+            return EXIT_ERROR
+        if error.errno not in _OUTPUT_LOST:
             raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        print(f"rigwatch: the output cannot be written: {error.strerror}", file=sys.stderr)
+        print(f"rigwatch: the output cannot be written: {reason_of(error)}", file=sys.stderr)
         return EXIT_ERROR
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED

@@ -5,6 +5,7 @@ register lists as valid, so a revoked certificate stays invalid when its name is
 """
 
 import ipaddress
+import re
 import socket
 from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
@@ -21,6 +22,8 @@ from rigwatch.wire.errors import KeysError, reason_of
 from rigwatch.wire.host import replace_file
 
 AUTHORITY_KEY = "authority.key"
+LONGEST_NAME = 40  # a common name holds 64 characters, with what stands around the name
+_NAME = re.compile(rf"[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}")
 AUTHORITY_DAYS, CERTIFICATE_DAYS = 3650, 730
 
 
@@ -51,8 +54,9 @@ class Authority:
         """A new authority for `rig` in `folder`.
 
         Raises:
-            KeysError: the folder holds one already, or cannot be written.
+            KeysError: the rig's name is none, or the folder holds one already or cannot be written.
         """
+        _check_name("rig", rig)
         if (folder / REGISTER).exists():
             raise KeysError(f"{folder}: holds an authority already, expected a new folder")
         key = ec.generate_private_key(ec.SECP256R1())
@@ -76,12 +80,11 @@ class Authority:
             addresses: further names or addresses of the router's machine.
 
         Raises:
-            KeysError: the role is unknown, or the folder cannot be written.
+            KeysError: the role is unknown, the name is none, or the folder cannot be written.
         """
         if role not in ROLES:
             raise KeysError(f"role: found {role!r}, expected one of {', '.join(ROLES)}")
-        if not name.replace("-", "").replace("_", "").isalnum():
-            raise KeysError(f"name: found {name!r}, expected letters, digits, - and _")
+        _check_name("name", name)
         serial = 1 + max((one.serial for one in self.register.issued), default=0)
         ends = datetime.now(UTC) + timedelta(days=CERTIFICATE_DAYS)
         issued = Issued(name, role, serial, ends.strftime("%Y-%m-%d"))
@@ -121,6 +124,12 @@ class Authority:
     def _save(self, issued: tuple[Issued, ...]) -> None:
         self.register = Register(self.register.rig, issued)
         _write(self.folder, REGISTER, msgspec.json.encode(self.register))
+
+
+def _check_name(what: str, name: str) -> None:
+    if not _NAME.fullmatch(name):
+        expected = f"1 to {LONGEST_NAME} ASCII letters, digits, - and _"
+        raise KeysError(f"{what}: found {name!r}, expected {expected}")
 
 
 def _name(text: str) -> x509.Name:
@@ -171,4 +180,4 @@ def _write(folder: Path, name: str, data: bytes, *, secret: bool = False) -> Non
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         replace_file(folder / name, data, mode=0o600 if secret else 0o644)
     except OSError as error:
-        raise KeysError(f"{folder / name}: cannot be written: {error.strerror}") from error
+        raise KeysError(f"{folder / name}: cannot be written: {reason_of(error)}") from error

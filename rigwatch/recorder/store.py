@@ -10,7 +10,7 @@ in a new segment. These faults are not raised but returned as events.
 from collections import deque
 from pathlib import Path
 
-from rigwatch.wire.errors import SessionError
+from rigwatch.wire.errors import SessionError, reason_of
 from rigwatch.wire.messages import EstimateBlock, Event, Message, RunInfo, SampleBlock, Severity
 from rigwatch.wire.session import SessionWriter, merge_pending, segment_name
 
@@ -103,7 +103,7 @@ class Store:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            reason = error.strerror or str(error)
+            reason = reason_of(error)
             raise SessionError(f"{self.folder}: cannot be made: {reason}") from error
         path = self.folder / segment_name(self.segment_count + 1)
         while path.exists():

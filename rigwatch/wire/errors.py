@@ -18,8 +18,11 @@ RigwatchError             one plain line, shown by the command line without a tr
 """
 
 import difflib
+import errno
 from collections.abc import Mapping
 from pathlib import Path
+
+_KNOWN = {errno.ENOSPC: "no space left on the disk", errno.EROFS: "the disk is read-only"}
 
 
 class RigwatchError(Exception):
@@ -39,7 +42,10 @@ def line_about(file: Path | str, error: BaseException) -> str:
 
 def reason_of(error: BaseException) -> str:
     """Why, without the file, where the caller's sentence names it."""
-    return getattr(error, "strerror", None) or one_line(error)
+    if known := _KNOWN.get(getattr(error, "errno", None) or 0):
+        return known
+    why = getattr(error, "strerror", None)
+    return f"{why[0].lower()}{why[1:]}" if why else one_line(error)
 
 
 class ConfigError(RigwatchError):

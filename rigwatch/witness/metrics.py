@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigwatch.wire.access import authority_file, key_files
-from rigwatch.wire.errors import ConfigError, MissingExtraError, RigwatchError
+from rigwatch.wire.errors import ConfigError, MissingExtraError, RigwatchError, reason_of
 from rigwatch.wire.messages import Alarm, Health
 from rigwatch.wire.rig_config import SecuritySection
 
@@ -121,7 +121,7 @@ class Endpoint:
                 port, host, registry, **_tls(host, address, security)
             )
         except OSError as error:
-            text = f"cannot listen at {address}: {error.strerror or error}"
+            text = f"cannot listen at {address}: {reason_of(error)}"
             raise RigwatchError(f"witness.metrics: {text}") from None
 
     def close(self) -> None:

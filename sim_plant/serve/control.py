@@ -20,7 +20,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from rigwatch.wire.errors import DeviceError, RigwatchError
+from rigwatch.wire.errors import DeviceError, RigwatchError, reason_of
 
 _TIMEOUT = 5.0
 Answer = Callable[[str], str]
@@ -48,9 +48,7 @@ def ask(path: Path, line: str) -> str:
                 stream.flush()
                 answer = stream.readline().strip()
     except OSError as error:
-        raise DeviceError(
-            f"no simulated rig answers at {path}: {error.strerror or error}"
-        ) from error
+        raise DeviceError(f"no simulated rig answers at {path}: {reason_of(error)}") from error
     status, _, text = answer.partition(" ")
     if status != "ok":
         raise DeviceError(text or "the simulated rig did not answer")

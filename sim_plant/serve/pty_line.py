@@ -11,7 +11,7 @@ import select
 import tty
 from pathlib import Path
 
-from rigwatch.wire.errors import DeviceError
+from rigwatch.wire.errors import DeviceError, reason_of
 
 
 class PtyLine:
@@ -98,7 +98,7 @@ class PtyLine:
         except OSError as error:
             self.unplug()
             raise DeviceError(
-                f"{self.link}: cannot link the line here: {error.strerror}"
+                f"{self.link}: cannot link the line here: {reason_of(error)}"
             ) from error
 
     def __enter__(self) -> "PtyLine":

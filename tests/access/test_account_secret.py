@@ -227,7 +227,7 @@ def test_another_account_cannot_read_the_secret_and_is_refused(rig: TestRig) -> 
     assert done.returncode == 0, done.stderr
     user, with_the_rigs, with_an_own = json.loads(done.stdout)
     assert user == NOBODY
-    assert f"{secret}: secret of the rig cannot be read: Permission denied" in with_the_rigs
+    assert f"{secret}: secret of the rig cannot be read: permission denied" in with_the_rigs
     assert "not signed with the secret of the account" in with_an_own
     assert refused_count(own) == count + 1
     assert (model.read_bytes(), model.stat().st_mtime_ns) == (before, stamp)

@@ -123,7 +123,7 @@ def test_a_journal_that_cannot_be_opened_is_one_plain_line(tmp_path):
 def test_a_full_disk_is_remembered_not_raised():
     journal = AlarmJournal("/dev/full")
     journal.write(faulty_manager().take_changes())
-    assert "No space left" in journal.failure
+    assert "no space left" in journal.failure
 
 
 def test_kill_9_loses_nothing_that_was_written(tmp_path):
@@ -172,7 +172,7 @@ def test_a_torn_line_on_a_full_disk_does_not_keep_the_monitor_from_starting(tmp_
     monkeypatch.setattr(os, "write", on_a_full_disk)
     journal = AlarmJournal(path)
     journal.write(before[:1])
-    assert "No space left" in journal.failure
+    assert "no space left" in journal.failure
     full = False
     journal.write(before[1:2])
     assert journal.failure == ""

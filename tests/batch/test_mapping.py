@@ -159,7 +159,7 @@ def test_a_setting_that_is_a_file_counts_with_its_content(tmp_path):
     before = job.identity({"model": tmp_path / "model.toml"})
     (tmp_path / "model.toml").write_text("a = 2")
     assert job.identity({"model": tmp_path / "model.toml"}) != before
-    with pytest.raises(BatchError, match=r"none\.toml: No such file"):
+    with pytest.raises(BatchError, match=r"none\.toml: no such file"):
         job.identity({"model": tmp_path / "none.toml"})
 
 

@@ -21,7 +21,7 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_result_and_a_refusal_come_back(table: Path) -> None:
     assert apart(look_at, table).rows == 200_000
-    with pytest.raises(ApartError, match=r"no\.csv: cannot be read: No such file"):
+    with pytest.raises(ApartError, match=r"no\.csv: cannot be read: no such file"):
         apart(look_at, table.with_name("no.csv"))
 
 

@@ -154,6 +154,8 @@ def test_the_command_makes_issues_revokes_and_shows(
     assert [line.split()[2] for line in lines if line.startswith("ann")] == ["revoked"] * 2
     assert sum("valid until" in line for line in lines) == len(ROLES)
     for wrong in (["new", str(folder), "--rig", "b"], ["issue", str(folder), "x", "--role", "king"],
-                  ["revoke", str(folder), "ann"], ["show", str(tmp_path)]):  # fmt: skip
+                  ["revoke", str(folder), "ann"], ["show", str(tmp_path)],
+                  ["new", str(tmp_path / "b"), "--rig", "a\udcff"],
+                  ["issue", str(folder), "a" * 41, "--role", "operator"]):  # fmt: skip
         assert main(["keys", *wrong]) == 2
-    assert capsys.readouterr().err.count("\n") == 4
+    assert capsys.readouterr().err.count("\n") == 6

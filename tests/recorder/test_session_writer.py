@@ -255,7 +255,7 @@ def test_a_place_where_no_file_can_be_is_one_plain_line(tmp_path: Path) -> None:
     path = tmp_path / "none" / "a.mcap"
     with pytest.raises(SessionError) as refused:
         SessionWriter(path, RUN)
-    assert str(refused.value) == f"{path}: cannot be written: No such file or directory"
+    assert str(refused.value) == f"{path}: cannot be written: no such file or directory"
 
 
 def test_an_existing_file_is_named(tmp_path: Path) -> None:
@@ -280,7 +280,7 @@ def largest_file(size: int) -> Iterator[None]:
 
 
 def test_a_file_whose_head_cannot_be_written_is_taken_away(tmp_path: Path) -> None:
-    with largest_file(10), pytest.raises(SessionError, match="cannot be written: File too large"):
+    with largest_file(10), pytest.raises(SessionError, match="cannot be written: file too large"):
         SessionWriter(tmp_path / "a.mcap", RUN)
     assert list(tmp_path.iterdir()) == []
 
@@ -327,7 +327,7 @@ def test_a_kernel_that_takes_few_bytes_at_a_time_gets_them_all(
     [
         (OSError(errno.ENOSPC, "No space left on device"), "no space left on the disk"),
         (OSError(errno.EROFS, "Read-only file system"), "the disk is read-only"),
-        (OSError(errno.EIO, "Input/output error"), "Input/output error"),
+        (OSError(errno.EIO, "Input/output error"), "input/output error"),
         (OSError("without a number"), "without a number"),
     ],
 )

@@ -148,4 +148,4 @@ def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
         command = [sys.executable, "-m", "rigwatch", "info", str(path)]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr == "rigwatch: the output cannot be written: No space left on device\n"
+    assert done.stderr == "rigwatch: the output cannot be written: no space left on the disk\n"

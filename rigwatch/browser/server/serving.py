@@ -15,7 +15,7 @@ from rigwatch.browser.server.application import application
 from rigwatch.browser.server.context import Context
 from rigwatch.browser.server.fleet_pages import FleetPages, Look, fleet_application
 from rigwatch.browser.server.places import Places
-from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.errors import RigwatchError, reason_of
 
 LOCAL = ("127.0.0.1", "localhost", "::1")
 STOP_WITHIN = 2
@@ -141,7 +141,7 @@ def _listen(options: Listening) -> socket.socket:
     except OSError as error:
         found.close()
         raise RigwatchError(
-            f"{options.address}:{options.port}: {error.strerror}, expected a free port"
+            f"{options.address}:{options.port}: {reason_of(error)}, expected a free port"
         ) from error
     return found
 

@@ -98,12 +98,12 @@ def _read(role: "Role", path: Path) -> "Recording":
 
 
 def _write(path: Path, text: str) -> None:
-    from rigwatch.wire.errors import ModelError
+    from rigwatch.wire.errors import ModelError, reason_of
 
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise ModelError(f"{path}: found {error.strerror}, expected a file to write") from error
+        raise ModelError(f"{path}: found {reason_of(error)}, expected a file to write") from error
 
 
 def _summary(model: "RigModel", output: Path) -> dict[str, Any]:

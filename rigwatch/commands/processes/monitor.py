@@ -17,6 +17,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Monitor until a signal ends it."""
+    from rigwatch.wire.rig_config import load_rig
+
+    for config in arguments.config:
+        load_rig(config)  # a wrong file is told before the kernels are loaded, which takes seconds
     from monitor.process import run as run_monitor
     from monitor.process import run_several
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.common import file_or_name, say
-from rigwatch.wire.errors import ModelError
+from rigwatch.wire.errors import ModelError, reason_of
 
 if TYPE_CHECKING:
     from rigwatch.physics.engine.equations import Model
@@ -64,7 +64,7 @@ def write_page(path: Path, text: str) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise ModelError(f"{path}: {error.strerror or error}, cannot be written") from error
+        raise ModelError(f"{path}: {reason_of(error)}, cannot be written") from error
     say(f"report: {path}")
 
 

@@ -11,7 +11,7 @@ import urllib.request
 from email.message import Message
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
-from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.errors import RigwatchError, reason_of
 
 HOST = "127.0.0.1"
 _TIMEOUT = 10.0
@@ -42,7 +42,7 @@ class Page:
         try:
             self._server = ThreadingHTTPServer((HOST, port), handler)
         except OSError as error:
-            raise PageError(f"port {port}: {error.strerror}: configure another") from error
+            raise PageError(f"port {port}: {reason_of(error)}: configure another") from error
         self._server.daemon_threads = True
         threading.Thread(target=self._server.serve_forever, name="page", daemon=True).start()
 

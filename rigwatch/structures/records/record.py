@@ -16,7 +16,7 @@ import numpy as np
 from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.errors import ImportDataError, ModelError
+from rigwatch.wire.errors import ImportDataError, ModelError, reason_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +121,7 @@ def write_record(record: Record, path: Path | str) -> None:
             table = np.column_stack([time, *record.columns.values()])
             writer.writerows([[repr(cell) for cell in row] for row in table.tolist()])
     except OSError as error:
-        raise ImportDataError(f"{file}: {error.strerror or error}, cannot be written") from error
+        raise ImportDataError(f"{file}: {reason_of(error)}, cannot be written") from error
 
 
 def _from_npz(file: Path) -> dict[str, FloatArray]:

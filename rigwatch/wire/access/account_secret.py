@@ -12,7 +12,7 @@ import secrets
 import stat
 from pathlib import Path
 
-from rigwatch.wire.errors import KeysError
+from rigwatch.wire.errors import KeysError, reason_of
 from rigwatch.wire.rig_config import SecuritySection
 
 NAME = "commands.secret"
@@ -79,7 +79,7 @@ def _make(path: Path) -> None:
         with contextlib.suppress(FileExistsError):
             os.link(part, path)
     except OSError as error:
-        raise KeysError(f"{path}: secret of the rig cannot be made: {error.strerror}") from None
+        raise KeysError(f"{path}: secret of the rig cannot be made: {reason_of(error)}") from None
     finally:
         with contextlib.suppress(OSError):
             part.unlink()
@@ -92,7 +92,7 @@ def _read(path: Path) -> tuple[bytes, os.stat_result]:
             found, secret = os.fstat(handle), file.read(LENGTH + 1)
     except OSError as error:
         raise KeysError(
-            f"{path}: secret of the rig cannot be read: {error.strerror}; commands are accepted "
+            f"{path}: secret of the rig cannot be read: {reason_of(error)}; commands are accepted "
             "from the account that runs the rig"
         ) from None
     if len(secret) != LENGTH:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rigwatch.wire.errors import MissingExtraError, SessionError
+from rigwatch.wire.errors import MissingExtraError, SessionError, reason_of
 from rigwatch.wire.exchange.session_columns import Array, table_columns
 from rigwatch.wire.messages import Block
 from rigwatch.wire.session import Session
@@ -68,7 +68,7 @@ def export_session(
     except BaseException as error:
         target.unlink(missing_ok=True)
         if isinstance(error, OSError):
-            raise SessionError(f"{target}: cannot be written: {error.strerror}") from error
+            raise SessionError(f"{target}: cannot be written: {reason_of(error)}") from error
         raise
     return Exported(target, rows, tuple(first))
 

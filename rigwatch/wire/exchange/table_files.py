@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rigwatch.wire.errors import ImportDataError, MissingExtraError
+from rigwatch.wire.errors import ImportDataError, MissingExtraError, reason_of
 from rigwatch.wire.exchange.budget import Budget
 from rigwatch.wire.exchange.json_table import read_json
 from rigwatch.wire.exchange.mapping import ImportMapping
@@ -39,7 +39,7 @@ def read_table(path: Path, mapping: ImportMapping) -> Table:
     try:
         table = _READERS[kind](path, mapping)
     except OSError as error:
-        reason = error.strerror or str(error).partition("\n")[0]
+        reason = reason_of(error)
         raise ImportDataError(f"{path}: cannot be read: {reason}") from error
     table = table.without_first(mapping.skip_rows)
     if not table.cells or not max(len(column) for column in table.cells.values()):

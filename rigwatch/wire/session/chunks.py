@@ -19,7 +19,7 @@ from typing import BinaryIO
 
 import zstandard
 
-from rigwatch.wire.errors import SessionError
+from rigwatch.wire.errors import SessionError, reason_of
 
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST_RECORD = 1 << 28
@@ -95,7 +95,7 @@ def scan(path: Path) -> Iterator[Chunk | Damage]:
             _refuse_later_version(path, head)
             yield from _scan_records(file, head, path.stat().st_size)
     except OSError as error:
-        raise SessionError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise SessionError(f"{path}: cannot be read: {reason_of(error)}") from error
 
 
 def _scan_records(file: BinaryIO, magic: bytes, size: int) -> Iterator[Chunk | Damage]:

@@ -1,10 +1,9 @@
 """Output of the MCAP writer: bytes wait in memory until they are committed to the disk."""
 
-import errno
 import os
 from pathlib import Path
 
-from rigwatch.wire.errors import SessionError
+from rigwatch.wire.errors import SessionError, reason_of
 
 
 class FileOutput:
@@ -27,7 +26,7 @@ class FileOutput:
         except FileExistsError:
             raise SessionError(f"{path}: the file exists already and is not overwritten") from None
         except OSError as error:
-            raise SessionError(f"{path}: cannot be written: {error.strerror}") from error
+            raise SessionError(f"{path}: cannot be written: {reason_of(error)}") from error
         self.closed = False
 
     @property
@@ -82,9 +81,3 @@ class FileOutput:
         if not self.closed:
             self.closed = True
             os.close(self._descriptor)
-
-
-def reason_of(error: OSError) -> str:
-    """The reason of an error, in words."""
-    known = {errno.ENOSPC: "no space left on the disk", errno.EROFS: "the disk is read-only"}
-    return known.get(error.errno or 0, error.strerror or str(error))

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 import zstandard
 
-from rigwatch.wire.errors import MessageError, SessionError
+from rigwatch.wire.errors import MessageError, SessionError, reason_of
 from rigwatch.wire.messages import (
     EstimateBlock,
     SampleBlock,
@@ -147,7 +147,7 @@ def chunks_between(path: Path, offset: int, start: int, end: int) -> Iterator[Ch
             size = path.stat().st_size
             yield from _walk(file, max(offset, len(MAGIC)), size, (start, end))
     except OSError as error:
-        raise SessionError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise SessionError(f"{path}: cannot be read: {reason_of(error)}") from error
 
 
 def _walk(file: BinaryIO, at: int, size: int, span: tuple[int, int]) -> Iterator[Chunk]:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.typed_files.bounded import loads
 from rigwatch.wire.typed_files.explanation import explained
 
@@ -65,6 +65,6 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
-        raise ConfigError(path, "", error.strerror or str(error), "a readable file") from error
+        raise ConfigError(path, "", reason_of(error), "a readable file") from error
     except UnicodeDecodeError as error:
         raise ConfigError(path, "", "bytes that are not UTF-8", "a TOML file") from error

@@ -8,7 +8,7 @@ import difflib
 import shutil
 from pathlib import Path
 
-from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.errors import ConfigError, reason_of
 
 FOLDER = "configs"
 KINDS = ("imports", "plants", "rigs", "scenarios", "structures", "studies")
@@ -84,6 +84,6 @@ def copy_out(folder: Path) -> tuple[list[Path], list[Path]]:
             to.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(file, to)
         except OSError as error:
-            raise ConfigError(to, "", error.strerror or str(error), "a folder to write") from error
+            raise ConfigError(to, "", reason_of(error), "a folder to write") from error
         copied.append(to)
     return copied, kept

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rigwatch.page import page
-from rigwatch.wire.errors import ModelError
+from rigwatch.wire.errors import ModelError, reason_of
 from rigwatch.workbench.compare import locate
 from rigwatch.workbench.explain import explanation, ranking
 from rigwatch.workbench.report import charts, sections
@@ -58,5 +58,5 @@ def write_report(
     try:
         path.write_text(report_html(material), encoding="utf-8")
     except OSError as error:
-        raise ModelError(f"{path}: {error.strerror}, expected a file to write") from error
+        raise ModelError(f"{path}: {reason_of(error)}, expected a file to write") from error
     return material

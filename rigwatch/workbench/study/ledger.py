@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from rigwatch.version import __version__
-from rigwatch.wire.errors import ModelError
+from rigwatch.wire.errors import ModelError, reason_of
 from rigwatch.wire.typed_files import read_text
 from rigwatch.workbench.study.folder import FILE, digest, locked, write_step
 from rigwatch.workbench.study.own_files import check_unchanged
@@ -39,7 +39,7 @@ def _hash(path: Path) -> str:
         return _of_files(tuple((file, _state(file.stat())) for file in files))
     except OSError as error:
         raise ModelError(
-            f"{error.filename}: {error.strerror}, expected a session of the study"
+            f"{error.filename}: {reason_of(error)}, expected a session of the study"
         ) from error
 
 
