@@ -76,8 +76,10 @@ def main(argv: list[str] | None = None) -> int:
     # The matrices are small: a second thread of the linear algebra would spin, and take the time
     # of the rig's other processes. NumPy reads this when a command first imports it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    arguments = _parser(sys.argv[1:] if argv is None else argv).parse_args(argv)
+    given = sys.argv[1:] if argv is None else argv
     try:
+        _refuse_undecodable(given)
+        arguments = _parser(given).parse_args(given)
         code = int(arguments.run(arguments))
         sys.stdout.flush()
         return code
@@ -98,6 +100,13 @@ def main(argv: list[str] | None = None) -> int:
         return EXIT_ERROR
     except KeyboardInterrupt:
         return EXIT_INTERRUPTED
+
+
+def _refuse_undecodable(given: Sequence[str]) -> None:
+    """Names of files stand in files of TOML and JSON, which hold no other bytes than UTF-8."""
+    for argument in given:
+        if any("\ud800" <= letter <= "\udfff" for letter in argument):
+            raise RigwatchError(f"{argument!r}: found bytes that are not UTF-8, expected UTF-8")
 
 
 def every_command(

@@ -61,11 +61,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 if the model file is written."""
+    recordings = _recordings(arguments)
     from monitor.commissioning import CommissionSettings, commission_best
     from monitor.model import model_text
     from monitor.signals import commission_inertia
 
-    recordings = _recordings(arguments)
     if arguments.plant == "inertia":
         model = commission_inertia(recordings, window=arguments.window, hop=arguments.hop)
     else:
@@ -84,6 +84,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _recordings(arguments: argparse.Namespace) -> "list[Recording]":
+    from rigwatch.wire.errors import ModelError
+
+    if not arguments.healthy:
+        raise ModelError("--healthy: found no recording, expected at least one")
     roles: tuple[Role, ...] = ("chirp", "healthy", "friction")
     return [_read(role, path) for role in roles for path in getattr(arguments, role)]
 

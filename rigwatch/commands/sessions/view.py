@@ -34,8 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 if it is drawn; returns once a window is closed."""
     from rigwatch.commands.common import print_json, ready_to_draw, say
+    from rigwatch.wire.session import open_session
 
     ready_to_draw(arguments.save, arguments.picture)
+    open_session(arguments.session)  # a wrong file is told before a window opens
     drawn = _shown(arguments, _silent if arguments.json else say)
     if arguments.json and drawn:
         print_json(drawn)
