@@ -6,7 +6,7 @@ The rest of the engine calls `CompiledSystem`; `step_size` gives the integration
 interval.
 """
 
-from rigwatch.physics.engine.compile.all_cores import on_all_cores, shares
+from rigwatch.physics.engine.compile.all_cores import cores, on_all_cores, shares
 from rigwatch.physics.engine.compile.compiled_system import (
     CompiledSystem,
     Linearisation,
@@ -16,6 +16,7 @@ from rigwatch.physics.engine.compile.compiled_system import (
 from rigwatch.physics.engine.compile.derivatives import derivative
 from rigwatch.physics.engine.compile.integrator import across, call, lateness, place
 from rigwatch.physics.engine.compile.resolved_rates import resolved
+from rigwatch.physics.engine.compile.side_by_side import side_by_side, together
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
 
@@ -26,6 +27,7 @@ __all__ = [
     "across",
     "call",
     "compile_system",
+    "cores",
     "derivative",
     "evaluated",
     "even_substeps",
@@ -35,4 +37,6 @@ __all__ = [
     "place",
     "resolved",
     "shares",
+    "side_by_side",
+    "together",
 ]
