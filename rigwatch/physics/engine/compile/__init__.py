@@ -16,9 +16,9 @@ from rigwatch.physics.engine.compile.compiled_system import (
 from rigwatch.physics.engine.compile.derivatives import derivative
 from rigwatch.physics.engine.compile.integrator import across, call, lateness, place
 from rigwatch.physics.engine.compile.resolved_rates import resolved
-from rigwatch.physics.engine.compile.side_by_side import side_by_side, together
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
+from rigwatch.physics.engine.compile.turns import side_by_side, together
 
 __all__ = [
     "CompiledSystem",

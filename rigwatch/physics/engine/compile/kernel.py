@@ -28,8 +28,8 @@ from rigwatch.physics.engine.compile.all_cores import on_all_cores, shares
 from rigwatch.physics.engine.compile.derivatives import Differentiated, differentiated
 from rigwatch.physics.engine.compile.llvm import Function, literal, machine_code
 from rigwatch.physics.engine.compile.runge_kutta_step import step_function
-from rigwatch.physics.engine.compile.side_by_side import alone, turn_given
 from rigwatch.physics.engine.compile.step_size import Pace, pace
+from rigwatch.physics.engine.compile.turns import alone, turn_given
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
 
 LARGE = 300_000
