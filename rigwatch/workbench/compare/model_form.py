@@ -8,21 +8,20 @@ difference from the base within a group of variants is a standard deviation of t
 are independent and add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from msgspec import structs
 
-from rigwatch.physics.engine.compile import compile_system, on_all_cores
+from rigwatch.physics.engine.compile import compile_system, side_by_side
 from rigwatch.physics.engine.equations import Model, along_measured_motion, compose, neighbours
 from rigwatch.physics.engine.fit import Recording, beginning
-from rigwatch.physics.engine.search import WholeRuns, multi_start_fit
+from rigwatch.physics.engine.search import WholeRuns
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free, with_values
+from rigwatch.workbench.fit import Fitted, values_with, with_kept_free, with_values
 from rigwatch.workbench.study import Study, varied
 
 BEGINNING = 2048
@@ -50,65 +49,38 @@ def variances_between_bases(
     moved: dict[str, FloatArray] = {}
     try:
         known = with_kept_free(_along(study, own))
-        base, *others = _all_fitted([_posed(study, names, part, bare, known) for names in every])
-        if base is None:
-            return {}
-        before = _strengths(study, data, base.model, fitted)
     except RigwatchError:
         return {}
-    for names, other in zip(every[1:], others, strict=True):
-        if other is None or other.error > AS_GOOD * base.error:
-            continue
-        try:
-            difference = _strengths(study, data, other.model, fitted) - before
-        except RigwatchError:
-            continue
-        group = study.model.variants[names[-1]].group or names[-1]
-        moved[group] = np.maximum(moved.get(group, 0.0), difference**2)
+    base, *others = side_by_side(lambda names: _tried(study, names, part, bare, known), every)
+    if base is None:
+        return {}
+    good = [each for each in others if each is not None and each.error <= AS_GOOD * base.error]
+    before, *after = side_by_side(
+        lambda each: _strengths(study, data, each.model, fitted), [base, *good]
+    )
+    if before is None:
+        return {}
+    for other, strengths in zip(good, after, strict=True):
+        if strengths is not None:
+            group = study.model.variants[other.names[-1]].group or other.names[-1]
+            moved[group] = np.maximum(moved.get(group, 0.0), (strengths - before) ** 2)
     total = np.sum([np.zeros_like(before), *moved.values()], axis=0)
     return dict(zip(fitted.compiled.system.free, total.tolist(), strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A base with the parameters of a healthy recording, and its error there."""
+    """A base: its variants, the model with the parameters of a healthy recording, the error."""
 
+    names: Sequence[str]
     model: Model
     error: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Posed:
-    """A base along the motion, and the search for its parameters."""
-
-    model: Model
-    search: WholeRuns
-    scale: FloatArray
-
-    def fitted(self) -> _Tried:
-        """The base as the search leaves it."""
-        found, _ = multi_start_fit(self.search)
-        error = float(np.sqrt(np.mean((found.rms / self.scale) ** 2)))
-        return _Tried(with_values(self.model, found.values()), error)
-
-
-def _all_fitted(posed: Sequence[_Posed | None]) -> list[_Tried | None]:
-    """Each base fitted, side by side; None where that fails."""
-    found: list[_Tried | None] = [None] * len(posed)
-
-    def fit_one(index: int) -> None:
-        one = posed[index]
-        with contextlib.suppress(RigwatchError):
-            found[index] = one.fitted() if one else None
-
-    on_all_cores(fit_one, range(len(posed)))
-    return found
-
-
-def _posed(
+def _tried(
     study: Study, names: Sequence[str], healthy: Recording, bare: Fitted, known: Model
-) -> _Posed | None:
-    """The base with these variants; its search starts from what it shares with the study's base.
+) -> _Tried | None:
+    """The base with these variants, searched from the values it shares with the study's.
 
     Args:
         study: prepared, with parameters from the healthy recording.
@@ -125,9 +97,10 @@ def _posed(
         start = compiled.vector({n: study.model.parameters[n].value for n in shared})
         scale, steps = bare.train.scale, study.file.substeps
         search = WholeRuns(compiled, [healthy], scale, start=start, substeps=steps, brief=True)
+        values, error = search.first_search()
     except RigwatchError:
         return None
-    return _Posed(model, search, scale)
+    return _Tried(names, with_values(model, values), error)
 
 
 def _along(study: Study, names: Sequence[str]) -> Model:
@@ -138,10 +111,13 @@ def _along(study: Study, names: Sequence[str]) -> Model:
     return structs.replace(model, inputs=study.model.inputs, parameters=parameters)
 
 
-def _strengths(study: Study, data: Data, model: Model, fitted: Fitted) -> FloatArray:
-    """The fitted parameters with another base, shape (m,)."""
+def _strengths(study: Study, data: Data, model: Model, fitted: Fitted) -> FloatArray | None:
+    """The fitted parameters with another base, shape (m,); None if they cannot be fitted."""
     prefixes = tuple(placement.prefix for placement in fitted.placements)
     start = {n: v for n, v in fitted.train.values().items() if n.startswith(prefixes)}
     other, scale = replace(study, model=model, kept=None), fitted.train.scale
-    found = fit_model(other, data, fitted.placements, start, scale).train.values()
+    try:
+        found = values_with(other, data, fitted.placements, start, scale)
+    except RigwatchError:
+        return None
     return np.array([found[name] for name in fitted.compiled.system.free])
