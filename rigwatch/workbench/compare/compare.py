@@ -85,7 +85,7 @@ def comparison(bench: Bench) -> Comparison:
         base.train_error,
         base.held_out_error,
         float(total),
-        next(iter(channels.values())).unit if alone else "noise floors",
+        base.error_unit,
         METHODS[floor.method],
         channels,
         as_written(found, base.compiled.system),

@@ -91,6 +91,7 @@ class Explanation:
         like_this: number of simulated cases with a similar verdict, and how many were wrong.
         beside: the other effects of the set that the named effect was judged in; with them `add`
             accepts it if it is refused alone.
+        error_unit: unit of the errors in `text` and `ranking`.
     """
 
     verdict: str
@@ -103,6 +104,7 @@ class Explanation:
     wrong_probability: float | None = 0.5
     like_this: tuple[int, int] = (0, 0)
     beside: list[str] = field(default_factory=list)
+    error_unit: str = ""
 
 
 def explain(study: Study, progress: Progress = no_progress) -> Explanation:
@@ -227,6 +229,7 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         probability,
         similar,
         list(verdict.beside),
+        compared.unit,
     )
 
 

@@ -13,6 +13,8 @@ from rigwatch.workbench.ranking import EXPLAINED, Ranked, left_over
 LITTLE = 1 / 3
 """Share of the energy above the quiet band that the missing effect must explain; one of three
 equal effects explains that much."""
+LITTLE_IN_TRAINING = LITTLE / 2
+"""The same of the training, which excites a missing effect about as much as what is held out."""
 MENTIONED = 3
 """Number of further accepted effects that are listed."""
 
@@ -30,6 +32,19 @@ def explains_little(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
     if floor.method != "quiet band":
         return not explains(base, row, floor)
     return left_over(base, row, floor, tolerant=True) > 1 - LITTLE
+
+
+def hardly_trains(base: Fitted, row: Ranked, floor: NoiseFloor) -> bool:
+    """Whether it leaves nearly all of the training error above the quiet band.
+
+    Near the noise a few percent of the error held out are most of what is above it, and an effect
+    may lower it by that much by accident.
+    """
+    assert row.fitted is not None
+    after = row.fitted.train
+    if floor.method != "quiet band" or floor.reached(after):
+        return False
+    return floor.left_over(base.train, after) > 1 - LITTLE_IN_TRAINING
 
 
 def remaining_error(base: Fitted, row: Ranked, floor: NoiseFloor) -> str:

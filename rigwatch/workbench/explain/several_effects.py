@@ -38,8 +38,8 @@ from rigwatch.workbench.ranking import (
 )
 
 UNNAMED = ("undetermined", "unknown_effect")
-ROUNDS = 3
-"""Largest number of times that an effect of the set is replaced by a better one."""
+ROUNDS = 4
+"""Largest number of times that an effect of the set is left out, or replaced by a better one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,8 @@ def _with_best_set(verdict: Verdict, best: Combination, every: Sequence[Combinat
     """The verdict with what the best set leaves in its text; that of a named effect unchanged."""
     if verdict.word not in UNNAMED or len(best.rows) == 1:
         return verdict
-    text = f"{verdict.text}; {_joined(best.labels)} together leave {best.fitted.held_out_error:.3g}"
+    text = f"{verdict.text}; {_joined(best.labels)} together leave"
+    text += f" {best.fitted.held_out_error:.3g} {best.fitted.error_unit}"
     equals = [each.labels for each in every if not_worse(each, best)]
     common = frozenset.intersection(*equals)
     if common and common != best.labels:
@@ -157,12 +158,15 @@ def _with_equal_sets(verdict: Verdict, best: Combination, every: Sequence[Combin
 def _judge_each(
     bench: Bench, best: Combination, progress: Progress
 ) -> tuple[Combination | None, list[_Member]]:
-    """A better set if replacing an effect gives one, and the verdict on each effect."""
+    """A better set if leaving out or replacing an effect gives one, and the verdict on each."""
+    each_left_out = [(row, without(bench, best, row)) for row in best.rows]
+    rests = [(row, rest) for row, rest in each_left_out if rest is not None]
+    as_good = [rest for _, rest in rests if not_worse(rest, best)]
+    if as_good:
+        # A needless effect takes part of another's, and hides what that cannot be told from.
+        return min(as_good, key=lambda rest: rest.fitted.held_out_error), []
     parts = []
-    for row in best.rows:
-        rest = without(bench, best, row)
-        if rest is None:
-            continue
+    for row, rest in rests:
         progress(f"judging {row.label} together with {_joined(rest.labels)}")
         floor = floor_of(bench, best.fitted)
         found = judge(rest.fitted, _ranked_with(bench, rest, row, floor), floor)

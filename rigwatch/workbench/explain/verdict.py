@@ -21,6 +21,7 @@ from rigwatch.workbench.data import NoiseFloor
 from rigwatch.workbench.explain.remaining_error import (
     explains,
     explains_little,
+    hardly_trains,
     other_accepted,
     remaining_error,
 )
@@ -116,6 +117,9 @@ def judge(base: Fitted, rows: Sequence[Ranked], floor: NoiseFloor) -> Verdict:
             f"{best.label} lowers the held-out error most, but {', '.join(elsewhere)} explains more"
             f" than {CONTRADICTED:g} times as much of the training error"
         )
+    elif word == "missing_effect" and hardly_trains(base, best, floor):
+        word = "unknown_effect"
+        text = f"the best known effect, {best.label}, leaves nearly all of the training error"
     text += remaining_error(base, best, floor) + other_accepted(rows, (*members, *rivals))
     return Verdict(word, best, members, rivals, text, evidence=evidence)
 
@@ -152,7 +156,7 @@ def _word(
         )
     return "missing_effect", (
         f"{best.label} is missing: the held-out error falls from {base.held_out_error:.3g} to"
-        f" {best.held_out_error:.3g}"
+        f" {best.held_out_error:.3g} {base.error_unit}"
     )
 
 

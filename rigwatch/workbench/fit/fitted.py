@@ -59,6 +59,12 @@ class Fitted:
         """Overall error on the recordings held out."""
         return overall(self.held_out)
 
+    @property
+    def error_unit(self) -> str:
+        """Unit of the overall errors: that of the channel if there is only one."""
+        outputs = list(self.compiled.system.model.outputs.values())
+        return outputs[0].unit if len(outputs) == 1 else "noise floors"
+
 
 def overall(fitted: Fit) -> float:
     """Error over all channels: in the channel's unit if there is only one, else in noise floors."""

@@ -26,6 +26,8 @@ from rigwatch.workbench.study import Study
 AGAIN = 0.25
 """Share of the energy above the floor that an effect must explain, to first order, to be fitted
 again if its fit may have ended in a local minimum."""
+NEARLY_AS_GOOD = 1.5
+"""Ratio to the smallest held-out error up to which other effects may be named in its place."""
 
 
 def rank(
@@ -67,21 +69,37 @@ def _substitute_of_failed(rows: Sequence[Ranked]) -> Ranked | None:
 
 
 def _unfitted_similar(rows: Sequence[Ranked], floor: NoiseFloor) -> Ranked | None:
-    """An unfitted row similar to the best; only a fit can decide between them.
+    """An unfitted row similar to one that may be named; only a fit can decide between them.
 
-    Similar are those whose directions are nearly the best's, to first order. Above the noise floor
-    also those parallel to it, and those that are similar to it on many recordings.
+    Similar are those whose directions are nearly the best's, to first order, and those skipped in
+    favour of an effect that is nearly as good: it may be named as the simpler one. Above the noise
+    floor also those parallel to it, and those that are similar to the best on many recordings.
     """
-    accepted = [row for row in rows if row.accepted]
+    accepted = in_order([row for row in rows if row.accepted])
     if not accepted:
         return None
-    best = in_order(accepted)[0]
+    best = accepted[0]
     waiting = {row.label: row for row in rows if row.fitted is None and not row.failure}
-    alike = [waiting[label] for label in best.alike if label in waiting]
+    alike = [(waiting[label], best) for label in best.alike if label in waiting]
+    alike += _skipped_for_nearly_as_good(accepted, waiting)
     assert best.fitted is not None
     if floor.reached(best.fitted.held_out):
-        return next((row for row in alike if best.cosines[row.label] <= SAME), None)
-    return next(iter(alike + _usually_similar(best, accepted, waiting)), None)
+        return next((row for row, other in alike if other.cosines[row.label] <= SAME), None)
+    similar = [row for row, _ in alike]
+    return next(iter(similar + _usually_similar(best, accepted, waiting)), None)
+
+
+def _skipped_for_nearly_as_good(
+    accepted: Sequence[Ranked], waiting: Mapping[str, Ranked]
+) -> list[tuple[Ranked, Ranked]]:
+    """Unfitted rows with those they resemble, of which the error is near that of the best."""
+    most = NEARLY_AS_GOOD * accepted[0].held_out_error
+    near = {row.label: row for row in accepted if row.held_out_error < most}
+    return [
+        (row, near[row.fitted_instead])
+        for row in waiting.values()
+        if row.fitted_instead in near and row.free <= near[row.fitted_instead].free
+    ]
 
 
 def _usually_similar(

@@ -119,8 +119,8 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
         "",
         f"ranking ({len(found.ranking)} effects at ports)",
     ]
-    head = ["effect@port", "training", "held out", "p", "", "cannot be told from"]
-    lines += table(head, [_ranked(row) for row in found.ranking[:most]])
+    errors = [f"training [{found.error_unit}]", "held out", "p", "", "cannot be told from"]
+    lines += table(["effect@port", *errors], [_ranked(row) for row in found.ranking[:most]])
     if found.next_experiment:
         lines += ["", f"next experiment: {found.next_experiment.text}"]
     return lines + [f"note: {remark}" for remark in base.remarks]

@@ -15,8 +15,8 @@ from rigwatch.workbench.explain.combinations import (
     _substitutes,
     with_rows,
 )
-from rigwatch.workbench.explain.several_effects import _ranked_with
-from rigwatch.workbench.ranking import rank
+from rigwatch.workbench.explain.several_effects import _judge_each, _ranked_with
+from rigwatch.workbench.ranking import candidates, no_progress, rank, refit, scored
 from rigwatch.workbench.ranking.rank import _unfitted_similar
 from rigwatch.workbench.ranking.ranked import Ranked
 from tests.workbench.dampers import damper
@@ -86,3 +86,38 @@ def test_above_the_floor_a_relative_of_the_best_is_fitted_though_it_looks_like_a
     floor: Any = SimpleNamespace(reached=lambda _: reached)
     found = _unfitted_similar([best, third, waiting], floor)
     assert (found and found.label) == fitted_next
+
+
+def test_what_was_skipped_for_an_effect_that_may_be_named_in_place_of_the_best_is_fitted() -> None:
+    names = ("bliman_sorine", "load_dependent", "coulomb")
+    best, simpler, waiting = (effect(f"{name}@load") for name in names)
+    best.placement.effect.confused_with = ()  # type: ignore[misc]
+    waiting.fitted_instead = simpler.label
+    for row, error in ((best, 2.5), (simpler, 2.7)):
+        fit: Any = SimpleNamespace(held_out=None, held_out_error=error)
+        row.fitted, row.accepted = fit, True
+    for row in (simpler, waiting):
+        row.placement.effect.free = 1  # type: ignore[misc]
+    floor: Any = SimpleNamespace(reached=lambda _: False)
+    assert _unfitted_similar([best, simpler, waiting], floor) is waiting
+    simpler.fitted.held_out_error = 4.0  # type: ignore[union-attr,misc]
+    assert _unfitted_similar([best, simpler, waiting], floor) is None
+
+
+def test_a_needless_effect_is_left_out_of_a_set_before_the_others_are_judged(
+    tmp_path: Path,
+) -> None:
+    study = damper(tmp_path, lambda x, v: 4 * np.tanh(v / 0.002) + 2e6 * x**3)
+    bench = open_bench(study)
+    rows = list[Ranked]()
+    for label in ("cubic_stiffness@load", "coulomb@load", "quadratic_drag@load"):
+        base = (rows[-1].fitted if rows else None) or bench.base
+        held = with_rows(study, rows)
+        every = scored(held, bench.data, base, candidates(held, bench.data.train), every=True)
+        row = next(row for row in every if row.label == label)
+        refit(held, bench.data, base, row)
+        rows.append(row)
+    better, parts = _judge_each(bench, Combination(tuple(rows)), no_progress)
+    assert better is not None
+    assert better.labels == {"cubic_stiffness@load", "coulomb@load"}
+    assert not parts
