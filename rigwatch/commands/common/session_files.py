@@ -24,6 +24,8 @@ def print_json(value: Any) -> None:
 def _plain(value: Any) -> Any:
     if isinstance(value, Path):
         return str(value)
+    if hasattr(value, "tolist"):  # an array or a number of NumPy
+        return value.tolist()
     raise NotImplementedError(f"{type(value).__name__} has no JSON form")
 
 

@@ -25,7 +25,7 @@ def read_columns(folder: Path, span: Span) -> Columns:
         raise ModelError(f"{span.session}: found {len(boots)} runs of a device, expected one")
     first, last = blocks[0], blocks[-1]
     count = last.seq + len(last) - first.seq
-    dt = (last.t_ns[-1] - first.t_ns[0]) * 1e-9 / max(count - 1, 1)
+    dt = float(last.t_ns[-1] - first.t_ns[0]) * 1e-9 / max(count - 1, 1)
     values = {c.name: np.full(count, np.nan) for c in first.channels}
     for block in blocks:
         at = block.seq - first.seq

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import json
 
 from rigwatch.commands import main
 from rigwatch.workbench.data.signals import prepare
@@ -80,6 +81,7 @@ def test_loggers_of_slightly_different_rates_and_jitter_are_combined(tmp_path, r
     assert made(tmp_path, *paths) == 0
     data = prepare(open_study(tmp_path / "study"))
     assert 1 / data.train.dt == pytest.approx(188.1, rel=2e-3)
+    json.encode(data.train.dt)  # the lateness of a held input, in seconds, is told as JSON
 
 
 def test_a_speed_that_no_column_shows_is_made_from_the_displacement(tmp_path):
