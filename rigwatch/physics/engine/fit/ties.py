@@ -69,10 +69,10 @@ def untied(
 def _units(about: FloatArray, at: FloatArray) -> FloatArray:
     """What counts as large of each parameter: a strength of which the mean is 0 has its own size.
 
-    A fixed unit would make a newton of a force of 100 kN weigh as much as one of 10 N.
+    A newton for all would pull a force of 100 kN to zero where the error is flat to first order
+    only. Small strengths are held loosely, at 1 in SI units.
     """
-    own = np.where(about != 0, np.abs(about), np.abs(at))
-    return np.asarray(np.where(own > 0, own, 1.0))
+    return np.where(about != 0, np.abs(about), np.maximum(np.abs(at), 1.0))
 
 
 def _values(found: Fit) -> FloatArray:
