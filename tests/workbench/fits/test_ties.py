@@ -5,7 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.compare.compare import Comparison, compare
+from rigwatch.workbench.fit import fit_model
+from rigwatch.workbench.ranking import candidates, refit, scored
+from rigwatch.workbench.study import Accepted
+from tests.workbench.dampers import damper
 from tests.workbench.machine import studied
 
 TWO_PADS = """
@@ -49,3 +54,24 @@ def test_what_the_recording_tells_stays_as_it_was(tmp_path: Path) -> None:
     found = compared(tmp_path, "a = 0.7, b = 0.3", together=1.0).parameters
     assert found["a"].value == pytest.approx(0.5, rel=0.02)
     assert found["b"].value == pytest.approx(0.6, rel=0.02)
+
+
+def slipping(x: np.ndarray, _: np.ndarray) -> np.ndarray:
+    """Force of a slider behind a spring, 150 kN."""
+    force = np.zeros(len(x))
+    for k in range(1, len(x)):
+        force[k] = np.clip(force[k - 1] + 8e7 * (x[k] - x[k - 1]), -1.5e5, 1.5e5)
+    return force
+
+
+def test_a_second_strong_friction_costs_no_error(tmp_path: Path) -> None:
+    study = damper(tmp_path, slipping)
+    with_one = study.with_effects([Accepted(effect="jenkins", port="load")])
+    bench = open_bench(with_one)
+    found = candidates(with_one, bench.data.train)
+    for label in ("bouc_wen@load", "dahl@load"):
+        every = scored(with_one, bench.data, bench.base, found, every=True)
+        row = next(row for row in every if row.label == label)
+        refit(with_one, bench.data, bench.base, row, fit_model)
+        assert row.fitted is not None
+        assert row.fitted.train_error < 1.05 * bench.base.train_error

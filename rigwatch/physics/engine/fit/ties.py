@@ -25,6 +25,8 @@ ROUNDS = 12
 """Most fits, as ties may be curved."""
 CLOSE = 0.01
 """Relative change below which no further fit is made."""
+COSTS = 0.05
+"""Relative rise of the error at which what seemed a tie is none: it is flat to first order only."""
 
 
 def untied(
@@ -42,7 +44,7 @@ def untied(
     """
     names = found.compiled.system.free
     about = np.array([centre[name] for name in names])
-    unit = np.where(about != 0, np.abs(about), 1.0)
+    unit = _units(about, _values(found))
     for _ in range(ROUNDS):
         at = _values(found)
         size = np.maximum(unit * (about != 0), np.abs(at))
@@ -52,13 +54,25 @@ def untied(
         # Of all equivalent parameters, those nearest to the prior means.
         basis = np.linalg.qr(flat / unit[:, None]).Q
         prior = Prior(about, _noise(found) * basis.T / unit)
-        found = fit(
+        tried = fit(
             found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
             initial=found.initial, substeps=substeps, prior=prior,
         )  # fmt: skip
+        if _noise(tried) > _noise(found) * (1 + COSTS):
+            break
+        found = tried
         if np.max(np.abs(_values(found) - at) / unit) < CLOSE:
             break
     return found
+
+
+def _units(about: FloatArray, at: FloatArray) -> FloatArray:
+    """What counts as large of each parameter: a strength of which the mean is 0 has its own size.
+
+    A newton for all would pull a force of 100 kN to zero where the error is flat to first order
+    only. Small strengths are held loosely, at 1 in SI units.
+    """
+    return np.where(about != 0, np.abs(about), np.maximum(np.abs(at), 1.0))
 
 
 def _values(found: Fit) -> FloatArray:
