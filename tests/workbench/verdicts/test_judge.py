@@ -257,6 +257,23 @@ def test_similar_physics_that_does_as_well_is_a_rival(
 
 
 @pytest.mark.parametrize(
+    ("fitted", "cosine", "joins"),
+    [(False, 0.9996, True), (False, 0.9994, False), (True, 0.9996, False)],
+)
+def test_what_was_not_fitted_is_a_rival_where_it_is_parallel_to_one(
+    fitted: bool, cosine: float, joins: bool
+) -> None:
+    first = best(cosines={"lag@drive": 0.9})
+    second = row("lag@drive")
+    third = row("delay@drive", cosines={"lag@drive": cosine}, fitted=fitted, accepted=False)
+    assert judge(base(8.0), [first, second, third], PERIODS).rivals == (
+        ("lag@drive", "delay@drive") if joins else ("lag@drive",)
+    )
+    unknown = row("gap@x", fitted=False)
+    assert judge(base(8.0), [first, second, unknown], PERIODS).rivals == ("lag@drive",)
+
+
+@pytest.mark.parametrize(
     ("port", "cosine", "behind", "expected"),
     [
         ("load", 0.96, 0.0, True),
