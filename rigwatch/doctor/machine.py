@@ -90,7 +90,7 @@ def check_disk(folder: Path) -> Finding:
     """The disk for recordings has room."""
     existing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     usage = shutil.disk_usage(existing)
-    part = usage.free / usage.total
+    part = usage.free / (usage.used + usage.free)
     text = f"{usage.free / 1e9:.1f} GB free ({part:.0%}) for recordings in {folder}"
     remedy = "free some space, or name another folder in [recorder]"
     if not os.access(existing, os.W_OK):

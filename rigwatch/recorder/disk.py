@@ -16,16 +16,18 @@ _LEVELS: tuple[tuple[float, Severity, str], ...] = (
 
 
 def free_share(folder: Path) -> float:
-    """Share of the disk of `folder` available to this process, 0 to 1; NaN if unknown.
+    """Share of the disk of `folder` that this process can still fill, 0 to 1; NaN if unknown.
 
-    If the folder does not exist yet, its nearest existing parent is used.
+    Blocks that the file system keeps for its administrator count neither as free nor as the
+    disk's, as in `df`. If the folder does not exist yet, its nearest existing parent is used.
     """
     for place in (folder, *folder.absolute().parents):
         try:
             found = os.statvfs(place)
         except OSError:
             continue
-        return found.f_bavail / found.f_blocks if found.f_blocks else float("nan")
+        usable = found.f_blocks - found.f_bfree + found.f_bavail
+        return found.f_bavail / usable if usable else float("nan")
     return float("nan")
 
 

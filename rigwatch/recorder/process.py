@@ -7,6 +7,7 @@ import hashlib
 import math
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 from rigwatch.recorder.disk import DiskWatch, free_share
@@ -96,8 +97,10 @@ class Recorder:
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:
-            self._bus.publish(EVENTS, event)
-            self.store.add(event)
+            # A recorder elsewhere speaks of its own disk, not of that of the rig's recorder.
+            own = replace(event, source=self._bus.process)
+            self._bus.publish(EVENTS, own)
+            self.store.add(own)
 
     def _health(self, share: float, t_ns: int) -> Health:
         state = "recording" if not self.store.failure else "not recording"

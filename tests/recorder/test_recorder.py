@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigwatch.recorder import process
 from rigwatch.recorder.folders import choose
 from rigwatch.recorder.process import Recorder, describe_run
 from rigwatch.wire.bus.bus import Bus
@@ -30,7 +31,7 @@ from rigwatch.wire.messages.message_types import (
     Gap,
     SampleBlock,
 )
-from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, EVENTS, GAPS, SAMPLES
+from rigwatch.wire.messages.topics import ALARMS, ESTIMATES, EVENTS, GAPS, RECORDERS, SAMPLES
 from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.session import open_session, run_info
 from tests.waiting import eventually
@@ -64,6 +65,14 @@ def config(tmp_path: Path) -> Path:
     path = tmp_path / "rig.toml"
     path.write_text(CONFIG.format(port=free_port(), folder=tmp_path / "sessions"))
     return path
+
+
+@pytest.fixture(autouse=True)
+def disk(monkeypatch: pytest.MonkeyPatch) -> dict[str, float]:
+    """Share of the disk that is free, whatever this machine's disk has."""
+    disk = {"free": 0.5}
+    monkeypatch.setattr(process, "free_share", lambda _: disk["free"])
+    return disk
 
 
 def block(seq: int, n: int = 1) -> SampleBlock:
@@ -133,6 +142,24 @@ def test_everything_said_is_kept_once(config: Path) -> None:
     assert session.info.configuration == config.read_text()
     (estimates,) = session.estimates()
     assert len(estimates) == 100
+
+
+@pytest.mark.parametrize("name", RECORDERS)
+def test_a_recorder_speaks_of_its_own_disk_and_keeps_that_once(
+    config: Path, disk: dict[str, float], name: str
+) -> None:
+    network = MemoryNetwork()
+    rig = load_rig(config)
+    listener = network.bus("bench1", "test").subscribe(EVENTS)
+    recorder = Recorder(rig, describe_run(config, rig), network.bus("bench1", name))
+    disk["free"] = 0.05
+    for turn in range(3):
+        recorder.turn(float(turn), turn)
+    recorder.close(3.0, 3)
+    said = [event for event in listener.drain() if event.code == "DISK_NEARLY_FULL"]
+    assert [event.source for event in said] == [name]
+    kept = [item.message for item in open_session(recorder.store.folder).messages(["events"])]
+    assert [event.source for event in kept if event.code == "DISK_NEARLY_FULL"] == [name]
 
 
 def test_a_recorder_whose_disk_is_away_says_so_and_keeps_the_samples(config: Path) -> None:
