@@ -30,7 +30,7 @@ from monitor.observer import (
     MEASURED,
     PREDICTED,
     E,
-    FixedLag,
+    LaggedSignals,
     Layout,
     Observed,
     ObserverSignals,
@@ -135,7 +135,7 @@ def _lateness(used: Sequence[Recording], layout: Layout, rate: float) -> float:
 
 
 def _motion(one: Recording, layout: Layout, lag: int, rate: float, late: float) -> FloatArray:
-    columns, state = FixedLag(layout.columns, lag, rate, late).update(*_admitted(one, layout))
+    columns, state, _ = LaggedSignals(layout, lag, rate, late).update(*_admitted(one, layout))
     return np.ascontiguousarray(columns[state != EMPTY])
 
 

@@ -154,13 +154,13 @@ def _largest(signal: FloatArray, length: int, allowed: FloatArray, skip: int) ->
 def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
     """The decision's columns for a recording, with the limits disabled."""
     out = np.zeros((len(OUTPUTS), len(part.state)))
-    inside, jumped = np.ones((2, len(part.state)), np.bool_)
+    inside, placed, jumped = np.ones((3, len(part.state)), np.bool_)
     jumped[:] = False
     usual = np.full((len(Extremes._fields), len(part.state)), np.inf)
     kept = new_state(part.levels.shape[1])
     decide(
-        part.judged, part.speed, part.levels, part.drive, inside, jumped, usual, part.state,
-        rules, kept, out,
+        part.judged, part.speed, part.levels, part.drive, inside, jumped, placed, usual,
+        part.state, rules, kept, out,
     )  # fmt: skip
     out[SPREAD] = np.maximum(out[SPREAD], rules.noise)
     return out

@@ -22,7 +22,7 @@ from monitor.observer.decision_state import (
     DecisionRules,
     new_state,
 )
-from monitor.observer.lagged_motion import EMPTY, FixedLag
+from monitor.observer.lagged_motion import EMPTY
 from monitor.observer.missing_force import (
     DISAGREE,
     DRY_UNIT,
@@ -33,6 +33,7 @@ from monitor.observer.missing_force import (
     levels,
 )
 from monitor.observer.model_signals import (
+    LaggedSignals,
     Layout,
     Observed,
     ObserverSignals,
@@ -73,7 +74,7 @@ __all__ = [
     "DecisionRules",
     "E",
     "Extremes",
-    "FixedLag",
+    "LaggedSignals",
     "Layout",
     "Observed",
     "ObserverSignals",

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.model import EquationsPlant, RemainderSection
-from monitor.observer.lagged_motion import DELAY, MATCHED, FixedLag, MotionColumn
+from monitor.observer.lagged_motion import DELAY, EMPTY, MATCHED, FixedLag, MotionColumn
 from monitor.observer.missing_force import HighPassed
 from monitor.observer.prediction import (
     AlongMotion,
@@ -19,9 +19,10 @@ from monitor.observer.prediction import (
     rate_columns,
     speed_state,
 )
+from monitor.observer.sliding_steps import SlidingSteps
 from monitor.signals import Codes
 from rigwatch.physics.engine.equations import Model, balanced_states, measured_states
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,7 @@ class Observed:
         measured: the measured output, shape (n,).
         predicted: the columns of the prediction.
         judged: high-passed columns, see `missing_force`, shape (n, 6).
+        placed: False while it is not known where between samples an input steps, shape (n,).
     """
 
     state: Codes
@@ -99,6 +101,32 @@ class Observed:
     measured: FloatArray
     predicted: Predicted
     judged: FloatArray
+    placed: BoolArray
+
+
+class LaggedSignals:
+    """The layout's columns from samples: the smoothed motion, and the inputs' means.
+
+    Args:
+        layout: of the model.
+        half_width: lag [samples].
+        rate: sample rate [Hz].
+        late: lateness of the motion behind the predicted output's sensor [s].
+    """
+
+    def __init__(self, layout: Layout, half_width: int, rate: float, late: float) -> None:
+        self._motion = FixedLag(layout.columns, half_width, rate, late)
+        self._steps = [SlidingSteps(half_width) for _ in range(layout.motions[0])]
+
+    def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes, BoolArray]:
+        """Columns, states, and whether the inputs' steps are known, for the next samples."""
+        columns, state = self._motion.update(signals, code)
+        placed = np.ones(code.size, np.bool_)
+        for place, steps in enumerate(self._steps):
+            found = steps.update(signals[:, place], code)
+            columns[:, place] = np.where(state == EMPTY, 0.0, found.mean)
+            placed &= found.known
+        return columns, state, placed
 
 
 class ObserverSignals:
@@ -115,14 +143,14 @@ class ObserverSignals:
 
     def __init__(self, plant: EquationsPlant, remainder: RemainderSection, rate: float) -> None:
         self.layout = layout_of(base_model(plant.model), plant.port)
-        self._motion = FixedLag(self.layout.columns, plant.half_width, rate, plant.late)
+        self._motion = LaggedSignals(self.layout, plant.half_width, rate, plant.late)
         self._along = AlongMotion(plant, rate)
         self.remainder_size = len(self.layout.motions) + self._along.hidden
         self._high_passed = HighPassed(plant.corner, rate, remainder)
 
     def update(self, signals: FloatArray, code: Codes) -> Observed:
         """The next samples, shape (n, channels) in the layout's order."""
-        columns, state = self._motion.update(signals, code)
+        columns, state, placed = self._motion.update(signals, code)
         inputs = self.layout.inputs
         rows, measured = columns[:, :inputs], columns[:, inputs]
         disagreement = columns[:, inputs + 2] - columns[:, inputs + 1]
@@ -135,7 +163,7 @@ class ObserverSignals:
         )  # fmt: skip
         z = remainder_signals(rows, predicted, self.layout)
         judged = self._high_passed.update(raw, z, state)
-        return Observed(state, rows, measured, predicted, judged)
+        return Observed(state, rows, measured, predicted, judged, placed)
 
 
 def remainder_signals(rows: FloatArray, predicted: Predicted, layout: Layout) -> FloatArray:

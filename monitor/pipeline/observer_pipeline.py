@@ -101,7 +101,7 @@ class ObserverMonitor:
         usual = self._usual.update(motion)
         decide(
             seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)),
-            usual, seen.state, self.rules, self._state, out,
+            seen.placed, usual, seen.state, self.rules, self._state, out,
         )  # fmt: skip
         conditions = self._conditions(admitted, seen, far, out)
         sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))
