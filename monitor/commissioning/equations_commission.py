@@ -241,6 +241,7 @@ def _model(  # noqa: PLR0917 -- all that was found
             drive_energy(o.rows, seen, layout.motions),
             o.state,
             motion,
+            o.drive[round(STARTED * rate) :],
         )
         for o, motion in zip(parts, motions, strict=True)
     ]

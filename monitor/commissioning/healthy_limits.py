@@ -34,9 +34,10 @@ LOW, HIGH = 5.0, 90.0
 
 @dataclass(frozen=True, eq=False)
 class HealthyPart:
-    """A healthy recording: judged columns, speed, levels of the motion, drive, states, spectrum.
+    """A healthy recording: judged columns, speed, levels of the motion, energy of the drive,
+    states, spectrum, and pace of the drive.
 
-    The spectrum begins after the start, during which it is transient.
+    The last two begin after the start, during which they are transient.
     """
 
     judged: FloatArray
@@ -45,6 +46,7 @@ class HealthyPart:
     drive: FloatArray
     state: Codes
     motion: Spectrum
+    pace: FloatArray
 
     def energies(self, column: int, skip: int) -> FloatArray:
         """Mean squares of a judged column over medium windows."""
@@ -79,7 +81,9 @@ def healthy_limits(
         noise, growth, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, speed_noise, NEVER, 1, 1.0
     )  # fmt: skip
     largest = [_extremes(part, rules, skip) for part in parts]
-    motions = [steady_motion(p.motion, own, rate) for p, own in zip(parts, largest, strict=True)]
+    motions = [
+        steady_motion(p.motion, p.pace, own, rate) for p, own in zip(parts, largest, strict=True)
+    ]
     steady = [motion for motion in motions if motion is not None]
     return HealthyLimits(
         noise=noise, growth=tuple(growth.tolist()),
@@ -90,6 +94,7 @@ def healthy_limits(
         steady_paces=tuple(motion.pace for motion in steady),
         steady_sizes=tuple(motion.size for motion in steady),
         steady_narrow=tuple(motion.narrow for motion in steady),
+        steady_drives=tuple(motion.drive for motion in steady),
         steady_energies=tuple(motion.extremes.lasting for motion in steady),
         steady_shorts=tuple(motion.extremes.short for motion in steady),
         steady_mediums=tuple(motion.extremes.medium for motion in steady),
@@ -154,12 +159,12 @@ def _largest(signal: FloatArray, length: int, allowed: FloatArray, skip: int) ->
 def _tried(part: HealthyPart, rules: DecisionRules) -> FloatArray:
     """The decision's columns for a recording, with the limits disabled."""
     out = np.zeros((len(OUTPUTS), len(part.state)))
-    inside, placed, jumped = np.ones((3, len(part.state)), np.bool_)
+    inside, steady, jumped = np.ones((3, len(part.state)), np.bool_)
     jumped[:] = False
     usual = np.full((len(Extremes._fields), len(part.state)), np.inf)
     kept = new_state(part.levels.shape[1])
     decide(
-        part.judged, part.speed, part.levels, part.drive, inside, jumped, placed, usual,
+        part.judged, part.speed, part.levels, part.drive, inside, jumped, steady, usual,
         part.state, rules, kept, out,
     )  # fmt: skip
     out[SPREAD] = np.maximum(out[SPREAD], rules.noise)

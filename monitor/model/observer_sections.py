@@ -101,6 +101,9 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
     ] = ()
     steady_sizes: Annotated[Floats, Meta(description="size of each, as in the range")] = ()
     steady_narrow: Annotated[Floats, Meta(description="narrowness of each")] = ()
+    steady_drives: Annotated[
+        Floats, Meta(description="pace of the drive of each: 2 sin of twice its phase a sample")
+    ] = ()
     steady_energies: Annotated[
         Floats, Meta(description="largest energy over a second of each")
     ] = ()

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from monitor.model import EquationsPlant, RemainderSection
+from monitor.observer.drive_changes import DriveChanges
 from monitor.observer.lagged_motion import DELAY, EMPTY, MATCHED, FixedLag, MotionColumn
 from monitor.observer.missing_force import HighPassed
 from monitor.observer.prediction import (
@@ -93,7 +94,9 @@ class Observed:
         measured: the measured output, shape (n,).
         predicted: the columns of the prediction.
         judged: high-passed columns, see `missing_force`, shape (n, 6).
-        placed: False while it is not known where between samples an input steps, shape (n,).
+        steady: False where an input changes suddenly, or steps between samples at a place that is
+            not known yet, shape (n,).
+        drive: pace of the first input, see `drive_changes.Drive`, shape (n,).
     """
 
     state: Codes
@@ -101,7 +104,8 @@ class Observed:
     measured: FloatArray
     predicted: Predicted
     judged: FloatArray
-    placed: BoolArray
+    steady: BoolArray
+    drive: FloatArray
 
 
 class LaggedSignals:
@@ -145,12 +149,13 @@ class ObserverSignals:
         self.layout = layout_of(base_model(plant.model), plant.port)
         self._motion = LaggedSignals(self.layout, plant.half_width, rate, plant.late)
         self._along = AlongMotion(plant, rate)
+        self._drives = [DriveChanges() for _ in range(self.layout.motions[0])]
         self.remainder_size = len(self.layout.motions) + self._along.hidden
         self._high_passed = HighPassed(plant.corner, rate, remainder)
 
     def update(self, signals: FloatArray, code: Codes) -> Observed:
         """The next samples, shape (n, channels) in the layout's order."""
-        columns, state, placed = self._motion.update(signals, code)
+        columns, state, steady = self._motion.update(signals, code)
         inputs = self.layout.inputs
         rows, measured = columns[:, :inputs], columns[:, inputs]
         disagreement = columns[:, inputs + 2] - columns[:, inputs + 1]
@@ -163,7 +168,11 @@ class ObserverSignals:
         )  # fmt: skip
         z = remainder_signals(rows, predicted, self.layout)
         judged = self._high_passed.update(raw, z, state)
-        return Observed(state, rows, measured, predicted, judged, placed)
+        drives = [own.update(signals[:, place], code) for place, own in enumerate(self._drives)]
+        for own in drives:
+            steady &= ~own.changed
+        pace = drives[0].pace if drives else np.zeros(code.size)
+        return Observed(state, rows, measured, predicted, judged, steady, pace)
 
 
 def remainder_signals(rows: FloatArray, predicted: Predicted, layout: Layout) -> FloatArray:

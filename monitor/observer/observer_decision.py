@@ -112,7 +112,7 @@ def decide(  # noqa: PLR0917 -- a kernel
     drive: FloatArray,
     inside: NDArray[np.bool_],
     jumped: NDArray[np.bool_],
-    placed: NDArray[np.bool_],
+    steady: NDArray[np.bool_],
     usual: FloatArray,
     state: Codes,
     rules: DecisionRules,
@@ -125,7 +125,7 @@ def decide(  # noqa: PLR0917 -- a kernel
             continue
         if state[k] == FIRST:
             _restart(kept)
-        _follow_drive(drive[k], placed[k], kept)
+        _follow_drive(drive[k], steady[k], kept)
         if state[k] != TAINTED:
             _remember(kept, judged[k], speed[k], levels[k])
         _follow_jumps(jumped[k], kept)
@@ -143,13 +143,13 @@ def _restart(kept: DecisionState) -> None:
 
 
 @njit()
-def _follow_drive(energy: float, placed: bool, kept: DecisionState) -> None:
-    """Detect a sudden start or increase of the drive, or steps of it at an unknown place."""
+def _follow_drive(energy: float, steady: bool, kept: DecisionState) -> None:
+    """Detect a sudden start or increase of the drive; or it is known not to be steady."""
     late, before = kept.value[2], kept.value[3]
     late += (energy - late) / LATE
     before += (energy - before) / BEFORE
     kept.counts[CHANGED] += 1
-    if late > SUDDEN * before + 1e-4 or not placed:
+    if late > SUDDEN * before + 1e-4 or not steady:
         kept.counts[CHANGED] = 0
     kept.value[2], kept.value[3] = late, before
 

@@ -34,7 +34,7 @@ PACE = 0.06
 """Relative change with every sample of the usual error, a running median."""
 SHORTEST, LONGEST = 40.0, 4096.0
 """Intervals between skips that are followed [samples]: clocks that differ by 2.5 to 0.025 %."""
-REGULAR, MISSED = 0.04, 8
+REGULAR, MISSED = 0.04, 32
 """Relative error of regular intervals, and most skips missed in a row."""
 SURE, STRAYS = 3, 3
 """Regular skips after which f is known, and irregular ones in a row after which it is not."""
@@ -130,6 +130,9 @@ def _advance(  # noqa: PLR0917 -- a kernel
         way = _skipped(misfits, ring, kept)
         share = _share(kept)
         now, following = ring[(head + size // 2 - 1) % size], ring[(head + size // 2) % size]
+        if way > 0 and kept[SKIPS] >= SURE:
+            # The step that no sample shows lies between the two that do.
+            share, following = 1.0, 0.5 * (now + following)
         mean[k] = (1.0 - share) * now + share * following
         known[k] = kept[SKIPS] == 0 or kept[SKIPS] >= SURE
         if way != 0:

@@ -19,6 +19,10 @@ from rigwatch.wire.arrays import FloatArray
 
 PACE, SIZE, NARROW = 0.03, 0.1, 0.03
 """Differences up to which motions are the same: relative in frequency and size, in narrowness."""
+DRIVE = 0.025
+"""Relative difference of the drives' paces up to which they are the same: that of a triangle is 3
+to 10 % above a sine's, that of a square more.
+"""
 RIPPLE = 2.0
 """Ratio of the spectrum's own ripple to them, above which its motion changes."""
 NARROWEST = 2.0
@@ -45,6 +49,7 @@ class Motion(NamedTuple):
     pace: float
     size: float
     narrow: float
+    drive: float
     extremes: Extremes
 
 
@@ -60,23 +65,31 @@ class UsualError:
         self._known = tuple(_known(limits))
         self._smooth = _Smooth(rate)
 
-    def update(self, seen: Spectrum) -> FloatArray:
-        """The extremes after each sample, infinite where they are not known, shape (4, n)."""
+    def update(self, seen: Spectrum, drive: FloatArray) -> FloatArray:
+        """The extremes after each sample, infinite where they are not known, shape (4, n).
+
+        Args:
+            seen: the motion.
+            drive: its pace, see `drive_changes.Drive`.
+        """
         smooth = self._smooth.update(seen)
         steady = np.abs(seen.pace - smooth.pace) <= RIPPLE * PACE * smooth.pace
         steady &= np.abs(seen.size - smooth.size) <= RIPPLE * SIZE * smooth.size
         found = np.zeros((len(Extremes._fields), seen.pace.size))
         for motion in self._known:
-            same = _same(smooth, motion)
+            same = _same(smooth, drive, motion)
             found[:, same] = np.maximum(found[:, same], np.array(motion.extremes)[:, None])
         return np.where(steady & (found > 0.0), found, np.inf)
 
 
-def steady_motion(seen: Spectrum, extremes: Extremes, rate: float) -> Motion | None:
+def steady_motion(
+    seen: Spectrum, drive: FloatArray, extremes: Extremes, rate: float
+) -> Motion | None:
     """The motion of a recording, None if it changes or is too short.
 
     Args:
         seen: the spectrum after the start.
+        drive: the pace of the drive after the start.
         extremes: of the recording's residual.
         rate: sample rate [Hz].
     """
@@ -84,8 +97,8 @@ def steady_motion(seen: Spectrum, extremes: Extremes, rate: float) -> Motion | N
         return None
     smooth = _Smooth(rate).update(seen)
     pace, size, narrow = (float(np.median(x)) for x in (smooth.pace, smooth.size, smooth.narrow))
-    middle = Motion(pace, size, narrow, extremes)
-    steady = size > 0.0 and float(np.mean(_same(smooth, middle))) >= STEADY
+    middle = Motion(pace, size, narrow, float(np.median(drive)), extremes)
+    steady = size > 0.0 and float(np.mean(_same(smooth, drive, middle))) >= STEADY
     return middle if steady else None
 
 
@@ -106,16 +119,19 @@ class _Smooth:
 
 
 def _known(limits: HealthyLimits) -> Iterator[Motion]:
-    shapes = zip(limits.steady_paces, limits.steady_sizes, limits.steady_narrow, strict=True)
+    # Model files of earlier versions do not tell drives apart, and have the lasting energy only.
+    drives = limits.steady_drives or (0.0,) * len(limits.steady_paces)
+    spectra = limits.steady_paces, limits.steady_sizes, limits.steady_narrow
+    shapes = zip(*spectra, drives, strict=True)
     windows = limits.steady_shorts, limits.steady_mediums, limits.steady_frictions
-    # Model files of earlier versions have the lasting energy only.
     unknown = (np.inf,) * len(limits.steady_paces)
     extremes = zip(limits.steady_energies, *(each or unknown for each in windows), strict=True)
     for shape, largest in zip(shapes, extremes, strict=True):
         yield Motion(*shape, Extremes(*largest))
 
 
-def _same(seen: Spectrum, motion: Motion) -> NDArray[np.bool_]:
+def _same(seen: Spectrum, drive: FloatArray, motion: Motion) -> NDArray[np.bool_]:
     near = np.abs(seen.pace - motion.pace) <= PACE * motion.pace
     near &= np.abs(seen.size - motion.size) <= SIZE * motion.size
+    near &= (np.abs(drive - motion.drive) <= DRIVE * motion.drive) | (motion.drive == 0.0)
     return np.asarray(near & (np.abs(seen.narrow - motion.narrow) <= NARROW))

@@ -98,10 +98,10 @@ class ObserverMonitor:
         known = self.model.motion_range
         assert known is not None
         drive = drive_energy(seen.rows, known, layout.motions)
-        usual = self._usual.update(motion)
+        usual = self._usual.update(motion, seen.drive)
         decide(
             seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)),
-            seen.placed, usual, seen.state, self.rules, self._state, out,
+            seen.steady, usual, seen.state, self.rules, self._state, out,
         )  # fmt: skip
         conditions = self._conditions(admitted, seen, far, out)
         sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))

@@ -75,7 +75,7 @@ def test_any_cut_gives_the_same_spectrum() -> None:
         assert np.array_equal(np.concatenate(pieces), getattr(whole, name)), name
 
 
-KNOWN = 1.5
+KNOWN, SINE_PACE, TRIANGLE_PACE = 1.5, 0.765, 0.791
 SETTLED = 1024
 
 
@@ -88,18 +88,22 @@ def spectrum(frequency: np.ndarray | float, size: float = 0.2, n: int = 3072) ->
 def limits() -> HealthyLimits:
     """With one steady motion, a tone of 8 Hz."""
     after = Spectrum(*(figure[512:] for figure in spectrum(8.0)))
-    known = steady_motion(after, Extremes(KNOWN), RATE)
+    known = steady_motion(after, driven(after), Extremes(KNOWN), RATE)
     assert known is not None
     return HealthyLimits(
         noise=1.0, growth=(0.0,), short=1.0, medium=1.0, friction=1.0, sensor_noise=1.0,
         sensor_growth=0.0, sensor=1.0, speed_noise=SLOW,
         steady_paces=(known.pace,), steady_sizes=(known.size,), steady_narrow=(known.narrow,),
-        steady_energies=(known.extremes.lasting,),
+        steady_drives=(known.drive,), steady_energies=(known.extremes.lasting,),
     )  # fmt: skip
 
 
-def usual(seen: Spectrum) -> np.ndarray:
-    return UsualError(limits(), RATE).update(seen)[0]
+def driven(seen: Spectrum, pace: float = SINE_PACE) -> np.ndarray:
+    return np.full(seen.pace.size, pace)
+
+
+def usual(seen: Spectrum, pace: float = SINE_PACE) -> np.ndarray:
+    return UsualError(limits(), RATE).update(seen, driven(seen, pace))[0]
 
 
 @pytest.mark.parametrize("frequency", [8.0, 8.1])
@@ -112,6 +116,18 @@ def test_another_motion_has_none(frequency: float, size: float) -> None:
     assert np.isinf(usual(spectrum(frequency, size))[SETTLED:]).all()
 
 
+def test_a_motion_by_another_drive_has_none() -> None:
+    assert np.isinf(usual(spectrum(8.0), TRIANGLE_PACE)[SETTLED:]).all()
+
+
+def test_a_model_file_without_drives_knows_the_motion_by_any() -> None:
+    seen, older = spectrum(8.0), structs.replace(limits(), steady_drives=())
+
+    found = UsualError(older, RATE).update(seen, driven(seen, TRIANGLE_PACE))[0]
+
+    assert np.all(found[SETTLED:] == KNOWN)
+
+
 def test_a_motion_that_changes_has_none() -> None:
     change = 1536
     found = usual(spectrum(np.where(np.arange(3072) < change, 8.0, 11.0)))
@@ -121,7 +137,9 @@ def test_a_motion_that_changes_has_none() -> None:
 
 
 def test_a_sweep_is_no_steady_motion() -> None:
-    assert steady_motion(spectrum(np.linspace(2.0, 14.0, 3072)), Extremes(KNOWN), RATE) is None
+    seen = spectrum(np.linspace(2.0, 14.0, 3072))
+
+    assert steady_motion(seen, driven(seen), Extremes(KNOWN), RATE) is None
 
 
 def test_any_cut_gives_the_same_limit() -> None:
@@ -129,7 +147,7 @@ def test_any_cut_gives_the_same_limit() -> None:
     cut, whole = UsualError(limits(), RATE), usual(seen)
 
     parts = [
-        cut.update(Spectrum(*(figure[a:b] for figure in seen)))[0]
+        cut.update(Spectrum(*(figure[a:b] for figure in seen)), driven(seen)[a:b])[0]
         for a, b in pairwise((0, 1, 9, 1500, 1540, 3072))
     ]
 
@@ -141,7 +159,8 @@ def without_lasting() -> RigModel:
     healthy = model().healthy
     assert healthy is not None
     bare = structs.replace(
-        healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_energies=(),
+        healthy, steady_paces=(), steady_sizes=(), steady_narrow=(), steady_drives=(),
+        steady_energies=(),
         steady_shorts=(), steady_mediums=(), steady_frictions=(),
     )  # fmt: skip
     return structs.replace(model(), healthy=bare)
