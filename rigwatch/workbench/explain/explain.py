@@ -11,11 +11,12 @@ from rigwatch.workbench.compare import (
     open_bench,
     unweighed,
 )
+from rigwatch.workbench.experiment import Experiment, propose
 from rigwatch.workbench.explain.adequacy import inadequate, unchecked, with_base_offered
 from rigwatch.workbench.explain.credibility import credible_verdict
+from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
-from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
@@ -92,6 +93,8 @@ class Explanation:
         beside: the other effects of the set that the named effect was judged in; with them `add`
             accepts it if it is refused alone.
         error_unit: unit of the errors in `text` and `ranking`.
+        exchange: an effect that describes the last accepted one better, if nothing beside it
+            explains the error; None if none does, or if that was not asked.
     """
 
     verdict: str
@@ -105,6 +108,7 @@ class Explanation:
     like_this: tuple[int, int] = (0, 0)
     beside: list[str] = field(default_factory=list)
     error_unit: str = ""
+    exchange: Exchange | None = None
 
 
 def explain(study: Study, progress: Progress = no_progress) -> Explanation:
@@ -122,7 +126,13 @@ def explain(study: Study, progress: Progress = no_progress) -> Explanation:
     rows, verdict = ranking(bench, progress)
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
         progress("finding what the healthy recording leaves open of the strength")
-    return explanation(bench, rows, verdict)
+    found = explanation(bench, rows, verdict)
+    if verdict.word != "unknown_effect" or not study.file.effects:
+        return found
+    offer = exchange(bench, progress)
+    if offer is None:
+        return found
+    return replace(found, text=f"{found.text}; but {offer.text(found.error_unit)}", exchange=offer)
 
 
 def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked], Verdict]:

@@ -12,7 +12,7 @@ from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import AGAIN, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
 from rigwatch.workbench.ranking.refinements import with_refinements
-from rigwatch.workbench.ranking.refitting import Progress, no_progress, refit
+from rigwatch.workbench.ranking.refitting import Progress, no_progress, refit, refit_all
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
 
 __all__ = [
@@ -35,6 +35,7 @@ __all__ = [
     "rank_all",
     "rank_only",
     "refit",
+    "refit_all",
     "score_all",
     "scored",
     "select_for_fit",
