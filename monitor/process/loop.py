@@ -192,6 +192,7 @@ class MonitorProcess:
     def close(self) -> None:
         """Close all resources."""
         self.reader.close()
+        self._explainer.close()
         self._models.close()
         for kept in (self._journal, self._cursor):
             if kept:
