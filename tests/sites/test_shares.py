@@ -61,7 +61,9 @@ def test_one_that_asks_no_more_holds_nobody_up_and_one_that_begins_does_not_take
 
 
 @given(st.lists(st.tuples(st.text(max_size=3), st.floats(0.0, 0.5)), max_size=200))
-def test_names_without_end_cost_a_bounded_memory_and_somebody_is_served(asked: list[tuple[str, float]]) -> None:
+def test_names_without_end_cost_a_bounded_memory_and_somebody_is_served(
+    asked: list[tuple[str, float]],
+) -> None:
     shares, now = Shares(), 0.0
     for name, pause in asked:
         now += pause
