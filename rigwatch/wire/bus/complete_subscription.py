@@ -46,6 +46,7 @@ class CompleteSubscription(Subscription):
         resume_after: run and number of the last message of each process that an earlier run of this
             subscriber has processed; None for messages from now on.
         gaps_in_place: losses are not published but returned among the messages, in their place.
+        patient: see `SampleOrder`.
 
     Attributes:
         lost: messages known to be lost.
@@ -60,10 +61,11 @@ class CompleteSubscription(Subscription):
         resume_after: Mapping[str, Place] | None = None,
         *,
         gaps_in_place: bool = False,
+        patient: bool = False,
     ) -> None:
         super().__init__(topic, capacity)
         self.lost = self.foreign = 0
-        self._bus, self._gaps_in_place = bus, gaps_in_place
+        self._bus, self._gaps_in_place, self._patient = bus, gaps_in_place, patient
         self._senders: dict[str, Sender] = {}
         self._runs: dict[int, str] = {}
         self._assumed: dict[str, int] = {}
@@ -235,7 +237,7 @@ class CompleteSubscription(Subscription):
         """Follow a further process, unless the limit is reached."""
         if len(self._senders) >= MOST_SENDERS:
             return False
-        self._senders[process] = Sender(place)
+        self._senders[process] = Sender(place, patient=self._patient)
         return True
 
     def _take_message(self, payload: bytes, sender: str, mark: bytes) -> None:
