@@ -9,7 +9,7 @@ from rigwatch.workbench.ranking.acceptance import EXPLAINED, MATERIAL, STEP, jud
 from rigwatch.workbench.ranking.candidates import candidates, shapes_of
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.paired_test import difference
-from rigwatch.workbench.ranking.rank import AGAIN, rank
+from rigwatch.workbench.ranking.rank import AGAIN, MUCH_WORSE, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
 from rigwatch.workbench.ranking.refinements import with_refinements
 from rigwatch.workbench.ranking.refitting import Progress, no_progress, refit, refit_all
@@ -19,6 +19,7 @@ __all__ = [
     "AGAIN",
     "EXPLAINED",
     "MATERIAL",
+    "MUCH_WORSE",
     "SAME",
     "SIMILAR",
     "STEP",
