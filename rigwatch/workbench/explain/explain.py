@@ -13,7 +13,10 @@ from rigwatch.workbench.compare import (
 )
 from rigwatch.workbench.experiment import Experiment, propose
 from rigwatch.workbench.explain.adequacy import inadequate, unchecked, with_base_offered
-from rigwatch.workbench.explain.credibility import credible_verdict
+from rigwatch.workbench.explain.credibility import (
+    credible_verdict,
+    undetermined_if_another_law,
+)
 from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
@@ -150,6 +153,8 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
         verdict = _by_pairs(bench, rows, verdict, progress)
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
+        progress("comparing with a free law at the same port")
+        verdict = undetermined_if_another_law(bench, verdict)
     verdict = with_motion_sensor(bench, verdict)
     if along and bench.study.model.rough:
         verdict = limited_verdict(bench.base, rows, bench.floor, verdict)
