@@ -189,7 +189,13 @@ def _undistinguished(
         elif _rivals(best, row, cosine, trusted=trusted):
             rivals.append(row.label)
     rivals += _parallel_to_rivals(rows, rivals, {*members, *rivals})
-    return tuple(members), tuple(rivals)
+    refining = {row.label for row in rows if row is not best and _lower(row) in members}
+    return tuple(label for label in members if label not in refining), tuple(rivals)
+
+
+def _lower(row: Ranked) -> str:
+    """Label of the effect that a row's effect describes in more detail, at the same port."""
+    return f"{row.placement.effect.refines}@{row.port}"
 
 
 def _parallel_to_rivals(

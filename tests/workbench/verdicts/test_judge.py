@@ -217,6 +217,22 @@ def test_a_refinement_needs_a_reason_of_its_own() -> None:
     assert members(row("stribeck@load", free=1), same(free=2)) == ()
 
 
+def test_a_refinement_of_what_is_in_the_class_is_not_named_beside_it() -> None:
+    known = best("offset@drive", cosines={"force@load": 1.0, "by_direction@load": 1.0})
+    simple, fine = row("force@load"), row("by_direction@load", refines="force")
+    found = judge(base(), [known, simple, fine], PERIODS)
+    assert found.members == ("offset@drive", "force@load")
+    found = judge(base(), [known, row("force@load", behind=9.0), fine], PERIODS)
+    assert found.members == ("offset@drive", "by_direction@load")
+    other = row("by_direction@shaft", refines="force")
+    known.cosines["by_direction@shaft"] = 1.0
+    found = judge(base(), [known, simple, other], PERIODS)
+    assert found.members == ("offset@drive", "force@load", "by_direction@shaft")
+    of_the_best = row("by_rate@drive", refines="offset")
+    known.cosines["by_rate@drive"] = 1.0
+    assert judge(base(), [known, of_the_best], PERIODS).members == ("offset@drive",)
+
+
 def test_errors_that_differ_by_where_the_fits_stopped_are_equal() -> None:
     for ratio, joins in ((1.00009, True), (1.00011, False)):
         other = row("stribeck@load", 1.05 * ratio, jitter=0.0)
