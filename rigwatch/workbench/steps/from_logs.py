@@ -88,7 +88,7 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
         for path in written:
             path.unlink(missing_ok=True)
         if made_folder:
-            folder.rmdir()
+            shutil.rmtree(folder)  # the model's own file is in it, too
         raise
 
 

@@ -179,3 +179,19 @@ def test_of_many_logs_a_quarter_is_held_out_spread_over_them_and_remarks_come_on
     assert said.count("log00.csv and 15 more: goal: no unit in its header, assumed rad") == 1
     assert sum("Hz, resampled to" in line for line in said) == 1
     assert sum("are not counted" in line for line in said) <= 2
+
+
+def test_a_model_of_ones_own_with_wrong_units_says_so_and_leaves_no_folder(tmp_path, run, capsys):
+    own = (
+        'name = "mine"\nsummary = "A spring."\ninputs.voltage = { unit = "V" }\n'
+        'states.x = { unit = "m", derivative = "k*voltage + x" }\n'
+        'parameters.k = { value = 1.0, unit = "m" }\n'
+        'outputs.speed = { unit = "rad/s", expression = "x" }\n'
+    )
+    (tmp_path / "mine.toml").write_text(own)
+    log_file = written(tmp_path / "run.csv", run)
+    assert made(tmp_path, log_file, more=["--model", str(tmp_path / "mine.toml")]) == 2
+    said = capsys.readouterr().err
+    assert "expected one unit" in said
+    assert "directory not empty" not in said
+    assert not (tmp_path / "study").exists()
