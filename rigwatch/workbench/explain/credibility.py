@@ -13,7 +13,14 @@ from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench, apparent_strength
 from rigwatch.workbench.explain.verdict import Verdict, judge
-from rigwatch.workbench.ranking import STEP, Ranked, best_free_law, difference
+from rigwatch.workbench.ranking import (
+    STEP,
+    Progress,
+    Ranked,
+    best_free_law,
+    difference,
+    no_progress,
+)
 
 STRONGER = 3.0
 """Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
@@ -44,16 +51,24 @@ def apparent_when_healthy(bench: Bench, row: Ranked) -> bool:
     return abs(value - p.neutral) < STRONGER * abs(seems)
 
 
-def undetermined_if_another_law(bench: Bench, found: Verdict) -> Verdict:
+def undetermined_if_another_law(
+    bench: Bench, found: Verdict, progress: Progress = no_progress
+) -> Verdict:
     """The verdict, made undetermined if a free law at the effect's port explains far more.
 
     An effect that is named together with others is judged with them, down to the noise.
+
+    Args:
+        bench: the study.
+        found: the verdict on its ranking.
+        progress: called with a line of text if the law is fitted.
     """
     best = found.best
     if found.word != "missing_effect" or found.beside or best is None or best.fitted is None:
         return found
     if bench.floor.reached(best.fitted.held_out):
         return found
+    progress(f"comparing {best.label} with a free law at its port")
     law = best_free_law(bench.study, bench.data, bench.base, best.port)
     if law is None or difference(best.fitted.held_out, law.fitted.held_out).p_falls >= STEP:
         return found

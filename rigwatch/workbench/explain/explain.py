@@ -153,8 +153,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
         verdict = _by_pairs(bench, rows, verdict, progress)
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
-        progress("comparing with a free law at the same port")
-        verdict = undetermined_if_another_law(bench, verdict)
+        verdict = undetermined_if_another_law(bench, verdict, progress)
     verdict = with_motion_sensor(bench, verdict)
     if along and bench.study.model.rough:
         verdict = limited_verdict(bench.base, rows, bench.floor, verdict)
