@@ -75,8 +75,8 @@ def _rest(monitor: RigMonitor, block: SampleBlock) -> list[float]:
     watched = monitor.update(block)
     assert watched is not None
     columns = {column.name: column.values for column in watched.estimates.columns}
-    rest = 1.0 - columns["observable"] if "observable" in columns else columns["rest"]
-    return [float(value) for value in rest]
+    moving = columns["observable"] > 0.0 if "observable" in columns else columns["rest"] < 1.0
+    return [float(not one) for one in moving]
 
 
 def _blocks(samples: np.ndarray[Any, np.dtype[np.float64]]) -> Iterator[SampleBlock]:
@@ -104,18 +104,18 @@ def stuck(member: Member) -> Scenario:
 
 
 def told(member: Member, model: Path) -> str:
-    """One line: limits of rest in micrometres and in deviations of the position's noise."""
-    noise = load_model(model).noise.position
+    """One line: limits of rest as ranges of a motion of 8 Hz, with its largest speed."""
+    pace = np.pi * SINE8.hz
     fading_motions = [seen(member, model, fading(factor)) for factor in FACTORS]
     held = seen(member, model, stuck(member))
     moving = min((one.moved for one in fading_motions if one.at_rest < 0.5), default=np.nan)
     resting = max((one.moved for one in fading_motions if one.at_rest >= 0.5), default=np.nan)
 
     def shown(moved: float) -> str:
-        return f"{1e6 * moved:.1f} um ({moved / noise:.1f} sd)"
+        return f"{1e6 * moved:.0f} um ({1e3 * pace * moved:.1f} mm/s)"
 
     return (
-        f"{member.name}: noise {1e6 * noise:.1f} um; smallest motion seen {shown(moving)}, "
+        f"{member.name}: smallest motion seen {shown(moving)}, "
         f"largest taken for rest {shown(resting)}; stuck {shown(held.moved)}, at rest "
         f"{100 * held.at_rest:.0f} % of the time"
     )
