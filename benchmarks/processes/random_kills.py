@@ -45,11 +45,13 @@ class Listener:
     Attributes:
         heard: alarms in order of arrival.
         gaps: of alarms, as reported.
+        ended_ns: when it ceased to listen [ns].
     """
 
     bus: Bus
     heard: list[Alarm] = field(default_factory=list)
     gaps: list[Gap] = field(default_factory=list)
+    ended_ns: int = 0
 
     def run(self, stop: threading.Event) -> None:
         """Listen until `stop` is set."""
@@ -59,6 +61,7 @@ class Listener:
             if alarm is not None:
                 self.heard.append(alarm)
             self.gaps += [one for one in alarms.reports() if isinstance(one, Gap)]
+        self.ended_ns = time.time_ns()
         self.heard += alarms.drain()
 
 
@@ -88,7 +91,7 @@ def run(quick: bool) -> list[Row]:
         done, listeners, left = disturbed(rig, 60.0 * minutes)
         journal = rig.folder / "alarms.jsonl"
         accounts = [
-            heard_account(name, one.heard, one.gaps, journal)
+            heard_account(name, one.heard, one.gaps, journal, one.ended_ns)
             for name, one in zip(LISTENERS, listeners, strict=True)
         ]
         accounts += recorded_account(rig.folder / "sessions", journal, [o.heard for o in listeners])

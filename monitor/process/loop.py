@@ -94,6 +94,7 @@ class MonitorProcess:
         self._standing = self.rig.alarms.standing()
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
+        bus.announce()
         self._healths = bus.subscribe(HEALTH)
         self._follow("daq", self._daq_presence)
         self._follow("recorder", self._recorder_presence)

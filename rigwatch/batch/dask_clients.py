@@ -32,6 +32,15 @@ KINDS = {
 }
 
 
+QUIET = {
+    "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False",
+    "DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL": "1s",
+}
+"""Settings of a worker that neither samples its own stack, a hundred times a second, nor looks
+whether its event loop turns, fifty times: each takes the interpreter from the work.
+"""
+
+
 class ClusterFile(Section, frozen=True):
     """A cluster whose workers are jobs of a batch system."""
 
@@ -81,7 +90,8 @@ def client_of(file: Path) -> Iterator[Any]:
     kind = _cluster_class(KINDS[asked.kind])
     client_class = _client_class("--on cluster.toml")
     try:
-        cluster = kind(**asked.options)
+        lines = prologue(asked.kind, asked.options)
+        cluster = kind(**asked.options | {"job_script_prologue": lines})
     except (TypeError, ValueError, OSError, RuntimeError) as error:
         raise BatchError(f"{file}: options: {one_line(error)}") from None
     with cluster, client_class(cluster, set_as_default=False) as client:
@@ -100,6 +110,22 @@ def _cluster_class(name: str) -> Any:
     for part in name.split("."):
         found = getattr(found, part)
     return found
+
+
+def prologue(kind: str, options: dict[str, Any]) -> list[str]:
+    """First lines of a job's script; the user's come last, so that they prevail.
+
+    Args:
+        kind: of cluster, as in its file.
+        options: of the jobs.
+    """
+    import dask
+
+    quiet = [f"{name}={value}" for name, value in QUIET.items()]
+    if kind == "local":  # its script is a single command
+        return ["env", *quiet]
+    theirs = dask.config.get(f"jobqueue.{kind}.job-script-prologue", None)
+    return [f"export {' '.join(quiet)}", *(options.get("job_script_prologue", theirs) or [])]
 
 
 def _connected(client: Any, where: str) -> Any:

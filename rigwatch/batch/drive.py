@@ -18,7 +18,7 @@ from rigwatch.batch.job import WORKER_DIED, Outcome
 from rigwatch.batch.pool import Pool
 from rigwatch.wire.errors import BatchError, one_line
 
-TASK_S = 0.3
+TASK_S = 1.5
 """Intended length of a task: far longer than it takes to hand it over [s]."""
 LARGEST_TASK = 256
 RETRIES = 3

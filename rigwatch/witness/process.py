@@ -60,6 +60,7 @@ class Witness:
     ) -> None:
         security = security or SecuritySection()
         self.settings, self._bus = settings, bus
+        bus.announce()
         self._announcer = Announcer(settings, bus.rig)
         self._outputs = Outputs(settings, bus, security)
         self._estimates = bus.subscribe_lossy(ESTIMATES)

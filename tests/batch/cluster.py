@@ -10,6 +10,7 @@ from typing import Self
 
 import psutil
 
+from rigwatch.batch.dask_clients import QUIET
 from tests.waiting import eventually
 
 ROOT = Path(__file__).parents[2]
@@ -52,6 +53,7 @@ class Cluster:
                 "PYTHONPATH": str(ROOT),
                 "OPENBLAS_NUM_THREADS": "1",
                 "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": str(self._failures),
+                **QUIET,  # as docs/archive.md says
             }
             self._processes.append(
                 subprocess.Popen(command, cwd=ROOT, env=env, stdout=log, stderr=log)

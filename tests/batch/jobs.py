@@ -18,6 +18,11 @@ def sizes(path: Path, *, pause: float = 0.0) -> dict[str, Any]:
     return {"number": int(text), "third": int(text) / 3, "name": path.name, "list": [1, 2]}
 
 
+def environment() -> dict[str, str]:
+    """The worker's."""
+    return dict(os.environ)
+
+
 def counted(path: Path, *, log: str) -> int:
     """A result that leaves a trace of each call."""
     with Path(log).open("a") as file:

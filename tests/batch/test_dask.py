@@ -10,10 +10,11 @@ import pytest
 
 import rigwatch
 from rigwatch.batch import executor_on
+from rigwatch.batch.dask_clients import QUIET, prologue
 from rigwatch.commands import main
 from rigwatch.wire.errors import BatchError, ConfigError, MissingExtraError
 from tests.batch.cluster import Cluster
-from tests.batch.jobs import ROOT, deadly, make_files, sizes
+from tests.batch.jobs import ROOT, deadly, environment, make_files, sizes
 from tests.waiting import eventually
 
 pytestmark = [pytest.mark.long, pytest.mark.xdist_group("dask")]
@@ -22,6 +23,7 @@ PAUSE = 0.05
 CLIENT = """\
 import sys, rigwatch
 from rigwatch.batch import executor_on
+from rigwatch.batch.dask_clients import QUIET, prologue
 from tests.batch.jobs import sizes
 with executor_on(sys.argv[3]) as executor:
     rigwatch.map(sizes, [sys.argv[1]], executor=executor, results=sys.argv[2], pause=0.05)
@@ -91,8 +93,19 @@ def test_a_cluster_declared_in_a_file_runs_its_workers_as_jobs(files, tmp_path, 
     target = tmp_path / "jobs.jsonl"
     with executor_on(str(file)) as executor:
         assert rigwatch.map(sizes, [files], executor=executor, results=target).done == COUNT
+        told = executor.submit(environment).result()
+    assert QUIET.items() <= told.items()
     rigwatch.map(sizes, [files], results=tmp_path / "plain.jsonl")
     assert target.read_bytes() == (tmp_path / "plain.jsonl").read_bytes()
+
+
+def test_the_lines_of_a_users_job_script_come_after_those_of_rigwatch():
+    own = "export DASK_DISTRIBUTED__ADMIN__TICK__INTERVAL=2s"
+    first, second = prologue("slurm", {"job_script_prologue": [own]})
+    assert first.startswith("export ")
+    assert all(f"{name}={value}" in first.split() for name, value in QUIET.items())
+    assert second == own
+    assert prologue("slurm", {}) == [first]
 
 
 def test_a_wrong_file_of_a_cluster_is_one_sentence(tmp_path, monkeypatch):

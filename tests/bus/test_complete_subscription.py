@@ -139,6 +139,28 @@ def test_a_listener_started_again_hears_all_of_a_process_that_began_meanwhile() 
     assert found == {3, 4, 10, 11}
 
 
+def test_what_an_ended_process_said_to_nobody_is_a_gap_once_its_successor_is_there() -> None:
+    network = MemoryNetwork()
+    gaps = network.bus("r", "observer").subscribe(GAPS)
+    listener = network.bus("r", "listener").subscribe(ALARMS)
+    first = network.bus("r", "witness")
+    first.announce()
+    network.up = False
+    say(first, range(1))
+    first.close()
+    network.up = True
+    network.bus("r", "witness").announce()
+    told: list[tuple[str, str, int]] = []
+
+    def reported() -> bool:
+        assert not listener.drain()
+        told.extend((gap.topic, gap.device, gap.first) for gap in gaps.drain())
+        return bool(told)
+
+    eventually(reported, "a report of the gap")
+    assert told == [("alarms", "witness", 0)]
+
+
 def test_two_processes_that_say_alarms_are_both_heard():
     network = MemoryNetwork()
     listener = network.bus("r", "listener").subscribe(ALARMS)

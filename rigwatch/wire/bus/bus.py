@@ -73,6 +73,13 @@ class Bus:
         else:
             self.transport.put(self.key(topic.key), payload)
 
+    def announce(self) -> None:
+        """Show subscribers who sends numbered messages here, before the first one.
+
+        One that is killed before that, and what it said to nobody, is then reported as a gap.
+        """
+        self._numbered()
+
     def _numbered(self) -> Outlet:
         with self._lock:
             if self._outlet is None:
