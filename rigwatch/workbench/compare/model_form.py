@@ -8,22 +8,20 @@ difference from the base within a group of variants is a standard deviation of t
 are independent and add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
-import contextlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from msgspec import structs
 
-from rigwatch.physics.engine.compile import compile_system, on_all_cores
-from rigwatch.physics.engine.equations import Model, along_measured_motion, compose, neighbours
+from rigwatch.physics.engine.equations import Model, along_measured_motion, neighbours
 from rigwatch.physics.engine.fit import Recording, beginning
-from rigwatch.physics.engine.search import WholeRuns, multi_start_fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.workbench.compare.brief_fits import Posed, all_fitted, posed
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free, with_values
-from rigwatch.workbench.study import Study, varied
+from rigwatch.workbench.study import Study, varied, written_variants
 
 BEGINNING = 2048
 """Samples of the healthy recording to which variants are fitted."""
@@ -46,21 +44,25 @@ def variances_between_bases(
     if bare is None or healthy is None or not (fitted.placements and study.model.variants):
         return {}
     part, own = beginning(healthy.train, BEGINNING), study.file.variants
-    every = [own, *neighbours(study.model, own)]
+    elements = [name for name in own if name not in written_variants(own)]
+    further = neighbours(study.model, written_variants(own))
+    every = [own, *((*elements, *names) for names in further)]
     moved: dict[str, FloatArray] = {}
     try:
         known = with_kept_free(_along(study, own))
-        base, *others = _all_fitted([_posed(study, names, part, bare, known) for names in every])
-        if base is None:
+        bases = [_posed(study, names, part, bare, known) for names in every]
+        base, *others = all_fitted([one and one[1] for one in bases])
+        if base is None or bases[0] is None:
             return {}
-        before = _strengths(study, data, base.model, fitted)
+        before = _strengths(study, data, with_values(bases[0][0], base.values), fitted)
     except RigwatchError:
         return {}
-    for names, other in zip(every[1:], others, strict=True):
-        if other is None or other.error > AS_GOOD * base.error:
+    for names, pair, other in zip(every[1:], bases[1:], others, strict=True):
+        if other is None or pair is None or other.error > AS_GOOD * base.error:
             continue
         try:
-            difference = _strengths(study, data, other.model, fitted) - before
+            model = with_values(pair[0], other.values)
+            difference = _strengths(study, data, model, fitted) - before
         except RigwatchError:
             continue
         group = study.model.variants[names[-1]].group or names[-1]
@@ -69,45 +71,9 @@ def variances_between_bases(
     return dict(zip(fitted.compiled.system.free, total.tolist(), strict=True))
 
 
-@dataclass(frozen=True, eq=False)
-class _Tried:
-    """A base with the parameters of a healthy recording, and its error there."""
-
-    model: Model
-    error: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Posed:
-    """A base along the motion, and the search for its parameters."""
-
-    model: Model
-    search: WholeRuns
-    scale: FloatArray
-
-    def fitted(self) -> _Tried:
-        """The base as the search leaves it."""
-        found, _ = multi_start_fit(self.search)
-        error = float(np.sqrt(np.mean((found.rms / self.scale) ** 2)))
-        return _Tried(with_values(self.model, found.values()), error)
-
-
-def _all_fitted(posed: Sequence[_Posed | None]) -> list[_Tried | None]:
-    """Each base fitted, side by side; None where that fails."""
-    found: list[_Tried | None] = [None] * len(posed)
-
-    def fit_one(index: int) -> None:
-        one = posed[index]
-        with contextlib.suppress(RigwatchError):
-            found[index] = one.fitted() if one else None
-
-    on_all_cores(fit_one, range(len(posed)))
-    return found
-
-
 def _posed(
     study: Study, names: Sequence[str], healthy: Recording, bare: Fitted, known: Model
-) -> _Posed | None:
+) -> tuple[Model, Posed | None] | None:
     """The base with these variants; its search starts from what it shares with the study's base.
 
     Args:
@@ -119,15 +85,12 @@ def _posed(
     """
     try:
         model = _along(study, names)
-        loose = with_kept_free(model)
-        shared = [n for n, p in loose.parameters.items() if known.parameters.get(n) == p]
-        compiled = compile_system(compose(loose, ()))
-        start = compiled.vector({n: study.model.parameters[n].value for n in shared})
-        scale, steps = bare.train.scale, study.file.substeps
-        search = WholeRuns(compiled, [healthy], scale, start=start, substeps=steps, brief=True)
     except RigwatchError:
         return None
-    return _Posed(model, search, scale)
+    loose = with_kept_free(model)
+    shared = [n for n, p in loose.parameters.items() if known.parameters.get(n) == p]
+    start = {n: study.model.parameters[n].value for n in shared}
+    return model, posed(model, healthy, bare.train.scale, start, study.file.substeps)
 
 
 def _along(study: Study, names: Sequence[str]) -> Model:

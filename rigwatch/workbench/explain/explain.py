@@ -16,6 +16,7 @@ from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
+from rigwatch.workbench.explain.own_base import with_adequate_base, with_change_told
 from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
@@ -116,7 +117,7 @@ def explain(study: Study, progress: Progress = no_progress) -> Explanation:
         ModelError: data have changed, or do not suit the model.
     """
     progress("fitting the current model")
-    bench = open_bench(study)
+    bench = with_adequate_base(open_bench(study), progress)
     rows, verdict = ranking(bench, progress)
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
         progress("finding what the healthy recording leaves open of the strength")
@@ -145,6 +146,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
         verdict = undetermined_if_much_left(bench.base, bench.floor, verdict)
         verdict = undetermined_if_little_and_unexplained(bench.base, bench.floor, verdict)
     verdict = with_base_offered(bench.study, unchecked(bench, verdict))
+    verdict = with_change_told(bench.study, verdict)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict
