@@ -18,7 +18,8 @@ VALUES = [-3.0, -1.0, -0.25, 0.0, 1e-9, 0.5, 2.0, 7.5]
 POINTS = np.stack(np.meshgrid(VALUES, VALUES, VALUES), axis=-1).reshape(-1, 3)
 TEXTS = [
     "x + v - 2*k", "x*v/k", "k/(x*v)", "x**2", "x**3 - v**4", "x**(-3)", "x**17", "x**2.5",
-    "1/sqrt(x)", "sqrt(abs(v))*x", "x**k", "sin(x) + cos(v) + atan(k)", "tanh(x/0.01)",
+    "1/sqrt(x)", "x/sqrt(v)**3", "sqrt(abs(v))*x", "x**k", "sin(x) + cos(v) + atan(k)",
+    "tanh(x/0.01)",
     "exp(-(v/0.5)**2)", "log(x)", "floor(x*3.3)", "sign(x)*abs(v)", "max(x, min(v, k))",
     "where(x > v, x, v/k)", "where(x <= 0, where(v >= k, 1.5, x), v)", "x*t + 0.1", "3",
 ]  # fmt: skip

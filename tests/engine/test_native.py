@@ -1,13 +1,16 @@
 """A system's kernel: one for equal equations, the same numbers however windows are shared out."""
 
+import time
 from ctypes import CFUNCTYPE, c_double, c_void_p
+from threading import Barrier
 
 import numpy as np
 import pytest
 
-from rigwatch.physics.engine.compile import all_cores, llvm
+from rigwatch.physics.engine.compile import all_cores, llvm, turns
 from rigwatch.physics.engine.compile import kernel as native
 from rigwatch.physics.engine.compile.compiled_system import compile_system
+from rigwatch.physics.engine.compile.turns import side_by_side
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
@@ -83,3 +86,55 @@ def as_function(address):
 
 def addresses(*arrays):
     return [array.ctypes.data for array in arrays]
+
+
+def test_results_come_in_order_and_the_first_error_is_raised(monkeypatch):
+    monkeypatch.setattr(turns, "cores", lambda: 3)
+    assert side_by_side(lambda item: item**2, range(8)) == [item**2 for item in range(8)]
+
+    def fails(item):
+        if item in {3, 5}:
+            raise ModelError(f"item {item}")
+
+    with pytest.raises(ModelError, match="item 3"):
+        side_by_side(fails, range(8))
+
+
+def test_one_thread_runs_python_while_others_run_compiled_code(monkeypatch):
+    monkeypatch.setattr(turns, "cores", lambda: 2)
+    running, most, met = [], [], Barrier(2, timeout=60)
+
+    def work(item):
+        running.append(item)
+        most.append(len(running))
+        time.sleep(0.01)
+        running.remove(item)
+        with turns.turn_given():
+            # Both get here only if neither keeps its turn.
+            met.wait()
+        return side_by_side(lambda inner: inner, [item, item])
+
+    assert side_by_side(work, [1, 2]) == [[1, 1], [2, 2]]
+    assert max(most) == 1
+
+
+def test_systems_compiled_side_by_side_give_the_numbers_of_one_after_another(monkeypatch):
+    names = ("coulomb", "stribeck", "dahl", "quadratic_drag", "cubic_stiffness", "backlash")
+    effects = [library()[name].scaled({"x": 0.1, "v": 1.0}) for name in names]
+    placed = [Placement(*each, "load") for each in zip(names, effects, strict=True)]
+
+    def run(placement):
+        compiled = compile_system(compose(MODEL, [placement]))
+        inputs = np.random.default_rng(3).normal(size=(400, 1))
+        return compiled.simulate(
+            inputs, 1 / 256, np.arange(4) * 100, 100, parameters=compiled.parameters,
+            initial=np.zeros((4, len(compiled.system.states))),
+        )  # fmt: skip
+
+    native._kernel.cache_clear()
+    alone = [run(placement) for placement in placed]
+    native._kernel.cache_clear()
+    monkeypatch.setattr(turns, "cores", lambda: 4)
+    for one, other in zip(side_by_side(run, placed), alone, strict=True):
+        np.testing.assert_array_equal(one.outputs, other.outputs)
+        np.testing.assert_array_equal(one.slopes, other.slopes)

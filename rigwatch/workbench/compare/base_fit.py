@@ -5,9 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigwatch.physics.engine.fit import beginning, evaluate
+from rigwatch.physics.engine.compile import compile_system
+from rigwatch.physics.engine.equations import compose
+from rigwatch.physics.engine.fit import Fit, beginning, evaluate
+from rigwatch.physics.engine.search import WholeRuns, multi_start_fit
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.compare.brief_fits import Brief, Posed, posed
 from rigwatch.workbench.data import (
     Data,
     along_motion,
@@ -58,14 +60,17 @@ class Tried:
 
 
 @dataclass(frozen=True, eq=False)
-class PosedBase:
-    """A base along the motion before a brief fit; `search` is None if it cannot be simulated."""
+class Brief:
+    """A base after a brief fit to the beginning of the recording along the motion.
 
+    `error` is in noise standard deviations; the rest as in `Tried`.
+    """
+
+    fit: Fit
+    error: float
     study: Study
     along: Study
     data: Data
-    scale: FloatArray
-    search: Posed | None
 
 
 def fitted_base(study: Study, data: Data, start: Mapping[str, float]) -> Tried:
@@ -84,15 +89,31 @@ def fitted_base(study: Study, data: Data, start: Mapping[str, float]) -> Tried:
     return _judged(study, along, used, scale, found)
 
 
-def briefly_fitted(posed: PosedBase, brief: Brief) -> Tried:
-    """The base as a brief fit to the beginning of the recording leaves it, judged as the others."""
-    used, substeps = posed.data, posed.study.file.substeps
+def brief_fit(study: Study, data: Data, start: Mapping[str, float]) -> Brief:
+    """The base fitted briefly along the motion, see `fitted_base`.
+
+    Raises:
+        ModelError: it cannot be fitted.
+    """
+    along, used, scale = _prepared(study, data)
+    compiled, part = compile_system(compose(along.model, ())), beginning(used.train, PART)
+    search = WholeRuns(
+        compiled, [part], scale, start=compiled.vector(start), substeps=study.file.substeps,
+        brief=True,
+    )  # fmt: skip
+    found, _ = multi_start_fit(search)
+    return Brief(found, _overall(found.rms, scale), study, along, used)
+
+
+def judged(brief: Brief) -> Tried:
+    """A briefly fitted base, judged as the others on all of the recordings."""
+    used, substeps = brief.data, brief.study.file.substeps
     train, held_out = (
         evaluate(brief.fit, recording, len(recording), substeps)
         for recording in (used.train, used.held_out)
     )
-    found = Fitted((), train, held_out, substeps, used.horizon, None, brief.ended)
-    return _judged(posed.study, posed.along, used, posed.scale, found)
+    found = Fitted((), train, held_out, substeps, used.horizon)
+    return _judged(brief.study, brief.along, used, brief.fit.scale, found)
 
 
 def _judged(study: Study, along: Study, used: Data, scale: FloatArray, found: Fitted) -> Tried:
@@ -107,14 +128,6 @@ def _judged(study: Study, along: Study, used: Data, scale: FloatArray, found: Fi
         " ".join(physics_of(study, name) for name in study.file.variants),
     )
     return Tried(base, found, study, along, used)
-
-
-def posed_base(study: Study, data: Data, start: Mapping[str, float]) -> PosedBase:
-    """A brief search for the base's parameters along the motion, see `fitted_base`."""
-    along, used, scale = _prepared(study, data)
-    part = beginning(used.train, PART)
-    search = posed(along.model, part, scale, start, study.file.substeps)
-    return PosedBase(study, along, used, scale, search)
 
 
 def shared_values(at: Tried, other: Study) -> dict[str, float]:

@@ -22,24 +22,27 @@ LEAST = 0.05
 """Smallest share of the residual's energy that an element has to explain, to first order."""
 
 
-def neighbouring_bases(at: Tried, rejected: Container[str]) -> list[Study]:
-    """Studies with one more variant or element, replacing the variants that it excludes.
+def further_variants(at: Tried, rejected: Container[str]) -> list[Study]:
+    """Studies with one more variant, replacing those that it excludes.
 
     Args:
         at: the base.
-        rejected: variants and elements that are not tried again.
+        rejected: variants that are not tried again.
     """
     names = at.study.file.variants
-    plain = written_variants(names)
-    own = [str(element) for element in elements_of(names)]
-    found = [
-        varied(at.study, (*own, *further))
-        for further in neighbours(at.study.model, plain)
-        if further[-1] not in rejected
-    ]
-    if not at.data.along_motion:
-        return found
-    return found + [_with(at.study, row) for row in _likely(at, rejected)]
+    elements = [str(element) for element in elements_of(names)]
+    sets = neighbours(at.study.model, written_variants(names))
+    return [varied(at.study, (*elements, *own)) for own in sets if own[-1] not in rejected]
+
+
+def further_elements(at: Tried, rejected: Container[str]) -> list[Study]:
+    """Studies with one more element, of those that its base along the motion speaks for.
+
+    Args:
+        at: the base.
+        rejected: elements that are not tried again.
+    """
+    return [_with(at.study, row) for row in _likely(at, rejected)]
 
 
 def _likely(at: Tried, rejected: Container[str]) -> list[Ranked]:

@@ -9,29 +9,30 @@ those of its group that it excludes.
 Along the measured motion every candidate is fitted briefly, to the beginning of the recording.
 """
 
-import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
+from rigwatch.physics.engine.compile import side_by_side
 from rigwatch.physics.engine.equations import check_variants
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.base_fit import (
     Base,
     Tried,
-    briefly_fitted,
+    brief_fit,
     fitted_base,
-    posed_base,
+    judged,
     shared_values,
 )
-from rigwatch.workbench.compare.base_neighbours import neighbouring_bases
-from rigwatch.workbench.compare.brief_fits import all_fitted
+from rigwatch.workbench.compare.base_neighbours import further_elements, further_variants
 from rigwatch.workbench.data import Data, predicts_along_motion, prepare
 from rigwatch.workbench.ranking import STEP, Progress, difference, no_progress
 from rigwatch.workbench.study import Study, check_data, varied
 
+T = TypeVar("T")
 FIT_SHARE = 0.6
 """Share of a single healthy recording used for fitting; the rest decides."""
 WORTH = 0.02
@@ -44,6 +45,9 @@ ROUNDS = 4
 """Largest number of variants and elements added."""
 AT_NOISE = 1.1
 """Ratio of the held-out error to its noise at which nothing more is looked for."""
+
+JUDGED = 3
+"""Largest number of briefly fitted bases that are judged on all of the recordings."""
 
 NO_HEALTHY = (
     "found no healthy recording, expected one: record a run with nothing wrong and list it under"
@@ -93,7 +97,7 @@ def find_base(study: Study, progress: Progress = no_progress) -> Bases:
     for _ in range(ROUNDS):
         fits = search.one_step(best)
         tried += fits
-        better = [one for one in fits if _improves(best, one)]
+        better = [one for one in fits if improves(best, one)]
         if not better:
             break
         best = min(better, key=lambda one: one.base.held_out_error)
@@ -103,7 +107,7 @@ def find_base(study: Study, progress: Progress = no_progress) -> Bases:
     return Bases(best.base, ranking, list(best.data.remarks), start)
 
 
-def _improves(best: Tried, one: Tried) -> bool:
+def improves(best: Tried, one: Tried) -> bool:
     """Whether a base is better by more than chance, or equal with fewer parameters."""
     found = difference(best.fitted.held_out, one.fitted.held_out)
     if one.base.parameters < best.base.parameters and found.relative > -TOLERATED_RISE:
@@ -123,54 +127,76 @@ class _Search:
         """The unmodified model."""
         if not predicts_along_motion(study):
             return fitted_base(study, self._data, self._start)
-        posed = posed_base(study, self._data, self._start)
-        brief = all_fitted([posed.search])[0]
-        if brief is None:
-            raise ModelError(f"{study.model.name}: found no fit to the healthy recording")
-        return briefly_fitted(posed, brief)
+        return judged(brief_fit(study, self._data, self._start))
 
     def one_step(self, at: Tried) -> list[Tried]:
-        """Fits of the bases next to one."""
-        if at.base.over_noise <= AT_NOISE and at.data.along_motion:
+        """Bases next to one, fitted; elements once no variant alone does better."""
+        if not at.data.along_motion:
+            return self._each(at, self._new(further_variants(at, self._rejected)))
+        if at.base.over_noise <= AT_NOISE:
             return []
-        bases = [one for one in neighbouring_bases(at, self._rejected) if self._is_new(one)]
-        fit = self._briefly if at.data.along_motion else self._each
-        found = fit(at, bases)
-        for one in bases:
-            errors = [t.base.held_out_error for t in found if t.study is one]
-            if min(errors, default=np.inf) > REJECT_RATIO * at.base.held_out_error:
-                self._rejected.add(one.file.variants[-1].partition("(")[0])
+        found = list[Tried]()
+        if not at.study.file.variants:
+            found = self._briefly(at, self._new(further_variants(at, self._rejected)))
+        if any(improves(at, one) for one in found):
+            return found
+        rest = [*further_variants(at, self._rejected), *further_elements(at, self._rejected)]
+        return found + self._briefly(at, self._new(rest))
+
+    def _new(self, bases: Sequence[Study]) -> list[Study]:
+        """Those whose set of variants and elements has not been tried, whatever their values."""
+        sets = [frozenset(map(_label, one.file.variants)) for one in bases]
+        found = [one for one, own in zip(bases, sets, strict=True) if own not in self._known]
+        self._known |= set(sets)
         return found
 
-    def _is_new(self, study: Study) -> bool:
-        """Whether this set of variants and elements has not been tried, whatever their values."""
-        names = frozenset(name.partition("(")[0] for name in study.file.variants)
-        if names in self._known:
-            return False
-        self._known.add(names)
-        return True
-
     def _each(self, at: Tried, bases: Sequence[Study]) -> list[Tried]:
+        """Each base fitted to the whole recording."""
         found = []
         for one in bases:
             self._progress(f"fitting the model with {' and '.join(one.file.variants)}")
-            with contextlib.suppress(ModelError):
-                found.append(fitted_base(one, self._data, self._from(at, one)))
+            tried = _or_none(fitted_base, one, self._data, self._from(at, one))
+            if tried is None or self._is_worse(tried.base.held_out_error, at.base.held_out_error):
+                self._rejected.add(_label(one.file.variants[-1]))
+            found += [] if tried is None else [tried]
         return found
 
     def _briefly(self, at: Tried, bases: Sequence[Study]) -> list[Tried]:
-        named = ", ".join(one.file.variants[-1].partition("(")[0] for one in bases)
-        self._progress(f"fitting the model with {named}")
-        posed = []
-        for one in bases:
-            with contextlib.suppress(ModelError):
-                posed.append(posed_base(one, self._data, self._from(at, one)))
-        briefs = all_fitted([one.search for one in posed])
-        pairs = zip(posed, briefs, strict=True)
-        return [briefly_fitted(one, brief) for one, brief in pairs if brief is not None]
+        """Each base fitted briefly along the motion, and the best of them judged."""
+        self._progress(f"fitting {len(bases)} bases next to {_named(at.study)}")
+        now, *found = side_by_side(
+            lambda one: _or_none(brief_fit, one, self._data, self._from(at, one)),
+            [at.study, *bases],
+        )
+        limit = np.inf if now is None else now.error
+        for brief, one in zip(found, bases, strict=True):
+            if brief is None or self._is_worse(brief.error, limit):
+                self._rejected.add(_label(one.file.variants[-1]))
+        best = sorted((one for one in found if one is not None), key=lambda one: one.error)
+        return side_by_side(judged, best[:JUDGED])
+
+    def _is_worse(self, error: float, before: float) -> bool:
+        return error > REJECT_RATIO * before
 
     def _from(self, at: Tried, study: Study) -> dict[str, float]:
         return {**self._start, **shared_values(at, study)}
+
+
+def _or_none(fit: Callable[..., T], *given: Any) -> T | None:
+    """A base, or None if it cannot be fitted."""
+    try:
+        return fit(*given)
+    except ModelError:
+        return None
+
+
+def _label(name: str) -> str:
+    """The name of a variant or an element without its values."""
+    return name.partition("(")[0]
+
+
+def _named(study: Study) -> str:
+    return " and ".join(map(_label, study.file.variants)) or "the unmodified model"
 
 
 def _split_healthy(healthy: Recording, horizon: int) -> Data:

@@ -9,19 +9,20 @@ are independent and add in quadrature (JCGM 100:2008 (GUM), 5.1).
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from msgspec import structs
 
-from rigwatch.physics.engine.equations import Model, along_measured_motion, neighbours
+from rigwatch.physics.engine.compile import compile_system, side_by_side
+from rigwatch.physics.engine.equations import Model, along_measured_motion, compose, neighbours
 from rigwatch.physics.engine.fit import Recording, beginning
+from rigwatch.physics.engine.search import WholeRuns
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.workbench.compare.brief_fits import Posed, all_fitted, posed
 from rigwatch.workbench.data import Data
-from rigwatch.workbench.fit import Fitted, fit_model, with_kept_free, with_values
-from rigwatch.workbench.study import Study, varied, written_variants
+from rigwatch.workbench.fit import Fitted, values_with, with_kept_free, with_values
+from rigwatch.workbench.study import Study, elements_of, varied, written_variants
 
 BEGINNING = 2048
 """Samples of the healthy recording to which variants are fitted."""
@@ -44,37 +45,44 @@ def variances_between_bases(
     if bare is None or healthy is None or not (fitted.placements and study.model.variants):
         return {}
     part, own = beginning(healthy.train, BEGINNING), study.file.variants
-    elements = [name for name in own if name not in written_variants(own)]
+    elements = [str(element) for element in elements_of(own)]
     further = neighbours(study.model, written_variants(own))
     every = [own, *((*elements, *names) for names in further)]
     moved: dict[str, FloatArray] = {}
     try:
         known = with_kept_free(_along(study, own))
-        bases = [_posed(study, names, part, bare, known) for names in every]
-        base, *others = all_fitted([one and one[1] for one in bases])
-        if base is None or bases[0] is None:
-            return {}
-        before = _strengths(study, data, with_values(bases[0][0], base.values), fitted)
     except RigwatchError:
         return {}
-    for names, pair, other in zip(every[1:], bases[1:], others, strict=True):
-        if other is None or pair is None or other.error > AS_GOOD * base.error:
-            continue
-        try:
-            model = with_values(pair[0], other.values)
-            difference = _strengths(study, data, model, fitted) - before
-        except RigwatchError:
-            continue
-        group = study.model.variants[names[-1]].group or names[-1]
-        moved[group] = np.maximum(moved.get(group, 0.0), difference**2)
+    base, *others = side_by_side(lambda names: _tried(study, names, part, bare, known), every)
+    if base is None:
+        return {}
+    good = [each for each in others if each is not None and each.error <= AS_GOOD * base.error]
+    before, *after = side_by_side(
+        lambda each: _strengths(study, data, each.model, fitted), [base, *good]
+    )
+    if before is None:
+        return {}
+    for other, strengths in zip(good, after, strict=True):
+        if strengths is not None:
+            group = study.model.variants[other.names[-1]].group or other.names[-1]
+            moved[group] = np.maximum(moved.get(group, 0.0), (strengths - before) ** 2)
     total = np.sum([np.zeros_like(before), *moved.values()], axis=0)
     return dict(zip(fitted.compiled.system.free, total.tolist(), strict=True))
 
 
-def _posed(
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A base: its variants, the model with the parameters of a healthy recording, the error."""
+
+    names: Sequence[str]
+    model: Model
+    error: float
+
+
+def _tried(
     study: Study, names: Sequence[str], healthy: Recording, bare: Fitted, known: Model
-) -> tuple[Model, Posed | None] | None:
-    """The base with these variants; its search starts from what it shares with the study's base.
+) -> _Tried | None:
+    """The base with these variants, searched from the values it shares with the study's.
 
     Args:
         study: prepared, with parameters from the healthy recording.
@@ -85,12 +93,16 @@ def _posed(
     """
     try:
         model = _along(study, names)
+        loose = with_kept_free(model)
+        shared = [n for n, p in loose.parameters.items() if known.parameters.get(n) == p]
+        compiled = compile_system(compose(loose, ()))
+        start = compiled.vector({n: study.model.parameters[n].value for n in shared})
+        scale, steps = bare.train.scale, study.file.substeps
+        search = WholeRuns(compiled, [healthy], scale, start=start, substeps=steps, brief=True)
+        values, error = search.first_search()
     except RigwatchError:
         return None
-    loose = with_kept_free(model)
-    shared = [n for n, p in loose.parameters.items() if known.parameters.get(n) == p]
-    start = {n: study.model.parameters[n].value for n in shared}
-    return model, posed(model, healthy, bare.train.scale, start, study.file.substeps)
+    return _Tried(names, with_values(model, values), error)
 
 
 def _along(study: Study, names: Sequence[str]) -> Model:
@@ -101,10 +113,13 @@ def _along(study: Study, names: Sequence[str]) -> Model:
     return structs.replace(model, inputs=study.model.inputs, parameters=parameters)
 
 
-def _strengths(study: Study, data: Data, model: Model, fitted: Fitted) -> FloatArray:
-    """The fitted parameters with another base, shape (m,)."""
+def _strengths(study: Study, data: Data, model: Model, fitted: Fitted) -> FloatArray | None:
+    """The fitted parameters with another base, shape (m,); None if they cannot be fitted."""
     prefixes = tuple(placement.prefix for placement in fitted.placements)
     start = {n: v for n, v in fitted.train.values().items() if n.startswith(prefixes)}
     other, scale = replace(study, model=model, kept=None), fitted.train.scale
-    found = fit_model(other, data, fitted.placements, start, scale).train.values()
+    try:
+        found = values_with(other, data, fitted.placements, start, scale)
+    except RigwatchError:
+        return None
     return np.array([found[name] for name in fitted.compiled.system.free])

@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
+from rigwatch.physics.engine.compile import side_by_side
 from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
@@ -194,12 +195,23 @@ def _exchanged(
             continue
         every = _scored_with(bench, rest)
         least = _least_share(bench, rest)
-        for other in _substitutes(row, every):
-            if rest.labels | {other.label} in tried or other.explained < least:
-                continue
-            _fit_with(bench, rest.rows, rest.fitted, other)
-            if other.fitted is not None:
-                yield _combination(bench, (*rest.rows, other))
+        yield from _all_fitted(bench, [
+            (rest, other)
+            for other in _substitutes(row, every)
+            if rest.labels | {other.label} not in tried and other.explained >= least
+        ])  # fmt: skip
+
+
+def _all_fitted(bench: Bench, larger: Sequence[tuple[Combination, Ranked]]) -> list[Combination]:
+    """Sets with another effect each, fitted side by side; without those that cannot be fitted."""
+    found = side_by_side(lambda each: _enlarged(bench, *each), larger)
+    return [each for each in found if each is not None]
+
+
+def _enlarged(bench: Bench, known: Combination, row: Ranked) -> Combination | None:
+    """A set with another effect; None if it cannot be fitted."""
+    _fit_with(bench, known.rows, known.fitted, row)
+    return None if row.fitted is None else _combination(bench, (*known.rows, row))
 
 
 def _substitutes(row: Ranked, every: Sequence[Ranked]) -> list[Ranked]:
@@ -224,20 +236,28 @@ def _extended(
     Only sets that reach the noise are used of the last size, so its effect must explain a share of
     what is above the noise, to first order.
     """
-    found: dict[frozenset[str], Combination] = {}
+    waiting: list[tuple[Combination, Ranked]] = []
     for known in level:
         least = _least_share(bench, known) if last else 0.0
-        for row in next_candidates(bench, known):
-            if known.labels | {row.label} in found or known.free + row.free > free:
-                continue
-            if row.explained < least:
-                continue
-            _fit_with(bench, known.rows, known.fitted, row)
-            if row.fitted is None:
-                continue
-            larger = _combination(bench, (*known.rows, row))
-            if _lowers(larger, known.search_error):
+        waiting += [
+            (known, row)
+            for row in next_candidates(bench, known)
+            if known.free + row.free <= free and row.explained >= least
+        ]
+    found: dict[frozenset[str], Combination] = {}
+    while waiting:
+        # A set made in two ways is fitted the second way only if the first does not help.
+        first = {known.labels | {row.label}: (known, row) for known, row in reversed(waiting)}
+        now = [each for each in waiting if each in first.values()]
+        smaller = {known.labels | {row.label}: known for known, row in now}
+        for larger in _all_fitted(bench, now):
+            if _lowers(larger, smaller[larger.labels].search_error):
                 found[larger.labels] = larger
+        waiting = [
+            (known, row)
+            for known, row in waiting
+            if (known, row) not in now and known.labels | {row.label} not in found
+        ]
     return list(found.values())
 
 

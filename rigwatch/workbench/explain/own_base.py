@@ -52,7 +52,7 @@ def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
 
 
 def with_change_told(study: Study, found: Verdict) -> Verdict:
-    """The verdict; if it names an element that the base has, it says that this is a change of it."""
+    """The verdict, which says so if it names an element that the base has already."""
     labels = {element.label for element in elements_of(study.file.variants)}
     named = sorted(labels & {*found.members})
     if not named:

@@ -16,6 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
+from rigwatch.physics.engine.compile import side_by_side
 from rigwatch.physics.engine.score import ALIKE
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
@@ -122,19 +123,21 @@ def _parallel(row: Ranked, other: Ranked) -> bool:
 
 def _fitted(bench: Bench, pairs: Sequence[Pair], progress: Progress) -> list[tuple[Pair, Fitted]]:
     """The pairs whose fit succeeds, with their fits."""
-    base, found = bench.base, []
     for pair in pairs:
         progress(f"fitting {pair.one.label} and {pair.other.label} at once")
-        placements = (*base.placements, pair.one.placement, pair.other.placement)
-        start = base.train.values() | pair.start
-        try:
-            fitted = fit_model(
-                bench.study, bench.data, placements, start, base.train.scale, base=base
-            )
-        except ModelError:
-            continue
-        found.append((pair, fitted))
-    return found
+    fits = side_by_side(lambda pair: _fitted_pair(bench, pair), pairs)
+    return [(pair, fitted) for pair, fitted in zip(pairs, fits, strict=True) if fitted is not None]
+
+
+def _fitted_pair(bench: Bench, pair: Pair) -> Fitted | None:
+    """The model with both effects; None if it cannot be fitted."""
+    base = bench.base
+    placements = (*base.placements, pair.one.placement, pair.other.placement)
+    start = base.train.values() | pair.start
+    try:
+        return fit_model(bench.study, bench.data, placements, start, base.train.scale, base=base)
+    except ModelError:
+        return None
 
 
 def _explaining(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pair, Fitted]]:

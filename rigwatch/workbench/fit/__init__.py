@@ -11,6 +11,7 @@ from rigwatch.workbench.fit.fitted_model import (
     nodes,
     placements_of,
     refit_from_short_horizons,
+    values_with,
 )
 from rigwatch.workbench.fit.free_run import free_run
 from rigwatch.workbench.fit.healthy_parameters import (
@@ -57,6 +58,7 @@ __all__ = [
     "refit_from_short_horizons",
     "shown",
     "values",
+    "values_with",
     "with_healthy_parameters",
     "with_healthy_reference",
     "with_healthy_remainder",

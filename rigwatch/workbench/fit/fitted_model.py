@@ -168,10 +168,44 @@ def fit_model(
     Raises:
         ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
     """
+    found, ended, horizon = _trained(
+        study, data, placements, start, scale, base, from_short_horizons, multi_start
+    )
+    initial = base.held_out.initial if base else None
+    return _judged(study, data, placements, found, horizon, initial, ended)
+
+
+def values_with(
+    study: Study,
+    data: Data,
+    placements: Sequence[Placement],
+    start: Mapping[str, float],
+    scale: FloatArray,
+) -> dict[str, float]:
+    """The parameters that `fit_model` finds, by name, without a judgement by held-out recordings.
+
+    Raises:
+        ModelError: an effect does not fit its port, or the simulation diverged (NaN or infinite).
+    """
+    found, _, _ = _trained(study, data, placements, start, scale)
+    return with_told(found, study.model, data.telling, data.horizon, study.file.substeps).values()
+
+
+def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
+    study: Study,
+    data: Data,
+    placements: Sequence[Placement],
+    start: Mapping[str, float],
+    scale: FloatArray | None,
+    base: Fitted | None = None,
+    from_short_horizons: bool = False,
+    multi_start: bool = False,
+) -> tuple[Fit, Convergence | None, int]:
+    """The fit to the training recordings, its convergence, and the horizon of its windows."""
     compiled = _compiled(study, placements, start, data.train.dt)
     horizon = data.horizon if study.model.states else len(data.train)
     begin, substeps = compiled.vector(start), study.file.substeps
-    first, later = (base.train.initial, base.held_out.initial) if base else (None, None)
+    first = base.train.initial if base else None
     fit_over = partial(fit, compiled, data.train, scale=scale, substeps=substeps)
     search: ShortHorizons | WholeRuns | None = None
     if data.along_motion and len(compiled.system.free) >= MANY_PARAMETERS and scale is not None:
@@ -183,13 +217,12 @@ def fit_model(
         search = ShortHorizons(compiled, data.train, horizon, begin, scale, noise, first, substeps)
     if search:
         found, ended = multi_start_fit(search)
-        found = _settled(study, data, found, horizon, substeps)
-        return _judged(study, data, placements, found, horizon, later, ended)
+        return _settled(study, data, found, horizon, substeps), ended, horizon
     free_run = study.model.states and not data.along_motion
     if free_run and (horizon >= LONG or from_short_horizons):
         begin = fit_over(horizon // SHORTER, start=begin).parameters
     found = _settled(study, data, fit_over(horizon, start=begin, initial=first), horizon, substeps)
-    return _judged(study, data, placements, found, horizon, later, None)
+    return found, None, horizon
 
 
 def _compiled(

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from rigwatch.physics.engine.compile import cores, side_by_side
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import Data, NoiseFloor
@@ -60,6 +61,17 @@ def _orders_at_port(base: Fitted, row: Ranked) -> list[Placement]:
     return [row.placement, replace(row.placement, ahead=True)]
 
 
+def refit_all(
+    study: Study,
+    data: Data,
+    base: Fitted,
+    rows: Sequence[Ranked],
+    fitting: Fitting = fit_with_retry,
+) -> None:
+    """`refit` for rows, side by side; the results do not depend on the number of cores."""
+    side_by_side(lambda row: refit(study, data, base, row, fitting), rows)
+
+
 def fit_each(  # noqa: PLR0917 -- they belong together
     study: Study,
     data: Data,
@@ -71,18 +83,30 @@ def fit_each(  # noqa: PLR0917 -- they belong together
     """Fit rows in turn and return those that explain the error.
 
     Once a row explains the error, only rows similar to it are fitted, and those with fewer
-    parameters: two of them together may explain what its shape parameters mimic.
+    parameters: two of them together may explain what its shape parameters mimic. As many rows as
+    there are cores are fitted ahead; what one of them makes needless is not used.
     """
     enough: list[Ranked] = []
+    ahead: dict[str, Ranked] = {}
     for number, row in enumerate(rows, start=1):
         if any(_is_unlike(row, other) for other in enough):
             row.reason = f"unlike {enough[0].label}, which explains {EXPLAINED:.0%}; not fitted"
             continue
         progress(f"fitting {row.label}, {number} of at most {len(rows)}")
-        refit(study, data, base, row, fit_model)
+        if row.label not in ahead:
+            waiting = [r for r in rows[number - 1 :] if not any(_is_unlike(r, o) for o in enough)]
+            ahead = {each.label: replace(each) for each in waiting[: cores()]}
+            refit_all(study, data, base, list(ahead.values()), fit_model)
+        _take(row, ahead[row.label])
         if row.accepted and leaves_nothing(row, base, floor):
             enough.append(row)
     return enough
+
+
+def _take(row: Ranked, fitted: Ranked) -> None:
+    """Store the fit of a copy of the row in it."""
+    row.fitted, row.gain, row.accepted = fitted.fitted, fitted.gain, fitted.accepted
+    row.reason, row.failure = fitted.reason, fitted.failure
 
 
 def _is_unlike(row: Ranked, other: Ranked) -> bool:
@@ -94,10 +118,19 @@ def refit_elsewhere(
     study: Study, data: Data, base: Fitted, rows: Sequence[Ranked], progress: Progress
 ) -> None:
     """Refit the rows that may have ended in a local minimum."""
-    for row in rows:
-        start = base.train.values() | row.begin()
-        if row.fitted is None or not may_be_local_minimum(study, data, row.fitted, start):
-            continue
+
+    def begun(row: Ranked) -> dict[str, float]:
+        return base.train.values() | row.begin()
+
+    again = [(row, row.fitted) for row in rows if row.fitted is not None]
+    doubtful = [
+        (row, found) for row, found in again if may_be_local_minimum(study, data, found, begun(row))
+    ]
+    for row, _ in doubtful:
         progress(f"fitting {row.label} again, starting from short horizons")
-        row.fitted = refit_from_short_horizons(study, data, row.fitted, start)
+    better = side_by_side(
+        lambda pair: refit_from_short_horizons(study, data, pair[1], begun(pair[0])), doubtful
+    )
+    for (row, _), found in zip(doubtful, better, strict=True):
+        row.fitted = found
         judge_fit(base, row)

@@ -209,8 +209,8 @@ def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_U
         unsaved=unsaved,
         known=known,
     )
-    for accepted in (*file.effects, *elements_of(file.variants)):
-        study.effect(accepted.effect)
+    for effect in (a.effect for a in (*file.effects, *elements_of(file.variants))):
+        study.effect(effect)
     return _in_si(study)
 
 

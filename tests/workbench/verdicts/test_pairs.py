@@ -5,9 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from rigwatch.physics.engine.compile import all_cores, turns
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.pairs import Pair, _pair, likely_pairs, two_effects
 from rigwatch.workbench.explain.verdict import judge
+from rigwatch.workbench.ranking import refitting
 from rigwatch.workbench.ranking.rank import rank
 from rigwatch.workbench.ranking.ranked import SIMILAR, Ranked
 from rigwatch.workbench.ranking.refitting import no_progress
@@ -28,6 +30,17 @@ def bench():
 @pytest.fixture(scope="module")
 def rows(bench):
     return rank(bench.study, bench.data, bench.base, bench.floor)
+
+
+@pytest.mark.parametrize("cores", [1, 5])
+def test_the_ranking_does_not_depend_on_the_number_of_cores(bench, rows, monkeypatch, cores):
+    for module in (all_cores, turns, refitting):
+        monkeypatch.setattr(module, "cores", lambda: cores)
+
+    def told(found):
+        return [(row.label, row.held_out_error, row.accepted, row.reason) for row in found]
+
+    assert told(rank(bench.study, bench.data, bench.base, bench.floor)) == told(rows)
 
 
 def pair_of(rows: list[Ranked], explained: tuple[float, float], cosine: float) -> Pair | None:

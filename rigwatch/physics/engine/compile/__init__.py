@@ -6,7 +6,7 @@ The rest of the engine calls `CompiledSystem`; `step_size` gives the integration
 interval.
 """
 
-from rigwatch.physics.engine.compile.all_cores import on_all_cores, shares
+from rigwatch.physics.engine.compile.all_cores import cores, on_all_cores, shares
 from rigwatch.physics.engine.compile.compiled_system import (
     CompiledSystem,
     Linearisation,
@@ -18,6 +18,7 @@ from rigwatch.physics.engine.compile.integrator import across, call, lateness, p
 from rigwatch.physics.engine.compile.resolved_rates import resolved
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
+from rigwatch.physics.engine.compile.turns import side_by_side, together
 
 __all__ = [
     "CompiledSystem",
@@ -26,6 +27,7 @@ __all__ = [
     "across",
     "call",
     "compile_system",
+    "cores",
     "derivative",
     "evaluated",
     "even_substeps",
@@ -35,4 +37,6 @@ __all__ = [
     "place",
     "resolved",
     "shares",
+    "side_by_side",
+    "together",
 ]

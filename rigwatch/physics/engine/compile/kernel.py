@@ -29,6 +29,7 @@ from rigwatch.physics.engine.compile.derivatives import Differentiated, differen
 from rigwatch.physics.engine.compile.llvm import Function, literal, machine_code
 from rigwatch.physics.engine.compile.runge_kutta_step import step_function
 from rigwatch.physics.engine.compile.step_size import Pace, pace
+from rigwatch.physics.engine.compile.turns import alone, turn_given
 from rigwatch.physics.engine.equations import TIME, UNTIL, System, symbol
 
 LARGE = 300_000
@@ -105,14 +106,15 @@ class NativeKernel:
         self._crossing = np.array(system.pace.crossing, np.int64)
 
     def _compiled(self, functions: Sequence[Function], step: str = "") -> Any:
-        kept, address = machine_code(functions, step)
+        with turn_given():
+            kept, address = machine_code(functions, step)
         self._kept.append(kept)
         return address
 
     def _compiled_along(self) -> tuple[int, int, int, int, int]:
         """The functions of `simulate`, compiled by the first thread that asks."""
         # SymPy is not made for several threads at once.
-        with _COMPILING:
+        with alone(_COMPILING):
             if not all(self._along):
                 address = self._compiled([
                     *self._sensitive(self._columns),
@@ -141,10 +143,11 @@ class NativeKernel:
         # Starting threads costs more than a small simulation.
         large = starts.size * y.shape[1] * substeps * numbers >= LARGE
         # Windows are independent, so every distribution over cores gives the same numbers.
-        on_all_cores(
-            lambda c: kernel(starts[c], x0[c], p, y[c], dy[c], last[c]),
-            shares(starts.size) if large else [slice(None)],
-        )
+        with turn_given():
+            on_all_cores(
+                lambda c: kernel(starts[c], x0[c], p, y[c], dy[c], last[c]),
+                shares(starts.size) if large else [slice(None)],
+            )
 
     def _step(self, columns: int) -> str:
         rates = "rates" if columns else "plain"
@@ -199,9 +202,11 @@ class NativeKernel:
 
         `jumps` receives the Jacobian of the states across each sample, if states change there.
         """
-        driver.linearise(
-            *self.jacobians(), u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy, jumps
-        )
+        equations = self.jacobians()
+        with turn_given():
+            driver.linearise(
+                *equations, u, dt, substeps, hold, starts, x0, p, nodes, slopes, y, dy, jumps
+            )
 
 
 def _function(system: Equations, name: str) -> Function:

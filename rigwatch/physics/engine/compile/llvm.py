@@ -18,7 +18,7 @@ from rigwatch.wire.errors import ModelError
 
 FUNCTIONS = ("tanh", "exp", "log", "sin", "cos", "atan", "pow")
 """Functions called from the C mathematics library."""
-INLINED = 1000
+INLINED = 250
 """Most instructions of a function that is inlined where it is called."""
 _RELATIONS: dict[type[sympy.Basic], str] = {
     sympy.StrictGreaterThan: "ogt",
@@ -168,7 +168,10 @@ class Function:
             return self._op("fdiv", literal(1.0), self.value(sympy.Pow(base, -exponent)))
         if exponent == sympy.Rational(1, 2):
             return self._call("llvm.sqrt.f64", self.value(base))
-        # Squaring shares its factors with other powers of the base; `pow` is far slower.
+        # `pow` is far slower than a root, and roots and squares are shared with other powers.
+        if exponent.is_Rational and exponent.q == 2:
+            whole = self.value(sympy.Pow(base, exponent - sympy.Rational(1, 2)))
+            return self._op("fmul", whole, self.value(sympy.sqrt(base)))
         if exponent.is_Integer and exponent <= 16:
             half = self.value(sympy.Pow(base, exponent // 2))
             square = self._op("fmul", half, half)

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rigwatch.physics.engine.compile import CompiledSystem
+from rigwatch.physics.engine.compile import CompiledSystem, Simulation
 from rigwatch.physics.engine.fit.initial_state_projection import Tangent
 from rigwatch.physics.engine.fit.recorded_effect_states import RecordedEffectStates
 from rigwatch.physics.engine.fit.recording import Recording, cut_for, initial_states, shown_states
@@ -35,6 +35,10 @@ FOLLOWED = 4
 
 SETTLED = 1e-6
 """Predicted reduction of a window's squared error below which its initial state is kept."""
+
+
+REMEMBERED = 2
+"""Simulations kept: a search starts where initial states were compared, and ends where it was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +122,7 @@ class Problem:
         )
         self._best: _Best | None = None
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
+        self._runs: dict[tuple[bytes, bytes, bytes], Simulation] = {}
 
     @property
     def starts(self) -> IntArray:
@@ -209,11 +214,7 @@ class Problem:
         self, parameters: FloatArray, rows: IntArray, initial: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Scaled residuals (rows, k), slopes (rows, k, free + states); 0 if unmeasured."""
-        r = self.recording
-        run = self.compiled.simulate(
-            self._inputs, r.dt, self._cut.starts[rows], self._cut.length, initial=initial,
-            parameters=parameters, substeps=self._substeps,
-        )  # fmt: skip
+        run = self._run(parameters, rows, initial)
         error = (self.measured[rows] - run.outputs) / self.scale
         slopes = run.slopes / self.scale[:, None]
         missing = np.isnan(self.measured[rows])
@@ -222,6 +223,20 @@ class Problem:
         error, slopes = self._thinned(error, rows), self._thinned(slopes, rows)
         flat = error.reshape(len(error), -1)
         return flat, slopes.reshape(*flat.shape, slopes.shape[-1])
+
+    def _run(self, parameters: FloatArray, rows: IntArray, initial: FloatArray) -> Simulation:
+        """A simulation, one of the last `REMEMBERED` if it was made before."""
+        key = (parameters.tobytes(), rows.tobytes(), initial.tobytes())
+        if key in self._runs:
+            return self._runs[key]
+        run = self.compiled.simulate(
+            self._inputs, self.recording.dt, self._cut.starts[rows], self._cut.length,
+            initial=initial, parameters=parameters, substeps=self._substeps,
+        )  # fmt: skip
+        while len(self._runs) >= REMEMBERED:
+            del self._runs[next(iter(self._runs))]
+        self._runs[key] = run
+        return run
 
     def _thinned(self, signals: FloatArray, rows: IntArray) -> FloatArray:
         """Values filtered and decimated as the recording requires, per recording if windows are."""

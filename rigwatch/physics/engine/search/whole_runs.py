@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 
-from rigwatch.physics.engine.compile import CompiledSystem
+from rigwatch.physics.engine.compile import CompiledSystem, side_by_side
 from rigwatch.physics.engine.fit import Fit, Problem, Recording, beginning, joined, result_of
 from rigwatch.physics.engine.search.convergence import PROMISED
 from rigwatch.physics.engine.search.multi_start_fit import Attempt
@@ -122,7 +122,6 @@ class WholeRuns:
         self._pull = np.concatenate([held, np.full(first.size, PRIOR)])
         present = np.isfinite(self._problem.measured)
         self._counted = max(np.mean(present) * self._problem.count, 1.0)
-        self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
 
     def _posed(self, initial: FloatArray | None) -> Problem:
         whole = joined(self._recordings)
@@ -155,13 +154,34 @@ class WholeRuns:
         """Whether no other optimum could be much better."""
         return best.error <= NEAR
 
-    def _attempt(self, begun: str, z: FloatArray) -> Attempt:
+    def first_search(self) -> tuple[dict[str, float], float]:
+        """All parameters by name where the search from the given values ends, and the error there.
+
+        The error is in standard deviations of noise, over all channels.
+
+        Raises:
+            ModelError: the simulation diverges.
+        """
+        look = self._converging(np.zeros(self._unknowns.size.size))
+        names = self._compiled.system.parameters
+        return dict(zip(names, self._split(look.z)[0].tolist(), strict=True)), look.rms
+
+    def _converging(self, z: FloatArray) -> _Look:
+        """The search from z.
+
+        Raises:
+            ModelError: the simulation diverges.
+        """
         look = self._polished(z)
         if look.rms >= BLOWN_UP:
             raise ModelError(
                 f"{self._compiled.system.model.name}: the simulation along the measured motion"
                 " diverges; try other starting values or more substeps"
             )
+        return look
+
+    def _attempt(self, begun: str, z: FloatArray) -> Attempt:
+        look = self._converging(z)
         return Attempt(begun, self._fit(look), look.cost, look.rms, look.promise)
 
     def _drawn(self) -> FloatArray:
@@ -173,11 +193,12 @@ class WholeRuns:
             substeps=self._substeps,
         )  # fmt: skip
         spread = SPREAD * np.random.default_rng(0).standard_normal((self._starts, self._m))
-        looks = [part._run(part._begun(z), LOOK) for z in spread]
+        looks = side_by_side(lambda z: part._run(part._begun(z), LOOK), list(spread))
         if self._thorough:
             # Along a curved valley a first search ends before it shows where it leads.
             least = CLOSE * min(look.cost for look in looks)
-            looks += [part._run(look.z, POLISH) for look in looks if look.cost <= least]
+            close = [look for look in looks if look.cost <= least]
+            looks += side_by_side(lambda look: part._run(look.z, POLISH), close)
         return self._begun(min(looks, key=lambda look: look.cost).z[: self._m])
 
     def _begun(self, z: FloatArray) -> FloatArray:
@@ -201,14 +222,15 @@ class WholeRuns:
     def _run(self, z: FloatArray, most: int) -> _Look:
         """The search from z, with `most` simulations."""
         if not len(z):
-            residual = self._evaluated(z)[0]
+            residual = self._simulated(z)[0]
             rms = float(np.sqrt(residual @ residual / self._counted))
             return _Look(z, float(residual @ residual) / 2, rms, 0.0)
         low, high = self._unknowns.low, self._unknowns.high
+        evaluated = Latest(self._simulated)
         found = least_squares(
-            lambda at: self._evaluated(at)[0],
+            lambda at: evaluated(at)[0],
             np.clip(z, low, high),
-            jac=lambda at: self._evaluated(at)[1],
+            jac=lambda at: evaluated(at)[1],
             bounds=(low, high),
             loss="soft_l1" if np.isfinite(self._robust) else "linear",
             f_scale=self._robust if np.isfinite(self._robust) else 1.0,
@@ -221,14 +243,8 @@ class WholeRuns:
         promised = _promise(found, low, high)
         return _Look(found.x, float(found.cost), rms, promised)
 
-    def _evaluated(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residuals and their slopes by the unknowns, followed by the rows of the priors."""
-        key = z.tobytes()
-        if self._last is None or self._last[0] != key:
-            self._last = (key, self._simulated(z))
-        return self._last[1]
-
     def _simulated(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residuals and their slopes by the unknowns, followed by the rows of the priors."""
         parameters, initial = self._split(z)
         with np.errstate(over="ignore", invalid="ignore"):
             error, own = self._problem.simulated(parameters, np.arange(len(initial)), initial)
@@ -252,6 +268,21 @@ class WholeRuns:
         problem = self._posed(initial)
         problem.recall(parameters)
         return result_of(problem, problem.start_windows(parameters))
+
+
+class Latest:
+    """A function of unknowns whose value where it was last evaluated is not computed again."""
+
+    def __init__(self, function: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> None:
+        self._function, self._at = function, b""
+        self._value: tuple[FloatArray, FloatArray] | None = None
+
+    def __call__(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Its value at z."""
+        key = z.tobytes()
+        if self._value is None or self._at != key:
+            self._value, self._at = self._function(z), key
+        return self._value
 
 
 def _block_columns(slopes: FloatArray, m: int) -> FloatArray:
