@@ -209,8 +209,8 @@ def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_U
         unsaved=unsaved,
         known=known,
     )
-    for effect in (a.effect for a in (*file.effects, *elements_of(file.variants))):
-        study.effect(effect)
+    for name in [a.effect for a in file.effects] + [e.effect for e in elements_of(file.variants)]:
+        study.effect(name)
     return _in_si(study)
 
 
