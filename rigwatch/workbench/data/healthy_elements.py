@@ -6,7 +6,6 @@ from msgspec import structs
 
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.physics.engine.fit import Recording
-from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.workbench.data.signal_scales import port_sizes
 from rigwatch.workbench.study import Element, Study, elements_of, varied
 
@@ -19,15 +18,12 @@ def with_elements(study: Study, recording: Recording) -> Study:
         recording: for the unmodified model; gives the size of the signals at the ports.
 
     Raises:
-        ModelError: an effect or a port is unknown.
+        ModelError: an effect's units do not suit its port.
     """
     named = elements_of(study.file.variants)
     if not named:
         return study
     sizes = port_sizes(study.model, recording)
-    for element in named:
-        if element.port not in sizes:
-            raise ModelError(f"variants: found port {element.port!r}{nearest(element.port, sizes)}")
     placed = tuple(_placed(study, element, sizes[element.port]) for element in named)
     return varied(replace(study, elements=placed), study.file.variants)
 

@@ -11,12 +11,17 @@ from rigwatch.workbench.compare import (
     open_bench,
     unweighed,
 )
-from rigwatch.workbench.explain.adequacy import inadequate, unchecked, with_base_offered
+from rigwatch.workbench.explain.adequacy import (
+    inadequate,
+    unchecked,
+    with_adequate_base,
+    with_base_offered,
+    with_change_told,
+)
 from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.next_experiment import Experiment, propose
-from rigwatch.workbench.explain.own_base import with_adequate_base, with_change_told
 from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
@@ -129,7 +134,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
     stopped = _stopped(bench)
     if stopped is not None:
         rows = rank_all(bench.study, bench.data, bench.base)
-        return rows, with_base_offered(bench.study, stopped)
+        return rows, with_base_offered(bench, stopped)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = credible_verdict(bench, rows)
     rows, verdict = _refined(bench, rows, verdict, progress)
@@ -145,7 +150,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
     elif along:
         verdict = undetermined_if_much_left(bench.base, bench.floor, verdict)
         verdict = undetermined_if_little_and_unexplained(bench.base, bench.floor, verdict)
-    verdict = with_base_offered(bench.study, unchecked(bench, verdict))
+    verdict = with_base_offered(bench, unchecked(bench, verdict))
     verdict = with_change_told(bench.study, verdict)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]

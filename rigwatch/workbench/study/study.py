@@ -209,8 +209,13 @@ def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_U
         unsaved=unsaved,
         known=known,
     )
-    for name in [a.effect for a in file.effects] + [e.effect for e in elements_of(file.variants)]:
-        study.effect(name)
+    for accepted in file.effects:
+        study.effect(accepted.effect)
+    for element in elements_of(file.variants):
+        study.effect(element.effect)
+        if element.port not in model.ports:
+            meant = nearest(element.port, model.ports)
+            raise ModelError(f"variants: found port {element.port!r} in {element.label}{meant}")
     return _in_si(study)
 
 
