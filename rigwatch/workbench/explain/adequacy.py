@@ -29,8 +29,6 @@ UNCHECKED = (
     "the model could not be checked on a healthy recording: record one with nothing wrong and list"
     " it under [[healthy]] in the study"
 )
-
-
 JUDGED_ON = (
     "judged on the model with {names}, which the healthy recording asks for; to keep it:"
     ' rigwatch study base {study} --take "{names}"'
@@ -107,26 +105,32 @@ def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
         bench: of a study; one with accepted effects keeps its base.
         progress: called with a line of text as each fit begins.
     """
-    study = bench.study
     if not _is_inadequate(bench) or not _may_search(bench):
         return bench
     progress("the model does not describe the healthy rig: searching for a better base")
     try:
-        found = find_base(study, progress)
-        names = found.enough.variants
-        if set(names) == set(study.file.variants):
-            return bench
-        chosen = varied(study, names)
-        file = structs.replace(chosen.file, start=found.start | dict(study.file.start))
-        progress(f"fitting the model with {', '.join(names)}")
-        better = open_bench(replace(chosen, file=file))
+        better = _on_found_base(bench.study, progress)
     except ModelError:
         return bench
-    if _is_inadequate(better):
-        return bench
+    return bench if better is None or _is_inadequate(better) else better
+
+
+def _on_found_base(study: Study, progress: Progress) -> Bench | None:
+    """The bench on the best base found; None if that is the study's own.
+
+    Raises:
+        ModelError: a base cannot be fitted.
+    """
+    found = find_base(study, progress)
+    names = found.enough.variants
+    if set(names) == set(study.file.variants):
+        return None
+    chosen = varied(study, names)
+    file = structs.replace(chosen.file, start=found.start | dict(study.file.start))
+    progress(f"fitting the model with {', '.join(names)}")
+    better = open_bench(replace(chosen, file=file))
     told = JUDGED_ON.format(names=", ".join(names), study=study.folder)
-    remarks = (*better.data.remarks, told)
-    return replace(better, data=replace(better.data, remarks=remarks))
+    return replace(better, data=replace(better.data, remarks=(*better.data.remarks, told)))
 
 
 def with_change_told(study: Study, found: Verdict) -> Verdict:
