@@ -15,7 +15,7 @@ from rigwatch.physics.engine.equations import check_variants
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare.base_fit import Base
-from rigwatch.workbench.compare.base_step import BaseSearch, improves
+from rigwatch.workbench.compare.base_step import AT_NOISE, BaseSearch, improves
 from rigwatch.workbench.data import Data, predicts_along_motion, prepare
 from rigwatch.workbench.ranking import Progress, no_progress
 from rigwatch.workbench.study import Study, check_data, varied
@@ -48,12 +48,14 @@ class Bases:
     start: dict[str, float]
 
 
-def find_base(study: Study, progress: Progress = no_progress) -> Bases:
+def find_base(study: Study, progress: Progress = no_progress, *, enough: float = AT_NOISE) -> Bases:
     """Search for the variants of the study's model that its healthy recordings support.
 
     Args:
         study: the study; its accepted effects are ignored.
         progress: called with a line of text as each fit begins.
+        enough: ratio of the held-out error to its noise at which nothing more is looked for along
+            the measured motion.
 
     Raises:
         ModelError: there is no healthy recording, the model cannot be fitted, or it has no variants
@@ -68,7 +70,7 @@ def find_base(study: Study, progress: Progress = no_progress) -> Bases:
     if data.healthy is None:
         raise ModelError(f"{study.folder}: {NO_HEALTHY}")
     split = _split_healthy(data.healthy, data.horizon)
-    search = BaseSearch(split, study.file.start, progress)
+    search = BaseSearch(split, study.file.start, enough, progress)
     progress("fitting the unmodified model")
     best = search.first(study)
     tried = [best]
@@ -98,7 +100,9 @@ def _split_healthy(healthy: Recording, horizon: int) -> Data:
             f"healthy: found {len(healthy) * healthy.dt:.3g} s, expected at least two horizons of"
             f" {horizon * healthy.dt:g} s: one to fit and one that decides"
         )
-    return Data(_cut(healthy, 0, cut, first), _cut(healthy, cut, None, rest), None, horizon, ())
+    fitted, judged = _cut(healthy, 0, cut, first), _cut(healthy, cut, None, rest)
+    # As in every other step the whole healthy motion determines the sensors' lateness and corner.
+    return Data(fitted, judged, healthy, horizon, ())
 
 
 def _cut(whole: Recording, begin: int, end: int | None, parts: tuple[int, ...]) -> Recording:

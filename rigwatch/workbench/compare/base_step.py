@@ -43,8 +43,10 @@ def improves(best: Tried, one: Tried) -> bool:
 class BaseSearch:
     """Bases one step from another; each set is tried once."""
 
-    def __init__(self, data: Data, start: Mapping[str, float], progress: Progress) -> None:
-        self._data, self._start, self._progress = data, start, progress
+    def __init__(
+        self, data: Data, start: Mapping[str, float], enough: float, progress: Progress
+    ) -> None:
+        self._data, self._start, self._enough, self._progress = data, start, enough, progress
         self._known: set[frozenset[str]] = set()
         self._rejected: set[str] = set()
 
@@ -58,7 +60,7 @@ class BaseSearch:
         """Bases next to one, fitted; elements once no variant alone does better."""
         if not at.data.along_motion:
             return self._each(at, self._new(further_variants(at, self._rejected)))
-        if at.base.over_noise <= AT_NOISE:
+        if at.base.over_noise <= self._enough:
             return []
         found = list[Tried]()
         if not at.study.file.variants:

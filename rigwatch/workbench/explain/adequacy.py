@@ -22,6 +22,8 @@ from rigwatch.workbench.study import Study, elements_of, varied
 
 MOST = 5.0
 """Largest ratio of the healthy recording's error to its noise at which a model is adequate."""
+ENOUGH = 2.0
+"""The same at which a search for a base ends: what further terms explain is no longer its laws."""
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
 VARIED = "`rigwatch study base {study} --take enough` searches for better variants of the model"
 
@@ -121,7 +123,7 @@ def _on_found_base(study: Study, progress: Progress) -> Bench | None:
     Raises:
         ModelError: a base cannot be fitted.
     """
-    found = find_base(study, progress)
+    found = find_base(study, progress, enough=ENOUGH)
     names = found.enough.variants
     if set(names) == set(study.file.variants):
         return None
