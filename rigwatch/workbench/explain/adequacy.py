@@ -23,7 +23,7 @@ from rigwatch.workbench.study import Study, elements_of, varied
 MOST = 5.0
 """Largest ratio of the healthy recording's error to its noise at which a model is adequate."""
 ENOUGH = 2.0
-"""The same at which a search for a base ends: further terms describe this recording, not the rig."""
+"""The same at which a search for a base ends: what is left is hardly a law that the base lacks."""
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
 VARIED = "`rigwatch study base {study} --take enough` searches for better variants of the model"
 
