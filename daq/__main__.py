@@ -13,6 +13,7 @@ from daq.adapter import Adapter
 from daq.adapters import adapter_for
 from daq.publisher import Publisher
 from daq.supervisor import Supervisor
+from daq.turns import Turns
 from rigwatch.wire.bus import Bus, connect
 from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.errors import RigwatchError
@@ -34,7 +35,7 @@ def acquire(
     stop: threading.Event,
     pulse: Pulse,
     *,
-    turn: float = 0.0,
+    turns: Turns | None = None,
 ) -> None:
     """Acquire until `stop` is set.
 
@@ -44,7 +45,8 @@ def acquire(
         bus: destination of its samples.
         stop: ends the loop.
         pulse: told of each turn.
-        turn: shortest time of a turn [s]; 0 passes samples on as they come.
+        turns: those of the process, if it serves several rigs: the device is read once a turn, and
+            in their thread if it never waits; otherwise samples are passed on as they come.
 
     Raises:
         DeviceBusyError: another process holds the device.
@@ -52,18 +54,29 @@ def acquire(
     device = Supervisor(adapter)
     acquisition = Acquisition(config, adapter.clock_rate)
     publisher = Publisher(bus, SampleRing(bus, config.daq.ring))
+    at_once = turns is not None and getattr(adapter, "at_once", False)
+
+    def step(wait: float) -> None:
+        for raw in device.read(wait):
+            publisher.publish(acquisition.update(raw))
+        link, counters = device.link, adapter.counters()
+        publisher.publish(acquisition.tick(time.monotonic_ns(), link, counters))
+        pulse.advance(acquisition.samples)
+
+    def in_turns() -> bool:
+        step(0.0)
+        return device.connected and not stop.is_set()
+
     device.start()
     pulse.ready()
     try:
         while not stop.is_set():
-            began = time.monotonic()
-            for raw in device.read(acquisition.patience(time.monotonic_ns())):
-                publisher.publish(acquisition.update(raw))
-            link, counters = device.link, adapter.counters()
-            publisher.publish(acquisition.tick(time.monotonic_ns(), link, counters))
-            pulse.advance(acquisition.samples)
-            if (left := began + turn - time.monotonic()) > 0:
-                time.sleep(left)
+            if turns is not None and at_once and device.connected:
+                turns.serve(in_turns)
+                continue
+            step(acquisition.patience(time.monotonic_ns()))
+            if turns is not None:
+                time.sleep(turns.turn - time.monotonic() % turns.turn)
         pulse.stopping()
     finally:
         device.close()

@@ -52,6 +52,8 @@ class Adapter(Protocol):
 
     Attributes:
         clock_rate: device microseconds per host microsecond; 1 except in replays.
+        at_once: (optional) whether `read(0)` of an open device never waits for it, so that one
+            thread may read many.
     """
 
     clock_rate: float

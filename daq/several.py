@@ -1,6 +1,7 @@
-"""Several rigs in one acquisition process: each device is read in a thread of its own.
+"""Several rigs in one process: each has a thread, which reads its device or has it read.
 
-A device that hangs, is unplugged or does not match its configuration delays no other. Samples are
+A device that hangs, is unplugged or does not match its configuration delays no other: it is opened
+in its rig's thread, and read there too unless reading it never waits (`turns.py`). Samples are
 taken in turns: most of the cost of a sample is that of the calls around it, and a message of a turn
 costs daq, bus, monitor and recorder little more than that of one sample.
 """
@@ -11,6 +12,7 @@ from pathlib import Path
 
 from daq.__main__ import acquire
 from daq.adapters import adapter_for
+from daq.turns import Turns
 from rigwatch.wire.bus import SharedLinks, joined
 from rigwatch.wire.host import (
     DAQ,
@@ -32,7 +34,7 @@ TURN = 0.03
 """Time from one reading of a device to the next: a sample waits for half of it on average [s]."""
 
 
-def work_of(path: Path, links: SharedLinks) -> Work:
+def work_of(path: Path, links: SharedLinks, turns: Turns) -> Work:
     """The acquisition of one rig."""
 
     def work(stop: threading.Event, pulse: RigPulse) -> None:
@@ -40,7 +42,7 @@ def work_of(path: Path, links: SharedLinks) -> Work:
         adapter = adapter_for(config.daq.device, config.channels)
         with joined(config, "daq", stop, pulse.say, links) as bus:
             if bus is not None:
-                acquire(config, adapter, bus, stop, pulse, turn=TURN)
+                acquire(config, adapter, bus, stop, pulse, turns=turns)
 
     return work
 
@@ -62,7 +64,8 @@ def run_several(paths: list[Path]) -> int:
     raise_priority(DAQ)
     prepare_for_real_time()
     links = SharedLinks(len(paths))
-    parts = [Part(str(path), work_of(path, links), partial(used, path)) for path in paths]
+    turns = Turns(TURN, links.together)
+    parts = [Part(str(path), work_of(path, links, turns), partial(used, path)) for path in paths]
     run_side_by_side(parts, Heartbeat("daq"), stop, set_at_hangup())
     links.close()
     return 0

@@ -84,6 +84,7 @@ class _Bench:
             self._daq.transport.put(self._daq.key(SAMPLES.key), payload)
         for item in self._monitor.reader.read(0.0):
             self._monitor.take(item)
+        self._monitor.keep_position()
         self._monitor.look_around()
 
 

@@ -134,6 +134,7 @@ class SerialAdapter:
     """
 
     clock_rate = 1.0
+    at_once = True
 
     def __init__(
         self, source: ByteSource, channels: int, clock: Callable[[], int] = time.monotonic_ns

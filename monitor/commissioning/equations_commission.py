@@ -181,7 +181,7 @@ def _remainder(
     size = ObserverSignals(plant, no_remainder(0), rate).remainder_size
     bare = _observed(used, plant, no_remainder(size), rate)
     filters, skip = high_pass(plant.corner, rate), round(SKIPPED * rate)
-    pairs = [(remainder_signals(o.rows, o.predicted, layout), o.judged[:, E]) for o in bare]
+    pairs = [(remainder_signals(o.rows, o.predicted.hidden, layout), o.judged[:, E]) for o in bare]
     earlier = [(z[: _split(z)], e[: _split(z)]) for z, e in pairs]
     learnt = fit_remainder(earlier, filters, skip)
     later = _observed(used, plant, learnt, rate)

@@ -4,6 +4,7 @@ The ranking itself is in `fault_candidates.py` and runs in a separate process; t
 the samples, requests the ranking and handles the answer.
 """
 
+import contextlib
 import queue
 import tempfile
 import threading
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from monitor.diagnosis.child import Child
 from monitor.diagnosis.ranking_job import ask
 from monitor.model import RigModel
 from rigwatch.wire.arrays import FloatArray
@@ -52,6 +54,8 @@ class Explainer:
         self._told: dict[tuple[int, int], str] = {}
         self._results: queue.SimpleQueue[tuple[Alarm, Event, str]] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
+        self._child = Child()
+        self._ended = False
 
     def take(self, block: EstimateBlock, samples: SampleBlock) -> None:
         """Keep estimates with the samples they are of, and ask where enough have come since an
@@ -99,14 +103,24 @@ class Explainer:
             return alarm
         return replace(alarm, cause=f"{alarm.cause}; {text}")
 
+    def close(self) -> None:
+        """End a ranking; the interpreter must not end while one is being written or started."""
+        self._ended = True
+        self._child.end()
+        if self._thread is not None:
+            self._thread.join()
+
     def _busy(self) -> bool:
         return self._thread is not None and self._thread.is_alive()
 
     def _rank(self, judged: Sequence[Judged], alarm: Alarm, model: RigModel) -> None:
         signals, change = _arrays(judged, model.channels)
         onset = max(alarm.onset_seq - judged[0][0].seq, 0)
-        with tempfile.TemporaryDirectory() as folder:
-            text = ask(Path(folder), signals, change, onset, model, self._files)
+        text = ""
+        with contextlib.suppress(OSError), tempfile.TemporaryDirectory() as folder:
+            text = ask(Path(folder), signals, change, onset, model, self._files, self._child)
+        if self._ended:
+            return
         text = text or "probably missing: cannot tell, the ranking failed"
         at = int(judged[-1][0].t_ns[-1])
         event = Event("monitor", at, alarm.severity, PROBABLY_MISSING, f"{alarm.name}: {text}")

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from monitor.diagnosis.child import Child
 from monitor.model import RigModel, load_model, model_text
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
@@ -33,17 +34,13 @@ def ask(  # noqa: PLR0917 -- what is put into the folder
     onset: int,
     model: RigModel,
     effect_files: Sequence[str],
+    child: Child | None = None,
 ) -> str:
-    """Wait for the ranking as text; empty if the job failed."""
+    """Wait for the ranking as text; empty if the job failed or its `child` was ended."""
     np.savez(folder / _EVIDENCE, signals=signals, change=change, onset=onset)
     (folder / _MODEL).write_text(model_text(model), encoding="utf-8")
     (folder / _EFFECTS).write_text(json.dumps(list(effect_files)), encoding="utf-8")
-    child = os.posix_spawn(
-        sys.executable, [sys.executable, "-m", MODULE, str(folder)], os.environ,
-        # A child would inherit the monitor's real-time class.
-        scheduler=(os.SCHED_OTHER, os.sched_param(0)),
-    )  # fmt: skip
-    os.waitpid(child, 0)
+    (child or Child()).run(["-m", MODULE, str(folder)])
     answer = folder / _ANSWER
     return answer.read_text(encoding="utf-8") if answer.exists() else ""
 

@@ -17,6 +17,7 @@ import msgspec
 from rigwatch.wire.errors import ConfigError, reason_of
 from rigwatch.wire.host import replace_file
 from rigwatch.wire.messages import NOT_PROVED, Identity
+from rigwatch.wire.typed_files import JsonError, json_value
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +62,8 @@ def history(path: Path) -> list[Version]:
         raise ConfigError(file, "", reason_of(error), "a readable file") from error
     found = []
     for line in lines:
-        with contextlib.suppress(msgspec.DecodeError):
-            found.append(msgspec.json.decode(line, type=Version))
+        with contextlib.suppress(JsonError):
+            found.append(json_value(line, Version))
     return found
 
 

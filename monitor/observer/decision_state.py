@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor.model import HealthyLimits
+from monitor.observer.input_lateness import no_lateness
 from rigwatch.wire.arrays import FloatArray
 
 SHORT, MEDIUM, LONG, LASTING = 8, 32, 128, 256
@@ -33,7 +34,7 @@ OUTPUTS = (
 USUAL_LASTING, USUAL_SHORT, USUAL_MEDIUM, USUAL_FRICTION = range(4)
 """Rows of the healthy residual's extremes at the present motion, see `usual_error.Extremes`."""
 
-ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, SPEED, LEVELS = range(8)
+ERROR, DRY, WET, LEVEL, DISAGREE, MEASURED, LATENESS, SPEED, LEVELS = range(9)
 """Columns of the history; from `LEVELS` on, the levels on which the healthy variance depends."""
 
 
@@ -67,12 +68,14 @@ class DecisionState(NamedTuple):
         counts: see `Counts`; since_onset is -1 without an episode.
         value: verdict, named force, and energies of the drive recently and before.
         lasting: the last judged energies, relative to their limit, shape (LASTING,).
+        lateness: of the inputs, see `input_lateness`.
     """
 
     rows: FloatArray
     counts: NDArray[np.int64]
     value: FloatArray
     lasting: FloatArray
+    lateness: FloatArray
 
 
 def new_state(levels: int) -> DecisionState:
@@ -85,7 +88,7 @@ def new_state(levels: int) -> DecisionState:
     count[AT.since_onset] = -1
     count[AT.since_jump] = WAKE
     rows = np.zeros((HISTORY, LEVELS + levels))
-    return DecisionState(rows, count, np.zeros(4), np.zeros(LASTING))
+    return DecisionState(rows, count, np.zeros(4), np.zeros(LASTING), no_lateness())
 
 
 class DecisionRules(NamedTuple):

@@ -16,8 +16,10 @@ from monitor.signals import DEAD, GOOD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
-DELAY, MATCHED = -1, -2
-"""Codes of columns that are only delayed, or smoothed like one that is differentiated twice."""
+DELAY, MATCHED, STEPPED = -1, -2, -3
+"""Codes of columns that are only delayed, smoothed like one that is differentiated twice, or half
+the change from the sample before to the sample after.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +70,8 @@ def _kernel(order: int, half_width: int, rate: float, late: float) -> FloatArray
     width = 2 * half_width + 1
     if order == DELAY:
         return np.asarray(np.eye(width)[half_width], np.float64)
+    if order == STEPPED:
+        return np.asarray(0.5 * (np.eye(width)[half_width + 1] - np.eye(width)[half_width - 1]))
     if order == MATCHED:
         # The kernel of the second derivative is a second difference of a smoothing one.
         second = savgol_coeffs(width, 3, deriv=2, delta=1.0, use="dot")

@@ -2,14 +2,19 @@
 
     e  = H[ y - ŷ - w·φ(z) ],   φ(z) = (z_i, z_i·z_j),   z = (motion, hidden states), scaled
     g1 = H[ŷ with one newton of dry friction - ŷ],   g2 = the same for viscous friction
+    s  = H[ŷ + w·φ(z) with inputs late by one sample - ŷ - w·φ(z)]
 
 In an integrating plant, small errors of flows accumulate to slow errors of forces. All signals are
 therefore judged above a corner frequency: H is a second-order Butterworth high-pass.
 """
 
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from scipy.signal import butter
 
 from monitor.model import RemainderSection
@@ -18,8 +23,10 @@ from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
-COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured")
-E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED = range(6)
+COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured", "late")
+LATER = 0.5
+"""Lateness of the inputs of which the response is taken [samples]."""
+E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, LATE_UNIT = range(7)
 
 
 class Polynomial(NamedTuple):
@@ -69,10 +76,19 @@ class HighPassed:
         self._state = np.zeros((len(COLUMNS), 2))
         self._remainder = polynomial(remainder)
 
-    def update(self, columns: FloatArray, z: FloatArray, state: np.ndarray) -> FloatArray:
-        """High-passed columns, shape (n, 6), from raw columns and the remainder's signals."""
+    def update(
+        self, columns: FloatArray, z: FloatArray, later: FloatArray, state: np.ndarray
+    ) -> FloatArray:
+        """High-passed columns, shape (n, 7), from raw columns and the remainder's signals.
+
+        Args:
+            columns: raw.
+            z: signals of the remainder.
+            later: the same with inputs that are late.
+            state: of each row.
+        """
         out = np.zeros_like(columns)
-        _advance(columns, z, state, self._remainder, self._b, self._a, self._state, out)
+        _advance(columns, z, later, state, self._remainder, self._b, self._a, self._state, out)
         return out
 
 
@@ -80,6 +96,7 @@ class HighPassed:
 def _advance(  # noqa: PLR0917 -- a kernel
     columns: FloatArray,
     z: FloatArray,
+    later: FloatArray,
     state: np.ndarray,
     known: Polynomial,
     b: FloatArray,
@@ -87,24 +104,36 @@ def _advance(  # noqa: PLR0917 -- a kernel
     kept: FloatArray,
     out: FloatArray,
 ) -> None:
-    count = z.shape[1]
-    scaled = np.zeros(count)
+    scaled = np.zeros(z.shape[1])
     for k in range(state.size):
         if state[k] == EMPTY:
             continue
         if state[k] == FIRST:
             _at_rest(columns[k], kept, b)
-        for i in range(count):
-            scaled[i] = (z[k, i] - known.centre[i]) / known.scale[i]
-        remainder, place = 0.0, count
-        for i in range(count):
-            remainder += known.weights[i] * scaled[i]
-            for j in range(i, count):
-                remainder += known.weights[place] * scaled[i] * scaled[j]
-                place += 1
+        remainder = _remainder(z[k], known, scaled)
+        change = _remainder(later[k], known, scaled) - remainder
         for c in range(columns.shape[1]):
-            value = columns[k, c] - (remainder if c == E else 0.0)
+            value = columns[k, c]
+            if c == E:
+                value -= remainder
+            elif c == LATE_UNIT:
+                value = (value + change) / LATER
             out[k, c] = filter_sample(b, a, kept[c], value)
+
+
+@njit()
+def _remainder(z: FloatArray, known: Polynomial, scaled: FloatArray) -> float:
+    """w·φ(z)."""
+    count = z.size
+    for i in range(count):
+        scaled[i] = (z[i] - known.centre[i]) / known.scale[i]
+    total, place = 0.0, count
+    for i in range(count):
+        total += known.weights[i] * scaled[i]
+        for j in range(i, count):
+            total += known.weights[place] * scaled[i] * scaled[j]
+            place += 1
+    return total
 
 
 @kernel()

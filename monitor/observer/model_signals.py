@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from monitor.drives import DriveChanges, SlidingSteps
 from monitor.model import EquationsPlant, RemainderSection
-from monitor.observer.drive_changes import DriveChanges
-from monitor.observer.lagged_motion import DELAY, EMPTY, MATCHED, FixedLag, MotionColumn
+from monitor.observer.lagged_motion import DELAY, EMPTY, MATCHED, STEPPED, FixedLag, MotionColumn
 from monitor.observer.missing_force import HighPassed
 from monitor.observer.prediction import (
     AlongMotion,
@@ -20,7 +20,6 @@ from monitor.observer.prediction import (
     rate_columns,
     speed_state,
 )
-from monitor.observer.sliding_steps import SlidingSteps
 from monitor.signals import Codes
 from rigwatch.physics.engine.equations import Model, balanced_states, measured_states
 from rigwatch.wire.arrays import BoolArray, FloatArray
@@ -33,7 +32,7 @@ class Layout:
     Attributes:
         channels: read from the samples: inputs, then motion, then predicted outputs.
         columns: computed from them: inputs, motion, measured output, the same output derived from
-            the motion, and the output with equal smoothing.
+            the motion, the output with equal smoothing, and the inputs' steps.
         inputs: number of inputs and motions that drive the equations.
         speed: index among them of the speed that friction opposes.
         motions: indices among them of the motion.
@@ -72,6 +71,7 @@ def layout_of(model: Model, port: str) -> Layout:
     balance = balanced_states(model)[0]
     columns.append(MotionColumn(places[balance.channel], balance.order + 1))
     columns.append(MotionColumn(len(channels) - 1, MATCHED if balance.order == 1 else 0))
+    columns += [MotionColumn(place, STEPPED) for place in range(len(inputs))]
     names = [*model.inputs, *(state.name for state in motion)]
     return Layout(
         channels,
@@ -93,10 +93,10 @@ class Observed:
         rows: inputs and motion, shape (n, inputs).
         measured: the measured output, shape (n,).
         predicted: the columns of the prediction.
-        judged: high-passed columns, see `missing_force`, shape (n, 6).
+        judged: high-passed columns, see `missing_force`, shape (n, 7).
         steady: False where an input changes suddenly, or steps between samples at a place that is
             not known yet, shape (n,).
-        drive: pace of the first input, see `drive_changes.Drive`, shape (n,).
+        drive: pace of the first input, see `monitor.drives.Drive`, shape (n,).
     """
 
     state: Codes
@@ -159,15 +159,18 @@ class ObserverSignals:
         inputs = self.layout.inputs
         rows, measured = columns[:, :inputs], columns[:, inputs]
         disagreement = columns[:, inputs + 2] - columns[:, inputs + 1]
-        predicted = self._along.update(rows, state)
+        predicted = self._along.update(rows, columns[:, inputs + 3 :], state)
         raw = np.column_stack(
             [
                 measured - predicted.output, predicted.dry, predicted.viscous, predicted.output,
-                disagreement, measured,
+                disagreement, measured, predicted.late - predicted.output,
             ]
         )  # fmt: skip
-        z = remainder_signals(rows, predicted, self.layout)
-        judged = self._high_passed.update(raw, z, state)
+        z, later = (
+            remainder_signals(rows, hidden, self.layout)
+            for hidden in (predicted.hidden, predicted.late_hidden)
+        )
+        judged = self._high_passed.update(raw, z, later, state)
         drives = [own.update(signals[:, place], code) for place, own in enumerate(self._drives)]
         for own in drives:
             steady &= ~own.changed
@@ -175,6 +178,6 @@ class ObserverSignals:
         return Observed(state, rows, measured, predicted, judged, steady, pace)
 
 
-def remainder_signals(rows: FloatArray, predicted: Predicted, layout: Layout) -> FloatArray:
+def remainder_signals(rows: FloatArray, hidden: FloatArray, layout: Layout) -> FloatArray:
     """Motion and hidden states, the arguments of the remainder, shape (n, signals)."""
-    return np.ascontiguousarray(np.hstack([rows[:, list(layout.motions)], predicted.hidden]))
+    return np.ascontiguousarray(np.hstack([rows[:, list(layout.motions)], hidden]))

@@ -31,6 +31,7 @@ from monitor.observer.decision_state import (
     FRICTION,
     HISTORY,
     JUDGING,
+    LATENESS,
     LEVEL,
     LEVELS,
     LONG,
@@ -57,7 +58,18 @@ from monitor.observer.decision_state import (
     DecisionRules,
     DecisionState,
 )
+from monitor.observer.input_lateness import (
+    AGO,
+    RECENT,
+    TAU,
+    UNSURE,
+    follow_lateness,
+    is_late,
+    lateness_changes,
+    rubs,
+)
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
+from monitor.observer.missing_force import LATE_UNIT
 from monitor.observer.window_statistics import (
     dry_force,
     friction,
@@ -127,7 +139,7 @@ def decide(  # noqa: PLR0917 -- a kernel
             _restart(kept)
         _follow_drive(drive[k], steady[k], kept)
         if state[k] != TAINTED:
-            _remember(kept, judged[k], speed[k], levels[k])
+            _remember(kept, judged[k], speed[k], levels[k], rules)
         _follow_jumps(jumped[k], kept)
         _one(k, inside[k], usual[:, k], rules, kept, out)
 
@@ -140,6 +152,8 @@ def _restart(kept: DecisionState) -> None:
     kept.counts[JUMP_AGO] = WAKE
     kept.value[:] = 0.0
     kept.value[0] = UNNAMED
+    kept.lateness[:] = 0.0
+    kept.lateness[AGO] = RECENT
 
 
 @njit()
@@ -170,11 +184,28 @@ def _follow_jumps(jumped: bool, kept: DecisionState) -> None:
 
 
 @njit()
-def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray) -> None:
+def _follow_lateness(kept: DecisionState, row: FloatArray, rules: DecisionRules) -> None:
+    """Learn the inputs' lateness, except in an episode; while it changes, the rig is not armed."""
+    count = kept.counts
+    judging = count[WAS_JUDGING] == 1
+    if not judging or (count[ONSET] < 0 and (count[ABOVE] == 0 or is_late(kept.lateness))):
+        follow_lateness(row, _variance(kept, rules), judging, kept.lateness)
+    if not judging and lateness_changes(kept.lateness):
+        count[CHANGED] = -LONG
+
+
+@njit()
+def _remember(
+    kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray, rules: DecisionRules
+) -> None:
     """Store a sample; the first columns are in the order of the residual's."""
+    _follow_lateness(kept, row, rules)
     head = kept.counts[HEAD]
     for c in range(6):
         kept.rows[head, c] = row[c]
+    late = kept.lateness[TAU] * row[LATE_UNIT]
+    kept.rows[head, ERROR] = row[ERROR] - late
+    kept.rows[head, LATENESS] = late
     kept.rows[head, SPEED] = speed
     for c in range(levels.size):
         kept.rows[head, LEVELS + c] = levels[c]
@@ -230,7 +261,7 @@ def _one(  # noqa: PLR0917 -- a kernel
     count[QUIET] = 0 if away else count[QUIET] + 1
     count[ABOVE] = count[ABOVE] + 1 if away else 0
     if count[ONSET] < 0:
-        away = out[DEVIATION, k] > SURE or count[ABOVE] >= REMAINS
+        away = count[ABOVE] >= REMAINS or _sure(out[DEVIATION, k], kept)
     away = away or count[JUMP_AGO] == 0
     mode = _mode(kept, rules)
     out[MODE, k] = mode
@@ -243,6 +274,17 @@ def _one(  # noqa: PLR0917 -- a kernel
 
 
 @njit()
+def _sure(deviation: float, kept: DecisionState) -> bool:
+    """Whether a deviation is a departure at once.
+
+    Where steps that slide fall is not known of every input, and the lateness jumps by a sample.
+    """
+    if is_late(kept.lateness):
+        return kept.counts[ABOVE] >= MEDIUM and rubs(kept.lateness)
+    return deviation > SURE
+
+
+@njit()
 def _variance(kept: DecisionState, rules: DecisionRules) -> float:
     """Healthy variance of the residual for the motion of the medium window."""
     n = min(MEDIUM, kept.counts[FILLED])
@@ -252,7 +294,7 @@ def _variance(kept: DecisionState, rules: DecisionRules) -> float:
         for ago in range(1, n + 1):
             level += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, LEVELS + c]
         total += rules.growth[c] * level / max(n, 1)
-    return total
+    return total + UNSURE**2 * mean_square(kept, LATENESS, MEDIUM)
 
 
 @njit()

@@ -3,7 +3,8 @@
 Two further predictions run with unit dry and unit viscous friction at the force port. Their
 differences to the plain prediction are the responses of the predicted output to friction of 1 N and
 of 1 N s/m, including everything in between (an inertia, the sensor's own high-pass). As the motion
-is given, the response is linear in the force.
+is given, the response is linear in the force. A fourth runs with inputs late by `LATER`, which
+gives the response to inputs late by one sample.
 """
 
 import dataclasses
@@ -16,6 +17,7 @@ from msgspec.structs import replace
 
 from monitor.model import EquationsPlant
 from monitor.observer.lagged_motion import EMPTY, FIRST
+from monitor.observer.missing_force import LATER
 from monitor.signals import Codes
 from rigwatch.physics.engine.compile import CompiledSystem, Simulation, compile_system
 from rigwatch.physics.engine.equations import (
@@ -119,13 +121,16 @@ def _fixed(effect: Effect) -> Effect:
 class Predicted:
     """Columns of the prediction, each of shape (n,) or (n, hidden states).
 
-    `reset` marks samples at which the states diverged and were started anew.
+    `late` and `late_hidden` are output and hidden states with inputs late by `LATER`; `reset` marks
+    samples at which the states diverged and were started anew.
     """
 
     output: FloatArray
     dry: FloatArray
     viscous: FloatArray
+    late: FloatArray
     hidden: FloatArray
+    late_hidden: FloatArray
     reset: BoolArray
 
 
@@ -148,44 +153,60 @@ class AlongMotion:
         values = dict(zip(plant.names, plant.values, strict=True))
         healthy = values | {strengths[0]: plant.coulomb, strengths[1]: 0.0}
         cases = [healthy, *(healthy | {name: healthy[name] + 1.0} for name in strengths)]
-        self._parameters = [self._compiled.vector(case) for case in cases]
-        self._states = [np.zeros(0)] * len(cases)
-        self._row = np.zeros(0)
+        self._parameters = [self._compiled.vector(case) for case in (*cases, healthy)]
+        self._states = [np.zeros(0)] * len(self._parameters)
+        self._last = np.zeros((2, 0))
 
-    def update(self, rows: FloatArray, state: Codes) -> Predicted:
-        """Predict the next rows of inputs and motion, shape (n, inputs); 0 without a kernel."""
+    def update(self, rows: FloatArray, steps: FloatArray, state: Codes) -> Predicted:
+        """Predict the next rows of inputs and motion, shape (n, inputs); 0 without a kernel.
+
+        Args:
+            rows: inputs, then motion.
+            steps: changes of the inputs per sample, shape (n, inputs other than motion).
+            state: of each row.
+        """
         n = len(rows)
-        hidden, reset = np.zeros((n, self.hidden)), np.zeros(n, np.bool_)
-        out = Predicted(np.zeros(n), np.zeros(n), np.zeros(n), hidden, reset)
+        later = rows.copy()
+        later[:, : steps.shape[1]] -= LATER * steps
+        output, dry, viscous, late = np.zeros((4, n))
+        hidden, late_hidden = np.zeros((2, n, self.hidden))
+        reset = np.zeros(n, np.bool_)
+        out = Predicted(output, dry, viscous, late, hidden, late_hidden, reset)
         for begin, end in _stretches(state):
             if state[begin] == FIRST:
                 self._begin(rows[begin])
             done = begin
             while done < end:
-                done += self._run(rows[done:end], done, out)
+                done += self._run(rows[done:end], later[done:end], done, out)
         return out
 
     def _begin(self, row: FloatArray) -> None:
         """Hidden states in equilibrium with a row, with the motion at rest."""
-        self._row = row.copy()
+        self._last = np.stack([row, row])
         still = np.repeat(row[None, :], round(SETTLING / self._dt), axis=0)
         still[:, self._rates] = 0.0
         for case, parameters in enumerate(self._parameters):
             self._states[case] = balanced(self._compiled, parameters, still, self._dt)
 
-    def _run(self, rows: FloatArray, first: int, out: Predicted) -> int:
+    def _run(self, rows: FloatArray, later: FloatArray, first: int, out: Predicted) -> int:
         """Run along the rows until they end or a state diverges; returns the number done."""
-        inputs = np.concatenate([self._row[None, :], rows])
-        made = [self._simulated(case, inputs) for case in range(len(self._parameters))]
+        plain, shifted = (
+            np.concatenate([last[None, :], own])
+            for last, own in zip(self._last, (rows, later), strict=True)
+        )
+        given = [plain] * (len(self._parameters) - 1) + [shifted]
+        made = [self._simulated(case, own) for case, own in enumerate(given)]
         outputs = np.stack([one.outputs[0, 1:] for one in made])
         finite = np.isfinite(outputs).all(axis=(0, 2))
         if good := bool(finite.all()):
-            self._states, self._row = [one.last[0] for one in made], rows[-1].copy()
+            self._states = [one.last[0] for one in made]
+            self._last = np.stack([rows[-1], later[-1]])
         done = len(rows) if good else int(np.argmin(finite)) + 1
         at, outputs = slice(first, first + done), np.nan_to_num(outputs[:, :done])
         out.output[at], out.hidden[at] = outputs[0, :, 0], outputs[0, :, 1:]
         out.dry[at] = outputs[1, :, 0] - outputs[0, :, 0]
         out.viscous[at] = outputs[2, :, 0] - outputs[0, :, 0]
+        out.late[at], out.late_hidden[at] = outputs[3, :, 0], outputs[3, :, 1:]
         if not good:
             out.reset[first + done - 1] = True
             self._begin(rows[done - 1])

@@ -70,7 +70,7 @@ class UsualError:
 
         Args:
             seen: the motion.
-            drive: its pace, see `drive_changes.Drive`.
+            drive: its pace, see `monitor.drives.Drive`.
         """
         smooth = self._smooth.update(seen)
         steady = np.abs(seen.pace - smooth.pace) <= RIPPLE * PACE * smooth.pace

@@ -132,8 +132,7 @@ class MonitorProcess:
             self._cursor.write(*position)
 
     def look_around(self) -> None:
-        """Store the position, execute commands, check the link, publish the health."""
-        self.keep_position()
+        """Execute commands, check the link, publish the health."""
         for announced in self._operators.execute(self.rig.alarms, time.time_ns()):
             self.say(announced)
         self._change_models()
@@ -192,6 +191,7 @@ class MonitorProcess:
     def close(self) -> None:
         """Close all resources."""
         self.reader.close()
+        self._explainer.close()
         self._models.close()
         for kept in (self._journal, self._cursor):
             if kept:
@@ -343,12 +343,11 @@ def watch(process: MonitorProcess, stop: threading.Event) -> None:
         items = process.reader.read(process.turn_s())
         for item in items:
             process.take(item)
+        process.keep_position()
         # While samples come, not after each of them; silence is looked at without delay.
         if not items or time.monotonic() - looked >= TURN:
             looked = time.monotonic()
             process.look_around()
-        else:
-            process.keep_position()
         heartbeat.advance(process.reader.counters.delivered)
     heartbeat.stopping()
 

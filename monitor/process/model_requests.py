@@ -13,6 +13,7 @@ from monitor.pipeline import RigMonitor, check_can_follow
 from rigwatch.wire.bus import KEY, PATIENCE, Bus, CommandCheck, ModelReply, ModelRequest
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.messages import LONGEST_NAME, LONGEST_TEXT, Identity, ModelChange
+from rigwatch.wire.typed_files import JsonError, json_value
 
 
 @dataclass(eq=False)
@@ -77,8 +78,8 @@ class ModelDesk:
     def _take(self, question: bytes) -> list[bytes]:
         """In a thread of the bus: queue the request and wait."""
         try:
-            request = msgspec.json.decode(question, type=ModelRequest)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            request = json_value(question, ModelRequest)
+        except JsonError as error:
             return [msgspec.json.encode(ModelReply(False, f"not a model request: {error}"))]
         verdict = self._check.judge(request)
         if verdict.refusal:

@@ -16,6 +16,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -81,6 +82,7 @@ class Seat:
         self._joined: queue.SimpleQueue[Joined] = queue.SimpleQueue()
         self._pause, self._again_at = FIRST_PAUSE, float("inf")
         self._before = 0
+        self._settled = False
         self._look_at = 0.0
         self._connect()
 
@@ -113,13 +115,16 @@ class Seat:
             self._due.extend(_divided(process.reader.read(0.0)))
         for _ in range(min(MOST_BLOCKS, len(self._due))):
             process.take(self._due.popleft())
-        if self._due:  # only afterwards all that was read has been judged
-            return
-        if now < self._look_at:
-            process.keep_position()
-            return
-        process.look_around()
-        self._look_at, self._pause = now + LOOK_EVERY, FIRST_PAUSE
+        self._settled = not self._due  # all that was read has been judged
+        if self._settled and now >= self._look_at:
+            process.look_around()
+            self._look_at, self._pause = now + LOOK_EVERY, FIRST_PAUSE
+
+    def keep_position(self) -> None:
+        """Store the position once the turn's estimates have been sent: a kill loses none."""
+        if self._settled and self._process is not None:
+            self._process.keep_position()
+        self._settled = False
 
     def _connect(self) -> None:
         """Read the rig's files and wait for its router in a thread: it may never answer."""
@@ -179,12 +184,32 @@ def _divided(items: Iterable[Item]) -> Iterable[Item]:
             yield item
 
 
-def take_turns(seats: list[Seat], stop: threading.Event, heartbeat: Heartbeat) -> None:
-    """The loop over all rigs until `stop` is set."""
-    while not stop.is_set():
-        began = time.monotonic()
+def one_turn(seats: Iterable[Seat], together: Callable[[], AbstractContextManager[object]]) -> None:
+    """Judge what has come of all rigs, send it, and only then store the positions."""
+    with together():
         for seat in seats:
             seat.turn()
+    for seat in seats:
+        seat.keep_position()
+
+
+def take_turns(
+    seats: list[Seat],
+    stop: threading.Event,
+    heartbeat: Heartbeat,
+    together: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
+) -> None:
+    """The loop over all rigs until `stop` is set.
+
+    Args:
+        seats: the rigs.
+        stop: ends the loop.
+        heartbeat: of the process.
+        together: entered for each turn, so that what it sends leaves together.
+    """
+    while not stop.is_set():
+        began = time.monotonic()
+        one_turn(seats, together)
         heartbeat.advance(sum(seat.delivered for seat in seats))
         stop.wait(max(0.0, began + TURN - time.monotonic()))
 
@@ -206,7 +231,7 @@ def run_several(paths: list[Path]) -> int:
     links = SharedLinks(len(paths))
     seats = [Seat(path, _log.warning, partial(connect, links=links)) for path in paths]
     heartbeat.ready()
-    take_turns(seats, stop, heartbeat)
+    take_turns(seats, stop, heartbeat, links.together)
     heartbeat.stopping()
     for seat in seats:
         seat.close()

@@ -15,6 +15,7 @@ import msgspec
 from rigwatch.batch.job import Outcome
 from rigwatch.batch.parquet import lines_of, write_parquet
 from rigwatch.wire.errors import BatchError, reason_of
+from rigwatch.wire.typed_files import JsonError, decoded
 
 PARQUET = ".parquet"
 
@@ -104,8 +105,8 @@ class Journal:
 
     def _take(self, raw: bytes, at: int) -> None:
         try:
-            line = _DECODER.decode(raw)
-        except msgspec.DecodeError:
+            line = decoded(raw, _DECODER)
+        except JsonError:
             text = "holds a line that is no result, expected another name for new results"
             raise BatchError(f"{self.file}: {text}") from None
         if line.work != self.work:

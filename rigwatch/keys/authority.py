@@ -20,6 +20,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from rigwatch.wire.access import REGISTER, ROLES, Issued, Register, authority_file, key_files
 from rigwatch.wire.errors import KeysError, reason_of
 from rigwatch.wire.host import replace_file
+from rigwatch.wire.typed_files import json_value
 
 AUTHORITY_KEY = "authority.key"
 LONGEST_NAME = 40  # a common name holds 64 characters, with what stands around the name
@@ -40,10 +41,10 @@ class Authority:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         try:
-            self.register = msgspec.json.decode((folder / REGISTER).read_bytes(), type=Register)
+            self.register = json_value((folder / REGISTER).read_bytes(), Register)
             self._certificate = x509.load_pem_x509_certificate(authority_file(folder).read_bytes())
             key = serialization.load_pem_private_key((folder / AUTHORITY_KEY).read_bytes(), None)
-        except (OSError, ValueError, msgspec.MsgspecError) as error:
+        except (OSError, ValueError) as error:
             why = reason_of(error)
             raise KeysError(f"{folder}: no authority here: {why}; `rigwatch keys new`") from None
         assert isinstance(key, ec.EllipticCurvePrivateKey)

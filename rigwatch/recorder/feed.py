@@ -35,10 +35,17 @@ class Feed:
     ) -> None:
         self.samples = self.gap_samples = 0
         self._name = bus.process
-        self._reader = SampleReader(bus, resume_after, publish_gaps=not gaps_in_place)
+        self._reader = SampleReader(
+            bus, resume_after, publish_gaps=not gaps_in_place, patient=not gaps_in_place
+        )
         resumed = positions or {}
         self._numbered = {
-            line.name: bus.listen(line, resumed.get(line.name), gaps_in_place=gaps_in_place)
+            line.name: bus.listen(
+                line,
+                resumed.get(line.name),
+                gaps_in_place=gaps_in_place,
+                patient=not gaps_in_place,
+            )
             for line in _SUBSCRIBED
             if line.numbered
         }

@@ -10,7 +10,7 @@ that was stopped on purpose, a new session begins with the samples from then on.
 import re
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -76,11 +76,11 @@ def _unused(folder: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class _Interrupted:
-    """The newest session of a rig.
+    """A session of a rig that may go on.
 
     Attributes:
         place: its end.
-        ended_ns: time of its last sample [ns].
+        ended_ns: time of its last sample, or of its last file without any [ns].
         stopped: it was closed in order; a recorder that was killed misses what came since.
     """
 
@@ -88,22 +88,64 @@ class _Interrupted:
     ended_ns: int
     stopped: bool
 
+    @property
+    def complete(self) -> bool:
+        """Whether it says of samples and of messages where to go on."""
+        return self.stopped or bool(self.place.last and self.place.positions)
+
 
 def _interrupted(root: Path, run: RunInfo) -> _Interrupted | None:
-    """The newest session of this rig if it has samples and the same configuration."""
+    """The newest session of this rig if it has the same configuration.
+
+    One that was killed before it had samples goes on after those of the session before it.
+    """
+    newest: _Interrupted | None = None
+    for one in _sessions(root, run):
+        if newest is None:
+            newest = one
+        elif not one.stopped:
+            place, before = newest.place, one.place
+            last, positions = place.last or before.last, place.positions or before.positions
+            newest = replace(newest, place=Place(place.folder, last, positions))
+        if newest.complete or one.stopped:
+            break
+    return newest
+
+
+def _sessions(root: Path, run: RunInfo) -> Iterator[_Interrupted]:
+    """Sessions of this rig, the newest first, back to another configuration."""
+    for folder in _newest_first(root, run.rig):
+        try:
+            session = open_session(folder)
+            if session.info.configuration_sha256 != run.configuration_sha256:
+                return
+            yield _end_of(session)
+        except (OSError, SessionError, ValueError):
+            continue  # killed before its first message
+
+
+def _newest_first(root: Path, rig: str) -> list[Path]:
     try:
-        folders = [path for path in sessions_of(root, run.rig) if any(path.glob(f"*{SUFFIX}"))]
-        newest = max(folders, key=lambda path: max(f.stat().st_mtime for f in path.iterdir()))
-        session = open_session(newest)
-        same = session.info.configuration_sha256 == run.configuration_sha256
-        last = last_block(session, SAMPLES) if same else None
-    except (OSError, SessionError, ValueError):
-        return None
-    if last is None:
-        return None
-    place = Place(newest, (last.boot, last.seq + len(last) - 1), load_positions(newest))
-    end = Session(newest, session.segments[-1:])
-    return _Interrupted(place, int(last.t_ns[-1]), not end.unclosed)
+        folders = [path for path in sessions_of(root, rig) if any(path.glob(f"*{SUFFIX}"))]
+        return sorted(folders, key=_written_ns, reverse=True)
+    except OSError:
+        return []
+
+
+def _written_ns(folder: Path) -> int:
+    return max(file.stat().st_mtime_ns for file in folder.iterdir())
+
+
+def _end_of(session: Session) -> _Interrupted:
+    block, stopped = last_block(session, SAMPLES), not _broke_off(session)
+    last = None if block is None else (block.boot, block.seq + len(block) - 1)
+    ended_ns = _written_ns(session.path) if block is None else int(block.t_ns[-1])
+    place = Place(session.path, last, load_positions(session.path))
+    return _Interrupted(place, ended_ns, stopped)
+
+
+def _broke_off(session: Session) -> bool:
+    return bool(Session(session.path, session.segments[-1:]).unclosed)
 
 
 def last_block(session: Session, topic: Topic) -> Block | None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import msgspec
 
 from rigwatch.wire.bus import Place
+from rigwatch.wire.typed_files import JsonError, json_value
 
 FILE = "positions.json"
 Positions = dict[str, dict[str, Place]]
@@ -27,6 +28,6 @@ def save_positions(folder: Path, positions: Positions) -> None:
 def load_positions(folder: Path) -> Positions:
     """The positions stored in `folder`; empty if they cannot be read."""
     try:
-        return msgspec.json.decode((folder / FILE).read_bytes(), type=Positions)
-    except (OSError, msgspec.DecodeError, ValueError):
+        return json_value((folder / FILE).read_bytes(), Positions)
+    except (OSError, JsonError):
         return {}

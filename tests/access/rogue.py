@@ -33,11 +33,17 @@ KINDS = 200
 BOOT = 5
 """The boot of the rig's real samples, which a client reads on the bus."""
 SAID = tuple(topic.key for topic in TOPICS)
+NAMED = (
+    "source/0", "source/5", "source/x", "said/monitor/0", "said/monitor/5", "said/witness/1",
+    "said/nobody/0",
+)  # fmt: skip
+"""Keys at which the holders of tokens say their names."""
 ALLOWED_SAID = ("events", "gaps", "health")
 """Topics on which every role may publish."""
 ASKED = (
     KEY, "monitor/standing", "monitor/receiver", RING_KEY, "ring/monitor/alarms",
     "ring/monitor/estimates", "ring/monitor/models", "ring/witness/alarms", "ring/nobody/alarms",
+    "source/*", "source/0", "said/*/*", "said/monitor/0",
 )  # fmt: skip
 _EXTREMES = (0, -1, 7, 10**9, 2**31, 2**53, 2**62, -(2**63), 2**63 - 1)
 _TEXTS = ("", "*", "eve", "x" * 5000, "\x00", "ß" * 300, "../../etc/passwd", "[" * 2000)
@@ -50,7 +56,9 @@ def kinds(seed: int = 1) -> list[bytes]:
 
 
 def _payload(number: int, chance: random.Random) -> bytes:
-    makers = (_forged, _forged, _mutated, _cut, _random_bytes, _question, _wish, _bomb)
+    makers = (
+        _forged, _forged, _mutated, _cut, _random_bytes, _question, _wish, _bomb, _token_name,
+    )  # fmt: skip
     return makers[number % len(makers)](chance)
 
 
@@ -121,6 +129,13 @@ def _wish(chance: random.Random) -> bytes:
     return json.dumps(wish).encode()
 
 
+def _token_name(chance: random.Random) -> bytes:
+    """The name of a token that the sender does not hold."""
+    key, run = chance.choice(NAMED), chance.choice((BOOT, *_EXTREMES))
+    identity = chance.choice(("", "0" * 32, "f" * 32, "x" * 300))
+    return f"rig/bench/{key} {run}/{chance.choice(_EXTREMES)}/{identity}".encode()
+
+
 def _bomb(chance: random.Random) -> bytes:
     nested = {"action": "promote", "user": "ann", "text": "", "model": "a = " + "[" * 50_000}
     return chance.choice((
@@ -132,5 +147,5 @@ def _bomb(chance: random.Random) -> bytes:
 def everything(payloads: list[bytes]) -> Iterator[tuple[str, str, bytes]]:
     """Each payload at each topic and queryable: "put" or "ask", key, payload."""
     for payload in payloads:
-        yield from (("put", key, payload) for key in SAID)
+        yield from (("put", key, payload) for key in (*SAID, *NAMED))
         yield from (("ask", key, payload) for key in ASKED)

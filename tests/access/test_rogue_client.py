@@ -4,14 +4,14 @@ import time
 from pathlib import Path
 
 from tests.access.attack import attacked
-from tests.access.rogue import ASKED, KINDS, SAID, everything, kinds
+from tests.access.rogue import ASKED, KINDS, NAMED, SAID, everything, kinds
 
 
 def test_two_hundred_kinds_of_message_change_nothing(tmp_path: Path) -> None:
     payloads = kinds()
     assert len(set(payloads)) > 0.8 * KINDS
     messages = list(everything(payloads))
-    assert len(messages) == KINDS * (len(SAID) + len(ASKED))
+    assert len(messages) == KINDS * (len(SAID) + len(NAMED) + len(ASKED))
     with attacked(tmp_path) as rig:
         # Every seventh: all of them run in `python -m benchmarks rogue_client`.
         rig.attack(messages[::7], time.monotonic() + 60.0)

@@ -6,7 +6,7 @@ import pytest
 
 from rigwatch.browser.recordings.looking import look_at
 from rigwatch.browser.work.apart import ApartError, apart
-from rigwatch.browser.work.desk import warm_up
+from rigwatch.browser.work.study_process import warm_up
 
 pytestmark = pytest.mark.xdist_group("browser")
 

@@ -5,12 +5,16 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from multiprocessing.forkserver import _forkserver
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
-from rigwatch.browser.work.desk import BusyError, Desk, Desks, warm_up
+from rigwatch.browser.work.desk import BusyError, Desk, Desks
 from rigwatch.browser.work.results import FOLDER, results_of
+from rigwatch.browser.work.study_process import warm_up
 from rigwatch.workbench.study.folder import FILE
 from rigwatch.workbench.study.ledger import lines
 from rigwatch.workbench.study.study import open_study
@@ -81,6 +85,37 @@ def test_progress_is_received_and_a_second_task_is_refused_meanwhile(desk: Desk)
         kept = results_of(open_study(desk.folder))
         assert kept.read("explanation")["ranking"]
         assert kept.read("evidence")
+
+    asyncio.run(story())
+
+
+@contextmanager
+def busy_fork_server() -> Iterator[Timer]:
+    """While it still loads the engine; it goes on in the end, also for who waits for it."""
+    server = vars(_forkserver)["_forkserver_pid"]
+    os.kill(server, signal.SIGSTOP)
+    patience = Timer(2.0, os.kill, (server, signal.SIGCONT))
+    patience.start()
+    try:
+        yield patience
+    finally:
+        patience.cancel()
+        os.kill(server, signal.SIGCONT)
+
+
+def test_nobody_waits_for_a_process_to_start_and_it_can_be_cancelled_before(desk: Desk) -> None:
+    async def story() -> None:
+        with busy_fork_server() as server:
+            desk.ask("explain", {})
+            starting = desk._process
+            assert desk.cancel()
+            desk.ask("show", {})
+            assert server.is_alive(), "waited for the fork server"
+        assert starting is not None
+        await until(lambda: starting.pid and not starting.is_alive(), "the end of the cancelled")
+        await until(lambda: desk.job and not desk.job.active, "the task that came after it")
+        assert desk.job is not None
+        assert (desk.job.task, desk.job.state) == ("show", "done")
 
     asyncio.run(story())
 

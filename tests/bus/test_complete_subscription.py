@@ -118,6 +118,27 @@ def test_messages_of_a_restarted_process_arrive_from_the_first_on_and_the_break_
     ]
 
 
+def test_a_listener_started_again_hears_all_of_a_process_that_began_meanwhile() -> None:
+    network = MemoryNetwork()
+    monitor = network.bus("r", "monitor")
+    say(monitor, range(2))
+    first = network.bus("r", "listener").listen(ALARMS)
+    say(monitor, range(2, 3))
+    assert heard(first, 2) == [2]
+    first.close()
+    say(monitor, range(3, 5))
+    say(network.bus("r", "witness"), range(10, 12))
+    again = network.bus("r", "listener").listen(ALARMS, first.positions())
+    found: set[int] = set()
+
+    def complete() -> bool:
+        found.update(message.seq for message in again.drain())
+        return len(found) >= 4
+
+    eventually(complete, "all of both processes")
+    assert found == {3, 4, 10, 11}
+
+
 def test_two_processes_that_say_alarms_are_both_heard():
     network = MemoryNetwork()
     listener = network.bus("r", "listener").subscribe(ALARMS)

@@ -296,6 +296,62 @@ def test_an_unanswered_hole_is_given_up_after_some_tries_while_samples_come() ->
     assert bench.ledger.lost(7) == 4
 
 
+def test_a_patient_reader_asks_until_a_slow_ring_answers() -> None:
+    bench = Bench(SampleOrder(patient=True), ring_replies=False)
+    bench.take(bench.order.on_token(7, 1, True))
+    bench.send(block(0))
+    bench.keep(block(1, 4))
+    bench.send(block(5))
+    for seq in range(6, 6 + 4 * TRIES):
+        bench.send(block(seq))
+        bench.reply()
+    bench.ring_replies = True
+    bench.reply_all()
+    bench.ledger.assert_complete(7, 0, 5 + 4 * TRIES)
+    assert bench.losses == []
+
+
+def test_a_patient_reader_asks_for_the_end_of_a_boot_while_the_next_one_sends() -> None:
+    bench = Bench(SampleOrder(patient=True), ring_replies=False)
+    bench.take(bench.order.on_token(7, 1, True))
+    bench.send(block(0))
+    bench.keep(block(1, 4))
+    bench.take(bench.order.on_token(7, 1, False))
+    bench.take(bench.order.on_token(8, 2, True))
+    for seq in range(4 * TRIES):
+        bench.send(block(seq, boot=8))
+        bench.reply()
+    bench.ring_replies = True
+    bench.reply_all()
+    bench.ledger.assert_complete(7, 0, 4)
+    bench.ledger.assert_complete(8, 0, 4 * TRIES - 1)
+    assert bench.losses == []
+
+
+def test_a_patient_reader_gives_up_if_no_source_is_known() -> None:
+    bench = Bench(SampleOrder(patient=True), ring_replies=False)
+    bench.send(block(0))
+    bench.send(block(5))
+    for seq in range(6, 6 + TRIES):
+        bench.send(block(seq))
+        bench.reply()
+    bench.ledger.assert_complete(7, 0, 5 + TRIES)
+    assert bench.ledger.lost(7) == 4
+
+
+def test_a_patient_reader_gives_up_if_too_much_waits_behind_the_end_of_a_boot() -> None:
+    bench = Bench(SampleOrder(capacity=4, patient=True), ring_replies=False)
+    bench.take(bench.order.on_token(7, 1, True))
+    bench.send(block(0))
+    bench.take(bench.order.on_token(7, 1, False))
+    bench.take(bench.order.on_token(8, 2, True))
+    bench.send(block(0, 5, boot=8))
+    for _ in range(TRIES):
+        bench.reply()
+    bench.ledger.assert_complete(8, 0, 4)
+    assert bench.ledger.unknown_ends == [7]
+
+
 def test_a_broken_link_is_waited_for_as_long_as_the_source_lives() -> None:
     bench = Bench(ring_replies=False)
     bench.take(bench.order.on_token(7, 1, True))

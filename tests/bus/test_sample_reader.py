@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rigwatch.wire.bus import ring_questions
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.delivery.ring import SampleRing
@@ -20,6 +21,9 @@ from tests.bus.rig import TestRig, kill, stopped
 from tests.bus.samples import Ledger, block
 from tests.faults.field import least_of
 from tests.waiting import eventually
+
+SHORT = 0.05
+"""First wait of a reader for a slow ring [s]."""
 
 
 class Listener:
@@ -74,6 +78,37 @@ class Listener:
 def rig(tmp_path: Path) -> Iterator[TestRig]:
     with TestRig(tmp_path) as made:
         yield made
+
+
+class SlowRing(SampleRing):
+    """A ring whose answers take several times as long as a reader first waits for them."""
+
+    def _answer(self, question: bytes) -> list[bytes]:
+        time.sleep(5 * SHORT)
+        return super()._answer(question)
+
+
+def test_what_a_slow_ring_has_is_not_given_up_by_a_patient_reader(
+    rig: TestRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ring_questions, "REPLY_TIMEOUT", SHORT)
+    rig.router()
+    source = rig.bus("daq")
+    ring = SlowRing(source, 4096)
+    listener = Listener(rig.bus("reader"), patient=True)
+    seq = 0
+    while not listener.reader.counters.recovered:
+        assert seq < 20_000, "the ring is never heard"
+        ring.add(block(seq, 5))
+        if seq != 5:
+            source.publish(SAMPLES, block(seq, 5))
+        seq += 5
+        time.sleep(SHORT / 5)
+    listener.reaches(7, seq - 1)
+    listener.close()
+    listener.ledger.assert_complete(7, 0, seq - 1)
+    assert listener.ledger.lost(7) == 0
+    ring.close()
 
 
 def test_a_router_that_is_killed_and_comes_back_costs_no_sample(rig: TestRig) -> None:

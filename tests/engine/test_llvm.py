@@ -21,7 +21,9 @@ TEXTS = [
     "1/sqrt(x)", "x/sqrt(v)**3", "sqrt(abs(v))*x", "x**k", "sin(x) + cos(v) + atan(k)",
     "tanh(x/0.01)",
     "exp(-(v/0.5)**2)", "log(x)", "floor(x*3.3)", "sign(x)*abs(v)", "max(x, min(v, k))",
-    "where(x > v, x, v/k)", "where(x <= 0, where(v >= k, 1.5, x), v)", "x*t + 0.1", "3",
+    "where(x > v, x, v/k)", "where(x <= 0, where(v >= k, 1.5, x), v)",
+    "where(where(x > v, x, -k)*v > 0, x, k)", "where(where(x > 0, 1, 0) > 0.5, v, k)",
+    "x*t + 0.1", "3",
 ]  # fmt: skip
 
 

@@ -44,6 +44,21 @@ def test_friction_is_named_in_newtons(drive) -> None:
     assert np.median(force) == pytest.approx(0.6, rel=0.2)
 
 
+@pytest.mark.parametrize("early", [0.3, 0.6])
+def test_voltage_that_acts_earlier_than_in_commissioning_is_no_fault(early) -> None:
+    channels = run(SINE, 12.0, coulomb(8.0), seed=6)
+    voltage = channels["voltage"]
+    channels["voltage"] = (1.0 - early) * voltage + early * np.roll(voltage, 1)
+
+    found = watched(channels)
+
+    times = raised(found)
+    assert min(times[name] for name in FAULTS & times.keys()) >= 8.0
+    assert times["dry_friction"] < 8.5
+    force = found.estimates.column("friction_force").values[round(10.0 * RATE) :]
+    assert np.median(force) == pytest.approx(0.6, rel=0.2)
+
+
 def test_accelerometer_fault_is_not_called_friction() -> None:
     channels = run(SINE, 10.0, seed=5)
     channels["acceleration"][round(6.0 * RATE) :] *= 1.5

@@ -70,6 +70,7 @@ class Bench:
     def turn(self) -> None:
         for item in self.monitor.reader.read(0.0):
             self.monitor.take(item)
+        self.monitor.keep_position()
         self.monitor.look_around()
 
     def turn_until(self, seq: int) -> None:

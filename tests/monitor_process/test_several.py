@@ -1,12 +1,13 @@
 """Several rigs in one process: each as if alone, and one that fails or is away delays none."""
 
+import contextlib
 import threading
 from pathlib import Path
 
 import pytest
 
 from monitor.pipeline import RigMonitor
-from monitor.process.several import Seat, run_several
+from monitor.process.several import Seat, one_turn, run_several
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.delivery import SampleRing
@@ -56,16 +57,14 @@ class Bench:
         """Turn until the monitors of these rigs read: what is sent before is none of theirs."""
 
         def done() -> bool:
-            for seat in self.seats:
-                seat.turn()
+            one_turn(self.seats, contextlib.nullcontext)
             return all(self.seats[n].is_running for n in numbers)
 
         assert wait_until(done, PATIENCE, 0.001)
 
     def turn_until(self, numbers: range, seq: int) -> None:
         def done() -> bool:
-            for seat in self.seats:
-                seat.turn()
+            one_turn(self.seats, contextlib.nullcontext)
             return all(self.last(number) >= seq for number in numbers)
 
         assert wait_until(done, PATIENCE, 0.001)
@@ -143,7 +142,7 @@ def test_a_wrong_file_is_named_and_its_rig_joins_once_it_is_right(tmp_path, monk
     seat = Seat(path, said.append, lambda config, process: network.bus(config.rig.id, process))
 
     def turned(holds):
-        seat.turn()
+        one_turn([seat], contextlib.nullcontext)
         return holds()
 
     assert wait_until(lambda: turned(lambda: said), PATIENCE, 0.001)

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from monitor.observer.drive_changes import Drive, DriveChanges
+from monitor.drives import Drive, DriveChanges
 from monitor.signals import GOOD, NEW_BOOT
 
 RATE, N, CHANGE = 256.0, 3072, 2048

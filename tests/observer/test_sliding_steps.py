@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from monitor.observer.sliding_steps import Sliding, SlidingSteps
+from monitor.drives import Sliding, SlidingSteps
 from monitor.signals import GOOD, NEW_BOOT
 
 WIDTH, N, FINE = 4, 5000, 16

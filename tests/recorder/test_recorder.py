@@ -259,6 +259,46 @@ def test_a_recorder_started_again_keeps_what_was_said_meanwhile(config: Path) ->
     assert [message.seq for message in said if isinstance(message, Alarm)] == list(range(9))
 
 
+@pytest.mark.parametrize("torn", [False, True])
+@pytest.mark.parametrize("pause_s", [0, 1000])
+def test_one_killed_before_it_had_samples_leaves_no_hole_in_the_alarms(
+    config: Path, pause_s: int, *, torn: bool
+) -> None:
+    network = MemoryNetwork()
+    monitor = network.bus("bench1", "monitor")
+    rig = load_rig(config)
+    run = describe_run(config, rig)
+
+    def recorder(t_ns: int) -> Recorder:
+        return Recorder(rig, dataclasses.replace(run, t_ns=t_ns), network.bus("bench1", "recorder"))
+
+    def records(one: Recorder, count: int) -> None:
+        def done() -> bool:
+            one.turn(0.0, time.time_ns())
+            return one.feed.positions()["alarms"].get("monitor", (0, -1))[1] + 1 >= count
+
+        eventually(done, f"{count} alarms are taken")
+
+    first = recorder(run.t_ns)
+    monitor.publish(ALARMS, alarm(0))
+    records(first, 1)
+    first.feed.close()
+    if torn:  # the next one was killed, too, as it began a file
+        place = first.store.folder.with_name("bench1-20991231T000000Z")
+        place.mkdir()
+        (place / "000001.mcap").touch()
+    for seq in range(1, 4):
+        monitor.publish(ALARMS, alarm(seq))
+    second = recorder(time.time_ns() + pause_s * 10**9)
+    monitor.publish(ALARMS, alarm(4))
+    records(second, 5)
+    second.close(1.0, time.time_ns())
+    folders = dict.fromkeys([first.store.folder, second.store.folder])
+    assert len(folders) == (2 if pause_s else 1)
+    kept = [item.message for one in folders for item in open_session(one).messages(["alarms"])]
+    assert [message.seq for message in kept if isinstance(message, Alarm)] == list(range(5))
+
+
 @pytest.fixture
 def router(config: Path) -> Iterator[None]:
     close = open_router(load_rig(config).bus.listen)

@@ -81,6 +81,7 @@ class Bench:
     def turn(self) -> None:
         for item in self.monitor.reader.read(0.0):
             self.monitor.take(item)
+        self.monitor.keep_position()
         self.monitor.look_around()
 
     def ask(self, change: ModelRequest) -> ModelReply:

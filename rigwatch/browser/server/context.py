@@ -14,6 +14,7 @@ from starlette.responses import PlainTextResponse, Response
 from rigwatch.browser.server.places import PlaceError, Places
 from rigwatch.browser.work import Desk, Desks, as_plain
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.typed_files import JsonError, json_value
 
 MOST_BODY = 1 << 20
 """Largest request that is not an upload [bytes]."""
@@ -93,8 +94,8 @@ async def body_of(request: Request) -> dict[str, Any]:
         if len(whole) > MOST_BODY:
             raise RigwatchError(f"found more than {MOST_BODY} bytes, expected a short request")
     try:
-        return msgspec.json.decode(whole or b"{}", type=dict[str, Any])
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        return json_value(bytes(whole) or b"{}", dict[str, Any])
+    except JsonError as error:
         raise RigwatchError(f"found no JSON: {error}") from None
 
 

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from rigwatch.browser.work.desk import WORKERS
+from rigwatch.browser.work.study_process import WORKERS
 from rigwatch.browser.work.worker import end_with_parent
 from rigwatch.wire.errors import RigwatchError
 

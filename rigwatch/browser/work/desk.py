@@ -1,22 +1,16 @@
 """The server's side of the study processes: one per study, one task at a time, killed to cancel."""
 
 import asyncio
-import multiprocessing
-import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from multiprocessing.connection import Connection
-from multiprocessing.forkserver import ensure_running
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from rigwatch.browser.work.worker import work
+from rigwatch.browser.work.study_process import StudyProcess
 from rigwatch.wire.errors import RigwatchError
 
-WORKERS = multiprocessing.get_context("forkserver")
 MOST_PROCESSES = 4
 """Number of idle processes kept for the next task of their studies."""
 MOST_WAITING = 64
@@ -104,8 +98,7 @@ class Desk:
     job: Job | None = None
     listeners: Listeners[Told] = field(default_factory=Listeners)
     _queue: list[Job] = field(default_factory=list)
-    _process: BaseProcess | None = None
-    _pipe: Connection | None = None
+    _process: StudyProcess | None = None
     _number: int = 0
 
     def ask(self, task: str, arguments: Mapping[str, Any]) -> Job:
@@ -170,32 +163,13 @@ class Desk:
             self._open().send((self.job.task, dict(self.job.arguments)))
             self.tell("job")
 
-    def _open(self) -> Connection:
-        if self._pipe is None or self._process is None or not self._process.is_alive():
-            self._pipe, theirs = WORKERS.Pipe()
-            self._process = WORKERS.Process(
-                target=work, args=(theirs, str(self.folder)), daemon=True
-            )
-            self._process.start()
-            theirs.close()
-            loop = asyncio.get_running_loop()
-            heard = (self._pipe, loop)
-            threading.Thread(target=self._hear, args=heard, daemon=True).start()
-        return self._pipe
+    def _open(self) -> StudyProcess:
+        if self._process is None or not self._process.is_alive():
+            self._process = StudyProcess(self.folder, self._said)
+        return self._process
 
-    def _hear(self, pipe: Connection, loop: asyncio.AbstractEventLoop) -> None:
-        """In a separate thread: forward the messages of the process."""
-        said: tuple[str, Any] = ("", None)
-        while said[0] != "gone":
-            try:
-                said = pipe.recv()
-            except (EOFError, OSError):
-                said = ("gone", None)
-            with suppress(RuntimeError):  # the loop may be closed already
-                loop.call_soon_threadsafe(self._said, pipe, *said)
-
-    def _said(self, pipe: Connection, kind: str, content: Any) -> None:
-        if pipe is not self._pipe or self.job is None:
+    def _said(self, process: StudyProcess, kind: str, content: Any) -> None:
+        if process is not self._process or self.job is None:
             return
         if kind == "progress":
             self._change(text=str(content))
@@ -220,7 +194,7 @@ class Desk:
         self.tell("job")
 
     def _end_process(self) -> None:
-        process, self._process, self._pipe = self._process, None, None
+        process, self._process = self._process, None
         if process is not None:
             process.kill()
 
@@ -266,9 +240,3 @@ class Desks:
                         seen[folder] = now
                         desk.tell("study")
             await asyncio.sleep(every)
-
-
-def warm_up() -> None:
-    """Start the process from which the others are forked, with the engine loaded."""
-    multiprocessing.set_forkserver_preload(["rigwatch.browser.work.worker"])
-    ensure_running()

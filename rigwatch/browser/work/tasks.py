@@ -12,7 +12,8 @@ from rigwatch.browser.work.directions import write_directions
 from rigwatch.browser.work.results import Results, as_plain, results_of, signal_key
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Bench, Warm, locate, sample_numbers
-from rigwatch.workbench.explain import Experiment, excitation, explanation, ranking
+from rigwatch.workbench.experiment import Experiment, excitation
+from rigwatch.workbench.explain import explanation, ranking
 from rigwatch.workbench.fit import Fitted, block_differences
 from rigwatch.workbench.ranking import Ranked, difference
 from rigwatch.workbench.report import write_report

@@ -1,11 +1,14 @@
 """Fetches spans of a site's recordings in a separate thread, so that recording never waits."""
 
 import contextlib
+import secrets
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from queue import Queue, SimpleQueue
+
+from msgspec import structs
 
 from rigwatch.recorder.past.pages import Page, Question
 from rigwatch.wire.bus import Bus
@@ -53,6 +56,7 @@ class PastQuestions:
         self._bus, self._reachable = bus, reachable
         self._questions: SimpleQueue[tuple[str, Question] | None] = SimpleQueue()
         self._closed = threading.Event()
+        self._name = secrets.token_hex(8)
         self._thread = threading.Thread(target=self._work, name="past-questions", daemon=True)
         self._left = bus.at_close(self.close)
         self._thread.start()
@@ -81,6 +85,7 @@ class PastQuestions:
 
     def _fetch(self, name: str, question: Question) -> None:
         heard_at = time.monotonic()
+        question = structs.replace(question, asker=self._name)
         while not self._closed.is_set():
             page = self._page(question)
             # The last page may lack what is not on the disk yet.
@@ -90,7 +95,7 @@ class PastQuestions:
                 self._answers.put(Answer(name, page.parts, ended, complete=ended))
                 if ended:
                     return
-                question = _after(question, page)
+                question = structs.replace(question, bookmark=page.bookmark)
                 continue
             if not self._reachable():
                 heard_at = time.monotonic()
@@ -104,7 +109,3 @@ class PastQuestions:
             for data in self._bus.query(PAST_KEY, question.to_bytes(), REPLY_TIMEOUT):
                 return Page.from_bytes(data)
         return None
-
-
-def _after(question: Question, page: Page) -> Question:
-    return Question(question.topics, question.start, question.end, page.bookmark)

@@ -14,6 +14,7 @@ from rigwatch.wire.bus import MAX_PAYLOAD
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import TOPICS, Topic
 from rigwatch.wire.session import Part
+from rigwatch.wire.typed_files import JsonError, json_value
 
 PAGE_BYTES = MAX_PAYLOAD // 2
 LARGEST_QUESTION = 4096
@@ -30,12 +31,16 @@ class Bookmark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Messages of these topics with times in [start, end) [ns], from a bookmark on."""
+    """Messages of these topics with times in [start, end) [ns], from a bookmark on.
+
+    `asker` tells askers apart, which share the rate of the answers.
+    """
 
     topics: tuple[str, ...]
     start: int
     end: int
     bookmark: Bookmark | None = None
+    asker: str = ""
 
     def to_bytes(self) -> bytes:
         """The question as bytes."""
@@ -49,8 +54,8 @@ class Question(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             MessageError: the bytes are not a question.
         """
         try:
-            return msgspec.json.decode(data[:LARGEST_QUESTION], type=cls)
-        except (msgspec.DecodeError, ValueError, RecursionError) as error:
+            return json_value(data[:LARGEST_QUESTION], cls)
+        except JsonError as error:
             raise MessageError(f"question to the recordings: {error}") from None
 
 
@@ -91,9 +96,9 @@ class Page:
         try:
             (length,) = _HEAD.unpack_from(data)
             at = _HEAD.size + length
-            head = msgspec.json.decode(data[_HEAD.size : at], type=_Head)
+            head = json_value(data[_HEAD.size : at], _Head)
             return cls(tuple(_parts(data, at)), head.settled, head.bookmark)
-        except (struct.error, IndexError, ValueError, RecursionError) as error:
+        except (struct.error, IndexError, ValueError) as error:
             raise MessageError(f"page of a recording: {error}") from None
 
 

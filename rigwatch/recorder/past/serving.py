@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rigwatch.recorder.folders import sessions_of
 from rigwatch.recorder.past.pages import PAGE_BYTES, Bookmark, Page, Question
+from rigwatch.recorder.past.shares import Shares
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.messages import PAST_KEY, topic
 from rigwatch.wire.session import SUFFIX, Place, Wanted, read_page
@@ -13,7 +14,8 @@ from rigwatch.wire.session import SUFFIX, Place, Wanted, read_page
 BYTES_PER_SECOND = 4_000_000
 """Rate of the answers, so that the recording goes on beside them: 25 rigs as they run [bytes/s]."""
 AHEAD = 1.0
-"""How far answers may be ahead of that rate; a question beyond gets none, and is repeated [s]."""
+"""How far answers may be ahead of that rate; a question beyond gets none, and is repeated [s].
+Of several askers those that had less are served first."""
 PAGE_TIME, SHARE = 0.05, 0.5
 """Time after which a page ends, however little was found [s], and share of the time for pages."""
 _MARGIN = 60.0
@@ -31,6 +33,7 @@ class PastServer:
     def __init__(self, bus: Bus, root: Path, settled: Callable[[], int]) -> None:
         self._rig, self._root, self._settled = bus.rig, root, settled
         self._free_at = 0.0
+        self._shares = Shares()
         self.close = bus.serve(PAST_KEY, self.answer)
 
     def answer(self, data: bytes) -> list[bytes]:
@@ -39,11 +42,15 @@ class PastServer:
         It never waits: what waits here delays the end of the recorder.
         """
         question, began = Question.from_bytes(data), time.monotonic()
+        if not self._shares.admits(question.asker, began):
+            return []
         if self._free_at > began + AHEAD:
+            self._shares.refused(question.asker, began)
             return []
         page = self.page(question).to_bytes()
         taken = max(len(page) / BYTES_PER_SECOND, (time.monotonic() - began) / SHARE)
         self._free_at = max(self._free_at, began) + taken
+        self._shares.served(question.asker, taken, began)
         return [page]
 
     def page(self, question: Question) -> Page:

@@ -5,6 +5,7 @@ from pathlib import Path
 import msgspec
 
 from rigwatch.wire.errors import KeysError, reason_of
+from rigwatch.wire.typed_files import JsonError, json_value
 
 REGISTER = "register.json"
 ROLES = ("router", "device", "daq", "monitor", "recorder", "witness", "dashboard", "operator")
@@ -44,8 +45,8 @@ def read_register(folder: Path) -> Register:
     """
     path = folder / REGISTER
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Register)
-    except (OSError, ValueError, RecursionError) as error:
+        return json_value(path.read_bytes(), Register)
+    except (OSError, JsonError) as error:
         raise KeysError(f"{path}: register cannot be read: {reason_of(error)}") from None
 
 

@@ -14,6 +14,7 @@ import time
 import msgspec
 
 from rigwatch.wire.errors import KeysError
+from rigwatch.wire.typed_files import JsonError, json_value
 
 VERSION = "rigwatch command 1"
 LARGEST_PROOF = 1 << 13
@@ -76,8 +77,8 @@ def read_proof(text: str) -> Proof:
     if len(text) > LARGEST_PROOF:
         raise KeysError(f"its proof has {len(text)} characters, expected at most {LARGEST_PROOF}")
     try:
-        return msgspec.json.decode(text.encode(), type=Proof)
-    except (ValueError, RecursionError):
+        return json_value(text.encode(), Proof)
+    except (JsonError, UnicodeEncodeError):
         raise KeysError("its proof cannot be read") from None
 
 

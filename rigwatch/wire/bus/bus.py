@@ -92,10 +92,11 @@ class Bus:
         capacity: int = QUEUE_CAPACITY,
         *,
         gaps_in_place: bool = False,
+        patient: bool = False,
     ) -> CompleteSubscription:
         """The messages of a numbered topic, after those that an earlier run has processed."""
         return CompleteSubscription(
-            self, topic, capacity, resume_after, gaps_in_place=gaps_in_place
+            self, topic, capacity, resume_after, gaps_in_place=gaps_in_place, patient=patient
         )
 
     def subscribe_lossy(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:

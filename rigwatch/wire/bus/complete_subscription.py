@@ -44,8 +44,10 @@ class CompleteSubscription(Subscription):
         topic: a numbered topic.
         capacity: messages queued before further ones are left to the ring.
         resume_after: run and number of the last message of each process that an earlier run of this
-            subscriber has processed; None for messages from now on.
+            subscriber has processed; a process that is not among them has begun since, and is
+            followed from its first message on. None for messages from now on.
         gaps_in_place: losses are not published but returned among the messages, in their place.
+        patient: see `SampleOrder`.
 
     Attributes:
         lost: messages known to be lost.
@@ -60,10 +62,11 @@ class CompleteSubscription(Subscription):
         resume_after: Mapping[str, Place] | None = None,
         *,
         gaps_in_place: bool = False,
+        patient: bool = False,
     ) -> None:
         super().__init__(topic, capacity)
         self.lost = self.foreign = 0
-        self._bus, self._gaps_in_place = bus, gaps_in_place
+        self._bus, self._gaps_in_place, self._patient = bus, gaps_in_place, patient
         self._senders: dict[str, Sender] = {}
         self._runs: dict[int, str] = {}
         self._assumed: dict[str, int] = {}
@@ -72,7 +75,8 @@ class CompleteSubscription(Subscription):
         self._ready: deque[Any] = deque()
         self._reports: list[Gap | Event] = []
         self._behind = False
-        self._began_ns = time.time_ns()
+        # The earlier run knew every process of its time.
+        self._began_ns = time.time_ns() if resume_after is None else 0
         self._looked_at = time.monotonic()
         self._questions = RingQuestions(bus, self._answered)
         self._start(dict(resume_after or {}))
@@ -82,8 +86,10 @@ class CompleteSubscription(Subscription):
         found = [_parsed(*one) for one in self._bus.names(places)]
         unnamed = {process for process, token in found if token is None}
         there = sorted((token for _, token in found if token), key=lambda token: token[2])
-        for process, run, _, _ in there:
-            resume_after.setdefault(process, (run, self._newest(process, run)))
+        for process, run, since_ns, _ in there:
+            if process not in resume_after:
+                last = self._newest(process, run) if since_ns < self._began_ns else -1
+                resume_after[process] = run, last
         for process, place in resume_after.items():
             self._follow(process, place)
         for token in there:
@@ -235,7 +241,7 @@ class CompleteSubscription(Subscription):
         """Follow a further process, unless the limit is reached."""
         if len(self._senders) >= MOST_SENDERS:
             return False
-        self._senders[process] = Sender(place)
+        self._senders[process] = Sender(place, patient=self._patient)
         return True
 
     def _take_message(self, payload: bytes, sender: str, mark: bytes) -> None:

@@ -62,6 +62,15 @@ class SharedLinks:
         finally:
             place.lock.release()
 
+    @contextlib.contextmanager
+    def together(self) -> Iterator[None]:
+        """Send what rigs put meanwhile together, at the end or if it has waited for too long."""
+        held = [place.link for place in tuple(self._places.values()) if place.link is not None]
+        with contextlib.ExitStack() as stack:
+            for link in held:
+                stack.enter_context(link.together())
+            yield
+
     def close(self) -> None:
         """Close the links, after all transports over them."""
         for place in self._places.values():

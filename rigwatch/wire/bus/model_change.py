@@ -8,6 +8,7 @@ import msgspec
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.command_check import signed
 from rigwatch.wire.errors import BusError
+from rigwatch.wire.typed_files import JsonError, json_value
 
 KEY = "monitor/model"
 PATIENCE = 3.0
@@ -59,7 +60,7 @@ def ask_for_model(bus: Bus, request: ModelRequest, timeout: float = PATIENCE) ->
     question = msgspec.json.encode(signed(bus, request))
     for reply in bus.query(KEY, question, timeout):
         try:
-            return msgspec.json.decode(reply, type=ModelReply)
-        except msgspec.DecodeError:
+            return json_value(reply, ModelReply)
+        except JsonError:
             continue
     raise BusError(f"no monitor of rig {bus.rig} answers: start `rigwatch monitor`")

@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from rigwatch.wire.bus.bus import Bus
 
 REPLY_TIMEOUT = 1.0
+"""Longest wait for the first reply [s]."""
+MOST_PATIENT = 3
+"""Largest power of two by which the wait grows while a query is repeated, after every second one:
+an answer that is too late is work for a ring that has too much of it.
+"""
 END_TIMEOUT = 2.0
 """Longest wait of the closing bus for the query thread [s]."""
 PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
@@ -60,12 +65,13 @@ class RingQuestions:
             repeats[key] = ask, count
             if count:
                 time.sleep(PAUSES[min(count, len(PAUSES)) - 1])
-            self._answered(key, ask, self._replies(key, ask))
+            timeout = REPLY_TIMEOUT * 2 ** min(count // 2, MOST_PATIENT)
+            self._answered(key, ask, self._replies(key, ask, timeout))
         self._left()
 
-    def _replies(self, key: str, ask: Ask) -> list[bytes]:
+    def _replies(self, key: str, ask: Ask, timeout: float) -> list[bytes]:
         while not (self._bus.connected() or self._closed):
             time.sleep(0.05)
         with contextlib.suppress(BusError):
-            return self._bus.query(key, ask.to_bytes(), REPLY_TIMEOUT)
+            return self._bus.query(key, ask.to_bytes(), timeout)
         return []

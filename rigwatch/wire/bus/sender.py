@@ -2,19 +2,25 @@
 
 from rigwatch.wire.ordering import Ask, Numbered, Outcome, Owners, RingReply, SampleOrder
 
+MOST_WAITING = 16384
+"""Messages that may wait behind a gap: minutes of estimates, which are most of them."""
+
 
 class Sender:
     """One sending process and its runs.
 
     Args:
         resume_after: (run, number) of the last processed message; number -1 for none.
+        patient: see `SampleOrder`.
 
     Attributes:
         order: determines which of its messages comes next.
     """
 
-    def __init__(self, resume_after: tuple[int, int]) -> None:
-        self.order: SampleOrder[Numbered] = SampleOrder(resume_after)
+    def __init__(self, resume_after: tuple[int, int], *, patient: bool = False) -> None:
+        self.order: SampleOrder[Numbered] = SampleOrder(
+            resume_after, capacity=MOST_WAITING, patient=patient
+        )
         self._owners = Owners()
         self._alive: dict[int, int] = {}
 

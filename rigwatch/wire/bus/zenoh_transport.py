@@ -27,6 +27,7 @@ from typing import Any
 import zenoh
 from zenoh.handlers import Callback
 
+from rigwatch.wire.bus.burst import Burst
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, answered
 from rigwatch.wire.errors import BusError
 
@@ -168,6 +169,7 @@ class ZenohTransport:
         leave: closes the session; None if it is not this transport's alone, which then takes back
             what it has declared.
         asking: held during a query.
+        burst: sends what rigs that share the session put; None sends at once.
     """
 
     def __init__(
@@ -175,10 +177,13 @@ class ZenohTransport:
         session: Any,
         leave: Close | None = None,
         asking: AbstractContextManager[object] | None = None,
+        burst: Burst | None = None,
     ) -> None:
         self._session, self._leave = session, leave
         self._asking = asking or contextlib.nullcontext()
         self._shared = threading.BoundedSemaphore(MOST_ASKED)
+        self._burst = burst
+        self._gathered = Burst()
         self._publishers: dict[str, Any] = {}
         self._lock = threading.Lock()
         self._kept: list[Any] = []
@@ -204,7 +209,11 @@ class ZenohTransport:
 
     def beside(self) -> "ZenohTransport":
         """Another transport over the same session, which it leaves open when it is closed."""
-        return ZenohTransport(self._session, asking=self._shared)
+        return ZenohTransport(self._session, asking=self._shared, burst=self._gathered)
+
+    def together(self) -> AbstractContextManager[None]:
+        """Send what transports over the same session put meanwhile together."""
+        return self._gathered.held()
 
     @property
     def identity(self) -> str:
@@ -213,9 +222,16 @@ class ZenohTransport:
 
     def put(self, key: str, payload: bytes, mark: bytes = b"") -> None:
         """Send without waiting; dropped if the link is full or down."""
-        publisher = self._publishers.get(key) or self._declare_publisher(key)
-        with contextlib.suppress(zenoh.ZError):
-            publisher[0].put(payload, source_info=publisher[1], attachment=mark or None)
+        publisher, info = self._publishers.get(key) or self._declare_publisher(key)
+
+        def send() -> None:
+            with contextlib.suppress(zenoh.ZError):
+                publisher.put(payload, source_info=info, attachment=mark or None)
+
+        if self._burst is None:
+            send()
+        else:
+            self._burst.add(send)
 
     def _declare_publisher(self, key: str) -> Any:
         with self._lock:
@@ -285,8 +301,11 @@ class ZenohTransport:
     def close(self) -> None:
         """Take back everything declared, with the session if it is this transport's alone."""
         if self._leave is not None:
+            self._gathered.close()
             self._leave()
             return
+        if self._burst is not None:
+            self._burst.send()
         with self._lock:
             declared = [*self._kept, *(publisher for publisher, _ in self._publishers.values())]
             self._kept.clear()

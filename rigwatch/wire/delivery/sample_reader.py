@@ -66,6 +66,7 @@ class SampleReader:
             if the ring has them; missing ones are not a gap.
         capacity: messages queued for a slow reader before further ones are left to the ring.
         publish_gaps: whether gaps are also published; not if they may still be filled.
+        patient: see `SampleOrder`.
 
     Attributes:
         heard: whether a sample block was ever received.
@@ -82,13 +83,14 @@ class SampleReader:
         capacity: int = QUEUE_CAPACITY,
         *,
         publish_gaps: bool = True,
+        patient: bool = False,
     ) -> None:
         self.heard = False
         self.rejected = 0
         self.rejected_by: Counter[str] = Counter()
         self.dropped = 0
         self._bus, self._publish_gaps = bus, publish_gaps
-        self._order: SampleOrder[SampleBlock] = SampleOrder(resume_after, history)
+        self._order: SampleOrder[SampleBlock] = SampleOrder(resume_after, history, patient=patient)
         self._owners = Owners()
         self._refused_boot: int | None = None
         self._impostor_at: float | None = None

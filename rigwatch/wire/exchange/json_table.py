@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from rigwatch.wire.errors import ImportDataError
 from rigwatch.wire.exchange.tables import Cells, Table
+from rigwatch.wire.typed_files import JsonError, json_value
 
 
 def read_json(path: Path) -> Table:
@@ -23,8 +23,8 @@ def read_json(path: Path) -> Table:
         ImportDataError: it is not JSON, or holds no table or more than one.
     """
     try:
-        found = msgspec.json.decode(path.read_bytes())
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        found = json_value(path.read_bytes(), object)
+    except JsonError as error:
         raise ImportDataError(f"{path}: not readable as JSON: {error}") from error
     header: Mapping[str, Any] = found if isinstance(found, dict) else {}
     columns = _columns(found) or _columns_below(path, header)

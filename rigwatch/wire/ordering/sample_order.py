@@ -32,7 +32,9 @@ LARGEST_SEQ = 2**53
 SUSPECT = 256
 """Number of old samples after which the ring is queried whether the reader's position is wrong."""
 TRIES = 5
-"""Number of unanswered queries, while newer samples arrive, before a gap is given up."""
+"""Number of unanswered queries, while newer samples arrive, before a gap is given up by a reader
+that is not patient, or by any if nobody is there to answer.
+"""
 
 
 class SampleOrder(Generic[S]):
@@ -44,6 +46,9 @@ class SampleOrder(Generic[S]):
         history: number of samples before those that are also queried, if the ring still has them;
             without `resume_after`, samples before the first one received.
         capacity: samples that may wait behind a gap before it is given up.
+        patient: go on asking as long as a source lives and `capacity` allows: a ring may be slow to
+            answer, and what it still has is not lost. A reader that judges samples as they come
+            prefers the newest after some tries.
     """
 
     def __init__(
@@ -51,11 +56,14 @@ class SampleOrder(Generic[S]):
         resume_after: tuple[int, int] | None = None,
         history: int = 0,
         capacity: int = 65536,
+        *,
+        patient: bool = False,
     ) -> None:
         self.counters = Counters()
         self.sources = Sources()
         self._history = history
         self._capacity = capacity
+        self._patient = patient
         self._line: deque[Stream[S]] = deque()
         self._settled_boots: dict[int, int] = {}
         self._asked: Ask | None = None
@@ -319,11 +327,17 @@ class SampleOrder(Generic[S]):
         # Without any samples the link is down: the ring is available again once it recovers.
         alone = not self._heard_since_ask and self.sources.is_alive(ask.boot)
         self._unanswered += 0 if alone else 1
-        if self._unanswered < TRIES and (ask.last != OPEN or self._line[0].ended):
+        again = self._unanswered < TRIES or (self._patient and self._may_still_answer())
+        if again and (ask.last != OPEN or self._line[0].ended):
             self._ask(ask)
             return
         self._unanswered = 0
         self._give_up(self._line[0], ask, "no source could be queried for them")
+
+    def _may_still_answer(self) -> bool:
+        """Whether a source lives, and what waits is less than the reader may hold."""
+        waiting = sum(stream.samples_waiting for stream in self._line)
+        return self.sources.any_alive and waiting <= self._capacity
 
     def _give_up(self, front: Stream[S], ask: Ask, reason: str) -> None:
         if ask.last != OPEN:

@@ -60,6 +60,11 @@ class Sources:
         return boot in self._alive
 
     @property
+    def any_alive(self) -> bool:
+        """Whether any source's token exists."""
+        return bool(self._alive)
+
+    @property
     def contested(self) -> bool:
         """Whether a second source sends samples besides the one in control."""
         return any(

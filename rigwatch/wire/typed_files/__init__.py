@@ -1,18 +1,24 @@
-"""Typed TOML files: loaded into declared sections, with errors that name file, key and value."""
+"""Typed files: TOML loaded into declared sections, with errors that name file, key and value; JSON
+as typed values.
+"""
 
 from rigwatch.wire.typed_files.bounded import loads
+from rigwatch.wire.typed_files.json_values import JsonError, decoded, json_value
 from rigwatch.wire.typed_files.loading import Section, load, parse, read_text
 from rigwatch.wire.typed_files.overlay import holder, load_layered, whole_text
 from rigwatch.wire.typed_files.shipped import copy_out, find_config, find_file, shipped_names
 from rigwatch.wire.typed_files.writing import as_toml
 
 __all__ = [
+    "JsonError",
     "Section",
     "as_toml",
     "copy_out",
+    "decoded",
     "find_config",
     "find_file",
     "holder",
+    "json_value",
     "load",
     "load_layered",
     "loads",

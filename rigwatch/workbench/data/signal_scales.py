@@ -4,8 +4,15 @@ import numpy as np
 from scipy.signal import detrend
 
 from rigwatch.physics.engine.compile import evaluated
-from rigwatch.physics.engine.equations import Model, Port, arriving, compose, spelt_out
-from rigwatch.physics.engine.fit import Recording, initial_states
+from rigwatch.physics.engine.equations import (
+    Model,
+    Port,
+    arriving,
+    compose,
+    names_in,
+    spelt_out,
+)
+from rigwatch.physics.engine.fit import Recording, initial_states, shown_states
 from rigwatch.physics.engine.score import sizes_at_port
 from rigwatch.wire.arrays import FloatArray
 
@@ -50,9 +57,20 @@ def _sizes(port: Port, model: Model, signals: dict[str, FloatArray], recording: 
         for name, variable in port.variables.items()
     }
     signal = _signal(port, model, signals) if port.signal else None
-    if "v" in variables and "x" not in variables:
+    if "v" in variables and ("x" not in variables or _is_hidden(port, model)):
         variables["x"] = _travel(variables["v"], recording)
     return sizes_at_port(variables, signal, recording.dt)
+
+
+def _is_hidden(port: Port, model: Model) -> bool:
+    """Whether a port's position is a state that no channel shows, such as the twist of a shaft.
+
+    Before a fit such a state is known at its initial value only, which is not its size.
+    """
+    system = compose(model)
+    shown = shown_states(system)
+    hidden = {name for index, name in enumerate(system.states) if index not in shown}
+    return bool(names_in(port.variables["x"].expression, "port variable x") & hidden)
 
 
 def _travel(speed: FloatArray, recording: Recording) -> FloatArray:

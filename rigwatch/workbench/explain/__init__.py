@@ -11,18 +11,15 @@ from rigwatch.workbench.explain.explain import (
     explanation,
     ranking,
 )
-from rigwatch.workbench.explain.next_experiment import Experiment, excitation
 from rigwatch.workbench.explain.set_gain import SetGain, set_gain
 from rigwatch.workbench.explain.verdict import Verdict, judge
 
 __all__ = [
-    "Experiment",
     "Explanation",
     "Row",
     "SetGain",
     "Verdict",
     "as_data",
-    "excitation",
     "explain",
     "explanation",
     "judge",

@@ -17,11 +17,12 @@ from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import NoiseFloor, from_residual
-from rigwatch.workbench.explain.verdict import LITTLE_MORE, MUCH_WORSE
+from rigwatch.workbench.explain.verdict import LITTLE_MORE
 from rigwatch.workbench.fit import Fitted, continued_train_error, fit_model
 from rigwatch.workbench.ranking import (
     AGAIN,
     MATERIAL,
+    MUCH_WORSE,
     STEP,
     Progress,
     Ranked,

@@ -11,6 +11,7 @@ from rigwatch.workbench.compare import (
     open_bench,
     unweighed,
 )
+from rigwatch.workbench.experiment import Experiment, propose
 from rigwatch.workbench.explain.adequacy import (
     inadequate,
     unchecked,
@@ -18,10 +19,13 @@ from rigwatch.workbench.explain.adequacy import (
     with_base_offered,
     with_change_told,
 )
-from rigwatch.workbench.explain.credibility import credible_verdict
+from rigwatch.workbench.explain.credibility import (
+    credible_verdict,
+    undetermined_if_another_law,
+)
+from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
-from rigwatch.workbench.explain.next_experiment import Experiment, propose
 from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
@@ -98,6 +102,8 @@ class Explanation:
         beside: the other effects of the set that the named effect was judged in; with them `add`
             accepts it if it is refused alone.
         error_unit: unit of the errors in `text` and `ranking`.
+        exchange: an effect that describes the last accepted one better, if nothing beside it
+            explains the error; None if none does, or if that was not asked.
     """
 
     verdict: str
@@ -111,6 +117,7 @@ class Explanation:
     like_this: tuple[int, int] = (0, 0)
     beside: list[str] = field(default_factory=list)
     error_unit: str = ""
+    exchange: Exchange | None = None
 
 
 def explain(study: Study, progress: Progress = no_progress) -> Explanation:
@@ -128,7 +135,13 @@ def explain(study: Study, progress: Progress = no_progress) -> Explanation:
     rows, verdict = ranking(bench, progress)
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
         progress("finding what the healthy recording leaves open of the strength")
-    return explanation(bench, rows, verdict)
+    found = explanation(bench, rows, verdict)
+    if verdict.word != "unknown_effect" or not study.file.effects:
+        return found
+    offer = exchange(bench, progress)
+    if offer is None:
+        return found
+    return replace(found, text=f"{found.text}; but {offer.text(found.error_unit)}", exchange=offer)
 
 
 def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked], Verdict]:
@@ -146,6 +159,8 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
         verdict = _by_pairs(bench, rows, verdict, progress)
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
+        progress("comparing with a free law at the same port")
+        verdict = undetermined_if_another_law(bench, verdict)
     verdict = with_motion_sensor(bench, verdict)
     if along and bench.study.model.rough:
         verdict = limited_verdict(bench.base, rows, bench.floor, verdict)

@@ -16,9 +16,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.data import NoiseFloor
-from rigwatch.workbench.explain.verdict import MUCH_WORSE, NEARLY, Verdict
+from rigwatch.workbench.explain.verdict import NEARLY, Verdict
 from rigwatch.workbench.fit import Fitted
-from rigwatch.workbench.ranking import Ranked
+from rigwatch.workbench.ranking import MUCH_WORSE, Ranked
 
 MOTION_ALLOWANCE = 1.2
 """Ratio of the error to the healthy error that a changed motion alone can cause.

@@ -27,7 +27,7 @@ from rigwatch.workbench.explain.remaining_error import (
 )
 from rigwatch.workbench.explain.verdict_calibration import CLEAR, Evidence, probability_wrong
 from rigwatch.workbench.fit import Fitted, block_differences
-from rigwatch.workbench.ranking import SAME, SIMILAR, Ranked
+from rigwatch.workbench.ranking import MUCH_WORSE, SAME, SIMILAR, Ranked
 
 Word = Literal[
     "nothing_missing", "missing_effect", "undetermined", "unknown_effect", "model_inadequate"
@@ -40,8 +40,6 @@ LITTLE_MORE = 0.01
 """Relative difference of errors too small to justify a further parameter above the noise floor."""
 PERHAPS = 1.0
 """Standard deviations by which an effect with more parameters must be ahead to be a rival."""
-MUCH_WORSE = 1.5
-"""Ratio of held-out errors too large to be caused by other missing physics favouring one effect."""
 NEARLY = 0.8
 """Share of the best effect's gain above which another effect may be the right one."""
 CONTRADICTED = 2.0

@@ -2,29 +2,33 @@
 
 `candidates` are scored (`scoring`) and become rows (`ranked`); the most promising (`fit_selection`)
 are fitted (`refitting`) and judged by the held-out error (`acceptance`). `rank` runs all of these;
-`with_refinements` adds effects that describe the best one in more detail.
+`with_refinements` adds effects that describe the best one in more detail. `best_free_law` says how
+much any law at a port explains.
 """
 
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, MATERIAL, STEP, judge_fit, left_over
 from rigwatch.workbench.ranking.candidates import candidates, shapes_of
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
+from rigwatch.workbench.ranking.free_law import best_free_law
 from rigwatch.workbench.ranking.paired_test import difference
-from rigwatch.workbench.ranking.rank import AGAIN, rank
+from rigwatch.workbench.ranking.rank import AGAIN, MUCH_WORSE, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
 from rigwatch.workbench.ranking.refinements import with_refinements
-from rigwatch.workbench.ranking.refitting import Progress, no_progress, refit
+from rigwatch.workbench.ranking.refitting import Progress, no_progress, refit, refit_all
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
 
 __all__ = [
     "AGAIN",
     "EXPLAINED",
     "MATERIAL",
+    "MUCH_WORSE",
     "SAME",
     "SIMILAR",
     "STEP",
     "Progress",
     "Ranked",
     "accepted_from",
+    "best_free_law",
     "candidates",
     "difference",
     "in_order",
@@ -35,6 +39,7 @@ __all__ = [
     "rank_all",
     "rank_only",
     "refit",
+    "refit_all",
     "score_all",
     "scored",
     "select_for_fit",

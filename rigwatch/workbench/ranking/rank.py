@@ -26,8 +26,11 @@ from rigwatch.workbench.study import Study
 AGAIN = 0.25
 """Share of the energy above the floor that an effect must explain, to first order, to be fitted
 again if its fit may have ended in a local minimum."""
-NEARLY_AS_GOOD = 1.5
-"""Ratio to the smallest held-out error up to which other effects may be named in its place."""
+MUCH_WORSE = 1.5
+"""Ratio of held-out errors too large to be caused by other missing physics favouring one effect.
+
+Up to it another effect may be the right one, is fitted and may be named in place of the best.
+"""
 
 
 def rank(
@@ -93,7 +96,7 @@ def _skipped_for_nearly_as_good(
     accepted: Sequence[Ranked], waiting: Mapping[str, Ranked]
 ) -> list[tuple[Ranked, Ranked]]:
     """Unfitted rows with those they resemble, of which the error is near that of the best."""
-    most = NEARLY_AS_GOOD * accepted[0].held_out_error
+    most = MUCH_WORSE * accepted[0].held_out_error
     near = {row.label: row for row in accepted if row.held_out_error < most}
     return [
         (row, near[row.fitted_instead])

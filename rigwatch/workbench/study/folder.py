@@ -14,9 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from rigwatch.wire.host import write_through
+from rigwatch.wire.typed_files import JsonError, json_value
 
 FILE = "study.toml"
 LEDGER = "ledger.jsonl"
@@ -95,8 +94,8 @@ def _last_line(folder: Path) -> dict[str, Any]:
     """The ledger's last line; empty if there is none."""
     lines = (folder / LEDGER).read_bytes().splitlines()
     try:
-        return dict(msgspec.json.decode(lines[-1])) if lines else {}
-    except msgspec.DecodeError:
+        return json_value(lines[-1], dict[str, Any]) if lines else {}
+    except JsonError:
         return {}
 
 

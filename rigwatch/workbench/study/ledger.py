@@ -16,7 +16,7 @@ import msgspec
 
 from rigwatch.version import __version__
 from rigwatch.wire.errors import ModelError, reason_of
-from rigwatch.wire.typed_files import read_text
+from rigwatch.wire.typed_files import JsonError, json_value, read_text
 from rigwatch.workbench.study.folder import FILE, digest, locked, write_step
 from rigwatch.workbench.study.own_files import check_unchanged
 from rigwatch.workbench.study.study import Study
@@ -126,13 +126,13 @@ def commit(before: Study, after: Study, step: str, /, **content: Any) -> dict[st
 
 
 def lines(study: Study) -> Iterator[dict[str, Any]]:
-    """The steps so far, oldest first; an incomplete line is skipped."""
+    """The steps so far, oldest first; a line that is no step is skipped."""
     if not study.ledger.exists():
         return
     for raw in study.ledger.read_bytes().splitlines():
         try:
-            yield msgspec.json.decode(raw)
-        except msgspec.DecodeError:
+            yield json_value(raw, dict[str, Any])
+        except JsonError:
             continue
 
 

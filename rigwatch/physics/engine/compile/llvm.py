@@ -206,6 +206,10 @@ class Function:
             return first
         if isinstance(e, sympy.Not):
             return self._do(f"xor i1 {self._condition(e.args[0])}, true")
+        if isinstance(e, sympy.ITE):
+            # A comparison of a choice, which SymPy turns into a choice of comparisons.
+            asked, one, other = (self._condition(argument) for argument in e.args)
+            return self._do(f"select i1 {asked}, i1 {one}, i1 {other}")
         if isinstance(e, sympy.logic.boolalg.BooleanAtom):
             return "true" if e == sympy.true else "false"
         return self._compared(_RELATIONS[type(e)], *(self.value(a) for a in e.args))

@@ -61,6 +61,10 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
     def _print_Or(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
         return self._pairs("logical_or", expr.args)
 
+    def _print_ITE(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
+        condition, one, other = map(self._print, expr.args)
+        return f"where({condition}, {one}, {other})"
+
     def _print_Piecewise(self, expr: sympy.Expr) -> str:  # noqa: N802 -- SymPy's name
         *choices, last = expr.args
         text = self._print(last.expr) if last.cond == sympy.true else "nan"

@@ -19,6 +19,7 @@ from rigwatch.physics.engine.fit.recording import (
     filled,
     initial_states,
     joined,
+    shown_states,
     windows,
 )
 from rigwatch.physics.engine.fit.ties import untied
@@ -52,6 +53,7 @@ __all__ = [
     "motion_widths",
     "port_signals",
     "result_of",
+    "shown_states",
     "untied",
     "windows",
     "with_told",

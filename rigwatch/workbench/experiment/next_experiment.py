@@ -22,7 +22,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.units import unit_of
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.explain.excitation_shapes import shapes
+from rigwatch.workbench.experiment.excitation_shapes import shapes
 from rigwatch.workbench.fit import nodes
 from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Derived

@@ -1,0 +1,116 @@
+"""How late the inputs act behind where commissioning saw them, learnt from the residual.
+
+A generator that starts again steps at another place between two samples, and one that does not hold
+its voltage acts half a sample earlier than one that does. To first order the residual is then τ·s,
+with s the response to inputs late by one sample and τ unknown. τ is taken from the residual where
+it explains nearly all of it and more than dry friction would. It is learnt while the rig is not
+judged and followed slowly afterwards, so that a fault, which is sudden, is not learnt.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import numpy as np
+from numba import njit
+
+from monitor.observer.missing_force import DRY_UNIT, LATE_UNIT, E
+from rigwatch.wire.arrays import FloatArray
+
+MOST = 1.0
+"""Largest lateness [samples]."""
+QUICK, SLOW = 32.0, 128.0
+"""Memory of what it is learnt from, before and while the rig is judged [samples]."""
+EXPLAINS, PLAIN = 0.85, 2.0
+"""Share of the residual's energy beyond half the healthy one that it must explain, and the ratio of
+the two below which there is nothing to explain.
+"""
+UNSURE = 0.15
+"""Relative error of the response: equations fitted to one lateness are less accurate at another."""
+UNSTEADY = 0.2
+"""Lateness, and change of it, that matters [samples]."""
+RECENT = 4096.0
+"""Samples after which a lateness no longer found is forgotten: the longest interval between skips
+of steps that slide."""
+ERRORS, PRODUCTS, RESPONSES, RUBBED, FRICTIONS = range(5)
+"""Means of e², e·s, s², e·g and g², with g the response to dry friction."""
+OF_QUICK, OF_SLOW, TAU, AGO = 0, 5, 10, 11
+"""Carried figures: the means with both memories, τ, and the time since it mattered, `RECENT` if
+never.
+"""
+
+
+def no_lateness() -> FloatArray:
+    """The figures at the start."""
+    kept = np.zeros(AGO + 1)
+    kept[AGO] = RECENT
+    return kept
+
+
+@njit()
+def follow_lateness(row: FloatArray, healthy: float, judging: bool, kept: FloatArray) -> None:
+    """Learn from a sample.
+
+    Args:
+        row: its judged columns, see `missing_force`.
+        healthy: variance of the healthy residual.
+        judging: whether the rig is judged.
+        kept: the carried figures.
+    """
+    for first, memory in ((OF_QUICK, QUICK), (OF_SLOW, SLOW)):
+        _average(row[E] * row[E], first + ERRORS, memory, kept)
+        _average(row[E] * row[LATE_UNIT], first + PRODUCTS, memory, kept)
+        _average(row[LATE_UNIT] * row[LATE_UNIT], first + RESPONSES, memory, kept)
+        _average(row[E] * row[DRY_UNIT], first + RUBBED, memory, kept)
+        _average(row[DRY_UNIT] * row[DRY_UNIT], first + FRICTIONS, memory, kept)
+    first = OF_SLOW if judging and not is_late(kept) else OF_QUICK
+    energy, found = kept[first + ERRORS], _best(kept, first)
+    least = min((1.0 - EXPLAINS) * energy + 0.5 * healthy, _rubbing(kept, first))
+    if energy > PLAIN * healthy and _left(found, kept, first) < least:
+        kept[TAU] = found
+    elif _left(kept[TAU], kept, first) > energy:
+        kept[TAU] = 0.0
+    kept[AGO] = 0.0 if abs(kept[TAU]) > UNSTEADY else min(kept[AGO] + 1.0, RECENT)
+
+
+@njit()
+def _average(value: float, place: int, memory: float, kept: FloatArray) -> None:
+    kept[place] += (value - kept[place]) / memory
+
+
+@njit()
+def is_late(kept: FloatArray) -> bool:
+    """Whether there is or was a lateness, which may change."""
+    return kept[AGO] < RECENT
+
+
+@njit()
+def rubs(kept: FloatArray) -> bool:
+    """Whether dry friction explains the newest samples better than any lateness does."""
+    return _rubbing(kept, OF_QUICK) < _left(_best(kept, OF_QUICK), kept, OF_QUICK)
+
+
+@njit()
+def lateness_changes(kept: FloatArray) -> bool:
+    """Whether there is a lateness and the newest samples show another one than those before."""
+    return is_late(kept) and abs(_best(kept, OF_QUICK) - _best(kept, OF_SLOW)) > UNSTEADY
+
+
+@njit()
+def _best(kept: FloatArray, first: int) -> float:
+    """The lateness that explains most."""
+    found = kept[first + PRODUCTS] / max(kept[first + RESPONSES], 1e-300)
+    return min(max(found, -MOST), MOST)
+
+
+@njit()
+def _left(tau: float, kept: FloatArray, first: int) -> float:
+    """Mean square of the residual without a lateness."""
+    explained = tau * (2.0 * kept[first + PRODUCTS] - tau * kept[first + RESPONSES])
+    return kept[first + ERRORS] - explained
+
+
+@njit()
+def _rubbing(kept: FloatArray, first: int) -> float:
+    """Mean square of the residual without dry friction."""
+    explained = max(kept[first + RUBBED], 0.0) ** 2 / max(kept[first + FRICTIONS], 1e-300)
+    return kept[first + ERRORS] - explained

@@ -1,0 +1,119 @@
+"""The last accepted effect, exchanged for one of its kind, if nothing beside it explains the error.
+
+An earlier step names the simplest effect of its class, and other missing physics may have favoured
+it. A spring with a slider that is moved through play leaves little that any effect beside the
+slider explains; the same slider behind play does. What is found is an offer, not a verdict.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigwatch.physics.engine.equations import Effect
+from rigwatch.physics.engine.score import suits
+from rigwatch.workbench.compare import Bench, bench_of, prepared, with_horizon_of
+from rigwatch.workbench.fit import held_as
+from rigwatch.workbench.ranking import (
+    MATERIAL,
+    Progress,
+    Ranked,
+    difference,
+    rank_only,
+    refit_all,
+    shapes_of,
+)
+from rigwatch.workbench.study import Study, drop_effect
+
+MOST_TRIED = 8
+"""Largest number of effects of a kind that are fitted in place of one."""
+LEVEL = 0.05
+"""Largest probability, corrected for those tried, that chance lowers the held-out error so far."""
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """A better description of the physics that the last accepted effect stands for.
+
+    Attributes:
+        effect, port: the effect that fits better.
+        instead_of: the accepted effect at that port.
+        held_out_error: with the exchange, in the unit of the study's errors.
+        p_value: one-sided, of so large a fall of the held-out error by chance; corrected for the
+            number of effects tried.
+    """
+
+    effect: str
+    port: str
+    instead_of: str
+    held_out_error: float
+    p_value: float
+
+    def text(self, unit: str) -> str:
+        """The offer in words, with the commands that take it."""
+        return (
+            f"{self.effect}@{self.port} in place of {self.instead_of}@{self.port} lowers"
+            f" the held-out error to {self.held_out_error:.3g} {unit}"
+            " (rigwatch undo, then rigwatch add)"
+        )
+
+
+def exchange(bench: Bench, progress: Progress) -> Exchange | None:
+    """The effect of the same kind that describes the last accepted effect better, if there is one.
+
+    Args:
+        bench: the study, its recordings and the fitted model.
+        progress: called with a line of text as the fits begin.
+
+    Raises:
+        ModelError: data have changed, or the model cannot be fitted without the effect.
+    """
+    last = bench.study.file.effects[-1]
+    names = of_a_kind(bench.study, last.effect, last.port)[:MOST_TRIED]
+    if not names:
+        return None
+    progress(f"fitting {', '.join(names)} in place of {last.effect}@{last.port}")
+    rows = _fitted(_without_last(bench), names, last.port)
+    found = [_in_place(bench, row, last.effect, len(names)) for row in rows if row.accepted]
+    better = [each for each in found if each is not None]
+    return min(better, key=lambda each: each.held_out_error, default=None)
+
+
+def of_a_kind(study: Study, effect: str, port: str) -> list[str]:
+    """Effects that the library calls similar to one, elective or not, which suit its port."""
+    placed = {accepted.effect for accepted in study.file.effects if accepted.port == port}
+    one, place = study.effect(effect), study.model.ports[port]
+    return [
+        name
+        for name, other in study.effects.items()
+        if name not in placed and _is_related(effect, one, name, other)
+        if suits(other, place, study.model)
+    ]
+
+
+def _is_related(name: str, one: Effect, other_name: str, other: Effect) -> bool:
+    likened = other_name in one.confused_with or name in other.confused_with
+    return likened or other.refines == name or one.refines == other_name
+
+
+def _without_last(bench: Bench) -> Bench:
+    """The study without its last effect, simulated over the same horizon with the same holds."""
+    before = drop_effect(bench.study)
+    return bench_of(*prepared(with_horizon_of(held_as(before, bench.study.holds), bench.study)))
+
+
+def _fitted(bench: Bench, names: Sequence[str], port: str) -> list[Ranked]:
+    study, data, base = bench.study, bench.data, bench.base
+    shapes = [shapes_of(study, data.train, name, port) for name in names]
+    rows = [rank_only(study, data, base, found) for found in shapes if found]
+    refit_all(study, data, base, rows)
+    return rows
+
+
+def _in_place(bench: Bench, row: Ranked, instead_of: str, tried: int) -> Exchange | None:
+    """The exchange for a row if both errors fall, the held-out one by more than chance."""
+    assert row.fitted is not None
+    fall = difference(bench.base.held_out, row.fitted.held_out)
+    p_value = min(tried * fall.p_falls, 1.0)
+    trained = row.fitted.train_error < bench.base.train_error
+    if not (trained and p_value < LEVEL and fall.relative > MATERIAL):
+        return None
+    return Exchange(row.effect, row.port, instead_of, row.held_out_error, p_value)

@@ -1,0 +1,87 @@
+"""Rigs of one process take turns in one thread, and what they send leaves together."""
+
+import contextlib
+import threading
+
+import pytest
+
+from daq.turns import Turns
+from rigwatch.wire.bus.burst import Burst
+from tests.waiting import eventually
+
+
+class Rig:
+    """Steps in turns, called from a thread of its own as a rig's acquisition does."""
+
+    def __init__(self, turns: Turns, fails: bool = False) -> None:
+        self.steps, self.threads, self.error = 0, set[int](), ""
+        self.goes_on, self._fails = True, fails
+        self.thread = threading.Thread(target=self._run, args=[turns], daemon=True)
+        self.thread.start()
+
+    def _run(self, turns: Turns) -> None:
+        try:
+            turns.serve(self._step)
+        except OSError as error:
+            self.error = str(error)
+
+    def _step(self) -> bool:
+        self.steps += 1
+        self.threads.add(threading.get_ident())
+        if self._fails:
+            raise OSError("unplugged")
+        return self.goes_on
+
+
+def test_open_devices_are_read_in_one_thread_and_one_that_ends_or_fails_ends_alone() -> None:
+    turns = Turns(0.001, contextlib.nullcontext)
+    rigs = [Rig(turns), Rig(turns), Rig(turns, fails=True)]
+    eventually(lambda: all(rig.steps >= 5 for rig in rigs[:2]), "turns of both")
+    rigs[2].thread.join(60.0)
+    assert rigs[2].error == "unplugged"
+    assert rigs[2].steps == 1
+    rigs[0].goes_on = False
+    rigs[0].thread.join(60.0)
+    before = rigs[1].steps
+    eventually(lambda: rigs[1].steps > before + 5, "the other goes on")
+    assert len(rigs[0].threads | rigs[1].threads) == 1
+    rigs[1].goes_on = False
+    rigs[1].thread.join(60.0)
+    again = Rig(turns)
+    eventually(lambda: again.steps >= 5, "turns begin again after a pause")
+    again.goes_on = False
+    again.thread.join(60.0)
+    assert not again.thread.is_alive()
+
+
+def test_what_is_sent_in_a_turn_leaves_in_order_at_its_end() -> None:
+    burst, sent = Burst(), list[int]()
+    with burst.held():
+        for number in range(3):
+            burst.add(lambda number=number: sent.append(number))
+    assert sent == [0, 1, 2]
+    burst.close()
+
+
+def test_what_waits_for_too_long_leaves_before_a_long_turn_ends(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("rigwatch.wire.bus.burst.GATHER", 0.0)
+    burst, sent = Burst(), list[int]()
+    with burst.held():
+        burst.add(lambda: sent.append(0))
+        eventually(lambda: burst.add(lambda: sent.append(1)) or bool(sent), "the first")
+        assert sent[0] == 0
+    burst.close()
+
+
+def test_what_is_sent_outside_of_turns_leaves_by_itself_and_the_rest_at_the_end() -> None:
+    burst, sent = Burst(), list[int]()
+    burst.add(lambda: sent.append(0))
+    eventually(lambda: sent == [0], "the first")
+    burst.add(lambda: sent.append(1))
+    burst.close()
+    assert sent == [0, 1]
+    burst.add(lambda: sent.append(2))
+    burst.send()
+    assert sent == [0, 1, 2]

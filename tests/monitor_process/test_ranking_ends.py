@@ -1,0 +1,84 @@
+"""A ranking in the background ends with its monitor, wherever it is."""
+
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from monitor.diagnosis import background_ranking
+from monitor.diagnosis.background_ranking import Explainer
+from monitor.diagnosis.child import Child
+from monitor.model import load_model
+from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock
+from tests.bus.samples import block
+from tests.waiting import eventually
+
+RIG = load_model(Path(__file__).parents[1] / "verify" / "model.toml")
+ALARM = Alarm(
+    "departure", "unacknowledged", "warning", "a cause", "", "rig", 7, 0, 0, 1.0, 0.0, 0.5, True,
+    "", 0,
+)  # fmt: skip
+
+
+def explained(explainer: Explainer) -> None:
+    """An alarm and enough samples for a ranking to start."""
+    samples = block(0, 600)
+    change = (Column("change", "m/s^2", np.zeros(600)),)
+    explainer.hear(ALARM)
+    explainer.take(EstimateBlock("rig", 7, 0, samples.t_ns, change), samples)
+
+
+def test_a_child_that_runs_is_killed_and_one_that_comes_late_never_starts(tmp_path: Path) -> None:
+    child, mark = Child(), tmp_path / "runs"
+    words = ["-c", f"import time; open({str(mark)!r}, 'w').close(); time.sleep(600)"]
+    thread = threading.Thread(target=child.run, args=[words])
+    thread.start()
+    eventually(mark.exists, "the child runs")
+    child.end()
+    thread.join()
+    mark.unlink()
+    child.run(words)
+    assert not mark.exists()
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_monitor_that_ends_while_a_ranking_starts_waits_for_no_answer(
+    late: bool, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    started, go_on = threading.Event(), threading.Event()
+
+    def held(folder: Path, *_: object) -> str:
+        child = _[-1]
+        assert isinstance(child, Child)
+        started.set()
+        assert go_on.wait(60.0)
+        child.run(["-c", "import time; time.sleep(600)"])
+        (folder / "there").touch()
+        return "an answer"
+
+    monkeypatch.setattr(background_ranking, "ask", held)
+    monkeypatch.setattr(background_ranking, "_arrays", lambda *_: (np.zeros((1, 1)), np.zeros(1)))
+    explainer = Explainer(lambda: RIG)
+    explained(explainer)
+    assert started.wait(60.0)
+    if late:
+        threading.Timer(0.1, go_on.set).start()
+    else:
+        go_on.set()
+    explainer.close()
+    assert explainer.results() == []
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_a_ranking_that_cannot_be_started_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> str:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(background_ranking, "ask", full)
+    monkeypatch.setattr(background_ranking, "_arrays", lambda *_: (np.zeros((1, 1)), np.zeros(1)))
+    explainer = Explainer(lambda: RIG)
+    explained(explainer)
+    found = []
+    eventually(lambda: found.extend(explainer.results()) or found, "an answer")
+    assert "the ranking failed" in found[0].text

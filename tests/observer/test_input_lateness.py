@@ -1,0 +1,67 @@
+"""The lateness of the inputs, learnt from the residual."""
+
+import numpy as np
+import pytest
+
+from monitor.observer.input_lateness import (
+    SLOW,
+    TAU,
+    follow_lateness,
+    is_late,
+    lateness_changes,
+    no_lateness,
+    rubs,
+)
+from monitor.observer.missing_force import COLUMNS, DRY_UNIT, LATE_UNIT, E
+
+N, NOISE = 1024, 0.1
+AT = 2.0 * np.pi * np.arange(N) / 32.0
+RNG = np.random.default_rng(8)
+LATE, DRY = 2.0 * np.sin(AT), -4.0 * np.sign(np.sin(AT + 0.4))
+
+
+def learnt(error: np.ndarray, *, judging: bool = False, kept: np.ndarray | None = None):
+    """The carried figures after a residual."""
+    rows = np.zeros((N, len(COLUMNS)))
+    rows[:, E] = error + NOISE * RNG.standard_normal(N)
+    rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, DRY
+    kept = no_lateness() if kept is None else kept
+    for row in rows:
+        follow_lateness(row, NOISE**2, judging, kept)
+    return kept
+
+
+@pytest.mark.parametrize("tau", [-0.9, -0.4, 0.3, 1.0])
+def test_lateness_is_found(tau) -> None:
+    kept = learnt(tau * LATE)
+
+    assert kept[TAU] == pytest.approx(tau, abs=0.05)
+    assert is_late(kept)
+    assert not lateness_changes(kept)
+
+
+def test_friction_is_not_learnt_as_lateness() -> None:
+    kept = learnt(0.3 * DRY)
+
+    assert kept[TAU] == 0.0
+    assert rubs(kept)
+
+
+def test_nothing_is_learnt_from_a_healthy_residual() -> None:
+    assert learnt(0.02 * LATE)[TAU] == 0.0
+
+
+def test_a_lateness_that_is_gone_is_forgotten() -> None:
+    kept = learnt(-0.5 * LATE)
+
+    assert learnt(np.zeros(N), kept=kept)[TAU] == 0.0
+
+
+def test_a_lateness_that_jumps_is_said_to_change() -> None:
+    kept = learnt(-0.5 * LATE)
+    row = np.zeros(len(COLUMNS))
+    for late in LATE[: round(SLOW / 4)]:
+        row[E], row[LATE_UNIT] = 0.4 * late, late
+        follow_lateness(row, NOISE**2, False, kept)
+
+    assert lateness_changes(kept)

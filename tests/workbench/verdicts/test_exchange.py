@@ -1,0 +1,47 @@
+"""The last accepted effect exchanged for a relative that describes the same physics better."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.workbench.explain import explain
+from rigwatch.workbench.steps.change import add, undo
+from rigwatch.workbench.study import open_study
+from tests.workbench.dampers import damper
+
+STIFFNESS, LIMIT = 8e3, 20.0
+
+
+def slider_behind(gap: float):
+    """Force of a spring with a dry slider whose pin has play of a width [m], stepped by hand."""
+
+    def force(x: np.ndarray, _: np.ndarray) -> np.ndarray:
+        behind = stretched = 0.0
+        found = np.empty_like(x)
+        for index, place in enumerate(x):
+            moved = min(max(behind, place - gap / 2), place + gap / 2) - behind
+            behind += moved
+            stretched = float(np.clip(stretched + STIFFNESS * moved, -LIMIT, LIMIT))
+            found[index] = stretched
+        return found
+
+    return force
+
+
+@pytest.mark.parametrize(("gap", "offered"), [(0.003, "jenkins_behind_gap"), (0.0, None)])
+def test_a_slider_that_turns_out_to_be_behind_play_is_offered_in_its_place(
+    tmp_path: Path, gap: float, offered: str | None
+) -> None:
+    study = damper(tmp_path, slider_behind(gap))
+    add(study, "jenkins", "load")
+    before = explain(open_study(study.folder))
+    found = before.exchange
+    assert (found.effect if found else None) == offered
+    if found is None:
+        return
+    assert "in place of jenkins@load" in before.text
+    undo(open_study(study.folder))
+    after = add(open_study(study.folder), found.effect, found.port).after
+    assert after.held_out_error == pytest.approx(found.held_out_error, rel=0.05)
+    assert after.held_out_error < before.comparison.held_out_error
