@@ -72,8 +72,9 @@ def _remodelled(study: "Study", arguments: argparse.Namespace) -> "Study":
 
 def _found(study: "Study", arguments: argparse.Namespace) -> int:
     """Ranks the bases and takes the best if asked to."""
+    from rigwatch.workbench.compare import find_base
     from rigwatch.workbench.report import base_lines
-    from rigwatch.workbench.steps import find_base, take_base
+    from rigwatch.workbench.steps import take_base
 
     found = find_base(study, progress=say)
     names = found.enough.variants

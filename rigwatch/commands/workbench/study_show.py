@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 on success."""
     from rigwatch.workbench.report import number, table
-    from rigwatch.workbench.study import ledger, open_study
+    from rigwatch.workbench.study import ledger, open_study, physics_of
 
     study = open_study(arguments.study)
     steps = list(ledger.lines(study))
@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     print(f"{study.folder}: model {study.model.name}: {study.model.summary}")
     for name in study.file.variants:
-        print(f"  with {name}: {study.model.variants[name].physics}")
+        print(f"  with {name}: {physics_of(study, name)}")
     for one in study.known:
         print(f"  known of {one}")
     if moving := study.moving():

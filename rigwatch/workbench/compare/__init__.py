@@ -1,5 +1,7 @@
 """Compares model and measurements: errors against the noise floor, and where they occur."""
 
+from rigwatch.workbench.compare.base_fit import Base
+from rigwatch.workbench.compare.base_search import Bases, find_base
 from rigwatch.workbench.compare.compare import Comparison, compare, comparison
 from rigwatch.workbench.compare.horizon import with_horizon_of
 from rigwatch.workbench.compare.locate import Region, locate, motion, sample_numbers
@@ -15,6 +17,8 @@ from rigwatch.workbench.compare.unweighed import unweighed
 from rigwatch.workbench.compare.warm import Warm
 
 __all__ = [
+    "Base",
+    "Bases",
     "Bench",
     "Comparison",
     "Region",
@@ -25,6 +29,7 @@ __all__ = [
     "compare",
     "comparison",
     "determined_by_healthy",
+    "find_base",
     "locate",
     "motion",
     "open_bench",

@@ -22,7 +22,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, values_with, with_kept_free, with_values
-from rigwatch.workbench.study import Study, varied
+from rigwatch.workbench.study import Study, elements_of, varied, written_variants
 
 BEGINNING = 2048
 """Samples of the healthy recording to which variants are fitted."""
@@ -45,7 +45,9 @@ def variances_between_bases(
     if bare is None or healthy is None or not (fitted.placements and study.model.variants):
         return {}
     part, own = beginning(healthy.train, BEGINNING), study.file.variants
-    every = [own, *neighbours(study.model, own)]
+    elements = [str(element) for element in elements_of(own)]
+    further = neighbours(study.model, written_variants(own))
+    every = [own, *((*elements, *names) for names in further)]
     moved: dict[str, FloatArray] = {}
     try:
         known = with_kept_free(_along(study, own))

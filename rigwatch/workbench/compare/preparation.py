@@ -16,6 +16,7 @@ from rigwatch.workbench.data import (
     predicts_along_motion,
     prepare,
     quiet_scale,
+    with_elements,
 )
 from rigwatch.workbench.fit import (
     Fitted,
@@ -75,6 +76,7 @@ def determined_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatA
     Raises:
         ModelError: the model cannot be fitted to the healthy recording.
     """
+    study = with_elements(study, data.healthy or data.train)
     if learns_from_healthy(study):
         return *with_healthy_remainder(study, data), None
     if predicts_along_motion(study):

@@ -1,6 +1,7 @@
 """A study's measured data: signals on one time grid, their scales, and the noise floor."""
 
 from rigwatch.workbench.data.columns import Columns
+from rigwatch.workbench.data.healthy_elements import with_elements
 from rigwatch.workbench.data.motion import along_motion, predicts_along_motion
 from rigwatch.workbench.data.noise_floor import (
     METHODS,
@@ -42,4 +43,5 @@ __all__ = [
     "read_columns",
     "repeat_along_motion",
     "repeat_of",
+    "with_elements",
 ]

@@ -2,22 +2,28 @@
 
 If the fit has not converged, or the model describes another machine, the residual of a healthy
 recording is far above its noise. Any added effect explains part of it and would be named with
-confidence.
+confidence. Another base is then searched for, with the healthy recordings alone, before those with
+the fault are looked at; the study's file is not changed, and the verdict says what it is judged on.
 """
 
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 
 from rigwatch.physics.engine.equations import Model
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.workbench.compare import Bench
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.compare import Bench, find_base, open_bench
 from rigwatch.workbench.data import METHODS, from_residual
-from rigwatch.workbench.explain.verdict import Verdict
-from rigwatch.workbench.study import Study
+from rigwatch.workbench.explain.verdict import Verdict, not_converged
+from rigwatch.workbench.ranking import Progress
+from rigwatch.workbench.study import Study, elements_of, varied
 
 MOST = 5.0
 """Largest ratio of the healthy recording's error to its noise at which a model is adequate."""
+ENOUGH = 2.0
+"""The same at which a search for a base ends: what is left is hardly a law that the base lacks."""
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
 VARIED = "`rigwatch study base {study} --take enough` searches for better variants of the model"
 
@@ -25,6 +31,11 @@ UNCHECKED = (
     "the model could not be checked on a healthy recording: record one with nothing wrong and list"
     " it under [[healthy]] in the study"
 )
+JUDGED_ON = (
+    "judged on the model with {names}, which the healthy recording asks for; to keep it:"
+    ' rigwatch study base {study} --take "{names}"'
+)
+CHANGE = "the healthy machine has {label} already: what is missing is more of it"
 
 
 def inadequate(bench: Bench) -> Verdict | None:
@@ -47,9 +58,11 @@ def inadequate(bench: Bench) -> Verdict | None:
     return Verdict("model_inadequate", None, (), (), text)
 
 
-def with_base_offered(study: Study, found: Verdict) -> Verdict:
-    """The verdict, with the command that searches for a better base if the model has variants."""
-    if found.word != "model_inadequate" or not study.model.variants or not study.file.healthy:
+def with_base_offered(bench: Bench, found: Verdict) -> Verdict:
+    """The verdict, with the command that searches for a better base if there may be one."""
+    study = bench.study
+    searched = study.file.healthy and (study.model.variants or bench.data.along_motion)
+    if found.word != "model_inadequate" or not searched:
         return found
     return replace(found, text=f"{found.text}; {VARIED.format(study=study.folder)}")
 
@@ -85,3 +98,63 @@ def unchecked(bench: Bench, found: Verdict) -> Verdict:
 def _worst(model: Model, ratios: FloatArray) -> str:
     """The output with the largest error over its noise."""
     return list(model.outputs)[int(np.argmax(ratios))]
+
+
+def with_adequate_base(bench: Bench, progress: Progress) -> Bench:
+    """The bench, or one on a base that the healthy recordings ask for if its own is inadequate.
+
+    Args:
+        bench: of a study; one with accepted effects keeps its base.
+        progress: called with a line of text as each fit begins.
+    """
+    if not _is_inadequate(bench) or not _may_search(bench):
+        return bench
+    progress("the model does not describe the healthy rig: searching for a better base")
+    try:
+        better = _on_found_base(bench.study, progress)
+    except ModelError:
+        return bench
+    return bench if better is None or _is_inadequate(better) else better
+
+
+def _on_found_base(study: Study, progress: Progress) -> Bench | None:
+    """The bench on the best base found; None if that is the study's own.
+
+    Raises:
+        ModelError: a base cannot be fitted.
+    """
+    found = find_base(study, progress, enough=ENOUGH)
+    names = found.enough.variants
+    if set(names) == set(study.file.variants):
+        return None
+    chosen = varied(study, names)
+    file = structs.replace(chosen.file, start=found.start | dict(study.file.start))
+    progress(f"fitting the model with {', '.join(names)}")
+    better = open_bench(replace(chosen, file=file))
+    told = JUDGED_ON.format(names=", ".join(names), study=study.folder)
+    return replace(better, data=replace(better.data, remarks=(*better.data.remarks, told)))
+
+
+def with_change_told(study: Study, found: Verdict) -> Verdict:
+    """The verdict, which says so if it names an element that the base has already."""
+    labels = {element.label for element in elements_of(study.file.variants)}
+    named = sorted(labels & {*found.members})
+    if not named:
+        return found
+    return replace(found, text=f"{found.text}; {CHANGE.format(label=named[0])}")
+
+
+def _may_search(bench: Bench) -> bool:
+    study = bench.study
+    return bool(bench.data.along_motion and study.file.healthy) and not (
+        study.file.effects or study.model.rough
+    )
+
+
+def _is_inadequate(bench: Bench) -> bool:
+    bare, kept = bench.bare, bench.study.kept
+    ended = {
+        "the model to the healthy recording": bare.convergence if bare else None,
+        "the kept parameters to the healthy recording": kept.convergence if kept else None,
+    }
+    return (not_converged(ended) or inadequate(bench)) is not None

@@ -12,7 +12,13 @@ from rigwatch.workbench.compare import (
     unweighed,
 )
 from rigwatch.workbench.experiment import Experiment, propose
-from rigwatch.workbench.explain.adequacy import inadequate, unchecked, with_base_offered
+from rigwatch.workbench.explain.adequacy import (
+    inadequate,
+    unchecked,
+    with_adequate_base,
+    with_base_offered,
+    with_change_told,
+)
 from rigwatch.workbench.explain.credibility import (
     credible_verdict,
     undetermined_if_another_law,
@@ -125,7 +131,7 @@ def explain(study: Study, progress: Progress = no_progress) -> Explanation:
         ModelError: data have changed, or do not suit the model.
     """
     progress("fitting the current model")
-    bench = open_bench(study)
+    bench = with_adequate_base(open_bench(study), progress)
     rows, verdict = ranking(bench, progress)
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
         progress("finding what the healthy recording leaves open of the strength")
@@ -143,7 +149,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
     stopped = _stopped(bench)
     if stopped is not None:
         rows = rank_all(bench.study, bench.data, bench.base)
-        return rows, with_base_offered(bench.study, stopped)
+        return rows, with_base_offered(bench, stopped)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
     verdict = credible_verdict(bench, rows)
     rows, verdict = _refined(bench, rows, verdict, progress)
@@ -160,7 +166,8 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
     elif along:
         verdict = undetermined_if_much_left(bench.base, bench.floor, verdict)
         verdict = undetermined_if_little_and_unexplained(bench.base, bench.floor, verdict)
-    verdict = with_base_offered(bench.study, unchecked(bench, verdict))
+    verdict = with_base_offered(bench, unchecked(bench, verdict))
+    verdict = with_change_told(bench.study, verdict)
     if verdict.best is not None:
         rows = [verdict.best, *(row for row in rows if row is not verdict.best)]
     return rows, verdict

@@ -47,6 +47,9 @@ WELL_ABOVE = 1.5
 """Ratio of error to noise above which a fit may have ended in a local minimum."""
 MANY_PARAMETERS = 5
 """Number of free parameters above which a fit along the measured motion uses several starts."""
+TO_THE_END = 30
+"""Most simulations that fit the initial states of a held-out recording along the motion: a slow
+state, as a sensor's mean, waits until pressures that soon do not matter have stopped moving."""
 FAST, SLOWED = 1.0, 0.5
 """Eigenvalue times step above which a linearisation uses finer steps, and its value then."""
 LOOKED_AT = 20
@@ -263,7 +266,8 @@ def _judged(  # noqa: PLR0917 -- they belong together
     found = with_told(found, study.model, data.telling, data.horizon, substeps)
     # Along the motion hidden states follow it; a rough model is judged with its reference.
     judging = not (data.along_motion or study.model.rough)
-    judged = evaluate(found, data.held_out, length, substeps, initial, judging=judging)
+    further = {"steps": TO_THE_END} if data.along_motion else {}
+    judged = evaluate(found, data.held_out, length, substeps, initial, judging=judging, **further)
     calm = away_from_jumps(found, data.held_out, length)
     return Fitted(tuple(placements), found, judged, substeps, horizon, calm, ended)
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from rigwatch.workbench.compare import Comparison, Region
+from rigwatch.workbench.compare import Bases, Comparison, Region
 from rigwatch.workbench.explain import Explanation, Row
 from rigwatch.workbench.fit import Value
-from rigwatch.workbench.steps import Bases, Change
+from rigwatch.workbench.steps import Change
 from rigwatch.workbench.study import GIVEN, Held
 
 VERDICTS = {

@@ -1,7 +1,7 @@
 """Steps of a study: choose a base, add and undo effects, replay the ledger, promote the model."""
 
 from rigwatch.workbench.steps import change
-from rigwatch.workbench.steps.base import Base, Bases, find_base, take_base
+from rigwatch.workbench.steps.base import take_base
 from rigwatch.workbench.steps.change import add, check_effect, learn, learn_text, remodel, undo
 from rigwatch.workbench.steps.from_logs import Logs, study_from_logs
 from rigwatch.workbench.steps.ledger_replay import replay
@@ -18,8 +18,6 @@ from rigwatch.workbench.steps.promotion import promotion
 from rigwatch.workbench.steps.trial import Change, Trial, try_add, try_effect, try_undo, whole
 
 __all__ = [
-    "Base",
-    "Bases",
     "Change",
     "Logs",
     "ModelHandover",
@@ -30,7 +28,6 @@ __all__ = [
     "add",
     "change",
     "check_effect",
-    "find_base",
     "hand_over",
     "learn",
     "learn_text",

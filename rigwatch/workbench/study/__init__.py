@@ -10,11 +10,21 @@ from rigwatch.workbench.study.edits import (
     use_model_file,
     use_variants,
 )
+from rigwatch.workbench.study.elements import Element, elements_of, written_variants
 from rigwatch.workbench.study.folder import FILE, LEDGER, digest
 from rigwatch.workbench.study.ledger import append, check_data, commit, lines, model_hash, stands_on
 from rigwatch.workbench.study.moving_parameters import judged_alone
 from rigwatch.workbench.study.recording_parameters import Known
-from rigwatch.workbench.study.study import GIVEN, Held, Kept, Study, open_study, study_of, varied
+from rigwatch.workbench.study.study import (
+    GIVEN,
+    Held,
+    Kept,
+    Study,
+    open_study,
+    physics_of,
+    study_of,
+    varied,
+)
 from rigwatch.workbench.study.study_file import Accepted, Derive, Derived, Span, StudyFile
 
 __all__ = [
@@ -24,6 +34,7 @@ __all__ = [
     "Accepted",
     "Derive",
     "Derived",
+    "Element",
     "Held",
     "Kept",
     "Known",
@@ -39,12 +50,14 @@ __all__ = [
     "digest",
     "discard",
     "drop_effect",
+    "elements_of",
     "judged_alone",
     "keep_holds",
     "ledger",
     "lines",
     "model_hash",
     "open_study",
+    "physics_of",
     "stands_on",
     "start_study",
     "study_of",
@@ -52,4 +65,5 @@ __all__ = [
     "use_model_file",
     "use_variants",
     "varied",
+    "written_variants",
 ]

@@ -21,6 +21,7 @@ from rigwatch.physics.engine.equations import (
     Hold,
     Model,
     Parameter,
+    Placement,
     check_model,
     library,
     model_named,
@@ -34,6 +35,7 @@ from rigwatch.physics.engine.search import Convergence
 from rigwatch.wire.errors import ConfigError, ModelError, nearest
 from rigwatch.wire.typed_files import parse, read_text
 from rigwatch.wire.units import Unit, unit_of
+from rigwatch.workbench.study.elements import elements_of, with_element, written_variants
 from rigwatch.workbench.study.folder import FILE, LEDGER, settle
 from rigwatch.workbench.study.known_values import with_known_values
 from rigwatch.workbench.study.moving_parameters import fitted_by_recording, told_apart
@@ -101,6 +103,7 @@ class Study:
         own_files: content of own effect and model files when opened, by name.
         unsaved: own files, by name, that `commit` is to write.
         known: what the file gives for single recordings.
+        elements: effects of the healthy machine, scaled for their ports, see `elements.py`.
     """
 
     folder: Path
@@ -115,6 +118,7 @@ class Study:
     own_files: Mapping[str, str] = dataclass_field(default_factory=dict)
     unsaved: Mapping[str, Unsaved] = dataclass_field(default_factory=dict)
     known: tuple[Known, ...] = ()
+    elements: tuple[Placement, ...] = ()
 
     @property
     def ledger(self) -> Path:
@@ -207,6 +211,11 @@ def study_of(folder: Path, text: str, unsaved: Mapping[str, Unsaved] = NOTHING_U
     )
     for accepted in file.effects:
         study.effect(accepted.effect)
+    for element in elements_of(file.variants):
+        study.effect(element.effect)
+        if element.port not in model.ports:
+            meant = nearest(element.port, model.ports)
+            raise ModelError(f"variants: found port {element.port!r} in {element.label}{meant}")
     return _in_si(study)
 
 
@@ -267,11 +276,11 @@ def _own_names(file: StudyFile) -> tuple[str, ...]:
 def _written(folder: Path, file: StudyFile, own_files: Mapping[str, str]) -> Model:
     """The study's model with its variants, without holds."""
     if not file.model.endswith(".toml"):
-        return with_variants(model_named(file.model), file.variants)
+        return with_variants(model_named(file.model), written_variants(file.variants))
     path = folder / file.model
     model = parse_model(own_files[file.model], path)
     check_model(model, str(path))
-    return with_variants(model, file.variants)
+    return with_variants(model, written_variants(file.variants))
 
 
 def varied(study: Study, variants: Sequence[str]) -> Study:
@@ -282,9 +291,20 @@ def varied(study: Study, variants: Sequence[str]) -> Study:
     """
     file = structs.replace(study.file, variants=tuple(variants))
     written = _written(study.folder, file, study.own_files)
+    named = {element.label for element in elements_of(variants)}
+    for element in study.elements:
+        if f"{element.name}@{element.port}" in named:
+            written = with_element(written, element)
     model, holds = _held(_by_recording(written, file), file)
     model = with_known_values(model, file)
     return replace(study, file=file, model=model, kept=None, holds=holds)
+
+
+def physics_of(study: Study, name: str) -> str:
+    """The physics of a variant or of an element, in words."""
+    for element in elements_of((name,)):
+        return study.effect(element.effect).physics
+    return study.model.variants[name].physics
 
 
 def _by_recording(model: Model, file: StudyFile) -> Model:

@@ -68,7 +68,11 @@ class StudyFile(Section, frozen=True, kw_only=True):
 
     model: Annotated[str, Meta(description="name of a shipped model, or a model file")]
     variants: Annotated[
-        tuple[str, ...], Meta(description="model variants in use, see `rigwatch study base`")
+        tuple[str, ...],
+        Meta(
+            description="model variants in use, and effects that the healthy machine has, as"
+            " `effect@port(parameter=value …)` in SI, see `rigwatch study base`"
+        ),
     ] = ()
     train: Annotated[tuple[Span, ...], Meta(min_length=1, description="training recordings")]
     held_out: Annotated[

@@ -15,7 +15,7 @@ from rigwatch.physics.engine.equations.effect_files import (
     offered,
     parse_effects,
 )
-from rigwatch.physics.engine.equations.expression import FUNCTIONS, names_in, parse
+from rigwatch.physics.engine.equations.expression import FUNCTIONS, names_in, parse, renamed
 from rigwatch.physics.engine.equations.measured_motion import (
     along_measured_motion,
     balanced_states,
@@ -112,6 +112,7 @@ __all__ = [
     "parse_effects",
     "parse_model",
     "predicted_outputs",
+    "renamed",
     "shipped_models",
     "signal_order",
     "spelt_out",

@@ -33,6 +33,8 @@ BACK = 0.8
 FOLLOWED = 4
 """Ratio of a window to its part after which hidden states of an unknown start are settled."""
 
+STEPS = 6
+"""Most simulations that fit the initial states of windows."""
 SETTLED = 1e-6
 """Predicted reduction of a window's squared error below which its initial state is kept."""
 
@@ -265,14 +267,18 @@ class Problem:
         """Values of all windows, (windows, samples, …), in the layout of `Fit`."""
         return self._cut.whole(windowed, self._lengths)
 
-    def start_windows(self, parameters: FloatArray) -> Started:
+    def start_windows(self, parameters: FloatArray, steps: int = STEPS) -> Started:
         """Settle, and restart diverged windows from the end of the previous window.
 
         Initial states have local minima of their own.
+
+        Args:
+            parameters: all parameters, shape (n_p,).
+            steps: most simulations.
         """
         if self._best is not None and np.array_equal(self._best.parameters, parameters):
             self.initial = self._best.initial
-        error, slopes = self.settle(parameters)
+        error, slopes = self.settle(parameters, steps)
         found, rows = Started(parameters, self.initial, error, slopes), _outliers(error)
         if not (self.system.states and len(rows)) or self._cut.parts:
             return found
@@ -302,7 +308,7 @@ class Problem:
     def settle(
         self,
         parameters: FloatArray,
-        steps: int = 6,
+        steps: int = STEPS,
         *,
         least_reduction: float = SETTLED,
         rows: IntArray | None = None,

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.equations import System
 from rigwatch.physics.engine.fit.continued_windows import continued
-from rigwatch.physics.engine.fit.problem import Problem, Started
+from rigwatch.physics.engine.fit.problem import STEPS, Problem, Started
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError
@@ -203,6 +203,7 @@ def evaluate(
     initial: FloatArray | None = None,
     *,
     judging: bool = False,
+    steps: int = STEPS,
 ) -> Fit:
     """The same parameters on another recording; only its windows' initial states are fitted.
 
@@ -210,13 +211,16 @@ def evaluate(
         fitted: the parameters.
         recording, horizon, substeps, initial: as in `fit`.
         judging: whether counted samples may only determine states that channels measure.
+        steps: most simulations that fit the initial states, unless judging.
     """
     problem = Problem(
         fitted.compiled, recording, horizon, scale=fitted.scale, substeps=substeps, initial=initial
     )
     problem.recall(fitted.parameters)
-    start = continued if judging else Problem.start_windows
-    found = start(problem, fitted.parameters)
+    if judging:
+        found = continued(problem, fitted.parameters)
+    else:
+        found = problem.start_windows(fitted.parameters, steps)
     return replace(result_of(problem, found), covariance=fitted.covariance)
 
 

@@ -53,6 +53,8 @@ PART = 2048
 """Number of samples of a first search."""
 BLOWN_UP = 1e3
 """Residual assigned to a diverged simulation [standard deviations of noise]."""
+LARGEST = 1e100
+"""Residual, or slope of one, from which a simulation has diverged: its square overflows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +251,7 @@ class WholeRuns:
         with np.errstate(over="ignore", invalid="ignore"):
             error, own = self._problem.simulated(parameters, np.arange(len(initial)), initial)
             slopes = _block_columns(own, self._m) * self._unknowns.slope(z)
-        if not (np.isfinite(error).all() and np.isfinite(slopes).all()):
+        if not (_is_tame(error) and _is_tame(slopes)):
             error, slopes = np.full_like(error, BLOWN_UP), np.zeros_like(slopes)
         return (
             np.concatenate([-error.ravel(), self._pull * z]),
@@ -268,6 +270,11 @@ class WholeRuns:
         problem = self._posed(initial)
         problem.recall(parameters)
         return result_of(problem, problem.start_windows(parameters))
+
+
+def _is_tame(values: FloatArray) -> bool:
+    """Whether all are finite, and small enough to be squared."""
+    return bool(np.all(np.abs(values) < LARGEST))
 
 
 class Latest:

@@ -1,0 +1,78 @@
+"""A base that lacks what the healthy machine has: the element is found, and a fault beside it."""
+
+import numpy as np
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.explain.explain import explain
+from rigwatch.workbench.study.elements import elements_of
+from rigwatch.workbench.study.study import Study, open_study
+from tests.workbench.fits.test_strength_intervals import MODEL, RATE, slide
+from tests.workbench.machine import Table, recorded, studied
+
+UNITS = {"u": "N", "position": "m", "acceleration": "m/s^2"}
+HEALTHY, FAULT = 0.5, 0.25
+"""Dry friction of the healthy slide and of its fault [N]."""
+
+
+def table(seed: int, friction: float) -> Table:
+    """A recording of a slide with this dry friction, its position a sample late."""
+    made = slide(seed, friction, 0.0, 0.03)
+    columns = np.column_stack([made.inputs, made.outputs]).T
+    u, position, acceleration = columns
+    late = np.concatenate([position[:1], position[:-1]])
+    return dict(zip(UNITS, (u, late, acceleration), strict=True))
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """The study of a slide that rubs more than a healthy one; its model does not rub at all."""
+    folder = tmp_path_factory.mktemp("slide")
+    train, held_out = ([table(seed, HEALTHY + FAULT)] for seed in range(2))
+    made = studied(folder, MODEL, train, held_out, UNITS, rates=[RATE] * 2)
+    recorded(folder / "healthy.mcap", table(2, HEALTHY), UNITS, RATE)
+    with (made.folder / "study.toml").open("a") as file:
+        file.write('\n[[healthy]]\nsession = "../healthy.mcap"\n')
+    return open_study(made.folder)
+
+
+def test_more_friction_is_named_beside_what_the_healthy_slide_has(study: Study) -> None:
+    found = explain(study)
+    assert found.verdict == "missing_effect", found.text
+    best = found.ranking[0]
+    strength = best.parameters[study.effect(best.effect).strength]
+    assert (best.effect, best.port) == ("coulomb", "load")
+    assert "the healthy machine has coulomb@load already" in found.text
+    assert strength.value == pytest.approx(FAULT, rel=0.15)
+    (told,) = (r for r in found.comparison.remarks if r.startswith("judged on the model with"))
+    (element,) = elements_of([told.split("with ")[1].split(",")[0]])
+    assert element.values["Fc"] == pytest.approx(HEALTHY, rel=0.1)
+    assert open_study(study.folder).file.variants == ()
+
+
+def test_an_element_is_taken_shown_and_undone(
+    study: Study, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(study.folder)
+    assert main(["study", "base", folder, "--take", "coulomb@load(Fc=0.5)"]) == 0
+    assert open_study(folder).file.variants == ("coulomb@load(Fc=0.5)",)
+    capsys.readouterr()
+    assert main(["study", "show", folder]) == 0
+    assert "with coulomb@load(Fc=0.5): " in capsys.readouterr().out
+    assert main(["undo", folder]) == 0
+    assert open_study(folder).file.variants == ()
+
+
+def test_an_element_that_cannot_be_read_is_one_line() -> None:
+    with pytest.raises(ModelError, match="expected a variant of the model or an effect at a port"):
+        elements_of(["coulomb@load(Fc: 0.5)"])
+
+
+def test_an_unknown_port_or_effect_is_told(
+    study: Study, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, told in (("coulmb@load", "coulomb"), ("coulomb@laod", "load")):
+        assert main(["study", "base", str(study.folder), "--take", name]) != 0
+        assert told in capsys.readouterr().err
+    assert open_study(study.folder).file.variants == ()
