@@ -20,14 +20,16 @@ RNG = np.random.default_rng(8)
 LATE, DRY = 2.0 * np.sin(AT), -4.0 * np.sign(np.sin(AT + 0.4))
 
 
-def learnt(error: np.ndarray, *, judging: bool = False, kept: np.ndarray | None = None):
+def learnt(
+    error: np.ndarray, *, judging: bool = False, kept: np.ndarray | None = None
+) -> np.ndarray:
     """The carried figures after a residual."""
     rows = np.zeros((N, len(COLUMNS)))
     rows[:, E] = error + NOISE * RNG.standard_normal(N)
     rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, DRY
     kept = no_lateness() if kept is None else kept
     for row in rows:
-        follow_lateness(row, NOISE**2, judging, kept)
+        follow_lateness(row, NOISE**2, False, kept)
     return kept
 
 
