@@ -53,6 +53,17 @@ def test_nothing_is_learnt_from_a_healthy_residual() -> None:
     assert learnt(0.02 * LATE)[TAU] == 0.0
 
 
+def test_a_residual_as_large_as_in_commissioning_is_not_explained() -> None:
+    rows = np.zeros((N, len(COLUMNS)))
+    rows[:, E], rows[:, LATE_UNIT], rows[:, DRY_UNIT] = 0.5 * LATE, LATE, DRY
+    kept = no_lateness()
+    for row in rows:
+        follow_lateness(row, 4.0 * float(np.mean(rows[:, E] ** 2)), False, kept)
+
+    assert kept[TAU] == 0.0
+    assert not is_late(kept)
+
+
 def test_a_lateness_that_is_gone_is_forgotten() -> None:
     kept = learnt(-0.5 * LATE)
 
