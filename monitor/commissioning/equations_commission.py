@@ -232,7 +232,9 @@ def _model(  # noqa: PLR0917 -- all that was found
     slow = max(SLOW * _rms(speeds), plant.turn)
     signals = [range_signals(o)[o.state != EMPTY] for o in parts]
     motions = [_spectrum(o, layout, slow, rate) for o in parts]
-    seen = range_of(layout.signals, signals, motions, bends_of(used, base_model(plant.model)))
+    drives = [o.drive[round(STARTED * rate) :] for o in parts]
+    bends = bends_of(used, base_model(plant.model))
+    seen = range_of(layout.signals, signals, motions, drives, bends)
     healthy = [
         HealthyPart(
             o.judged,
@@ -241,9 +243,9 @@ def _model(  # noqa: PLR0917 -- all that was found
             drive_energy(o.rows, seen, layout.motions),
             o.state,
             motion,
-            o.drive[round(STARTED * rate) :],
+            drive,
         )
-        for o, motion in zip(parts, motions, strict=True)
+        for o, motion, drive in zip(parts, motions, drives, strict=True)
     ]
     skip = round(SKIPPED * rate)
     limits = healthy_limits(healthy, slow, skip, rate)

@@ -78,7 +78,7 @@ def healthy_limits(
         for gap, size in zip(gaps, sizes, strict=True)
     )
     rules = DecisionRules(
-        noise, growth, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, speed_noise, NEVER, 1, 1.0
+        noise, growth, 1.0, np.inf, 1.0, 1.0, 0.0, 1.0, speed_noise, NEVER, 1, 1.0
     )  # fmt: skip
     largest = [_extremes(part, rules, skip) for part in parts]
     motions = [

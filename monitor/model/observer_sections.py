@@ -62,6 +62,10 @@ class RangeSection(Section, frozen=True, kw_only=True):
         Floats,
         Meta(description="largest mean frequency of a motion of at least each size [Hz]"),
     ] = ()
+    drive_paces: Annotated[
+        Floats, Meta(description="pace of the drive, of each kind of drive and motion")
+    ] = ()
+    motion_paces: Annotated[Floats, Meta(description="mean frequency of its motion [Hz]")] = ()
     channels: Annotated[
         tuple[str, ...], Meta(description="channels that measure a state, which cannot jump")
     ] = ()

@@ -20,22 +20,23 @@ MOST = 1.0
 """Largest lateness [samples]."""
 QUICK, SLOW = 32.0, 128.0
 """Memory of what it is learnt from, before and while the rig is judged [samples]."""
-EXPLAINS, PLAIN = 0.85, 2.0
-"""Share of the residual's energy beyond half the healthy one that it must explain, and the ratio of
-the two below which there is nothing to explain.
+EXPLAINS, REST = 0.85, 0.25
+"""Share of the residual's energy that it must explain, besides a share of the largest healthy one;
+less than that one is not explained at all.
 """
 UNSURE = 0.15
 """Relative error of the response: equations fitted to one lateness are less accurate at another."""
 UNSTEADY = 0.2
 """Lateness, and change of it, that matters [samples]."""
-RECENT = 4096.0
-"""Samples after which a lateness no longer found is forgotten: the longest interval between skips
-of steps that slide."""
+SHOWN, RECENT = 128.0, 4096.0
+"""Samples for which a lateness must be found to count, as at a start there may be a false one; and
+those after which one no longer found is forgotten: the longest interval between skips.
+"""
 ERRORS, PRODUCTS, RESPONSES, RUBBED, FRICTIONS = range(5)
 """Means of e², e·s, s², e·g and g², with g the response to dry friction."""
-OF_QUICK, OF_SLOW, TAU, AGO = 0, 5, 10, 11
-"""Carried figures: the means with both memories, τ, and the time since it mattered, `RECENT` if
-never.
+OF_QUICK, OF_SLOW, TAU, FOR, AGO = 0, 5, 10, 11, 12
+"""Carried figures: the means with both memories, τ, the time for which it has mattered, and the
+time since it did, `RECENT` if never.
 """
 
 
@@ -47,12 +48,12 @@ def no_lateness() -> FloatArray:
 
 
 @njit()
-def follow_lateness(row: FloatArray, healthy: float, judging: bool, kept: FloatArray) -> None:
+def follow_lateness(row: FloatArray, largest: float, judging: bool, kept: FloatArray) -> None:
     """Learn from a sample.
 
     Args:
         row: its judged columns, see `missing_force`.
-        healthy: variance of the healthy residual.
+        largest: mean square of the healthy residual at the present motion.
         judging: whether the rig is judged.
         kept: the carried figures.
     """
@@ -64,12 +65,13 @@ def follow_lateness(row: FloatArray, healthy: float, judging: bool, kept: FloatA
         _average(row[DRY_UNIT] * row[DRY_UNIT], first + FRICTIONS, memory, kept)
     first = OF_SLOW if judging and not is_late(kept) else OF_QUICK
     energy, found = kept[first + ERRORS], _best(kept, first)
-    least = min((1.0 - EXPLAINS) * energy + 0.5 * healthy, _rubbing(kept, first))
-    if energy > PLAIN * healthy and _left(found, kept, first) < least:
+    least = min((1.0 - EXPLAINS) * energy + REST * largest, _rubbing(kept, first))
+    if energy > largest and _left(found, kept, first) < least:
         kept[TAU] = found
     elif _left(kept[TAU], kept, first) > energy:
         kept[TAU] = 0.0
-    kept[AGO] = 0.0 if abs(kept[TAU]) > UNSTEADY else min(kept[AGO] + 1.0, RECENT)
+    kept[FOR] = kept[FOR] + 1.0 if abs(kept[TAU]) > UNSTEADY else 0.0
+    kept[AGO] = 0.0 if kept[FOR] >= SHOWN else min(kept[AGO] + 1.0, RECENT)
 
 
 @njit()

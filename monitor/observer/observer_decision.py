@@ -139,7 +139,8 @@ def decide(  # noqa: PLR0917 -- a kernel
             _restart(kept)
         _follow_drive(drive[k], steady[k], kept)
         if state[k] != TAINTED:
-            _remember(kept, judged[k], speed[k], levels[k], rules)
+            _follow_lateness(kept, judged[k], usual[:, k], rules)
+            _remember(kept, judged[k], speed[k], levels[k])
         _follow_jumps(jumped[k], kept)
         _one(k, inside[k], usual[:, k], rules, kept, out)
 
@@ -184,22 +185,22 @@ def _follow_jumps(jumped: bool, kept: DecisionState) -> None:
 
 
 @njit()
-def _follow_lateness(kept: DecisionState, row: FloatArray, rules: DecisionRules) -> None:
+def _follow_lateness(
+    kept: DecisionState, row: FloatArray, usual: FloatArray, rules: DecisionRules
+) -> None:
     """Learn the inputs' lateness, except in an episode; while it changes, the rig is not armed."""
     count = kept.counts
     judging = count[WAS_JUDGING] == 1
     if not judging or (count[ONSET] < 0 and (count[ABOVE] == 0 or is_late(kept.lateness))):
-        follow_lateness(row, _variance(kept, rules), judging, kept.lateness)
+        largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
+        follow_lateness(row, largest * _variance(kept, rules), judging, kept.lateness)
     if not judging and lateness_changes(kept.lateness):
         count[CHANGED] = -LONG
 
 
 @njit()
-def _remember(
-    kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray, rules: DecisionRules
-) -> None:
+def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray) -> None:
     """Store a sample; the first columns are in the order of the residual's."""
-    _follow_lateness(kept, row, rules)
     head = kept.counts[HEAD]
     for c in range(6):
         kept.rows[head, c] = row[c]

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from monitor.model import RangeSection, RigModel
+from monitor.observer.drives_seen import DrivesSeen, kinds_of
 from monitor.observer.lagged_motion import EMPTY
 from monitor.observer.missing_force import PREDICTED
 from monitor.observer.model_signals import Observed
@@ -42,6 +43,7 @@ class RangeSeen:
         self._half = ALLOWED * np.maximum(0.5 * (high - low), 1e-12)
         self._sizes = np.array(model.motion_range.sizes)
         self._paces = np.array([*model.motion_range.paces, np.inf])
+        self._kinds = DrivesSeen(model.motion_range)
 
     def motion(self, seen: Observed) -> Spectrum:
         """The spectrum of the motion after each sample; once for each block."""
@@ -51,13 +53,15 @@ class RangeSeen:
         """Distance from the fitted range, 1 at the limit, shape (n,).
 
         It is the largest of: distance of a signal from the centre, width of the spectrum compared
-        with a tone's, and mean frequency compared with the largest for a motion of that size.
+        with a tone's, mean frequency compared with the largest for a motion of that size, and
+        kind of drive and motion compared with those seen.
         """
         signals = range_signals(seen)
         far = (np.abs(signals - self._middle) / self._half).max(axis=1)
         far = np.maximum(far, (1.0 - motion.narrow) / self._wider)
         known = self._paces[np.searchsorted(self._sizes, motion.size / ALLOWED)]
         far = np.maximum(far, motion.pace / (FASTER * known))
+        far = np.maximum(far, self._kinds.distance(motion, seen.drive))
         return np.where(seen.state == EMPTY, 0.0, far)
 
 
@@ -78,6 +82,7 @@ def range_of(
     names: Sequence[str],
     parts: Sequence[FloatArray],
     motions: Sequence[Spectrum],
+    drives: Sequence[FloatArray],
     bends: Mapping[str, float],
 ) -> RangeSection:
     """The range of healthy signals.
@@ -86,11 +91,13 @@ def range_of(
         names: of the signals.
         parts: of each recording, shape (n, signals).
         motions: spectra of each recording after its start.
+        drives: paces of the drive after each start.
         bends: largest differences of channels that measure a state.
     """
     every = np.concatenate(parts)
     narrow, pace, size = (np.concatenate(part) for part in zip(*motions, strict=True))
     sizes = size.max(initial=0.0) / LEVEL_STEP ** np.arange(LEVELS)[::-1]
+    drive_paces, motion_paces = kinds_of(motions, drives)
     return RangeSection(
         names=(*names, PREDICTION),
         low=tuple(every.min(axis=0).tolist()),
@@ -98,6 +105,8 @@ def range_of(
         narrow=float(np.clip(narrow.min(initial=1.0), 0.0, 1.0)),
         sizes=tuple(sizes.tolist()),
         paces=tuple(float(pace[size >= least].max(initial=0.0)) for least in sizes),
+        drive_paces=tuple(drive_paces.tolist()),
+        motion_paces=tuple(motion_paces.tolist()),
         channels=tuple(bends),
         bends=tuple(bends.values()),
     )

@@ -20,14 +20,16 @@ RNG = np.random.default_rng(8)
 LATE, DRY = 2.0 * np.sin(AT), -4.0 * np.sign(np.sin(AT + 0.4))
 
 
-def learnt(error: np.ndarray, *, judging: bool = False, kept: np.ndarray | None = None):
+def learnt(
+    error: np.ndarray, *, judging: bool = False, kept: np.ndarray | None = None
+) -> np.ndarray:
     """The carried figures after a residual."""
     rows = np.zeros((N, len(COLUMNS)))
     rows[:, E] = error + NOISE * RNG.standard_normal(N)
     rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, DRY
     kept = no_lateness() if kept is None else kept
     for row in rows:
-        follow_lateness(row, NOISE**2, judging, kept)
+        follow_lateness(row, NOISE**2, False, kept)
     return kept
 
 
@@ -49,6 +51,17 @@ def test_friction_is_not_learnt_as_lateness() -> None:
 
 def test_nothing_is_learnt_from_a_healthy_residual() -> None:
     assert learnt(0.02 * LATE)[TAU] == 0.0
+
+
+def test_a_residual_as_large_as_in_commissioning_is_not_explained() -> None:
+    rows = np.zeros((N, len(COLUMNS)))
+    rows[:, E], rows[:, LATE_UNIT], rows[:, DRY_UNIT] = 0.5 * LATE, LATE, DRY
+    kept = no_lateness()
+    for row in rows:
+        follow_lateness(row, 4.0 * float(np.mean(rows[:, E] ** 2)), False, kept)
+
+    assert kept[TAU] == 0.0
+    assert not is_late(kept)
 
 
 def test_a_lateness_that_is_gone_is_forgotten() -> None:
