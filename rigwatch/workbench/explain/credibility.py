@@ -1,37 +1,15 @@
-"""When an effect is not credible: it shows on a healthy recording, or another law fits far better.
+"""An effect is credible only if it is clearly stronger than its apparent strength when healthy.
 
 Model error mimics a little of every effect on a healthy recording. The apparent strength of an
 effect there, to first order, is the part that model error can account for.
-
-What is missing may not be in the library. Then the most similar effect lowers the error in its
-place, often by most of it. A free law of one variable at its port (`ranking/free_law.py`) has its
-shape and every other one, so it leaves far less than an effect of the wrong shape. It leaves about
-as much as the right effect, however much other missing physics leaves in both.
 """
-
-from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench, apparent_strength
 from rigwatch.workbench.explain.verdict import Verdict, judge
-from rigwatch.workbench.ranking import (
-    STEP,
-    Progress,
-    Ranked,
-    best_free_law,
-    difference,
-    no_progress,
-)
+from rigwatch.workbench.ranking import Ranked
 
 STRONGER = 3.0
 """Smallest ratio of an effect's strength to its apparent strength on the healthy recording."""
-
-OTHER_SHAPE = 0.7
-"""Share of the energy above the floor, left by an effect, that a free law leaves if its shape is
-wrong.
-
-On simulated machines of which the library lacked a law, wrong shapes had 0.19 to 0.6 and right ones
-0.84 and more, except 0.68 where another effect of the same variable was missing too.
-"""
 
 
 def credible_verdict(bench: Bench, rows: list[Ranked]) -> Verdict:
@@ -53,35 +31,3 @@ def apparent_when_healthy(bench: Bench, row: Ranked) -> bool:
     value = row.fitted.train.values()[row.placement.prefix + row.placement.effect.strength]
     seems = apparent_strength(healthy, bench.bare, row.placement, row.fitted)
     return abs(value - p.neutral) < STRONGER * abs(seems)
-
-
-def undetermined_if_another_law(
-    bench: Bench, found: Verdict, progress: Progress = no_progress
-) -> Verdict:
-    """The verdict, made undetermined if a free law at the effect's port explains far more.
-
-    An effect that is named together with others is judged with them, down to the noise.
-
-    Args:
-        bench: the study.
-        found: the verdict on its ranking.
-        progress: called with a line of text if the law is fitted.
-    """
-    best = found.best
-    if found.word != "missing_effect" or found.beside or best is None or best.fitted is None:
-        return found
-    if bench.floor.reached(best.fitted.held_out):
-        return found
-    progress(f"comparing {best.label} with a free law at its port")
-    law = best_free_law(bench.study, bench.data, bench.base, best.port)
-    if law is None or difference(best.fitted.held_out, law.fitted.held_out).p_falls >= STEP:
-        return found
-    if bench.floor.left_over(best.fitted.held_out, law.fitted.held_out) > OTHER_SHAPE:
-        return found
-    left, least = (bench.floor.ratio(f.held_out) for f in (best.fitted, law.fitted))
-    text = (
-        f"{best.label} lowers the held-out error most, but leaves {left:.2g} times the noise floor,"
-        f" and a free function of {law.variable} at {best.port} {least:.2g} times: the law there"
-        " may be another, which is not in the library"
-    )
-    return replace(found, word="undetermined", text=text)

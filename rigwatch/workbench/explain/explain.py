@@ -19,10 +19,7 @@ from rigwatch.workbench.explain.adequacy import (
     with_base_offered,
     with_change_told,
 )
-from rigwatch.workbench.explain.credibility import (
-    credible_verdict,
-    undetermined_if_another_law,
-)
+from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
@@ -159,7 +156,6 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
         verdict = _by_pairs(bench, rows, verdict, progress)
     elif may_need_several(bench, verdict):
         verdict = several_effects(bench, rows, verdict, progress)
-        verdict = undetermined_if_another_law(bench, verdict, progress)
     verdict = with_motion_sensor(bench, verdict)
     if along and bench.study.model.rough:
         verdict = limited_verdict(bench.base, rows, bench.floor, verdict)

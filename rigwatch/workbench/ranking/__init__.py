@@ -2,14 +2,12 @@
 
 `candidates` are scored (`scoring`) and become rows (`ranked`); the most promising (`fit_selection`)
 are fitted (`refitting`) and judged by the held-out error (`acceptance`). `rank` runs all of these;
-`with_refinements` adds effects that describe the best one in more detail. `best_free_law` says how
-much any law at a port explains.
+`with_refinements` adds effects that describe the best one in more detail.
 """
 
 from rigwatch.workbench.ranking.acceptance import EXPLAINED, MATERIAL, STEP, judge_fit, left_over
 from rigwatch.workbench.ranking.candidates import candidates, shapes_of
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
-from rigwatch.workbench.ranking.free_law import best_free_law
 from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import AGAIN, MUCH_WORSE, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
@@ -28,7 +26,6 @@ __all__ = [
     "Progress",
     "Ranked",
     "accepted_from",
-    "best_free_law",
     "candidates",
     "difference",
     "in_order",
