@@ -13,7 +13,7 @@ from rigwatch.browser.work.results import Results, as_plain, results_of, signal_
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare import Bench, Warm, locate, sample_numbers
 from rigwatch.workbench.experiment import Experiment, excitation
-from rigwatch.workbench.explain import explanation, ranking
+from rigwatch.workbench.explain import explained
 from rigwatch.workbench.fit import Fitted, block_differences
 from rigwatch.workbench.ranking import Ranked, difference
 from rigwatch.workbench.report import write_report
@@ -73,9 +73,8 @@ class Worker:
         """Rank the effects that may be missing, with evidence for each."""
         self.show()
         study = self.step()
-        kept, bench = results_of(study), self.warm.bench(study)
-        rows, verdict = ranking(bench, self.progress)
-        told = explanation(bench, rows, verdict)
+        kept, found = results_of(study), explained(self.warm.bench(study), self.progress)
+        bench, rows, told = found.bench, found.rows, found.explanation
         self.progress(RANKED)
         kept.write("evidence", {row.label: _evidence(bench, row) for row in rows})
         kept.write("explanation", told)

@@ -20,7 +20,7 @@ from rigwatch.wire.typed_files import read_text
 from rigwatch.workbench.api.data_frames import NamedArrays, columns_from, records, write_csv
 from rigwatch.workbench.api.shown import Rows, Shown
 from rigwatch.workbench.compare import Comparison, Region, Warm, locate
-from rigwatch.workbench.explain import Explanation, explanation, ranking
+from rigwatch.workbench.explain import Explanation, explained
 from rigwatch.workbench.report import (
     change_lines,
     comparison_lines,
@@ -131,7 +131,7 @@ class Study:
     def explain(self) -> Shown[Explanation]:
         """Effects that may be missing (`rigwatch explain`)."""
         bench = self._warm.bench(self._opened())
-        return Shown(explanation(bench, *ranking(bench)), explanation_lines, _ranking)
+        return Shown(explained(bench).explanation, explanation_lines, _ranking)
 
     def add(
         self,

@@ -4,10 +4,12 @@ compare ──▶ rank ──▶ pairs ──▶ verdict (calibrated) ──▶ 
 """
 
 from rigwatch.workbench.explain.explain import (
+    Explained,
     Explanation,
     Row,
     as_data,
     explain,
+    explained,
     explanation,
     ranking,
 )
@@ -15,12 +17,14 @@ from rigwatch.workbench.explain.set_gain import SetGain, set_gain
 from rigwatch.workbench.explain.verdict import Verdict, judge
 
 __all__ = [
+    "Explained",
     "Explanation",
     "Row",
     "SetGain",
     "Verdict",
     "as_data",
     "explain",
+    "explained",
     "explanation",
     "judge",
     "ranking",

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from rigwatch.physics.engine.equations import Effect
 from rigwatch.physics.engine.score import suits
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, bench_of, prepared, with_horizon_of
 from rigwatch.workbench.fit import held_as
 from rigwatch.workbench.ranking import (
@@ -62,16 +63,16 @@ def exchange(bench: Bench, progress: Progress) -> Exchange | None:
     Args:
         bench: the study, its recordings and the fitted model.
         progress: called with a line of text as the fits begin.
-
-    Raises:
-        ModelError: data have changed, or the model cannot be fitted without the effect.
     """
     last = bench.study.file.effects[-1]
     names = of_a_kind(bench.study, last.effect, last.port)[:MOST_TRIED]
     if not names:
         return None
     progress(f"fitting {', '.join(names)} in place of {last.effect}@{last.port}")
-    rows = _fitted(_without_last(bench), names, last.port)
+    try:
+        rows = _fitted(_without_last(bench), names, last.port)
+    except ModelError:
+        return None  # the model cannot be fitted without it
     found = [_in_place(bench, row, last.effect, len(names)) for row in rows if row.accepted]
     better = [each for each in found if each is not None]
     return min(better, key=lambda each: each.held_out_error, default=None)

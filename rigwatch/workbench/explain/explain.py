@@ -117,6 +117,21 @@ class Explanation:
     exchange: Exchange | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """An explanation, and what it is based on.
+
+    Attributes:
+        bench: the study with the base that it was judged on.
+        rows: the ranking.
+        explanation: what is told of it.
+    """
+
+    bench: Bench
+    rows: list[Ranked]
+    explanation: Explanation
+
+
 def explain(study: Study, progress: Progress = no_progress) -> Explanation:
     """Rank every effect at every port and judge.
 
@@ -128,13 +143,28 @@ def explain(study: Study, progress: Progress = no_progress) -> Explanation:
         ModelError: data have changed, or do not suit the model.
     """
     progress("fitting the current model")
-    bench = with_adequate_base(open_bench(study), progress)
+    return explained(open_bench(study), progress).explanation
+
+
+def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
+    """`explain` of a study that has been fitted.
+
+    Args:
+        bench: the study, its recordings and the fitted model.
+        progress: called with a line of text as each part begins.
+    """
+    bench = with_adequate_base(bench, progress)
     rows, verdict = ranking(bench, progress)
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
         progress("finding what the healthy recording leaves open of the strength")
     found = explanation(bench, rows, verdict)
-    if verdict.word != "unknown_effect" or not study.file.effects:
-        return found
+    if verdict.word == "unknown_effect" and bench.study.file.effects:
+        found = _with_exchange(bench, found, progress)
+    return Explained(bench, rows, found)
+
+
+def _with_exchange(bench: Bench, found: Explanation, progress: Progress) -> Explanation:
+    """The explanation with the effect that fits better than the last accepted one, if any does."""
     offer = exchange(bench, progress)
     if offer is None:
         return found

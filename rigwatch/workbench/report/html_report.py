@@ -13,7 +13,7 @@ from pathlib import Path
 from rigwatch.page import page
 from rigwatch.wire.errors import ModelError, reason_of
 from rigwatch.workbench.compare import locate
-from rigwatch.workbench.explain import explanation, ranking
+from rigwatch.workbench.explain import explained
 from rigwatch.workbench.report import charts, sections
 from rigwatch.workbench.steps import signals, stages
 from rigwatch.workbench.study import Study
@@ -32,8 +32,7 @@ def gather(study: Study, progress: Callable[[str], None] = lambda _: None) -> se
     shown = [signals(stage) for stage in found]
     progress("ranking effects")
     last = found[-1].bench
-    rows, verdict = ranking(last, progress)
-    told = explanation(last, rows, verdict)
+    told = explained(last, progress).explanation
     before, now = locate(found[0].bench), locate(last)
     return sections.Material(study, found, shown, told, before, now, list(book.lines(study)))
 
