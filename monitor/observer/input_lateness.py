@@ -3,8 +3,9 @@
 A generator that starts again steps at another place between two samples, and one that does not hold
 its voltage acts half a sample earlier than one that does. To first order the residual is then τ·s,
 with s the response to inputs late by one sample and τ unknown. τ is taken from the residual where
-it explains nearly all of it and more than dry friction would. It is learnt while the rig is not
-judged and followed slowly afterwards, so that a fault, which is sudden, is not learnt.
+it explains nearly all of it and leaves at most half of what dry friction would. It is learnt while
+the rig is not judged and followed slowly afterwards, so that a fault, which is sudden, is not
+learnt.
 """
 
 # Compiled functions are untyped to mypy.
@@ -23,6 +24,10 @@ QUICK, SLOW = 32.0, 128.0
 EXPLAINS, REST = 0.85, 0.25
 """Share of the residual's energy that it must explain, besides a share of the largest healthy one;
 less than that one is not explained at all.
+"""
+RATHER = 2.0
+"""Ratio of what dry friction leaves to what it leaves above which it is a lateness: where both
+explain the residual, friction is an alarm and a lateness hides one.
 """
 UNSURE = 0.15
 """Relative error of the response: equations fitted to one lateness are less accurate at another."""
@@ -65,7 +70,7 @@ def follow_lateness(row: FloatArray, largest: float, judging: bool, kept: FloatA
         _average(row[DRY_UNIT] * row[DRY_UNIT], first + FRICTIONS, memory, kept)
     first = OF_SLOW if judging and not is_late(kept) else OF_QUICK
     energy, found = kept[first + ERRORS], _best(kept, first)
-    least = min((1.0 - EXPLAINS) * energy + REST * largest, _rubbing(kept, first))
+    least = min((1.0 - EXPLAINS) * energy + REST * largest, _rubbing(kept, first) / RATHER)
     if energy > largest and _left(found, kept, first) < least:
         kept[TAU] = found
     elif _left(kept[TAU], kept, first) > energy:

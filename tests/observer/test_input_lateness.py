@@ -21,12 +21,12 @@ LATE, DRY = 2.0 * np.sin(AT), -4.0 * np.sign(np.sin(AT + 0.4))
 
 
 def learnt(
-    error: np.ndarray, *, judging: bool = False, kept: np.ndarray | None = None
+    error: np.ndarray, *, dry: np.ndarray = DRY, kept: np.ndarray | None = None
 ) -> np.ndarray:
-    """The carried figures after a residual."""
+    """The carried figures after a residual, where `dry` is the response to dry friction."""
     rows = np.zeros((N, len(COLUMNS)))
     rows[:, E] = error + NOISE * RNG.standard_normal(N)
-    rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, DRY
+    rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, dry
     kept = no_lateness() if kept is None else kept
     for row in rows:
         follow_lateness(row, NOISE**2, False, kept)
@@ -47,6 +47,12 @@ def test_friction_is_not_learnt_as_lateness() -> None:
 
     assert kept[TAU] == 0.0
     assert rubs(kept)
+
+
+def test_what_friction_explains_nearly_as_well_is_not_learnt_as_lateness() -> None:
+    dry = np.tanh(3.0 * np.sin(AT))
+
+    assert learnt(0.1 * LATE + 0.15 * dry, dry=dry)[TAU] == 0.0
 
 
 def test_nothing_is_learnt_from_a_healthy_residual() -> None:
