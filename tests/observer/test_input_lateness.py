@@ -16,7 +16,6 @@ from monitor.observer.missing_force import COLUMNS, DRY_UNIT, LATE_UNIT, E
 
 N, NOISE = 1024, 0.1
 AT = 2.0 * np.pi * np.arange(N) / 32.0
-RNG = np.random.default_rng(8)
 LATE, DRY = 2.0 * np.sin(AT), -4.0 * np.sign(np.sin(AT + 0.4))
 
 
@@ -25,7 +24,7 @@ def learnt(
 ) -> np.ndarray:
     """The carried figures after a residual, where `dry` is the response to dry friction."""
     rows = np.zeros((N, len(COLUMNS)))
-    rows[:, E] = error + NOISE * RNG.standard_normal(N)
+    rows[:, E] = error + NOISE * np.random.default_rng(8).standard_normal(N)
     rows[:, LATE_UNIT], rows[:, DRY_UNIT] = LATE, dry
     kept = no_lateness() if kept is None else kept
     for row in rows:
