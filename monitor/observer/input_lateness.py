@@ -48,8 +48,15 @@ time since it did, `RECENT` if never.
 def no_lateness() -> FloatArray:
     """The figures at the start."""
     kept = np.zeros(AGO + 1)
-    kept[AGO] = RECENT
+    forget_lateness(kept)
     return kept
+
+
+@njit()
+def forget_lateness(kept: FloatArray) -> None:
+    """Begin anew."""
+    kept[:] = 0.0
+    kept[AGO] = RECENT
 
 
 @njit()

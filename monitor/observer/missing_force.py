@@ -24,9 +24,9 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
 COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured", "late")
+E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, LATE_UNIT = range(7)
 LATER = 0.5
 """Lateness of the inputs of which the response is taken [samples]."""
-E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, LATE_UNIT = range(7)
 
 
 class Polynomial(NamedTuple):

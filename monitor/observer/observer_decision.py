@@ -59,11 +59,10 @@ from monitor.observer.decision_state import (
     DecisionState,
 )
 from monitor.observer.input_lateness import (
-    AGO,
-    RECENT,
     TAU,
     UNSURE,
     follow_lateness,
+    forget_lateness,
     is_late,
     lateness_changes,
     rubs,
@@ -153,8 +152,7 @@ def _restart(kept: DecisionState) -> None:
     kept.counts[JUMP_AGO] = WAKE
     kept.value[:] = 0.0
     kept.value[0] = UNNAMED
-    kept.lateness[:] = 0.0
-    kept.lateness[AGO] = RECENT
+    forget_lateness(kept.lateness)
 
 
 @njit()
@@ -202,7 +200,7 @@ def _follow_lateness(
 def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatArray) -> None:
     """Store a sample; the first columns are in the order of the residual's."""
     head = kept.counts[HEAD]
-    for c in range(6):
+    for c in range(LATENESS):
         kept.rows[head, c] = row[c]
     late = kept.lateness[TAU] * row[LATE_UNIT]
     kept.rows[head, ERROR] = row[ERROR] - late

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rigwatch.doctor.finding import Finding, judged
 from rigwatch.wire.errors import one_line
+from rigwatch.wire.host import free_share
 
 OLDEST, NEWEST = (3, 11), (3, 13)
 LOW_DISK, NO_DISK = 0.10, 0.02
@@ -89,9 +90,8 @@ def check_kernels() -> Finding:
 def check_disk(folder: Path) -> Finding:
     """The disk for recordings has room."""
     existing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    usage = shutil.disk_usage(existing)
-    part = usage.free / (usage.used + usage.free)
-    text = f"{usage.free / 1e9:.1f} GB free ({part:.0%}) for recordings in {folder}"
+    free, part = shutil.disk_usage(existing).free, free_share(existing)
+    text = f"{free / 1e9:.1f} GB free ({part:.0%}) for recordings in {folder}"
     remedy = "free some space, or name another folder in [recorder]"
     if not os.access(existing, os.W_OK):
         return Finding("disk", "fail", f"{existing} cannot be written to", remedy)

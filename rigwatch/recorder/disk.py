@@ -1,8 +1,6 @@
-"""Free space on the session's disk, and when to report it."""
+"""When to report how much of the session's disk is free."""
 
 import math
-import os
-from pathlib import Path
 
 from rigwatch.wire.messages import Event, Severity
 
@@ -13,22 +11,6 @@ _LEVELS: tuple[tuple[float, Severity, str], ...] = (
     (ALMOST_FULL, "critical", "DISK_ALMOST_FULL"),
     (NEARLY_FULL, "warning", "DISK_NEARLY_FULL"),
 )
-
-
-def free_share(folder: Path) -> float:
-    """Share of the disk of `folder` that this process can still fill, 0 to 1; NaN if unknown.
-
-    Blocks that the file system keeps for its administrator count neither as free nor as the
-    disk's, as in `df`. If the folder does not exist yet, its nearest existing parent is used.
-    """
-    for place in (folder, *folder.absolute().parents):
-        try:
-            found = os.statvfs(place)
-        except OSError:
-            continue
-        usable = found.f_blocks - found.f_bfree + found.f_bavail
-        return found.f_bavail / usable if usable else float("nan")
-    return float("nan")
 
 
 class DiskWatch:

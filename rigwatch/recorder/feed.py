@@ -35,16 +35,12 @@ class Feed:
     ) -> None:
         self.samples = self.gap_samples = 0
         self._name = bus.process
-        self._reader = SampleReader(
-            bus, resume_after, publish_gaps=not gaps_in_place, patient=not gaps_in_place
-        )
+        here = not gaps_in_place
+        self._reader = SampleReader(bus, resume_after, publish_gaps=here, patient=here)
         resumed = positions or {}
         self._numbered = {
             line.name: bus.listen(
-                line,
-                resumed.get(line.name),
-                gaps_in_place=gaps_in_place,
-                patient=not gaps_in_place,
+                line, resumed.get(line.name), gaps_in_place=gaps_in_place, patient=here
             )
             for line in _SUBSCRIBED
             if line.numbered

@@ -10,7 +10,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from rigwatch.recorder.disk import DiskWatch, free_share
+from rigwatch.recorder.disk import DiskWatch
 from rigwatch.recorder.feed import Feed
 from rigwatch.recorder.folders import LONGEST_BREAK, choose
 from rigwatch.recorder.past import PastServer
@@ -19,7 +19,7 @@ from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, connect
-from rigwatch.wire.host import Heartbeat, Pulse
+from rigwatch.wire.host import Heartbeat, Pulse, free_share
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,

@@ -57,6 +57,16 @@ class Bench:
         carried = RingReply.from_bytes(answer.to_bytes()) if answer else None
         self.take(self.order.on_reply(Ask.from_bytes(ask.to_bytes()), carried))
 
+    def assert_gives_up_a_hole(self) -> None:
+        """Samples 1 to 4 are missing, and no query for them is answered."""
+        self.send(block(0))
+        self.send(block(5))
+        for seq in range(6, 6 + TRIES):
+            self.send(block(seq))
+            self.reply()
+        self.ledger.assert_complete(7, 0, 5 + TRIES)
+        assert self.ledger.lost(7) == 4
+
     def reply_all(self) -> None:
         for _ in range(10_000):
             if not self.asks:
@@ -287,13 +297,7 @@ def test_replayed_samples_of_long_ago_are_dropped() -> None:
 def test_an_unanswered_hole_is_given_up_after_some_tries_while_samples_come() -> None:
     bench = Bench(ring_replies=False)
     bench.take(bench.order.on_token(7, 1, True))
-    bench.send(block(0))
-    bench.send(block(5))
-    for seq in range(6, 6 + TRIES):
-        bench.send(block(seq))
-        bench.reply()
-    bench.ledger.assert_complete(7, 0, 5 + TRIES)
-    assert bench.ledger.lost(7) == 4
+    bench.assert_gives_up_a_hole()
 
 
 def test_a_patient_reader_asks_until_a_slow_ring_answers() -> None:
@@ -330,13 +334,7 @@ def test_a_patient_reader_asks_for_the_end_of_a_boot_while_the_next_one_sends() 
 
 def test_a_patient_reader_gives_up_if_no_source_is_known() -> None:
     bench = Bench(SampleOrder(patient=True), ring_replies=False)
-    bench.send(block(0))
-    bench.send(block(5))
-    for seq in range(6, 6 + TRIES):
-        bench.send(block(seq))
-        bench.reply()
-    bench.ledger.assert_complete(7, 0, 5 + TRIES)
-    assert bench.ledger.lost(7) == 4
+    bench.assert_gives_up_a_hole()
 
 
 def test_a_patient_reader_gives_up_if_too_much_waits_behind_the_end_of_a_boot() -> None:

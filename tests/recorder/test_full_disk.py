@@ -12,7 +12,8 @@ SCRIPT = """
 import json, os, sys
 from pathlib import Path
 import numpy as np
-from rigwatch.recorder.disk import DiskWatch, free_share
+from rigwatch.recorder.disk import DiskWatch
+from rigwatch.wire.host import free_share
 from rigwatch.recorder.store import Store
 from rigwatch.wire.messages import Column, SampleBlock
 from rigwatch.wire.session import open_session, run_info

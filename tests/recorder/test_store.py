@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigwatch.recorder.disk import DiskWatch, free_share
+from rigwatch.recorder.disk import DiskWatch
 from rigwatch.recorder.store import Store
+from rigwatch.wire.host import free_share
 from rigwatch.wire.messages.message_types import Column, Event, Health, SampleBlock
 from rigwatch.wire.session import open_session, run_info
 

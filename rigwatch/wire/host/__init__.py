@@ -1,6 +1,7 @@
-"""The host: notifications, priority, threads of rigs, ports, signals, files, clocks."""
+"""The host: notifications, priority, threads of rigs, ports, signals, files, disks, clocks."""
 
 from rigwatch.wire.host.both_clocks import both_clocks
+from rigwatch.wire.host.disk_space import free_share
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
 from rigwatch.wire.host.heartbeat import Heartbeat
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
@@ -21,6 +22,7 @@ __all__ = [
     "endpoint_address",
     "free_port",
     "free_ports",
+    "free_share",
     "is_free",
     "prepare_for_real_time",
     "raise_priority",

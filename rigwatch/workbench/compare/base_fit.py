@@ -153,7 +153,7 @@ def _with_values(study: Study, values: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def _told(study: Study, element: Element, values: Mapping[str, float]) -> Element:
-    prefix = f"healthy_{element.port}_{element.effect}_"
+    prefix = element.prefix
     own = {n for n, p in study.model.parameters.items() if p.kept and n.startswith(prefix)}
     return replace(element, values={n[len(prefix) :]: values[n] for n in sorted(own)})
 

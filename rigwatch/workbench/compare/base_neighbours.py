@@ -22,6 +22,13 @@ LEAST = 0.05
 """Smallest share of the residual's energy that an element has to explain, to first order."""
 
 
+def with_one_variant_more(study: Study) -> list[tuple[str, ...]]:
+    """Names of variants and elements, with one more variant in place of those that it excludes."""
+    names = study.file.variants
+    elements = [str(element) for element in elements_of(names)]
+    return [(*elements, *own) for own in neighbours(study.model, written_variants(names))]
+
+
 def further_variants(at: Tried, rejected: Container[str]) -> list[Study]:
     """Studies with one more variant, replacing those that it excludes.
 
@@ -29,10 +36,8 @@ def further_variants(at: Tried, rejected: Container[str]) -> list[Study]:
         at: the base.
         rejected: variants that are not tried again.
     """
-    names = at.study.file.variants
-    elements = [str(element) for element in elements_of(names)]
-    sets = neighbours(at.study.model, written_variants(names))
-    return [varied(at.study, (*elements, *own)) for own in sets if own[-1] not in rejected]
+    sets = with_one_variant_more(at.study)
+    return [varied(at.study, names) for names in sets if names[-1] not in rejected]
 
 
 def further_elements(at: Tried, rejected: Container[str]) -> list[Study]:

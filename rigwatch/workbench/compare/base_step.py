@@ -1,7 +1,7 @@
 """One step of the search for a base: which bases next to one do better on healthy recordings."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from rigwatch.workbench.ranking import STEP, Progress, difference
 from rigwatch.workbench.study import Study
 
 T = TypeVar("T")
+Fitting = Callable[[Study, Data, Mapping[str, float]], T]
 WORTH = 0.02
 """Smallest relative fall of the held-out error that justifies more parameters."""
 TOLERATED_RISE = 0.002
@@ -82,7 +83,7 @@ class BaseSearch:
         found = []
         for one in bases:
             self._progress(f"fitting the model with {' and '.join(one.file.variants)}")
-            tried = _or_none(fitted_base, one, self._data, self._from(at, one))
+            tried = self._or_none(fitted_base, at, one)
             if tried is None or self._is_worse(tried.base.held_out_error, at.base.held_out_error):
                 self._rejected.add(_label(one.file.variants[-1]))
             found += [] if tried is None else [tried]
@@ -92,8 +93,7 @@ class BaseSearch:
         """Each base fitted briefly along the motion, and the best of them judged."""
         self._progress(f"fitting {len(bases)} bases next to {_named(at.study)}")
         now, *found = side_by_side(
-            lambda one: _or_none(brief_fit, one, self._data, self._from(at, one)),
-            [at.study, *bases],
+            lambda one: self._or_none(brief_fit, at, one), [at.study, *bases]
         )
         limit = np.inf if now is None else now.error
         for brief, one in zip(found, bases, strict=True):
@@ -105,16 +105,13 @@ class BaseSearch:
     def _is_worse(self, error: float, before: float) -> bool:
         return error > REJECT_RATIO * before
 
-    def _from(self, at: Tried, study: Study) -> dict[str, float]:
-        return {**self._start, **shared_values(at, study)}
-
-
-def _or_none(fit: Callable[..., T], *given: Any) -> T | None:
-    """A base, or None if it cannot be fitted."""
-    try:
-        return fit(*given)
-    except ModelError:
-        return None
+    def _or_none(self, fit: Fitting[T], at: Tried, study: Study) -> T | None:
+        """A base fitted from the values of another, or None if it cannot be fitted."""
+        start = {**self._start, **shared_values(at, study)}
+        try:
+            return fit(study, self._data, start)
+        except ModelError:
+            return None
 
 
 def _label(name: str) -> str:

@@ -15,17 +15,17 @@ import numpy as np
 from msgspec import structs
 
 from rigwatch.physics.engine.compile import compile_system, side_by_side
-from rigwatch.physics.engine.equations import Model, along_measured_motion, compose, neighbours
+from rigwatch.physics.engine.equations import Model, along_measured_motion, compose
 from rigwatch.physics.engine.fit import Recording, beginning
 from rigwatch.physics.engine.search import WholeRuns
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import RigwatchError
+from rigwatch.workbench.compare.base_fit import PART
+from rigwatch.workbench.compare.base_neighbours import with_one_variant_more
 from rigwatch.workbench.data import Data
 from rigwatch.workbench.fit import Fitted, values_with, with_kept_free, with_values
-from rigwatch.workbench.study import Study, elements_of, varied, written_variants
+from rigwatch.workbench.study import Study, varied
 
-BEGINNING = 2048
-"""Samples of the healthy recording to which variants are fitted."""
 AS_GOOD = 1.1
 """Largest ratio of the errors on the healthy recording at which a variant counts."""
 
@@ -44,10 +44,8 @@ def variances_between_bases(
     healthy = data.of_healthy
     if bare is None or healthy is None or not (fitted.placements and study.model.variants):
         return {}
-    part, own = beginning(healthy.train, BEGINNING), study.file.variants
-    elements = [str(element) for element in elements_of(own)]
-    further = neighbours(study.model, written_variants(own))
-    every = [own, *((*elements, *names) for names in further)]
+    part, own = beginning(healthy.train, PART), study.file.variants
+    every = [own, *with_one_variant_more(study)]
     moved: dict[str, FloatArray] = {}
     try:
         known = with_kept_free(_along(study, own))

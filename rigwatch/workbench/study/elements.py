@@ -46,6 +46,11 @@ class Element:
         """Effect and port as "effect@port"."""
         return f"{self.effect}@{self.port}"
 
+    @property
+    def prefix(self) -> str:
+        """Prefix of the names of its parameters and states in the model."""
+        return f"healthy_{self.port}_{self.effect}_"
+
     def __str__(self) -> str:
         told = " ".join(f"{name}={value:.6g}" for name, value in self.values.items())
         return f"{self.label}({told})" if told else self.label
@@ -88,7 +93,7 @@ def with_element(model: Model, placement: Placement) -> Model:
         placement: the effect, scaled for the port; its values start the fit.
     """
     effect, port = placement.effect, model.ports[placement.port]
-    prefix = f"healthy_{placement.prefix}"
+    prefix = Element(placement.name, placement.port, {}).prefix
     own = {name: prefix + name for name in (*effect.parameters, *effect.states)}
     own |= {name: f"({v.expression})" for name, v in port.variables.items()} | {LEFT: "0"}
     parameters = {prefix + n: _parameter(placement, n, p) for n, p in effect.parameters.items()}
