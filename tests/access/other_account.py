@@ -15,8 +15,7 @@ from msgspec import structs
 
 from rigwatch.wire.access import signer_of
 from rigwatch.wire.access.account_secret import own_secret, secret_file
-from rigwatch.wire.bus import ask_for_model, connect
-from rigwatch.wire.bus.model_change import ModelRequest
+from rigwatch.wire.bus import ModelRequest, ask_for_model, connect
 from rigwatch.wire.bus.zenoh_transport import ZenohTransport
 from rigwatch.wire.errors import KeysError
 from rigwatch.wire.rig_config import RigConfig, SecuritySection, load_rig

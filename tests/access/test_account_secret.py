@@ -16,8 +16,14 @@ from monitor.model import load_model, model_text
 from rigwatch.wire.access import Signer, signer_of, verifier_of
 from rigwatch.wire.access.account_secret import own_secret, secret_file
 from rigwatch.wire.access.statement import read_proof
-from rigwatch.wire.bus import Bus, ask_alarm_list, ask_for_model, command_alarms, connect
-from rigwatch.wire.bus.model_change import ModelRequest
+from rigwatch.wire.bus import (
+    Bus,
+    ModelRequest,
+    ask_alarm_list,
+    ask_for_model,
+    command_alarms,
+    connect,
+)
 from rigwatch.wire.errors import BusError, KeysError
 from rigwatch.wire.messages import COMMANDS, EVENTS, HEALTH, AlarmCommand
 from rigwatch.wire.rig_config import SecuritySection, load_rig

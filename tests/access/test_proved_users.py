@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from rigwatch.keys import Authority
-from rigwatch.wire.bus import Bus, ask_alarm_list, ask_for_model, command_alarms
-from rigwatch.wire.bus.model_change import ModelRequest
+from rigwatch.wire.bus import Bus, ModelRequest, ask_alarm_list, ask_for_model, command_alarms
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import COMMANDS, ESTIMATES, EVENTS, HEALTH, Alarm, AlarmCommand
 from tests.access.secured_rig import SecuredRig, make_keys

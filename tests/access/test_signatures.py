@@ -11,10 +11,9 @@ from rigwatch.keys import Authority
 from rigwatch.wire.access import Signer, Verifier, operator_name
 from rigwatch.wire.access.replays import KEPT, Replays
 from rigwatch.wire.access.statement import LARGEST_PROOF, Proof, read_proof, statement
-from rigwatch.wire.bus import CommandCheck
-from rigwatch.wire.bus.command_check import signed
+from rigwatch.wire.bus import CommandCheck, ModelRequest
+from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.bus.model_change import ModelRequest
 from rigwatch.wire.errors import KeysError
 from rigwatch.wire.messages import AlarmCommand
 from rigwatch.wire.rig_config import BusSection, SecuritySection

@@ -15,8 +15,8 @@ import pytest
 from rigwatch.dashboard.board import palette
 from rigwatch.dashboard.feed import Feed
 from rigwatch.dashboard.viewer.viewer import answers
-from rigwatch.wire.bus.alarm_list import serve_alarm_list
 from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.commands.alarm_list import serve_alarm_list
 from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.bus.zenoh_transport import open_router

@@ -12,8 +12,8 @@ from monitor.pipeline.rig_monitor import RigMonitor
 from monitor.process.link_watch import LinkWatch, Seen
 from monitor.process.loop import MonitorProcess, suitable_model
 from rigwatch.wire.access import signer_of
-from rigwatch.wire.bus.alarm_list import ask_alarm_list
-from rigwatch.wire.bus.command_check import signed
+from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list
+from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.delivery.ring import SampleRing

@@ -11,7 +11,7 @@ import pytest
 
 from monitor.alarms import AlarmJournal, AlarmRecord, Occasion
 from rigwatch.wire.bus import Bus, Close, ask_alarm_list
-from rigwatch.wire.bus.alarm_list import KEY
+from rigwatch.wire.bus.commands.alarm_list import KEY
 from rigwatch.wire.bus.transport import Answer
 from tests.monitor_process.test_process import Bench
 from tests.waiting import eventually

@@ -9,8 +9,8 @@ import pytest
 
 from monitor.alarms import Occasion
 from monitor.process.cursor import Cursor
-from rigwatch.wire.bus.command_check import signed
-from rigwatch.wire.bus.model_change import ModelReply, ModelRequest, ask_for_model
+from rigwatch.wire.bus import ModelReply, ModelRequest, ask_for_model
+from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.messages import ALARMS, COMMANDS, ESTIMATES, AlarmCommand
 from tests.bus.publisher import wave
 from tests.bus.rig import PATIENCE

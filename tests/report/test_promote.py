@@ -17,8 +17,8 @@ from rigwatch.commands import main
 from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
 from rigwatch.wire.access import signer_of
+from rigwatch.wire.bus import ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.bus.model_change import ModelReply, ModelRequest, ask_for_model
 from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.messages.blocks import concatenate, cut, pieces
 from rigwatch.wire.messages.message_types import EstimateBlock, ModelChange, SampleBlock

@@ -3,14 +3,24 @@
     Bus             what processes use: messages are encoded and checked here
      └ Transport    what carries the bytes: Zenoh, or memory in tests
 
-`connect` joins the bus of a rig. `alarm_list` and `model_change` are the two queries that the
-monitor answers.
+`connect` joins the bus of a rig. `commands` are what operators ask of its monitor.
 """
 
-from rigwatch.wire.bus.alarm_command import command_alarms
-from rigwatch.wire.bus.alarm_list import ask_alarm_list, serve_alarm_list
-from rigwatch.wire.bus.bus import Bus, unique_process
-from rigwatch.wire.bus.command_check import CommandCheck, Verdict, command_mark, proved_here
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.commands import (
+    KEY,
+    PATIENCE,
+    CommandCheck,
+    ModelReply,
+    ModelRequest,
+    Verdict,
+    ask_alarm_list,
+    ask_for_model,
+    command_alarms,
+    command_mark,
+    proved_here,
+    serve_alarm_list,
+)
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
 from rigwatch.wire.bus.connection import (
     SharedLinks,
@@ -19,7 +29,7 @@ from rigwatch.wire.bus.connection import (
     log_refusals,
     open_router,
 )
-from rigwatch.wire.bus.model_change import KEY, PATIENCE, ModelReply, ModelRequest, ask_for_model
+from rigwatch.wire.bus.member import unique_process
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.transport import DENIED_MARK, MAX_PAYLOAD, REFUSED_MARK, Close

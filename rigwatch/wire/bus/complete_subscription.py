@@ -14,8 +14,9 @@ import time
 from collections import deque
 from collections.abc import Mapping
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rigwatch.wire.bus.member import Member
 from rigwatch.wire.bus.message_ring import SAID_KEY, ring_key
 from rigwatch.wire.bus.ring_questions import REPLY_TIMEOUT, RingQuestions
 from rigwatch.wire.bus.sender import Sender
@@ -25,9 +26,6 @@ from rigwatch.wire.bus.transport import MAX_PAYLOAD
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import EVENTS, GAPS, Event, Gap, Topic, decode
 from rigwatch.wire.ordering import OPEN, Ask, Loss, Numbered, Outcome, Remark, RingReply
-
-if TYPE_CHECKING:
-    from rigwatch.wire.bus.bus import Bus
 
 SILENCE = 0.5
 """Time without a message after which the rings are queried for more [s]."""
@@ -56,7 +54,7 @@ class CompleteSubscription(Subscription):
 
     def __init__(
         self,
-        bus: "Bus",
+        bus: Member,
         topic: Topic,
         capacity: int = QUEUE_CAPACITY,
         resume_after: Mapping[str, Place] | None = None,

@@ -5,13 +5,10 @@ import threading
 import time
 from collections.abc import Callable
 from queue import SimpleQueue
-from typing import TYPE_CHECKING
 
+from rigwatch.wire.bus.member import Member
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.ordering import Ask
-
-if TYPE_CHECKING:
-    from rigwatch.wire.bus.bus import Bus
 
 REPLY_TIMEOUT = 1.0
 """Longest wait for the first reply [s]."""
@@ -34,7 +31,7 @@ class RingQuestions:
             empty if there are none.
     """
 
-    def __init__(self, bus: "Bus", answered: Callable[[str, Ask, list[bytes]], None]) -> None:
+    def __init__(self, bus: Member, answered: Callable[[str, Ask, list[bytes]], None]) -> None:
         self._bus, self._answered = bus, answered
         self._questions: SimpleQueue[tuple[str, Ask] | None] = SimpleQueue()
         self._closed = False

@@ -3,9 +3,9 @@
 import time
 from dataclasses import dataclass, field
 
-from rigwatch.wire.bus.alarm_list import ask_alarm_list
 from rigwatch.wire.bus.bus import Bus
-from rigwatch.wire.bus.command_check import signed
+from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list
+from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.subscription import Subscription
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, Alarm, AlarmCommand

@@ -6,21 +6,19 @@ Without keys the secret of the account signs, and the user's name is not proved.
 import contextlib
 import hashlib
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from rigwatch.wire.access import signer_of, verifier_of
 from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.commands.model_request import ModelRequest
 from rigwatch.wire.errors import BusError, KeysError
 from rigwatch.wire.messages import NOT_PROVED, PROVED, AlarmCommand, Identity, encode
 from rigwatch.wire.rig_config import BusSection, SecuritySection
 
-if TYPE_CHECKING:
-    from rigwatch.wire.bus.model_change import ModelRequest
-
 RUN_KEY = "monitor/receiver"
 TIMEOUT = 3.0
 """Longest wait for the receivers' runs [s]."""
-Command = TypeVar("Command", AlarmCommand, "ModelRequest")
+Command = TypeVar("Command", AlarmCommand, ModelRequest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +51,7 @@ class CommandCheck:
         run = self._verifier.run.encode()
         bus.serve(RUN_KEY, lambda _: [run])
 
-    def judge(self, command: "AlarmCommand | ModelRequest") -> Verdict:
+    def judge(self, command: AlarmCommand | ModelRequest) -> Verdict:
         """Whether `command` may be executed."""
         try:
             self._verifier.check(command.user, command.proof, _said(command))
@@ -86,7 +84,7 @@ def command_mark(command: AlarmCommand) -> str:
     return f"command {hashlib.sha256(encode(command)).hexdigest()[:16]}"
 
 
-def proved_here(bus: BusSection, rig: str, command: "AlarmCommand | ModelRequest") -> Identity:
+def proved_here(bus: BusSection, rig: str, command: AlarmCommand | ModelRequest) -> Identity:
     """Prove the operator of this machine without a monitor, for a change of files.
 
     Without keys the permissions of the files decide.
@@ -102,7 +100,7 @@ def proved_here(bus: BusSection, rig: str, command: "AlarmCommand | ModelRequest
     return PROVED
 
 
-def _said(command: "AlarmCommand | ModelRequest") -> tuple[str, ...]:
+def _said(command: AlarmCommand | ModelRequest) -> tuple[str, ...]:
     """What is signed: the class of the command, then all its fields except the proof."""
     names = [one.name for one in fields(command) if one.name != "proof"]
     return type(command).__name__, *(str(getattr(command, name)) for name in names)

@@ -1,0 +1,27 @@
+"""What operators ask of a rig, signed: alarms acknowledged or shelved, another model."""
+
+from rigwatch.wire.bus.commands.alarm_command import command_alarms
+from rigwatch.wire.bus.commands.alarm_list import ask_alarm_list, serve_alarm_list
+from rigwatch.wire.bus.commands.command_check import (
+    CommandCheck,
+    Verdict,
+    command_mark,
+    proved_here,
+)
+from rigwatch.wire.bus.commands.model_change import KEY, PATIENCE, ask_for_model
+from rigwatch.wire.bus.commands.model_request import ModelReply, ModelRequest
+
+__all__ = [
+    "KEY",
+    "PATIENCE",
+    "CommandCheck",
+    "ModelReply",
+    "ModelRequest",
+    "Verdict",
+    "ask_alarm_list",
+    "ask_for_model",
+    "command_alarms",
+    "command_mark",
+    "proved_here",
+    "serve_alarm_list",
+]

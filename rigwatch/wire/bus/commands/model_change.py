@@ -1,0 +1,29 @@
+"""Requests to a running monitor to use another model, or to restore the previous one."""
+
+import msgspec
+
+from rigwatch.wire.bus.bus import Bus
+from rigwatch.wire.bus.commands.command_check import signed
+from rigwatch.wire.bus.commands.model_request import ModelReply, ModelRequest
+from rigwatch.wire.errors import BusError
+from rigwatch.wire.typed_files import JsonError, json_value
+
+KEY = "monitor/model"
+PATIENCE = 3.0
+"""Longest time in which a monitor replies [s]."""
+
+
+def ask_for_model(bus: Bus, request: ModelRequest, timeout: float = PATIENCE) -> ModelReply:
+    """Sign and send the request, and wait for the reply.
+
+    Raises:
+        BusError: no monitor answers.
+        KeysError: the operator's key cannot be read.
+    """
+    question = msgspec.json.encode(signed(bus, request))
+    for reply in bus.query(KEY, question, timeout):
+        try:
+            return json_value(reply, ModelReply)
+        except JsonError:
+            continue
+    raise BusError(f"no monitor of rig {bus.rig} answers: start `rigwatch monitor`")
