@@ -148,6 +148,14 @@ def test_wrong_data_are_named_with_their_place(
     assert not (tmp_path / "run.mcap").exists()
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_value_too_large_for_si_is_flagged_without_a_word_of_numpy(tmp_path: Path) -> None:
+    channels = {"position": "qm*1e10[m]"}
+    block, _ = made(tmp_path, "t,qm\n0,1\n1,1e300\n2,3\n", simple(channels=channels))
+    flags = block.channel("position").quality
+    assert flags.tolist() == [quality.GOOD, quality.NON_FINITE, quality.GOOD]
+
+
 def test_missing_values_can_be_flagged_instead(tmp_path: Path) -> None:
     text = GOOD.replace("2.0", "")
     block, _ = made(tmp_path, text, simple(flag_missing=True))

@@ -138,7 +138,8 @@ def _in_si(channel: str, source: Source, table: Table, mapping: ImportMapping) -
         factor = table.scalars[factor]
     if (factor, source.offset, to_si.factor, to_si.offset) == (1.0, 0.0, 1.0, 0.0):
         return values
-    return (factor * values + source.offset) * to_si.factor + to_si.offset
+    with np.errstate(over="ignore", invalid="ignore"):  # too large: flagged as not finite
+        return (factor * values + source.offset) * to_si.factor + to_si.offset
 
 
 def _channel(name: str, text: str, table: Table, base: _TimeBase, mapping: ImportMapping) -> Column:

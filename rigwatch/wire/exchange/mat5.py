@@ -128,7 +128,8 @@ def _matrix(element: _Element, order: str, budget: Budget) -> tuple[str, Value |
     if min(shape) < 0 or values.size != int(np.prod(shape, dtype=np.float64)):
         raise ValueError(f"{name} has {values.size} values, expected the shape {shape}")
     budget.take(values.size * np.dtype(_CLASSES[kind]).itemsize)
-    return name, values.reshape(shape, order="F").astype(_CLASSES[kind])
+    with np.errstate(over="ignore", invalid="ignore"):  # damaged: not what its class holds
+        return name, values.reshape(shape, order="F").astype(_CLASSES[kind])
 
 
 def _texts(cells: list[_Element], order: str, budget: Budget) -> list[str] | None:
