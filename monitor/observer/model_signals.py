@@ -4,7 +4,7 @@ The roles of channels (input, motion, predicted output) follow from the model of
 here is specific to a rig.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -106,6 +106,17 @@ class Observed:
     judged: FloatArray
     steady: BoolArray
     drive: FloatArray
+
+    def part(self, begin: int, end: int) -> "Observed":
+        """Samples `begin` to before `end`."""
+        at = slice(begin, end)
+        predicted = Predicted(
+            *(getattr(self.predicted, each.name)[at] for each in fields(Predicted))
+        )
+        return Observed(
+            self.state[at], self.rows[at], self.measured[at], predicted, self.judged[at],
+            self.steady[at], self.drive[at],
+        )  # fmt: skip
 
 
 class LaggedSignals:
