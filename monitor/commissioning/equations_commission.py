@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.signal import savgol_coeffs
 
+from monitor.commissioning.described import STARTED, TRAINED, Left, described, rms
 from monitor.commissioning.healthy_fit import fit_healthy
 from monitor.commissioning.healthy_limits import HealthyPart, healthy_limits
 from monitor.commissioning.sensor_chain import fit_sensor
@@ -27,7 +28,6 @@ from monitor.model import (
 )
 from monitor.observer import (
     EMPTY,
-    MEASURED,
     PREDICTED,
     E,
     LaggedSignals,
@@ -59,14 +59,8 @@ EQUATIONS = "servo-pneumatic"
 """Shipped model that is fitted by default."""
 FITTED, CHIRP = 6.5, 14.5
 """Length of the fitted part of a recording, and of one with a frequency sweep [s]."""
-TRAINED = 2.0 / 3.0
-"""Share of each recording used to fit the remainder; the rest judges it."""
 SKIPPED = 1.0
 """Start of each recording that is skipped for the limits [s]."""
-STARTED = 2.0
-"""Start of each recording during which its spectrum is transient [s]."""
-WORST = 0.2
-"""Relative residual on held-out healthy data above which the equations are refused."""
 SLOW, TURNS = 0.02, 4.0
 """Share of the speed's rms, and multiple of its noise, indistinguishable from rest."""
 
@@ -183,40 +177,49 @@ def _remainder(
     filters, skip = high_pass(plant.corner, rate), round(SKIPPED * rate)
     pairs = [(remainder_signals(o.rows, o.predicted.hidden, layout), o.judged[:, E]) for o in bare]
     earlier = [(z[: _split(z)], e[: _split(z)]) for z, e in pairs]
-    learnt = fit_remainder(earlier, filters, skip)
-    later = _observed(used, plant, learnt, rate)
+    later = _observed(used, plant, fit_remainder(earlier, filters, skip), rate)
     steady = [
         (one.name, o.judged) for one, o in zip(used, later, strict=True) if one.role == "healthy"
     ]
     check_healthy([name for name, _ in steady], [judged for _, judged in steady], rate)
-    left = [o.judged[_split(o.judged) :] for o in later]
-    shares = [_rms(part[:, E]) / max(_rms(part[:, MEASURED]), 1e-12) for part in left]
-    worst = int(np.argmax(shares))
-    if shares[worst] > WORST or not np.isfinite(shares[worst]):
-        raise ModelError(
-            f"{used[worst].name}: the equations of {plant.model} leave {100 * shares[worst]:.0f} %"
-            f" of a healthy recording, expected at most {100 * WORST:.0f} %: the model cannot judge"
-            " this rig; try another model, or check that the recording is healthy"
-        )
-    held_out = _rms(np.concatenate([part[:, E] for part in left]))
-    scheme = SchemeSection(why="", held_out=held_out, share=float(max(shares)))
-    remainder = fit_remainder(pairs, filters, skip)
-    return _observed(used, plant, remainder, rate), remainder, scheme
+    slow = _slow(later, layout, plant)
+    left = [
+        Left(one.name, one.role, o.judged, _spectrum(o, layout, slow, rate).pace)
+        for one, o in zip(used, later, strict=True)
+    ]
+    found = described(left, plant.model, rate)
+    scheme = SchemeSection(
+        why="", held_out=found.held_out, share=found.share, described_hz=found.fastest
+    )
+    kept = [
+        (z[begin:end], e[begin:end])
+        for (z, e), (begin, end) in zip(pairs, found.parts, strict=True)
+        if end > begin
+    ]
+    remainder = fit_remainder(kept, filters, skip)
+    every = _observed(used, plant, remainder, rate)
+    parts = [
+        o.part(begin, end)
+        for o, (begin, end) in zip(every, found.parts, strict=True)
+        if end > begin
+    ]
+    return parts, remainder, scheme
 
 
 def _split(rows: FloatArray) -> int:
     return round(TRAINED * len(rows))
 
 
-def _rms(signal: FloatArray) -> float:
-    return float(np.sqrt(np.mean(signal**2)))
+def _slow(parts: Sequence[Observed], layout: Layout, plant: EquationsPlant) -> float:
+    """Speed that cannot be distinguished from rest."""
+    speeds = np.concatenate([o.rows[:, layout.speed] for o in parts])
+    return max(SLOW * rms(speeds), plant.turn)
 
 
 def _spectrum(seen: Observed, layout: Layout, slow: float, rate: float) -> Spectrum:
-    """Spectrum of a recording's motion after its start."""
+    """Spectrum of a recording's motion."""
     speed = np.ascontiguousarray(seen.rows[:, layout.speed])
-    found = SpectralWidth(slow, rate).update(speed, seen.state)
-    return Spectrum(*(figure[round(STARTED * rate) :] for figure in found))
+    return SpectralWidth(slow, rate).update(speed, seen.state)
 
 
 def _model(  # noqa: PLR0917 -- all that was found
@@ -228,11 +231,11 @@ def _model(  # noqa: PLR0917 -- all that was found
     rate: float,
 ) -> RigModel:
     layout = layout_of(base_model(plant.model), plant.port)
-    speeds = np.concatenate([o.rows[:, layout.speed] for o in parts])
-    slow = max(SLOW * _rms(speeds), plant.turn)
+    slow, begin = _slow(parts, layout, plant), round(STARTED * rate)
     signals = [range_signals(o)[o.state != EMPTY] for o in parts]
-    motions = [_spectrum(o, layout, slow, rate) for o in parts]
-    drives = [o.drive[round(STARTED * rate) :] for o in parts]
+    spectra = [_spectrum(o, layout, slow, rate) for o in parts]
+    motions = [Spectrum(*(figure[begin:] for figure in each)) for each in spectra]
+    drives = [o.drive[begin:] for o in parts]
     bends = bends_of(used, base_model(plant.model))
     seen = range_of(layout.signals, signals, motions, drives, bends)
     healthy = [

@@ -54,6 +54,8 @@ def commission_best(
         f"equations of {equations}: {found.scheme.held_out:.3g} left of held-out healthy data,"
         f" {100 * found.scheme.share:.1f} % of what is measured at worst, whatever the excitation"
     )
+    if found.scheme.described_hz:
+        left += f" up to {found.scheme.described_hz:.3g} Hz; faster motion is not judged"
     return _with_reason(found, f"{left}; {why}")
 
 

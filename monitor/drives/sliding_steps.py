@@ -20,12 +20,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from monitor.drives.reading_ages import DEGREE
 from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
 
-DEGREE = 3
-"""Of the polynomials that represent the smooth curve."""
 CLEAR, FITS, USUALLY = 20.0, 0.1, 8.0
 """A step was skipped if the squared error without moved time is above the first multiple of the
 usual one, and that with it below a share of that without and below the last multiple.
@@ -50,10 +49,12 @@ class Sliding(NamedTuple):
     Attributes:
         mean: its mean until the next sample; 0 with too few samples.
         known: False while its steps slide and their clock is not yet known.
+        followed: whether they slide and their clock is known.
     """
 
     mean: FloatArray
     known: BoolArray
+    followed: BoolArray
 
 
 class SlidingSteps:
@@ -71,10 +72,12 @@ class SlidingSteps:
     def update(self, signal: FloatArray, code: Codes) -> Sliding:
         """The next samples of the input, shape (n,), with states of the admission."""
         mean, known = np.zeros(code.size), np.ones(code.size, np.bool_)
+        followed = np.zeros(code.size, np.bool_)
         _advance(
-            np.ascontiguousarray(signal), code, self._misfits, self._ring, self._kept, mean, known
-        )
-        return Sliding(mean, known)
+            np.ascontiguousarray(signal), code, self._misfits, self._ring, self._kept,
+            mean, known, followed,
+        )  # fmt: skip
+        return Sliding(mean, known, followed)
 
 
 def _misfit(half_width: int, moved: int) -> FloatArray:
@@ -112,6 +115,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
     kept: FloatArray,
     mean: FloatArray,
     known: NDArray[np.bool_],
+    followed: NDArray[np.bool_],
 ) -> None:
     size = ring.size
     for k in range(code.size):
@@ -134,7 +138,8 @@ def _advance(  # noqa: PLR0917 -- a kernel
             # The step that no sample shows lies between the two that do.
             share, following = 1.0, 0.5 * (now + following)
         mean[k] = (1.0 - share) * now + share * following
-        known[k] = kept[SKIPS] == 0 or kept[SKIPS] >= SURE
+        followed[k] = kept[SKIPS] >= SURE
+        known[k] = kept[SKIPS] == 0 or followed[k]
         if way != 0:
             _follow(way, kept)
         elif _lost(kept):

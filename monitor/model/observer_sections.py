@@ -130,3 +130,7 @@ class SchemeSection(Section, frozen=True, kw_only=True):
         float, Meta(ge=0, description="residual on held-out healthy data, rms, high-passed")
     ] = 0.0
     share: Annotated[float, Meta(ge=0, description="share of the measured output")] = 0.0
+    described_hz: Annotated[
+        float,
+        Meta(ge=0, description="mean frequency above which motion is not described; 0: none [Hz]"),
+    ] = 0.0

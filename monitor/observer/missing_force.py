@@ -24,7 +24,8 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
 COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured", "late")
-E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, LATE_UNIT = range(7)
+E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, LATE_UNIT, UNSURE_INPUT = range(8)
+"""Judged columns: those above, high-passed, and s for what is not known of the inputs' instants."""
 LATER = 0.5
 """Lateness of the inputs of which the response is taken [samples]."""
 

@@ -4,14 +4,14 @@ The roles of channels (input, motion, predicted output) follow from the model of
 here is specific to a rig.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from monitor.drives import DriveChanges, SlidingSteps
+from monitor.drives import DriveChanges, InputSteps, Steps
 from monitor.model import EquationsPlant, RemainderSection
 from monitor.observer.lagged_motion import DELAY, EMPTY, MATCHED, STEPPED, FixedLag, MotionColumn
-from monitor.observer.missing_force import HighPassed
+from monitor.observer.missing_force import LATE_UNIT, HighPassed
 from monitor.observer.prediction import (
     AlongMotion,
     Predicted,
@@ -93,7 +93,7 @@ class Observed:
         rows: inputs and motion, shape (n, inputs).
         measured: the measured output, shape (n,).
         predicted: the columns of the prediction.
-        judged: high-passed columns, see `missing_force`, shape (n, 7).
+        judged: high-passed columns, see `missing_force`, shape (n, 8).
         steady: False where an input changes suddenly, or steps between samples at a place that is
             not known yet, shape (n,).
         drive: pace of the first input, see `monitor.drives.Drive`, shape (n,).
@@ -106,6 +106,17 @@ class Observed:
     judged: FloatArray
     steady: BoolArray
     drive: FloatArray
+
+    def part(self, begin: int, end: int) -> "Observed":
+        """Samples `begin` to before `end`."""
+        at = slice(begin, end)
+        predicted = Predicted(
+            *(getattr(self.predicted, each.name)[at] for each in fields(Predicted))
+        )
+        return Observed(
+            self.state[at], self.rows[at], self.measured[at], predicted, self.judged[at],
+            self.steady[at], self.drive[at],
+        )  # fmt: skip
 
 
 class LaggedSignals:
@@ -120,17 +131,18 @@ class LaggedSignals:
 
     def __init__(self, layout: Layout, half_width: int, rate: float, late: float) -> None:
         self._motion = FixedLag(layout.columns, half_width, rate, late)
-        self._steps = [SlidingSteps(half_width) for _ in range(layout.motions[0])]
+        self._inputs = [InputSteps(half_width) for _ in range(layout.motions[0])]
 
-    def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes, BoolArray]:
-        """Columns, states, and whether the inputs' steps are known, for the next samples."""
+    def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes, Steps]:
+        """Columns, states, and what is known of the inputs' steps, for the next samples."""
         columns, state = self._motion.update(signals, code)
-        placed = np.ones(code.size, np.bool_)
-        for place, steps in enumerate(self._steps):
+        known, unsure = np.ones(code.size, np.bool_), np.zeros(code.size)
+        for place, steps in enumerate(self._inputs):
             found = steps.update(signals[:, place], code)
             columns[:, place] = np.where(state == EMPTY, 0.0, found.mean)
-            placed &= found.known
-        return columns, state, placed
+            known &= found.known
+            unsure = np.maximum(unsure, found.unsure)
+        return columns, state, Steps(np.zeros(0), known, unsure)
 
 
 class ObserverSignals:
@@ -155,7 +167,8 @@ class ObserverSignals:
 
     def update(self, signals: FloatArray, code: Codes) -> Observed:
         """The next samples, shape (n, channels) in the layout's order."""
-        columns, state, steady = self._motion.update(signals, code)
+        columns, state, steps = self._motion.update(signals, code)
+        steady = steps.known
         inputs = self.layout.inputs
         rows, measured = columns[:, :inputs], columns[:, inputs]
         disagreement = columns[:, inputs + 2] - columns[:, inputs + 1]
@@ -171,6 +184,7 @@ class ObserverSignals:
             for hidden in (predicted.hidden, predicted.late_hidden)
         )
         judged = self._high_passed.update(raw, z, later, state)
+        judged = np.column_stack([judged, steps.unsure * judged[:, LATE_UNIT]])
         drives = [own.update(signals[:, place], code) for place, own in enumerate(self._drives)]
         for own in drives:
             steady &= ~own.changed

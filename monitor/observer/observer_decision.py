@@ -68,7 +68,7 @@ from monitor.observer.input_lateness import (
     rubs,
 )
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
-from monitor.observer.missing_force import LATE_UNIT
+from monitor.observer.missing_force import LATE_UNIT, UNSURE_INPUT
 from monitor.observer.window_statistics import (
     dry_force,
     friction,
@@ -204,7 +204,7 @@ def _remember(kept: DecisionState, row: FloatArray, speed: float, levels: FloatA
         kept.rows[head, c] = row[c]
     late = kept.lateness[TAU] * row[LATE_UNIT]
     kept.rows[head, ERROR] = row[ERROR] - late
-    kept.rows[head, LATENESS] = late
+    kept.rows[head, LATENESS] = np.hypot(UNSURE * late, row[UNSURE_INPUT])
     kept.rows[head, SPEED] = speed
     for c in range(levels.size):
         kept.rows[head, LEVELS + c] = levels[c]
@@ -293,7 +293,7 @@ def _variance(kept: DecisionState, rules: DecisionRules) -> float:
         for ago in range(1, n + 1):
             level += kept.rows[(kept.counts[HEAD] - ago) % HISTORY, LEVELS + c]
         total += rules.growth[c] * level / max(n, 1)
-    return total + UNSURE**2 * mean_square(kept, LATENESS, MEDIUM)
+    return total + mean_square(kept, LATENESS, MEDIUM)
 
 
 @njit()

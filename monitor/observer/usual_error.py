@@ -2,8 +2,9 @@
 
 What equations leave of a healthy rig depends on the motion and hardly on anything else. A steady
 motion that was recorded at commissioning is therefore compared with what was left of it then,
-which is far less than the worst of all motions. Of any other motion, and while the motion changes,
-the extremes of a healthy rig are not known.
+which is far less than the worst of all motions. A smaller motion of the same kind, as faults of the
+drive cause, leaves no more than that. Of any other motion, and while the motion changes, the
+extremes of a healthy rig are not known.
 """
 
 from collections.abc import Iterator
@@ -23,6 +24,8 @@ DRIVE = 0.025
 """Relative difference of the drives' paces up to which they are the same: that of a triangle is 3
 to 10 % above a sine's, that of a square more.
 """
+SMALLEST = 0.6
+"""Ratio of a smaller motion to a recorded one down to which it leaves no more."""
 RIPPLE = 2.0
 """Ratio of the spectrum's own ripple to them, above which its motion changes."""
 NARROWEST = 2.0
@@ -75,10 +78,14 @@ class UsualError:
         smooth = self._smooth.update(seen)
         steady = np.abs(seen.pace - smooth.pace) <= RIPPLE * PACE * smooth.pace
         steady &= np.abs(seen.size - smooth.size) <= RIPPLE * SIZE * smooth.size
-        found = np.zeros((len(Extremes._fields), seen.pace.size))
+        found, smaller = np.zeros((2, len(Extremes._fields), seen.pace.size))
         for motion in self._known:
-            same = _same(smooth, drive, motion)
+            alike, ratio = _alike(smooth, drive, motion), smooth.size / motion.size
+            same = alike & (np.abs(ratio - 1.0) <= SIZE)
             found[:, same] = np.maximum(found[:, same], np.array(motion.extremes)[:, None])
+            less = alike & (ratio >= SMALLEST) & (ratio < 1.0 - SIZE)
+            smaller[:, less] = np.maximum(smaller[:, less], _no_more(motion.extremes, ratio[less]))
+        found = np.where(found > 0.0, found, smaller)
         return np.where(steady & (found > 0.0), found, np.inf)
 
 
@@ -130,8 +137,29 @@ def _known(limits: HealthyLimits) -> Iterator[Motion]:
         yield Motion(*shape, Extremes(*largest))
 
 
+def _no_more(known: Extremes, ratio: FloatArray) -> FloatArray:
+    """Extremes of smaller motions that leave as much, shape (4, n).
+
+    They are relative to the healthy variance, which falls at most as the square of the size.
+    """
+    energy = ratio**-2.0
+    return np.stack(
+        [
+            np.full(ratio.size, np.inf),
+            known.short * energy,
+            known.medium * energy,
+            known.friction * np.sqrt(energy),
+        ]
+    )
+
+
 def _same(seen: Spectrum, drive: FloatArray, motion: Motion) -> NDArray[np.bool_]:
+    near = np.abs(seen.size - motion.size) <= SIZE * motion.size
+    return np.asarray(near & _alike(seen, drive, motion))
+
+
+def _alike(seen: Spectrum, drive: FloatArray, motion: Motion) -> NDArray[np.bool_]:
+    """Whether a motion is the same but for its size."""
     near = np.abs(seen.pace - motion.pace) <= PACE * motion.pace
-    near &= np.abs(seen.size - motion.size) <= SIZE * motion.size
     near &= (np.abs(drive - motion.drive) <= DRIVE * motion.drive) | (motion.drive == 0.0)
     return np.asarray(near & (np.abs(seen.narrow - motion.narrow) <= NARROW))

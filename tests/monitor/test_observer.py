@@ -44,6 +44,36 @@ def test_friction_is_named_in_newtons(drive) -> None:
     assert np.median(force) == pytest.approx(0.6, rel=0.2)
 
 
+def jittering(voltage: np.ndarray) -> np.ndarray:
+    """The voltage read before its steps, at half of the samples."""
+    late = np.random.default_rng(6).random(voltage.size) < 0.5
+    return np.where(late, np.roll(voltage, 1), voltage)
+
+
+def test_steps_that_jitter_at_the_instants_of_sampling_hide_no_friction() -> None:
+    channels = run(SINE, 12.0, coulomb(8.0), seed=6)
+    channels["voltage"] = jittering(channels["voltage"])
+
+    found = watched(channels)
+
+    times = raised(found)
+    assert min(times[name] for name in FAULTS & times.keys()) >= 8.0
+    assert times["dry_friction"] < 8.3
+    force = found.estimates.column("friction_force").values[round(10.0 * RATE) :]
+    assert np.median(force) == pytest.approx(0.6, rel=0.2)
+
+
+def test_steps_that_jitter_raise_the_limits() -> None:
+    channels = run(SINE, 8.0, seed=6)
+    steady = watched(channels).estimates.column("healthy_spread").values
+    channels["voltage"] = jittering(channels["voltage"])
+
+    unsteady = watched(channels).estimates.column("healthy_spread").values
+
+    late = slice(round(6.0 * RATE), None)
+    assert np.median(unsteady[late]) > 1.1 * np.median(steady[late])
+
+
 @pytest.mark.parametrize("early", [0.3, 0.6])
 def test_voltage_that_acts_earlier_than_in_commissioning_is_no_fault(early) -> None:
     channels = run(SINE, 12.0, coulomb(8.0), seed=6)

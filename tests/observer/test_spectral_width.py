@@ -116,6 +116,31 @@ def test_another_motion_has_none(frequency: float, size: float) -> None:
     assert np.isinf(usual(spectrum(frequency, size))[SETTLED:]).all()
 
 
+@pytest.mark.parametrize("ratio", [0.7, 0.85])
+def test_a_smaller_motion_of_the_same_kind_leaves_no_more(ratio: float) -> None:
+    seen = spectrum(8.0, 0.2 * ratio)
+    windows = {"steady_shorts": (3.0,), "steady_mediums": (2.0,), "steady_frictions": (4.0,)}
+    known = structs.replace(limits(), **windows)
+
+    found = UsualError(known, RATE).update(seen, driven(seen))[:, SETTLED:]
+
+    assert np.isinf(found[0]).all()
+    energy = ratio**-2
+    np.testing.assert_allclose(found[1], 3.0 * energy, rtol=0.1)
+    np.testing.assert_allclose(found[2], 2.0 * energy, rtol=0.1)
+    np.testing.assert_allclose(found[3], 4.0 / ratio, rtol=0.1)
+
+
+def test_a_motion_recorded_at_its_own_size_is_compared_with_that() -> None:
+    seen, known = spectrum(8.0), limits()
+    larger = {"steady_sizes": (known.steady_sizes[0], 1.3 * known.steady_sizes[0])}
+    for name in ("steady_paces", "steady_narrow", "steady_drives", "steady_energies"):
+        larger[name] = 2 * getattr(known, name)
+    both = structs.replace(known, **larger)
+
+    assert np.all(UsualError(both, RATE).update(seen, driven(seen))[0, SETTLED:] == KNOWN)
+
+
 def test_a_motion_by_another_drive_has_none() -> None:
     assert np.isinf(usual(spectrum(8.0), TRIANGLE_PACE)[SETTLED:]).all()
 

@@ -1,0 +1,136 @@
+"""Up to which frequency of the motion equations describe a healthy rig.
+
+Equations may lack what only matters in fast motion, such as a valve of limited rate. They then
+leave a large part of the upper end of a sweep and little of slower recordings. The rig is judged
+below that frequency; faster motion is as unknown as motion of a size that was not recorded.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from monitor.observer import MEASURED, E
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
+
+WORST = 0.2
+"""Relative residual on held-out healthy data above which the equations are refused."""
+DESCRIBED = 0.1
+"""Relative residual of a band of frequencies up to which they describe it."""
+BAND = 1.2
+"""Ratio of a band's ends."""
+WINDOW = 1.0
+"""Time over which residual and frequency are taken [s]."""
+TRAINED = 2.0 / 3.0
+"""Share of each recording used to fit the remainder; the rest judges it."""
+LEAST, STARTED = 5.0, 2.0
+"""Length of what is kept of a recording, and start of it whose spectrum is transient [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """A healthy recording, the residual of which is that of a remainder fitted to its first part.
+
+    Attributes:
+        name, role: of the recording.
+        judged: its judged columns, see `missing_force`, shape (n, columns).
+        pace: mean frequency of its motion, shape (n,) [Hz].
+    """
+
+    name: str
+    role: str
+    judged: FloatArray
+    pace: FloatArray
+
+    def share(self, begin: int, end: int) -> float:
+        """Residual relative to what is measured; 0 of nothing."""
+        part = self.judged[begin:end]
+        return rms(part[:, E]) / max(rms(part[:, MEASURED]), 1e-12) if len(part) else 0.0
+
+    @property
+    def held_out(self) -> int:
+        """First sample that the remainder was not fitted to."""
+        return round(TRAINED * self.pace.size)
+
+
+@dataclass(frozen=True)
+class Described:
+    """What equations describe of healthy recordings.
+
+    Attributes:
+        parts: begin and end of what is kept of each [samples]; equal if nothing is.
+        fastest: frequency above which the motion is not described [Hz]; 0 if there is none.
+        share: largest relative residual on the held-out part of what is kept.
+        held_out: root mean square of the residual on all of these.
+    """
+
+    parts: tuple[tuple[int, int], ...]
+    fastest: float
+    share: float
+    held_out: float
+
+
+def rms(signal: FloatArray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(signal**2)))
+
+
+def described(recordings: Sequence[Left], model: str, rate: float) -> Described:
+    """The part of healthy recordings that the equations describe.
+
+    Args:
+        recordings: chirps and healthy ones.
+        model: name of the equations.
+        rate: sample rate [Hz].
+
+    Raises:
+        ModelError: they describe no part that is worth watching.
+    """
+    shares = [one.share(one.held_out, one.pace.size) for one in recordings]
+    bad = [one for one, share in zip(recordings, shares, strict=True) if not share <= WORST]
+    fastest = _fastest(bad, rate) if bad else 0.0
+    parts = tuple(_slower(one, fastest, rate) if bad else (0, one.pace.size) for one in recordings)
+    kept = [(one, part) for one, part in zip(recordings, parts, strict=True) if part[1]]
+    left = max((one.share(one.held_out, part[1]) for one, part in kept), default=np.inf)
+    if not left <= WORST or not any(one.role == "healthy" for one, _ in kept):
+        worst = int(np.argmax(np.nan_to_num(shares, nan=np.inf)))
+        raise ModelError(
+            f"{recordings[worst].name}: the equations of {model} leave {100 * shares[worst]:.0f} %"
+            f" of a healthy recording, expected at most {100 * WORST:.0f} %: the model cannot judge"
+            " this rig; try another model, or check that the recording is healthy"
+        )
+    errors = np.concatenate([one.judged[one.held_out : part[1], E] for one, part in kept])
+    return Described(parts, fastest, left, rms(errors))
+
+
+def _fastest(recordings: Sequence[Left], rate: float) -> float:
+    """Upper end of the fastest band that is described [Hz]; 0 if there is none."""
+    paces, errors, sizes = (
+        np.concatenate(x) for x in zip(*_windows(recordings, rate), strict=True)
+    )
+    for top in np.sort(paces)[::-1]:
+        band = (paces <= top) & (paces >= top / BAND)
+        if errors[band].sum() <= DESCRIBED**2 * sizes[band].sum():
+            return float(top)
+    return 0.0
+
+
+def _windows(recordings: Sequence[Left], rate: float) -> list[FloatArray]:
+    """Pace, and mean squares of residual and of what is measured, over windows, (3, windows)."""
+    length, found = round(WINDOW * rate), []
+    for one in recordings:
+        begin = round(STARTED * rate)
+        columns = np.column_stack([one.pace, one.judged[:, [E, MEASURED]] ** 2])[begin:]
+        whole = columns[: len(columns) // length * length]
+        found.append(whole.reshape(-1, length, 3).mean(axis=1).T)
+    return found
+
+
+def _slower(one: Left, fastest: float, rate: float) -> tuple[int, int]:
+    """The longest stretch of a recording whose motion is slow enough."""
+    slow = one.pace <= fastest
+    slow[: round(STARTED * rate)] = True
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], slow, [0]])))
+    begin, end = max(zip(ends[::2], ends[1::2], strict=True), key=lambda run: run[1] - run[0])
+    return (int(begin), int(end)) if end - begin >= LEAST * rate else (0, 0)

@@ -1,0 +1,54 @@
+"""An input between samples, as far as it is known: means where its steps slide or jitter."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from monitor.drives.jittered_edges import JitteredEdges
+from monitor.drives.jittered_steps import JitteredSteps
+from monitor.drives.sliding_steps import SlidingSteps
+from monitor.signals import Codes
+from rigwatch.wire.arrays import BoolArray, FloatArray
+
+JITTER, EDGES = 0.1, 0.5
+"""Uncertainty of the instants of steps that jitter [samples]: of those that are told apart, that of
+each interval's share; of edges, that of one read early or late.
+"""
+
+
+class Steps(NamedTuple):
+    """An input at the samples `half_width` before those given, each of shape (n,).
+
+    Attributes:
+        mean: its mean until the next sample; 0 with too few samples.
+        known: False while its steps slide and their clock is not yet known.
+        unsure: standard deviation of the instants of its steps [samples].
+    """
+
+    mean: FloatArray
+    known: BoolArray
+    unsure: FloatArray
+
+
+class InputSteps:
+    """Follows one input, block by block.
+
+    Args:
+        half_width: lag of the results [samples].
+    """
+
+    def __init__(self, half_width: int) -> None:
+        self._sliding = SlidingSteps(half_width)
+        self._jittered = JitteredSteps(half_width)
+        self._edges = JitteredEdges()
+
+    def update(self, signal: FloatArray, code: Codes) -> Steps:
+        """The next samples of the input, shape (n,), with states of the admission."""
+        slides = self._sliding.update(signal, code)
+        found = self._jittered.update(signal, code)
+        edges = self._edges.update(signal, code)
+        # Steps that slide and jitter do the latter only where they meet the samples.
+        jitters = np.where(slides.followed, found.shows, found.jitters)
+        mean = np.where(jitters, found.value, slides.mean)
+        unsure = np.where(edges, EDGES, np.where(jitters, JITTER, 0.0))
+        return Steps(mean, slides.known | jitters, unsure)

@@ -1,0 +1,135 @@
+"""Whether the instants of a square wave's edges are known, from the input alone.
+
+The edges of a steady wave, read on a grid of samples, come at intervals whose sums over any number
+of them differ by one sample at most, whatever the period. If edges coincide with the instants of
+sampling and jitter, some are read a sample late, and sums differ by two. An interval that alone
+differs from all others comes from such an edge, or from a clock of its own, on which edges slide
+over the samples. Where between samples they are cannot be told, as it can be of smooth drives (see
+`jittered_steps` and `sliding_steps`): an edge shows nothing of it.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
+from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.wire.kernel import kernel
+
+EDGE = 0.25
+"""Step, relative to the largest, above which it is an edge."""
+KEEPS = 0.9999
+"""What is left of the largest after a sample."""
+SHORTEST = 6.0
+"""Interval above which a step is an edge, and not part of a smooth drive or of noise [samples]."""
+COUNT, NEAR = 8, 2.0
+"""Intervals that are compared, and difference of two above which the wave is not steady."""
+LATE = 2.0
+"""Difference of sums that no regular edges have."""
+REMEMBERED = 1024.0
+"""Samples for which edges are taken to do so after they have shown it."""
+
+
+class JitteredEdges:
+    """Follows one input, block by block."""
+
+    def __init__(self) -> None:
+        self._intervals = np.zeros((2, COUNT))
+        self._ways = np.zeros((2, 2))
+        self._kept = np.zeros(len(_AT))
+
+    def update(self, signal: FloatArray, code: Codes) -> BoolArray:
+        """Whether its edges jitter or slide, shape (n,), with states of the admission."""
+        found = np.zeros(code.size, np.bool_)
+        _advance(np.ascontiguousarray(signal), code, self._intervals, self._ways, self._kept, found)
+        return found
+
+
+class _At(NamedTuple):
+    """Indices of the carried figures."""
+
+    last: int = 0
+    largest: int = 1
+    age: int = 2
+    ago: int = 3
+
+
+_AT = _At()
+LAST, LARGEST, AGE, AGO = _AT
+OWN_AGE, FILLED = range(2)
+"""Carried figures of edges that rise and of those that fall: age of the last, and number of
+intervals, below 0 without an edge.
+"""
+
+
+@kernel()
+def _advance(  # noqa: PLR0917 -- a kernel
+    signal: FloatArray,
+    code: Codes,
+    intervals: FloatArray,
+    ways: FloatArray,
+    kept: FloatArray,
+    found: NDArray[np.bool_],
+) -> None:
+    for k in range(code.size):
+        if code[k] == RESTART or code[k] == NEW_BOOT:
+            kept[:] = 0.0
+            kept[LAST] = signal[k]
+            kept[AGO] = REMEMBERED
+            ways[:, FILLED] = -1.0
+        if code[k] == DEAD:
+            continue
+        step = signal[k] - kept[LAST]
+        kept[LAST] = signal[k]
+        kept[LARGEST] = max(KEEPS * kept[LARGEST], abs(step))
+        kept[AGE] += 1.0
+        ways[:, OWN_AGE] += 1.0
+        kept[AGO] = min(kept[AGO] + 1.0, REMEMBERED)
+        if abs(step) > EDGE * kept[LARGEST]:
+            if kept[AGE] < SHORTEST:
+                ways[:, FILLED] = -1.0
+            else:
+                way = 1 if step > 0.0 else 0
+                _edge(intervals[way], ways[way], kept)
+            kept[AGE] = 0.0
+        found[k] = kept[AGO] < REMEMBERED
+
+
+@njit()
+def _edge(intervals: FloatArray, own: FloatArray, kept: FloatArray) -> None:
+    """Take an edge, which is compared with others of its way."""
+    if own[FILLED] >= 0.0:
+        intervals[:-1] = intervals[1:]
+        intervals[-1] = own[OWN_AGE]
+    own[FILLED] = min(own[FILLED] + 1.0, float(COUNT))
+    own[OWN_AGE] = 0.0
+    if own[FILLED] == COUNT and (_lone(intervals) or _jitter(intervals)):
+        kept[AGO] = 0.0
+
+
+@njit()
+def _jitter(intervals: FloatArray) -> bool:
+    """Whether the intervals are those of a steady wave but for a sample more or less."""
+    if intervals.max() - intervals.min() > NEAR:
+        return False
+    for length in range(1, intervals.size):
+        least, most = np.inf, 0.0
+        for first in range(intervals.size - length + 1):
+            total = intervals[first : first + length].sum()
+            least, most = min(least, total), max(most, total)
+        if most - least >= LATE:
+            return True
+    return False
+
+
+@njit()
+def _lone(intervals: FloatArray) -> bool:
+    """Whether the newest interval differs by a sample from all others, which are equal."""
+    others = intervals[:-1]
+    alike = others.max() == others.min()
+    return alike and abs(intervals[-1] - others[0]) == 1.0

@@ -1,0 +1,69 @@
+"""Up to which frequency equations describe healthy recordings."""
+
+import numpy as np
+import pytest
+
+from monitor.commissioning.described import Left, described
+from monitor.observer import MEASURED, E
+from rigwatch.wire.errors import ModelError
+
+RATE, SECONDS = 256.0, 40
+N = round(RATE * SECONDS)
+
+
+def recording(role: str, pace: np.ndarray, share: np.ndarray) -> Left:
+    """A recording of which the share `share` is left at each sample."""
+    judged = np.zeros((N, 6))
+    judged[:, MEASURED] = np.random.default_rng(3).standard_normal(N)
+    judged[:, E] = share * judged[:, MEASURED]
+    return Left(role, role, judged, pace)
+
+
+def sweep(worst: float, above: float = 12.0) -> Left:
+    """From 1 to 20 Hz, with a residual that grows above a frequency."""
+    pace = np.linspace(1.0, 20.0, N)
+    return recording("chirp", pace, 0.03 + worst * np.clip(pace - above, 0.0, 2.0) / 2.0)
+
+
+def tone(hertz: float, share: float = 0.03) -> Left:
+    return recording("healthy", np.full(N, hertz), np.full(N, share))
+
+
+def test_what_is_described_is_kept_whole() -> None:
+    found = described([sweep(0.1), tone(8.0)], "rig", RATE)
+
+    assert found.parts == ((0, N), (0, N))
+    assert found.fastest == 0.0
+
+
+def test_fast_motion_that_is_not_described_is_left_out() -> None:
+    found = described([sweep(0.4), tone(8.0), tone(16.0)], "rig", RATE)
+
+    assert 12.0 < found.fastest < 14.0
+    begin, end = found.parts[0]
+    assert begin == 0
+    assert end == pytest.approx(N * (found.fastest - 1.0) / 19.0, abs=RATE)
+    assert found.parts[1] == (0, N)
+    assert found.parts[2] == (0, 0)
+    assert found.share == pytest.approx(0.03, rel=0.2)
+
+
+def test_noise_at_the_slow_end_of_a_sweep_does_not_count() -> None:
+    one = sweep(0.4)
+    one.judged[: N // 10, E] = 0.5 * one.judged[: N // 10, MEASURED]
+
+    assert 12.0 < described([one, tone(8.0)], "rig", RATE).fastest < 14.0
+
+
+@pytest.mark.parametrize(
+    "recordings",
+    [
+        [sweep(0.4, above=0.0), tone(8.0, 0.4)],
+        [sweep(0.4, above=6.0), tone(8.0)],
+        [sweep(0.4), tone(8.0, 0.4)],
+    ],
+    ids=["nothing", "no healthy recording", "a slow recording"],
+)
+def test_equations_that_describe_nothing_of_use_are_refused(recordings: list[Left]) -> None:
+    with pytest.raises(ModelError, match=r"leave \d+ % of a healthy recording"):
+        described(recordings, "rig", RATE)
