@@ -15,7 +15,7 @@ from rigwatch.wire.messages.blocks import (
     pieces,
     unseen,
 )
-from rigwatch.wire.messages.codec import decode, encode
+from rigwatch.wire.messages.codec import decode, decode_all, encode
 from rigwatch.wire.messages.json_fields import json_fields
 from rigwatch.wire.messages.message_types import (
     EVERY_ALARM,
@@ -113,6 +113,7 @@ __all__ = [
     "continues",
     "cut",
     "decode",
+    "decode_all",
     "decode_block",
     "encode",
     "json_fields",
