@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 Step = Callable[[], bool]
 """One reading of a device; whether it shall go on."""
-PART = 8
+PART = 16
 """Rigs in a part of a turn, at least, if there are so many."""
 SHORTEST_PART = 0.005
 """Shortest part of a turn: the turn of the monitor, which takes what came in it together [s]."""
