@@ -1,7 +1,8 @@
 """Messages on the bus and in session files: their types, encoding and topics.
 
 `message_types` declares every message, `protobuf` turns it into bytes, `topics` is the
-table of topics. `blocks` cuts and joins blocks of samples without touching a value.
+table of topics. `packed` reads the arrays of long blocks in place, `gathered` those of short ones
+in one go. `blocks` cuts and joins blocks of samples without touching a value.
 """
 
 from rigwatch.wire.messages import blocks, protobuf_schema, quality_flags
