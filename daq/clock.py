@@ -23,6 +23,8 @@ _BIN_US = 250_000
 _BINS = 240
 _BINS_FOR_LINE = 8
 _BINS_FOR_DRIFT = 80
+_FIT_EVERY = 4
+"""Quarter seconds from one fit of a line of so many to the next: it hardly changes in a second."""
 _USUAL_DRIFT = 1e-3
 """Standard deviation of a drift that is not measured yet."""
 _JUMP_PERIODS = 2.5
@@ -58,6 +60,7 @@ class DeviceClock:
     def restart(self) -> None:
         """Forget the device's clock, as after a restart; time still only moves forward."""
         self._bins: deque[tuple[float, float]] = deque(maxlen=_BINS)
+        self._since_fit = 0
         self._anchor: tuple[int, int] | None = None
         self._slope, self._offset, self._centre = 0.0, 0.0, 0.0
         self._last = None
@@ -127,7 +130,10 @@ class DeviceClock:
                 self._bins[-1] = (relative, late)
         else:
             self._bins.append((relative, late))
-            self._fit()
+            self._since_fit += 1
+            if len(self._bins) <= _BINS_FOR_DRIFT or self._since_fit >= _FIT_EVERY:
+                self._since_fit = 0
+                self._fit()
         if len(self._bins) < _BINS_FOR_LINE:
             self._offset = min(late for _, late in self._bins)
 

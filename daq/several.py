@@ -30,7 +30,7 @@ from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.several_rigs import valid_rigs
 from rigwatch.wire.typed_files import Section
 
-TURN = 0.03
+TURN = 0.035
 """Time from one reading of a device to the next: a sample waits for half of it on average [s]."""
 
 

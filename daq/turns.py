@@ -1,10 +1,14 @@
 """One thread reads the open devices of several rigs, one after the other.
 
     rig's thread   joins the bus, opens the device ──serve──▶ waits      ◀── lost, failed, stopped
-    turns' thread                                     └▶ step, step, step … each turn
+    turns' thread                                     └▶ step, step │ step, step │ … each turn
 
 With a thread for each of sixteen rigs, more than half of the processor's time went to handing the
 interpreter from one to another. A device that may keep its reader waiting stays in its own thread.
+
+A turn of many rigs has several parts, at equal distances: read all at once, the last of forty rigs
+would wait in daq and in the monitor until those before it have been worked on. A part has several
+rigs, since a message among others costs a tenth of one on its own.
 """
 
 import threading
@@ -15,6 +19,10 @@ from dataclasses import dataclass, field
 
 Step = Callable[[], bool]
 """One reading of a device; whether it shall go on."""
+PART = 16
+"""Rigs in a part of a turn, at least, if there are so many."""
+SHORTEST_PART = 0.005
+"""Shortest part of a turn: the turn of the monitor, which takes what came in it together [s]."""
 
 
 @dataclass(eq=False)
@@ -28,13 +36,21 @@ class Turns:
     """The readings of all rigs of a process.
 
     Args:
-        turn: time from one turn to the next [s]; turns begin at multiples of it.
-        together: entered for each turn, so that what it sends leaves together.
+        turn: time from one turn to the next [s].
+        together: entered for each part of a turn, so that what it sends leaves together.
+        clock: monotonic time [s].
+        sleep: waits for a number of seconds.
     """
 
-    def __init__(self, turn: float, together: Callable[[], AbstractContextManager[object]]) -> None:
+    def __init__(
+        self,
+        turn: float,
+        together: Callable[[], AbstractContextManager[object]],
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
         self.turn = turn
-        self._together = together
+        self._together, self._clock, self._sleep = together, clock, sleep
         self._served: list[_Served] = []
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -52,11 +68,24 @@ class Turns:
             raise one.error
 
     def _run(self) -> None:
+        due = self._clock()
         while self._goes_on():
-            time.sleep(self.turn - time.monotonic() % self.turn)
+            # A turn that took too long is followed by the next one at once.
+            due = max(due + self.turn, self._clock())
+            self._take_all(due)
+
+    def _take_all(self, due: float) -> None:
+        """The turn that begins at `due`."""
+        rigs = tuple(self._served)
+        parts = self._parts_of(len(rigs))
+        for number in range(parts):
+            self._sleep(max(0.0, due + number * self.turn / parts - self._clock()))
             with self._together():
-                for one in tuple(self._served):
+                for one in rigs[number::parts]:
                     self._take(one)
+
+    def _parts_of(self, rigs: int) -> int:
+        return max(1, min(rigs // PART, int(self.turn / SHORTEST_PART)))
 
     def _goes_on(self) -> bool:
         with self._lock:

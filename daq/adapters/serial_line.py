@@ -19,6 +19,7 @@ import numpy as np
 import serial
 
 from daq.adapter import DeviceBusyError, RawBlock
+from daq.adapters.frame_run import read_run
 from rigwatch.wire.device import Frame, FrameDecoder
 from rigwatch.wire.errors import DeviceError
 from rigwatch.wire.rig_config import ChannelSection, SerialSection
@@ -144,6 +145,7 @@ class SerialAdapter:
         self._channels = channels
         self._decoder = FrameDecoder()
         self._bytes = 0
+        read_run(b"", channels, 0)  # compiled before the first sample arrives
 
     def open(self) -> None:
         """Open the line; drops an unfinished frame from before."""
@@ -159,6 +161,9 @@ class SerialAdapter:
         data = self._source.read(timeout)
         arrived = self._clock()
         self._bytes += len(data)
+        run = self._decoder.feed_run(data, lambda whole: read_run(whole, self._channels, arrived))
+        if run is not None:
+            return [run]
         frames = self._decoder.feed(data)
         for frame in frames:
             if len(frame.codes) != self._channels:

@@ -92,6 +92,7 @@ class Monitor:
         self._clipping = Clipping(model)
         self._promoted = PromotedFriction(model)
         self._arming = _arming_rules(model)
+        self._judged = _judged_by(model)
         self._reference = new_reference(self._arming, _known(model))
         self._state = _new_state(model)
 
@@ -149,21 +150,15 @@ class Monitor:
             _GAP: lost,
             _INVALID: run.astype(np.float64),
         }
-        low = {_STANDS: decision.least_velocity}
-        high = _HIGH | {
-            _DEPARTED: rules.factor,
-            _ILL: decision.worst_condition,
-            _INVALID: decision.longest_hold,
-        }
         return tuple([
             Condition(
                 name,
                 flags[row],
-                values[row] if row in values else out[k],
-                level(n, float(low.get(row, -np.inf))),
-                level(n, float(high.get(row, 0.0))),
+                values[row] if k < 0 else out[k],
+                level(n, low),
+                level(n, high),
             )
-            for row, (name, k) in enumerate(_JUDGED)
+            for row, (name, k, low, high) in enumerate(self._judged)
         ])  # fmt: skip
 
 
@@ -213,6 +208,21 @@ def _flag(  # noqa: PLR0917
         flags[_ILL, i] = armed and out[w.CONDITION, i] > worst_condition
         flags[_GAP, i] = i == 0 and missing != 0
         flags[_INVALID, i] = run[i] > longest_hold
+
+
+def _judged_by(model: RigModel) -> tuple[tuple[str, int, float, float], ...]:
+    """The conditions `_JUDGED`, each with its lower and upper limit."""
+    decision = model.decision
+    low = {_STANDS: decision.least_velocity}
+    high = _HIGH | {
+        _DEPARTED: rules_for(model).factor,
+        _ILL: decision.worst_condition,
+        _INVALID: decision.longest_hold,
+    }
+    return tuple(
+        (name, k, float(low.get(row, -np.inf)), float(high.get(row, 0.0)))
+        for row, (name, k) in enumerate(_JUDGED)
+    )
 
 
 def _arming_rules(model: RigModel) -> ReferenceRules:

@@ -97,7 +97,7 @@ class RigMonitor:
         if self._wiring is None:
             return replace(at, columns=columns), (*own, *more, *quality)
         wrong, wiring = self._wiring.update(fresh)
-        if wrong.any():
+        if wrong is not None and wrong.any():
             columns = tuple(_disarmed(column, wrong) for column in columns)
             own, more = (tuple(_silenced(c, wrong) for c in part) for part in (own, more))
         return replace(at, columns=columns), (*own, *more, *wiring, *quality)
@@ -133,7 +133,8 @@ class RigMonitor:
 
 def _fresh(block: SampleBlock, judged: EstimateBlock) -> SampleBlock:
     """The part of a block judged in this call, without samples judged before."""
-    return cut(block, judged.seq - block.seq, len(block))
+    seen = judged.seq - block.seq
+    return cut(block, seen, len(block)) if seen else block
 
 
 def _disarmed(column: Column, wrong: BoolArray) -> Column:

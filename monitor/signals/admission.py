@@ -84,7 +84,7 @@ class Admission:
         sample_rate: float | None = None,
     ) -> None:
         self._period_us = 1e6 / sample_rate if sample_rate else 0.0
-        self._even, self._us = 0, 0
+        self._clock = np.zeros(4, np.int64)
         self._channels, self._hold = channels, longest_hold
         self._needed = np.array([name in needed for name in channels])
         self._last = np.zeros(len(channels))
@@ -109,9 +109,8 @@ class Admission:
             self._run[0] = self._hold + max(missing, 1)
         values, good = self._columns(block, seen, padding)
         broken = np.zeros(len(values), np.bool_)
-        clock = np.array([missing, new_boot, self._us, self._even], np.int64)
-        _find_breaks(block.device_us[seen:], self._period_us, clock, broken[padding:])
-        self._us, self._even = int(clock[2]), int(clock[3])
+        self._clock[0], self._clock[1] = missing, new_boot
+        _find_breaks(block.device_us[seen:], self._period_us, self._clock, broken[padding:])
         code, run = np.empty((2, len(values)), np.int64)
         _classify(values, good, self._needed, broken, self._last, self._run, self._hold, code, run)
         self._fresh = self._fresh or new_boot
@@ -126,8 +125,10 @@ class Admission:
 
     def _mark_new_boot(self, code: Codes) -> None:
         """The first good sample of a boot restarts more than the filters."""
+        if not self._fresh:
+            return
         good = np.flatnonzero(code == RESTART)
-        if self._fresh and good.size:
+        if good.size:
             code[good[0]] = NEW_BOOT
             self._fresh = False
 

@@ -48,8 +48,10 @@ class WiringCheck:
         self._window: list[FloatArray] = []
         self._gain = self._phase = np.nan
 
-    def update(self, block: SampleBlock) -> tuple[BoolArray, tuple[Condition, ...]]:
+    def update(self, block: SampleBlock) -> tuple[BoolArray | None, tuple[Condition, ...]]:
         """Whether the wiring is in doubt or wrong at each sample, shape (n,), and conditions.
+
+        None once it has passed: none of the samples is in doubt.
 
         Args:
             block: new samples; a gap before it discards the window.
@@ -59,9 +61,10 @@ class WiringCheck:
         elif block.seq != self._next:
             self._window = []
         self._boot, self._next = block.boot, block.seq + len(block)
+        if self._passed:
+            return None, ()
         doubted, wrong = np.zeros((2, len(block)), np.bool_)
-        if not self._passed:
-            wrong[self._first_failed(block, doubted) :] = True
+        wrong[self._first_failed(block, doubted) :] = True
         return doubted | wrong, tuple(
             above(name, wrong & (name == self._failed), np.full(len(block), value), limit)
             for name, value, limit in (

@@ -4,12 +4,23 @@ import signal
 import threading
 from pathlib import Path
 
+import numpy as np
+
 from rigwatch.wire.bus import Bus
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.bus.message_ring import REPLY_BYTES, MessageRing
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import Subscription
-from rigwatch.wire.messages import ALARMS, GAPS, Alarm, encode
+from rigwatch.wire.messages import (
+    ALARMS,
+    ESTIMATES,
+    GAPS,
+    Alarm,
+    Column,
+    EstimateBlock,
+    Gap,
+    encode,
+)
 from rigwatch.wire.ordering import OPEN, Ask, Numbered
 from tests.bus.rig import TestRig, answers, kill
 from tests.waiting import PATIENCE, eventually, wait_until
@@ -64,6 +75,33 @@ def test_what_takes_many_answers_of_the_ring_is_caught_up_with_in_one_call():
 
     eventually(begun, "the first answer")
     assert found == list(range(said.stop + 1))
+
+
+def test_estimates_that_wait_together_are_one_block_up_to_a_gap_and_invalid_ones_are_counted():
+    network = MemoryNetwork()
+    monitor = network.bus("r", "monitor")
+    listener = network.bus("r", "listener").listen(ESTIMATES, gaps_in_place=True)
+
+    def publish(seqs: range) -> None:
+        for seq in seqs:
+            values = np.array([seq, -seq], float)
+            block = EstimateBlock("rig", 7, 2 * seq, np.array([3, 4]), (Column("x", "", values),))
+            monitor.publish(ESTIMATES, block)
+
+    publish(range(3))
+    monitor._numbered().put(ESTIMATES, b"no estimates")
+    publish(range(3, 5))
+    publish(range(6, 8))
+    listener._ready.append(gap := Gap("monitor", 1, 2, 3, 4, "listener", "lost", "estimates"))
+    found = []
+    eventually(lambda: found.extend(listener.catch_up(0.0)) or len(found) == 4, "all")
+    before, first, second, third = found
+    assert before is gap
+    assert [first.seq, len(first)] == [0, 6]
+    assert [second.seq, len(second)] == [6, 4]
+    assert [third.seq, len(third)] == [12, 4]
+    assert first.column("x").values.tolist() == [0, 0, 1, -1, 2, -2]
+    assert listener.rejected == 1
 
 
 def test_the_last_word_before_a_silence_is_received_too():

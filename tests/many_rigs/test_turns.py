@@ -2,10 +2,13 @@
 
 import contextlib
 import threading
+import time
+from collections import Counter
+from itertools import pairwise
 
 import pytest
 
-from daq.turns import Turns
+from daq.turns import PART, Turns
 from rigwatch.wire.bus.burst import Burst
 from tests.waiting import eventually
 
@@ -52,6 +55,64 @@ def test_open_devices_are_read_in_one_thread_and_one_that_ends_or_fails_ends_alo
     again.goes_on = False
     again.thread.join(60.0)
     assert not again.thread.is_alive()
+
+
+class Clock:
+    """Time that passes only while something waits for it, or takes it."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def sleep(self, seconds: float) -> None:
+        self.now = round(self.now + seconds, 9)
+        time.sleep(1e-4)
+
+
+def steps_in_turns(turn: float, rigs: int, takes: float = 0.0) -> list[tuple[float, int]]:
+    """Time and rig of some thousand steps, once all rigs are served; each step takes a time [s]."""
+    clock, steps, ends = Clock(), list[tuple[float, int]](), threading.Event()
+    turns = Turns(turn, contextlib.nullcontext, lambda: clock.now, clock.sleep)
+
+    def step(rig: int) -> bool:
+        steps.append((clock.now, rig))
+        clock.now = round(clock.now + takes, 9)
+        return not ends.is_set()
+
+    threads = [
+        threading.Thread(target=turns.serve, args=[lambda rig=rig: step(rig)])
+        for rig in range(rigs)
+    ]
+    for thread in threads:
+        thread.start()
+    eventually(lambda: len({rig for _, rig in steps}) == rigs, "all rigs")
+    first = len(steps)
+    eventually(lambda: len(steps) > first + 1000, "turns of all")
+    found = steps[first : first + 1000]
+    ends.set()
+    for thread in threads:
+        thread.join(60.0)
+    return found
+
+
+def test_many_rigs_are_read_in_parts_of_a_turn_so_that_none_waits_for_all_others() -> None:
+    steps = steps_in_turns(0.04, 2 * PART)
+    at = sorted(Counter(now for now, _ in steps).items())[2:-2]
+    assert {count for _, count in at} == {PART}
+    assert {round(b - a, 6) for (a, _), (b, _) in pairwise(at)} == {0.02}
+
+
+def test_few_rigs_are_read_together() -> None:
+    steps = steps_in_turns(0.04, PART - 1)
+    at = sorted(Counter(now for now, _ in steps).items())[2:-2]
+    assert {count for _, count in at} == {PART - 1}
+
+
+def test_no_rig_misses_its_turn_where_a_turn_takes_too_long() -> None:
+    steps = steps_in_turns(0.04, 4 * PART, takes=0.002)
+    taken = Counter(rig for _, rig in steps)
+    assert max(taken.values()) - min(taken.values()) <= 2
+    times = [now for now, _ in steps]
+    assert max(b - a for a, b in pairwise(times)) < 0.01
 
 
 def test_what_is_sent_in_a_turn_leaves_in_order_at_its_end() -> None:

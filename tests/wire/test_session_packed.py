@@ -1,6 +1,6 @@
 """The fast reader and writer of blocks say what the general ones say, for any bytes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import pytest
@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages import columns_of
+from rigwatch.wire.messages import columns_of, concatenate, continues, decode_all, packed, pieces
+from rigwatch.wire.messages import decode as quick_decode
 from rigwatch.wire.messages import encode as quick_encode
 from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.messages.packed import decode_block
@@ -40,10 +41,18 @@ def blocks(draw: st.DrawFn) -> Block:
 
 
 def said(kind: type[Block], data: bytes, fast: bool) -> bytes | str:
+    if not fast:
+        return said_by(decode, kind, data)
+    views = said_by(decode_block, kind, data)
+    assert said_by(quick_decode, kind, data) == views
+    found, rejected = decode_all(kind, [data])
+    assert [*map(encode, found), *["refused"] * rejected] == [views]
+    return views
+
+
+def said_by(read: Callable[..., Block], kind: type[Block], data: bytes) -> bytes | str:
     try:
-        read: Callable[..., Block] = decode_block if fast else decode
-        message = read(kind, data)
-        return encode(message)
+        return encode(read(kind, data))
     except MessageError:
         return "refused"
 
@@ -54,6 +63,46 @@ def test_blocks_come_back_whatever_came_before(several: list[Block]) -> None:
     for block in (*several, *several):
         data = encode(block)
         assert said(type(block), data, fast=True) == data
+
+
+def joined(several: Iterable[Block]) -> list[Block]:
+    """The blocks, joined where one continues another and neither is empty."""
+    found: list[Block] = []
+    for block in several:
+        if found and len(block) and len(found[-1]) and continues(found[-1], block):
+            found[-1] = concatenate([found[-1], block])  # type: ignore[type-var]
+        else:
+            found.append(block)
+    return found
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(blocks(), min_size=1, max_size=3), st.integers(1, 40), st.data())
+def test_blocks_that_wait_together_are_joined_as_single_ones_would_be(
+    several: list[Block], size: int, draw: st.DataObject
+) -> None:
+    kind = type(several[0])
+    parts = [part for block in several if type(block) is kind for part in pieces(block, size)]
+    kept = [part for part in parts if len(parts) < 3 or draw.draw(st.integers(0, 9))]
+    payloads = [encode(part) for part in kept]
+    bad = draw.draw(st.integers(0, len(payloads)))
+    payloads.insert(bad, b"\xff")
+    found, rejected = decode_all(kind, payloads)
+    assert rejected == 1
+    expected = [*joined(kept[:bad]), *joined(kept[bad:])]
+    assert [encode(one) for one in found] == [encode(one) for one in expected]
+    for block in found:
+        for column in columns_of(block):
+            assert column.values.flags.writeable
+            assert column.values.flags.aligned
+
+
+def test_devices_that_measure_the_same_share_a_layout() -> None:
+    packed._layouts.clear()
+    for name in ("rig-a", "rig-b", "rig-c"):
+        block = SampleBlock(name, 1, 2, np.array([5]), np.array([7]), ())
+        assert quick_decode(SampleBlock, encode(block)).device == name
+    assert len(packed._layouts) == 1
 
 
 @settings(max_examples=200, deadline=None)

@@ -12,7 +12,8 @@ the run it names is dropped and counted.
 import contextlib
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import groupby
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -24,7 +25,7 @@ from rigwatch.wire.bus.subscription import QUEUE_CAPACITY, Subscription
 from rigwatch.wire.bus.tokens import EarlyMessages
 from rigwatch.wire.bus.transport import MAX_PAYLOAD
 from rigwatch.wire.errors import MessageError
-from rigwatch.wire.messages import EVENTS, GAPS, Event, Gap, Topic, decode
+from rigwatch.wire.messages import EVENTS, GAPS, Event, Gap, Topic, decode, decode_all
 from rigwatch.wire.ordering import OPEN, Ask, Loss, Numbered, Outcome, Remark, RingReply
 
 SILENCE = 0.5
@@ -70,7 +71,7 @@ class CompleteSubscription(Subscription):
         self._assumed: dict[str, int] = {}
         self._early = EarlyMessages()
         self._inbox: SimpleQueue[Any] = SimpleQueue()
-        self._ready: deque[Any] = deque()
+        self._ready: deque[bytes | Gap] = deque()  # decoded by the call that returns them
         self._reports: list[Gap | Event] = []
         self._behind = False
         # The earlier run knew every process of its time.
@@ -119,18 +120,29 @@ class CompleteSubscription(Subscription):
             timeout: 0 does not wait, None waits indefinitely.
         """
         deadline = None if timeout is None else time.monotonic() + timeout
+        while True:
+            self._wait(deadline)
+            if not self._ready:
+                return None
+            if found := self._decoded([self._ready.popleft()]):
+                return found[0]
+
+    def _wait(self, deadline: float | None) -> None:
+        """Wait for a message until `deadline` [s on the monotonic clock]."""
         while not self._ready:
             left = SILENCE if deadline is None else min(SILENCE, deadline - time.monotonic())
             try:
                 self._take(self._inbox.get(block=left > 0, timeout=max(left, 0.0)))
             except Empty:
                 if left <= 0:
-                    break
+                    return
             self._look_for_more()
-        return self._ready.popleft() if self._ready else None
 
     def drain(self, most: int | None = None) -> list[Any]:
         """The waiting messages, in order; `most` of them, or all."""
+        return self._decoded(self._drained(most))
+
+    def _drained(self, most: int | None = None) -> list[bytes | Gap]:
         for _ in range(self._inbox.qsize()):
             self._take(self._inbox.get_nowait())
         self._look_for_more()
@@ -140,15 +152,39 @@ class CompleteSubscription(Subscription):
     def catch_up(self, longest: float) -> list[Any]:
         """The waiting messages, and those of the rings as long as each answer brings more.
 
+        Blocks of estimates are joined where one continues another.
+
         Args:
             longest: time after which the rest is left to the next call [s].
         """
         until = time.monotonic() + longest
-        found = self.drain()
+        found = self._drained()
         while self._behind and (left := until - time.monotonic()) > 0:
             with contextlib.suppress(Empty):
                 self._take(self._inbox.get(timeout=left))
-            found += self.drain()
+            found += self._drained()
+        return self._joined(found)
+
+    def _decoded(self, waiting: Sequence[bytes | Gap]) -> list[Any]:
+        """The messages that are valid."""
+        found = []
+        for one in waiting:
+            try:
+                found.append(one if isinstance(one, Gap) else decode(self.topic.message, one))
+            except MessageError:
+                self.rejected += 1
+        return found
+
+    def _joined(self, waiting: Sequence[bytes | Gap]) -> list[Any]:
+        """The same with joined blocks; none across a gap."""
+        found: list[Any] = []
+        for is_gap, some in groupby(waiting, lambda one: isinstance(one, Gap)):
+            if is_gap:
+                found += some
+                continue
+            messages, rejected = decode_all(self.topic.message, [*some])  # type: ignore[list-item]
+            self.rejected += rejected
+            found += messages
         return found
 
     def reports(self) -> list[Gap | Event]:
@@ -290,10 +326,7 @@ class CompleteSubscription(Subscription):
 
     def _deliver(self, message: Numbered) -> None:
         self._looked_at = time.monotonic()
-        try:
-            self._ready.append(decode(self.topic.message, message.payload))
-        except MessageError:
-            self.rejected += 1
+        self._ready.append(message.payload)
 
     def _miss(self, process: str, loss: Loss) -> None:
         gap = Gap(

@@ -45,7 +45,7 @@ class RingStore:
         """Store the samples of a block, replacing those `capacity` earlier."""
         keep = slice(max(0, len(block) - self.capacity), len(block))
         seq = np.arange(block.seq, block.seq + len(block))[keep]
-        rows = seq % self.capacity
+        rows = self._rows(int(seq[0]), len(seq))
         self._seq[rows] = seq
         self._device_us[rows] = block.device_us[keep]
         self._t_ns[rows] = block.t_ns[keep]
@@ -56,6 +56,13 @@ class RingStore:
             if len(channel.quality):
                 quality[rows] = channel.quality[keep]
         self.newest = max(self.newest, block.seq + len(block) - 1)
+
+    def _rows(self, first: int, count: int) -> slice | NDArray[np.int64]:
+        """Where consecutive samples are stored; as a slice, unless the ring's end divides them."""
+        start = first % self.capacity
+        if start + count <= self.capacity:
+            return slice(start, start + count)
+        return np.arange(first, first + count) % self.capacity
 
     def reply(self, ask: Ask) -> RingReply[SampleBlock]:
         """The requested samples still stored, as many as fit into one reply."""

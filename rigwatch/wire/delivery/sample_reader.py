@@ -10,6 +10,8 @@ All logic is in `sample_order.py`; a block in order passes straight through, in 
 import contextlib
 import time
 from collections import Counter
+from collections.abc import Iterable, Sequence
+from itertools import groupby
 from queue import Empty, SimpleQueue
 
 from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus, RingQuestions
@@ -25,7 +27,7 @@ from rigwatch.wire.messages import (
     SampleBlock,
     concatenate,
     continues,
-    decode,
+    decode_all,
 )
 from rigwatch.wire.ordering import (
     FORGED,
@@ -48,9 +50,8 @@ MOST_REJECTED = 8
 """Senders whose invalid payloads are counted separately: identities cost a stranger nothing."""
 
 Item = SampleBlock | Gap | Event
-_Incoming = (
-    tuple[bytes, str] | tuple[int, int, str | None] | tuple[Ask, RingReply[SampleBlock] | None]
-)
+_Payload = tuple[bytes, str]
+_Incoming = _Payload | tuple[int, int, str | None] | tuple[Ask, RingReply[SampleBlock] | None]
 
 
 class SampleReader:
@@ -150,11 +151,11 @@ class SampleReader:
         while not self._ready:
             left = deadline - time.monotonic()
             try:
-                self._take(self._inbox.get(block=left > 0, timeout=max(left, 0)))
+                first = self._inbox.get(block=left > 0, timeout=max(left, 0))
             except Empty:
                 break
-        for _ in range(self._inbox.qsize()):
-            self._take(self._inbox.get_nowait())
+            more = [self._inbox.get_nowait() for _ in range(self._inbox.qsize())]
+            self._take_all([first, *more])
         self._check_silence()
         items, self._ready = self._ready, []
         return joined(items)
@@ -196,12 +197,19 @@ class SampleReader:
 
     # ---- called in the reader's thread --------------------------------------------------
 
+    def _take_all(self, incoming: Iterable[_Incoming]) -> None:
+        """Take them in order; blocks that one sender sent one after the other are read together."""
+        for sender, some in groupby(incoming, _sender):
+            if sender is None:
+                for one in some:
+                    self._take(one)
+            else:
+                self._take_blocks([one[0] for one in some if isinstance(one[0], bytes)], sender)
+
     def _take(self, incoming: _Incoming) -> None:
         if len(incoming) == 3:
             self._take_token(*incoming)
-        elif isinstance(incoming[0], bytes):
-            self._take_block(*incoming)
-        else:
+        elif isinstance(incoming[0], Ask):
             self._handle(self._order.on_reply(*incoming))
 
     def _take_token(self, boot: int, since_ns: int, sender: str | None) -> None:
@@ -211,12 +219,14 @@ class SampleReader:
             self._owners.appeared(boot, since_ns, sender)
         self._handle(self._order.on_token(boot, since_ns, sender is not None))
 
-    def _take_block(self, payload: bytes, sender: str) -> None:
-        try:
-            block = decode(SampleBlock, payload)
-        except MessageError:
+    def _take_blocks(self, payloads: Sequence[bytes], sender: str) -> None:
+        blocks, rejected = decode_all(SampleBlock, payloads)
+        for _ in range(rejected):
             self._reject(sender)
-            return
+        for block in blocks:
+            self._take_block(block, sender)
+
+    def _take_block(self, block: SampleBlock, sender: str) -> None:
         if not self._owners.admits(block.boot, sender):
             self._refuse(block)
             return
@@ -292,6 +302,11 @@ class SampleReader:
                 replies.append(RingReply.from_bytes(data))
         own = [reply for reply in replies if reply.boot == ask.boot]
         self._inbox.put((ask, max(own, key=lambda reply: reply.settled, default=None)))
+
+
+def _sender(incoming: _Incoming) -> str | None:
+    """The sender of a payload; None for anything else."""
+    return incoming[1] if isinstance(incoming[0], bytes) else None
 
 
 def joined(items: list[Item]) -> list[Item]:

@@ -1,7 +1,7 @@
 """Device formats: serial frames, Modbus registers, and the calibration of channels to SI."""
 
 from rigwatch.wire.device.calibration import Calibration
-from rigwatch.wire.device.frame import Frame, FrameDecoder, encode
+from rigwatch.wire.device.frame import VERSION, Frame, FrameDecoder, encode
 from rigwatch.wire.device.modbus_map import (
     HEADER_LENGTH,
     Header,
@@ -14,6 +14,7 @@ from rigwatch.wire.device.modbus_map import (
 
 __all__ = [
     "HEADER_LENGTH",
+    "VERSION",
     "Calibration",
     "Frame",
     "FrameDecoder",

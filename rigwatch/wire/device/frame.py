@@ -17,7 +17,9 @@ and not CRC-16: over ten million corrupted frames the shorter one let 150 wrong 
 
 import struct
 import zlib
+from collections.abc import Callable, Sized
 from dataclasses import dataclass
+from typing import TypeVar
 
 from rigwatch.wire.errors import FrameError
 
@@ -28,6 +30,7 @@ _HEAD = struct.Struct("<BIII")
 _CRC = struct.Struct("<I")
 _SHORTEST = _HEAD.size + 2 + _CRC.size
 _LONGEST_ENCODED = _HEAD.size + 2 * MAX_CHANNELS + _CRC.size + 1
+R = TypeVar("R", bound=Sized)
 _CODES = [struct.Struct(f"<{n}h") for n in range(MAX_CHANNELS + 1)]
 
 
@@ -115,6 +118,25 @@ class FrameDecoder:
             self._skip(len(self._rest) - _LONGEST_ENCODED)
             self._rest = self._rest[-_LONGEST_ENCODED:]
         return frames
+
+    def feed_run(self, data: bytes, read: Callable[[bytes], R | None]) -> R | None:
+        """What `read` makes of the frames that `data` completes, as many as its length says.
+
+        Args:
+            data: the next bytes of the line.
+            read: given whole frames with delimiters between them; None if it leaves them to `feed`.
+
+        Returns:
+            None if `data` is to be fed with `feed`: nothing has been taken from it.
+        """
+        whole, found, rest = (self._rest + data).rpartition(DELIMITER)
+        if not found or self._lost or len(rest) > _LONGEST_ENCODED:
+            return None
+        run = read(whole)
+        if run is not None:
+            self._rest = rest
+            self.good += len(run)
+        return run
 
     def forget(self) -> None:
         """Drop an unfinished frame, as after a closed line; its bytes count as skipped."""

@@ -1,7 +1,8 @@
 """Messages on the bus and in session files: their types, encoding and topics.
 
 `message_types` declares every message, `protobuf` turns it into bytes, `topics` is the
-table of topics. `blocks` cuts and joins blocks of samples without touching a value.
+table of topics. `packed` reads the arrays of long blocks in place, `gathered` those of short ones
+in one go. `blocks` cuts and joins blocks of samples without touching a value.
 """
 
 from rigwatch.wire.messages import blocks, protobuf_schema, quality_flags
@@ -15,7 +16,7 @@ from rigwatch.wire.messages.blocks import (
     pieces,
     unseen,
 )
-from rigwatch.wire.messages.codec import decode, encode
+from rigwatch.wire.messages.codec import decode, decode_all, encode
 from rigwatch.wire.messages.json_fields import json_fields
 from rigwatch.wire.messages.message_types import (
     EVERY_ALARM,
@@ -113,6 +114,7 @@ __all__ = [
     "continues",
     "cut",
     "decode",
+    "decode_all",
     "decode_block",
     "encode",
     "json_fields",

@@ -1,22 +1,25 @@
 """Reads blocks of samples and estimates straight from their protobuf bytes, as numpy arrays.
 
 The general decoder makes a Python object of every number; here the packed doubles and integers are
-viewed in place. Blocks of one device differ only in `boot`, `seq` and the numbers, so their layout
-is determined once, and every other byte is compared for each further block. Anything that this
-module does not recognise is left to `protobuf.decode`, which reports the error.
+viewed in place. Blocks of devices that measure the same differ only in the device's name, `boot`,
+`seq` and the numbers, so their layout is determined once, and every other byte is compared for each
+further block. Anything that this module does not recognise is left to `protobuf.decode`, which
+reports the error.
 """
 
 from collections.abc import Set
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigwatch.wire.messages import protobuf_schema as schema
 from rigwatch.wire.messages.message_types import ByteArray, Column, EstimateBlock, SampleBlock
 from rigwatch.wire.messages.protobuf import decode
 
-_NO_QUALITY: ByteArray = np.zeros(0, np.uint8)
+NO_QUALITY: ByteArray = np.zeros(0, np.uint8)
 _F8, _I8, _U1 = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
 _MOST_LAYOUTS = 256
 _TAGS = {kind: schema.field_tags(kind) for kind in (SampleBlock, EstimateBlock)}
@@ -34,8 +37,12 @@ Span = tuple[int, int]
 K = TypeVar("K", SampleBlock, EstimateBlock)
 
 
-class _UnfamiliarError(Exception):
+class UnfamiliarError(Exception):
     """An encoding that this module leaves to the general decoder."""
+
+
+UNFAMILIAR = (UnfamiliarError, IndexError, ValueError)
+"""What an encoding raises that is left to the general decoder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,27 +55,52 @@ class _ColumnPlace:
     quality: int
 
 
-@dataclass(frozen=True, slots=True)
-class _Layout:
-    """The layout of the blocks of one device, length and kind.
+@dataclass(frozen=True)
+class Layout:
+    """The layout of blocks of one kind, length and set of columns.
 
     Attributes:
         samples: samples per block.
+        device: offsets of the device's name, None for an empty one.
         boot, seq: offsets of these numbers, None for 0.
         times: offsets of its integer arrays.
         fixed: all other bytes, with their offsets.
     """
 
     samples: int
-    device: str
+    device: Span | None
     boot: Span | None
     seq: Span | None
     times: tuple[int, ...]
     columns: tuple[_ColumnPlace, ...]
     fixed: tuple[tuple[int, int, bytes], ...]
 
+    @cached_property
+    def names(self) -> tuple[tuple[str, str, bool], ...]:
+        """Name and unit of each column, and whether it has quality."""
+        return tuple((place.name, place.unit, place.quality >= 0) for place in self.columns)
 
-_layouts: dict[tuple[type[Any], int, bytes], _Layout] = {}
+    @cached_property
+    def numbers(self) -> NDArray[np.intp]:
+        """Offsets of all bytes of the times, then of the values, then of the quality."""
+        eights = [*self.times, *(place.values for place in self.columns)]
+        ones = [place.quality for place in self.columns if place.quality >= 0]
+        spans = [np.arange(at, at + _F8.itemsize * self.samples) for at in eights]
+        spans += [np.arange(at, at + self.samples) for at in ones]
+        return np.concatenate(spans)
+
+    def head(self, data: bytes) -> tuple[str, int, int]:
+        """Device, boot and number of the first sample.
+
+        Raises:
+            ValueError: the device's name is no text.
+        """
+        device = "" if self.device is None else data[slice(*self.device)].decode()
+        boot, seq = (0 if at is None else _integer(data, at) for at in (self.boot, self.seq))
+        return device, boot, seq
+
+
+_layouts: dict[tuple[type[Any], int, int], Layout] = {}
 
 
 def decode_block(kind: type[K], data: bytes) -> K:
@@ -78,15 +110,18 @@ def decode_block(kind: type[K], data: bytes) -> K:
         MessageError: the bytes are not such a message, or its columns differ in length.
     """
     try:
-        layout = _layout_of(kind, data)
-    except (_UnfamiliarError, IndexError, ValueError):
+        return _read(kind, layout_of(kind, data), data)
+    except UNFAMILIAR:
         return decode(kind, data)
-    return _read(kind, layout, data)
 
 
-def _layout_of(kind: type[Any], data: bytes) -> _Layout:
-    """The layout of `data`, computed unless an earlier block has the same."""
-    key = kind, len(data), data[: 2 + data[1]]  # which holds the device's name
+def layout_of(kind: type[Any], data: bytes) -> Layout:
+    """The layout of `data`, computed unless an earlier block has the same.
+
+    Raises:
+        one of UNFAMILIAR: the general decoder has to read it.
+    """
+    key = kind, len(data), data[1]  # usually the length of the device's name
     known = _layouts.get(key)
     if known is not None and _fits(known, data):
         return known
@@ -97,14 +132,14 @@ def _layout_of(kind: type[Any], data: bytes) -> _Layout:
     return layout
 
 
-def _fits(layout: _Layout, data: bytes) -> bool:
+def _fits(layout: Layout, data: bytes) -> bool:
     for span in (layout.boot, layout.seq):
         if span is not None and _varint(data, span[0])[1] != span[1]:
             return False
     return all(data[start:stop] == part for start, stop, part in layout.fixed)
 
 
-def _read(kind: type[K], layout: _Layout, data: bytes) -> K:
+def _read(kind: type[K], layout: Layout, data: bytes) -> K:
     n, read = layout.samples, np.frombuffer
     columns = tuple(
         [
@@ -112,31 +147,31 @@ def _read(kind: type[K], layout: _Layout, data: bytes) -> K:
                 place.name,
                 place.unit,
                 read(data, _F8, n, place.values),
-                _NO_QUALITY if place.quality < 0 else read(data, _U1, n, place.quality),
+                NO_QUALITY if place.quality < 0 else read(data, _U1, n, place.quality),
             )
             for place in layout.columns
         ]
     )
-    boot, seq = (0 if at is None else _integer(data, at) for at in (layout.boot, layout.seq))
     times = [read(data, _I8, n, start) for start in layout.times]
-    return kind(layout.device, boot, seq, *times, columns)  # type: ignore[call-arg, arg-type]
+    return kind(*layout.head(data), *times, columns)  # type: ignore[call-arg, arg-type]
 
 
-def _layout(kind: type[Any], data: bytes) -> _Layout:
+def _layout(kind: type[Any], data: bytes) -> Layout:
     """The layout of `data`, with lengths checked."""
     fields = _fields(data, (0, len(data)), {_DEVICE, _BOOT, _SEQ, *_TIMES[kind], _COLUMNS[kind]})
     times = [_only(fields.get(tag)) for tag in _TIMES[kind]]
     n, rest = divmod(times[0][1] - times[0][0], _I8.itemsize)
     if rest or any(stop - start != n * _I8.itemsize for start, stop in times):
-        raise _UnfamiliarError
+        raise UnfamiliarError
     columns = [_column(data, span, n) for span in fields.get(_COLUMNS[kind], ())]
     boot, seq = (_only(fields[tag]) if tag in fields else None for tag in (_BOOT, _SEQ))
-    variable = [span for span in (boot, seq) if span]
+    device = _only(fields[_DEVICE]) if _DEVICE in fields else None
+    variable = [span for span in (device, boot, seq) if span]
     variable += times + [(place.values, place.values + n * _F8.itemsize) for place in columns]
     variable += [(place.quality, place.quality + n) for place in columns if place.quality >= 0]
-    return _Layout(
+    return Layout(
         n,
-        _text(data, fields.get(_DEVICE)),
+        device,
         boot,
         seq,
         tuple(start for start, _ in times),
@@ -150,7 +185,7 @@ def _column(data: bytes, span: Span, n: int) -> _ColumnPlace:
     values = _only(fields.get(_VALUES))
     quality = _only(fields[_QUALITY]) if _QUALITY in fields else (-1, n - 1)
     if values[1] - values[0] != n * _F8.itemsize or quality[1] - quality[0] != n:
-        raise _UnfamiliarError
+        raise UnfamiliarError
     name, unit = (_text(data, fields.get(tag)) for tag in (_NAME, _UNIT))
     return _ColumnPlace(name, unit, values[0], quality[0])
 
@@ -169,12 +204,12 @@ def _fields(data: bytes, within: Span, tags: Set[int]) -> dict[int, list[Span]]:
         tag = data[at]
         value, after = _varint(data, at + 1)
         if tag not in tags:
-            raise _UnfamiliarError
+            raise UnfamiliarError
         span = (at + 1, after) if tag in (_BOOT, _SEQ) else (after, after + value)
         found.setdefault(tag, []).append(span)
         at = span[1]
     if at != end:
-        raise _UnfamiliarError
+        raise UnfamiliarError
     return found
 
 
@@ -186,7 +221,7 @@ def _varint(data: bytes, at: int) -> tuple[int, int]:
         value |= (byte & 0x7F) << shift
         shift += 7
         if value >> 64 or shift > 70:
-            raise _UnfamiliarError
+            raise UnfamiliarError
         if byte < 0x80:
             return value, at
 
@@ -199,7 +234,7 @@ def _integer(data: bytes, span: Span) -> int:
 
 def _only(spans: list[Span] | None) -> Span:
     if spans is None or len(spans) != 1:
-        raise _UnfamiliarError
+        raise UnfamiliarError
     return spans[0]
 
 

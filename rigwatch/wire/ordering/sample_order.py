@@ -288,8 +288,7 @@ class SampleOrder(Generic[S]):
         A sample that arrived during the query is also dropped, and recovered from the ring.
         """
         self.counters.foreign += front.samples_waiting
-        front.waiting.clear()
-        front.samples_waiting = 0
+        front.drop_waiting()
         text = f"samples of boot {front.boot} that its source never sent; they are dropped"
         self._out.append(Remark("error", FORGED, text))
 
@@ -298,8 +297,7 @@ class SampleOrder(Generic[S]):
         told = f"sample {front.next - 1} of boot {front.boot} lies beyond its newest, {seq - 1}"
         self._out.append(Remark("error", POSITION_WRONG, f"{told}; reading continues from there"))
         self._lose(front.boot, seq, seq - 1, "the resume position was wrong")
-        front.waiting.clear()
-        front.samples_waiting = 0
+        front.drop_waiting()
         front.next = front.promised_from = seq
 
     def _take_recovered(self, front: Stream[S], block: S, last: int) -> None:

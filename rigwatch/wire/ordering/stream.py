@@ -1,5 +1,6 @@
 """The samples of one boot as they arrive, kept until their turn."""
 
+from heapq import heappop, heappush
 from typing import Generic
 
 from rigwatch.wire.messages import cut, unseen
@@ -23,6 +24,9 @@ class Stream(Generic[S]):
         self.ended = False
         self.waiting: dict[int, S] = {}
         self.samples_waiting = 0
+        # A search among all that waits, for each block that comes, keeps a reader that is behind
+        # from ever catching up.
+        self._numbers: list[int] = []
 
     def hold(self, block: S) -> None:
         """Store a block until its turn; of two with the same start the longer."""
@@ -30,16 +34,24 @@ class Stream(Generic[S]):
         if known is None or len(known) < len(block):
             self.samples_waiting += len(block) - (len(known) if known else 0)
             self.waiting[block.seq] = block
+            if known is None:
+                heappush(self._numbers, block.seq)
 
     def first_waiting(self) -> int:
         """The lowest number among the waiting blocks; OPEN if there are none."""
-        return min(self.waiting, default=OPEN)
+        return self._numbers[0] if self._numbers else OPEN
 
     def take(self) -> S:
         """Remove and return the waiting block with the lowest number."""
-        block = self.waiting.pop(min(self.waiting))
+        block = self.waiting.pop(heappop(self._numbers))
         self.samples_waiting -= len(block)
         return block
+
+    def drop_waiting(self) -> None:
+        """Forget all that waits."""
+        self.waiting.clear()
+        self._numbers.clear()
+        self.samples_waiting = 0
 
 
 def from_number(block: S, next_seq: int) -> S | None:

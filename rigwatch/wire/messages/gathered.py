@@ -1,0 +1,149 @@
+"""Decodes short blocks as they come over the bus: their numbers are gathered in one go.
+
+    payload ──one index──▶ times │ values │ quality ──views──▶ arrays of the block's own
+
+A view and a copy for each column cost more than the numbers of a block of some samples. Payloads
+that wait together and follow one another become one block, with the objects of one.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigwatch.wire.arrays import FloatArray, IntArray
+from rigwatch.wire.errors import MessageError
+from rigwatch.wire.messages.blocks import owned
+from rigwatch.wire.messages.message_types import ByteArray, Column
+from rigwatch.wire.messages.packed import (
+    NO_QUALITY,
+    UNFAMILIAR,
+    K,
+    Layout,
+    decode_block,
+    layout_of,
+)
+
+LARGEST = 1 << 13
+"""Longest payload that is read here; a longer one is read column by column [bytes]."""
+Numbers = tuple[IntArray, FloatArray, ByteArray]
+"""Times, values and quality, each with the samples in the last axis."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    layout: Layout
+    data: bytes
+    device: str
+    boot: int
+    seq: int
+
+
+def decode_own(kind: type[K], data: bytes) -> K:
+    """Decode a block, with arrays of its own.
+
+    Raises:
+        MessageError: the bytes are not such a message, or its columns differ in length.
+    """
+    part = _part(kind, data)
+    return owned(decode_block(kind, data)) if part is None else _block(kind, [part])
+
+
+def decode_joined(kind: type[K], payloads: Sequence[bytes]) -> tuple[list[K], int]:
+    """The blocks in `payloads`, joined where one continues another, and how many are not valid."""
+    blocks: list[K] = []
+    run: list[_Part] = []
+    rejected = 0
+    for data in payloads:
+        part = _part(kind, data)
+        if run and not (part and _follows(run[-1], part)):
+            blocks.append(_block(kind, run))
+            run = []
+        if part:
+            run.append(part)
+            continue
+        try:
+            blocks.append(owned(decode_block(kind, data)))
+        except MessageError:
+            rejected += 1
+    if run:
+        blocks.append(_block(kind, run))
+    return blocks, rejected
+
+
+def _part(kind: type[K], data: bytes) -> _Part | None:
+    """None if it is too long, or its encoding is not the usual one."""
+    if len(data) > LARGEST:
+        return None
+    try:
+        layout = layout_of(kind, data)
+        return _Part(layout, data, *layout.head(data)) if layout.samples else None
+    except UNFAMILIAR:
+        return None
+
+
+def _follows(one: _Part, other: _Part) -> bool:
+    return (
+        other.seq == one.seq + one.layout.samples
+        and other.boot == one.boot
+        and other.device == one.device
+        and (other.layout is one.layout or other.layout.names == one.layout.names)
+    )
+
+
+def _block(kind: type[K], run: Sequence[_Part]) -> K:
+    first = run[0]
+    times, values, quality = _numbers(run[0]) if len(run) == 1 else _joined(run)
+    rows, flags = iter(values), iter(quality)
+    columns = tuple(
+        [
+            Column(name, unit, next(rows), next(flags) if judged else NO_QUALITY)
+            for name, unit, judged in first.layout.names
+        ]
+    )
+    return kind(first.device, first.boot, first.seq, *times, columns)  # type: ignore[call-arg]
+
+
+def _numbers(part: _Part) -> Numbers:
+    times, values, quality = _gathered(part.layout, [part])
+    return times[0], values[0], quality[0]
+
+
+def _joined(run: Sequence[_Part]) -> Numbers:
+    """The numbers of a run; payloads of one layout are gathered together."""
+    ends = np.cumsum([part.layout.samples for part in run]).tolist()
+    shape = run[0].layout
+    quality = sum(judged for _, _, judged in shape.names)
+    whole = (
+        np.empty((len(shape.times), ends[-1]), np.int64),
+        np.empty((len(shape.columns), ends[-1])),
+        np.empty((quality, ends[-1]), np.uint8),
+    )
+    for places in _by_layout(run):
+        layout = run[places[0]].layout
+        found = _gathered(layout, [run[at] for at in places])
+        for row, at in enumerate(places):
+            span = slice(ends[at] - layout.samples, ends[at])
+            for kind in range(len(whole)):
+                whole[kind][:, span] = found[kind][row]
+    return whole
+
+
+def _by_layout(run: Sequence[_Part]) -> Collection[list[int]]:
+    """The places in `run` of each layout."""
+    found: dict[int, list[int]] = {}
+    for at, part in enumerate(run):
+        found.setdefault(id(part.layout), []).append(at)
+    return found.values()
+
+
+def _gathered(layout: Layout, parts: Sequence[_Part]) -> Numbers:
+    """Times, values and quality of payloads of one layout; the first axis is the payload."""
+    raw = np.frombuffer(b"".join([part.data for part in parts]), np.uint8)
+    numbers = raw.reshape(len(parts), -1).take(layout.numbers, axis=1)
+    n, times = layout.samples, len(layout.times)
+    eights = 8 * n * (times + len(layout.columns))
+    words: NDArray[np.int64] = numbers[:, :eights].view(np.int64).reshape(len(parts), -1, n)
+    values = words[:, times:].view(np.float64)
+    return words[:, :times], values, numbers[:, eights:].reshape(len(parts), -1, n)
