@@ -5,8 +5,8 @@
          └ this process ─▶ two listeners, an operator who acknowledges and resets
 
 The rig is that of the demonstration, whose faults come and go, so that there are alarms of the rig
-besides those of the kills. Afterwards the recording, the alarm journal and both listeners are
-compared (`random_kills_accounts.py`).
+besides those of the kills. Afterwards the recording, the alarm journal and what both listeners
+heard are compared (`random_kills_accounts.py`).
 """
 
 import contextlib
@@ -21,10 +21,11 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.processes.live_rig import LiveRig, live_rig
-from benchmarks.processes.random_kills_accounts import Account, heard_account, recorded_account
+from benchmarks.processes.random_kills_accounts import Account, accounts_of
 from rigwatch.wire.bus import Bus, command_alarms, connect
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.messages import ALARMS, Alarm, AlarmCommand, Gap
+from rigwatch.wire.messages import ALARMS, AlarmCommand, Event
+from rigwatch.wire.session import SessionWriter, run_info
 from tests.tooling.test_up import Rig as Up
 from tools.benchmark_table import Row
 
@@ -38,31 +39,31 @@ FIRST = 60.0
 """Longest start of all processes [s]."""
 
 
-@dataclass
 class Listener:
-    """A subscriber of alarms that lives for the whole run.
+    """A subscriber of alarms that lives for the whole run and keeps what it hears in a session.
 
-    Attributes:
-        heard: alarms in order of arrival.
-        gaps: of alarms, as reported.
-        ended_ns: when it ceased to listen [ns].
+    Args:
+        bus: source of the alarms.
+        folder: of the session.
     """
 
-    bus: Bus
-    heard: list[Alarm] = field(default_factory=list)
-    gaps: list[Gap] = field(default_factory=list)
-    ended_ns: int = 0
+    def __init__(self, bus: Bus, folder: Path) -> None:
+        self.bus = bus
+        path = folder / f"{bus.process}.mcap"
+        self._alarms = bus.listen(ALARMS, gaps_in_place=True)
+        self._heard = SessionWriter(path, run_info(bus.rig, 1.0))
 
     def run(self, stop: threading.Event) -> None:
         """Listen until `stop` is set."""
-        alarms = self.bus.listen(ALARMS)
         while not stop.is_set():
-            alarm = alarms.get(timeout=0.1)
-            if alarm is not None:
-                self.heard.append(alarm)
-            self.gaps += [one for one in alarms.reports() if isinstance(one, Gap)]
-        self.ended_ns = time.time_ns()
-        self.heard += alarms.drain()
+            said = self._alarms.get(timeout=0.1)
+            if said is not None:
+                self._heard.write(said)
+        ended_ns = time.time_ns()
+        for said in self._alarms.drain():
+            self._heard.write(said)
+        self._heard.write(Event(self.bus.process, ended_ns, "info", "ENDED", ""))
+        self._heard.close()
 
 
 @dataclass
@@ -88,15 +89,10 @@ def run(quick: bool) -> list[Row]:
     """Two minutes, or as many as RIGWATCH_KILL_MINUTES says (default 120)."""
     minutes = 2.0 if quick else float(os.environ.get("RIGWATCH_KILL_MINUTES", "120"))
     with live_rig() as rig:
-        done, listeners, left = disturbed(rig, 60.0 * minutes)
-        journal = rig.folder / "alarms.jsonl"
-        accounts = [
-            heard_account(name, one.heard, one.gaps, journal, one.ended_ns)
-            for name, one in zip(LISTENERS, listeners, strict=True)
-        ]
-        accounts += recorded_account(rig.folder / "sessions", journal, [o.heard for o in listeners])
+        done, left = disturbed(rig, 60.0 * minutes)
         if kept := os.environ.get("RIGWATCH_KILL_FOLDER"):
             shutil.copytree(rig.folder, kept, ignore=shutil.ignore_patterns("serial-line"))
+        accounts = accounts_of(rig.folder)
     return [_row(one, done, minutes) for one in accounts] + [_alive(left, done)]
 
 
@@ -117,7 +113,7 @@ def _alive(left: list[str], done: Disturbance) -> Row:
     return Row("the same: processes at the end", text, "all run", "", note, passed=not left)
 
 
-def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[Listener], list[str]]:
+def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[str]]:
     """Run and disturb the rig; the processes that do not run at the end."""
     with rig.path.open("a") as file:
         file.write("\n[witness]\n")
@@ -125,7 +121,7 @@ def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[Listener]
     try:
         statuses = _Statuses(up)
         statuses.wait(VICTIMS)
-        listeners = [Listener(connect(rig.config, name, FIRST)) for name in LISTENERS]
+        listeners = [Listener(connect(rig.config, name, FIRST), rig.folder) for name in LISTENERS]
         threads = [threading.Thread(target=one.run, args=(stop,)) for one in listeners]
         for thread in threads:
             thread.start()
@@ -144,7 +140,7 @@ def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[Listener]
     finally:
         stop.set()
         up.end()
-    return done, listeners, left
+    return done, left
 
 
 class _Statuses:
