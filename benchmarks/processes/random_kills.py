@@ -18,9 +18,8 @@ import threading
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from benchmarks.processes.live_rig import LiveRig, live_rig
+from benchmarks.processes.live_rig import LiveRig, Statuses, live_rig
 from benchmarks.processes.random_kills_accounts import Account, accounts_of
 from rigwatch.wire.bus import Bus, command_alarms, connect
 from rigwatch.wire.errors import RigwatchError
@@ -30,7 +29,7 @@ from tests.tooling.test_up import Rig as Up
 from tools.benchmark_table import Row
 
 VICTIMS = ("router", "daq", "monitor", "recorder", "witness")
-MEAN_PAUSE = 5.5
+MEAN_PAUSE = float(os.environ.get("RIGWATCH_KILL_PAUSE", "5.5"))
 """Mean pause before a kill or hang [s]; with the hangs themselves, a thousand in two hours."""
 LISTENERS = ("listener-1", "listener-2")
 SETTLING = 45.0
@@ -86,7 +85,11 @@ class Disturbance:
 
 
 def run(quick: bool) -> list[Row]:
-    """Two minutes, or as many as RIGWATCH_KILL_MINUTES says (default 120)."""
+    """Two minutes, or as many as RIGWATCH_KILL_MINUTES says (default 120).
+
+    RIGWATCH_KILL_PAUSE is the mean pause before a kill [s], RIGWATCH_KILL_FOLDER gets a copy of
+    what was recorded and heard.
+    """
     minutes = 2.0 if quick else float(os.environ.get("RIGWATCH_KILL_MINUTES", "120"))
     with live_rig() as rig:
         done, left = disturbed(rig, 60.0 * minutes)
@@ -119,8 +122,8 @@ def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[str]]:
         file.write("\n[witness]\n")
     up, stop = Up(rig.path, "--without", "dashboard"), threading.Event()
     try:
-        statuses = _Statuses(up)
-        statuses.wait(VICTIMS)
+        statuses = Statuses(up)
+        statuses.wait(VICTIMS, FIRST)
         listeners = [Listener(connect(rig.config, name, FIRST), rig.folder) for name in LISTENERS]
         threads = [threading.Thread(target=one.run, args=(stop,)) for one in listeners]
         for thread in threads:
@@ -143,36 +146,7 @@ def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[str]]:
     return done, left
 
 
-class _Statuses:
-    """The newest status of the supervisor, read in a thread."""
-
-    def __init__(self, up: Up) -> None:
-        self._up, self._newest = up, dict[str, Any]()
-        threading.Thread(target=self._follow, daemon=True).start()
-
-    def _follow(self) -> None:
-        with contextlib.suppress(AssertionError):
-            while True:
-                self._newest = self._up.wait_for("status", 120.0)["processes"]
-                self._up.events.clear()
-
-    def of(self, name: str) -> dict[str, Any]:
-        return dict(self._newest.get(name, {}))
-
-    def alive(self, name: str) -> bool:
-        """Whether the process of the newest status exists."""
-        pid = int(self.of(name).get("pid", 0))
-        return pid > 0 and Path(f"/proc/{pid}").exists()
-
-    def wait(self, names: tuple[str, ...]) -> None:
-        deadline = time.monotonic() + FIRST
-        while not all(self.alive(name) for name in names):
-            if time.monotonic() > deadline:
-                raise TimeoutError(f"not all of {', '.join(names)} came up")
-            time.sleep(0.2)
-
-
-def _disturb(statuses: _Statuses, done: Disturbance, seconds: float) -> None:
+def _disturb(statuses: Statuses, done: Disturbance, seconds: float) -> None:
     chance, ends = random.Random(1), time.monotonic() + seconds
     time.sleep(10.0)
     while (left := ends - time.monotonic()) > 0:
