@@ -100,7 +100,7 @@ def _samples(found: Recording) -> Account:
 def _estimates(found: Recording) -> Account:
     missing, told = estimate_holes(found.samples, found.estimates, found.lost_by_monitor)
     end = _end(found.samples)
-    silent = [(boot, span) for boot, span in missing if (boot, span[1]) < end]
+    silent = [(boot, span) for boot, span in missing if (boot, span[0]) < end]
     total = sum(one[1][1] - one[1][0] + 1 for one in found.estimates if not isinstance(one, Gap))
     note = f"{told} in a reported gap; silent: {len(silent)} holes {silent[:3]}"
     count = sum(last - first + 1 for _, (first, last) in silent)
