@@ -23,12 +23,12 @@ from benchmarks.processes.live_rig import LiveRig, Statuses, live_rig
 from benchmarks.processes.random_kills_accounts import Account, accounts_of
 from rigwatch.wire.bus import Bus, command_alarms, connect
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.messages import ALARMS, AlarmCommand, Event
+from rigwatch.wire.messages import ALARMS, SAMPLES, AlarmCommand, Event
 from rigwatch.wire.session import SessionWriter, run_info
 from tests.tooling.test_up import Rig as Up
 from tools.benchmark_table import Row
 
-VICTIMS = ("router", "daq", "monitor", "recorder", "witness")
+VICTIMS = ("plant", "router", "daq", "monitor", "recorder", "witness")
 MEAN_PAUSE = float(os.environ.get("RIGWATCH_KILL_PAUSE", "5.5"))
 """Mean pause before a kill or hang [s]; with the hangs themselves, a thousand in two hours."""
 LISTENERS = ("listener-1", "listener-2")
@@ -39,16 +39,19 @@ FIRST = 60.0
 
 
 class Listener:
-    """A subscriber of alarms that lives for the whole run and keeps what it hears in a session.
+    """A subscriber that lives for the whole run and keeps what it hears in a session.
+
+    Of the samples it keeps what happens to reach it, as a witness of what was sent.
 
     Args:
-        bus: source of the alarms.
+        bus: source of the alarms and samples.
         folder: of the session.
     """
 
     def __init__(self, bus: Bus, folder: Path) -> None:
         self.bus = bus
         path = folder / f"{bus.process}.mcap"
+        self._samples = bus.subscribe_lossy(SAMPLES)
         self._alarms = bus.listen(ALARMS, gaps_in_place=True)
         self._heard = SessionWriter(path, run_info(bus.rig, 1.0))
 
@@ -56,8 +59,8 @@ class Listener:
         """Listen until `stop` is set."""
         while not stop.is_set():
             said = self._alarms.get(timeout=0.1)
-            if said is not None:
-                self._heard.write(said)
+            for one in [*([said] if said else []), *self._samples.drain()]:
+                self._heard.write(one)
         ended_ns = time.time_ns()
         for said in self._alarms.drain():
             self._heard.write(said)

@@ -1,6 +1,6 @@
 """What is missing after the random kills, without a report in its place.
 
-samples     numbers of a boot, and the end of each boot but the last
+samples     every one that anybody heard, and every number between two others of its boot
 estimates   one for each recorded sample
 alarms      every change of state in the journal, and every one that anybody heard
 
@@ -12,13 +12,14 @@ between the message before it and the message after it: readers put gaps in thei
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.processes.losses import faults
 from benchmarks.processes.random_kills_places import (
     Said,
     Span,
     changes_of,
     estimate_holes,
+    key_of,
     silent_changes,
+    spans_without,
 )
 from monitor.alarms import AlarmRecord, read_journal
 from rigwatch.wire.messages import MONITOR_STALE, Alarm, EstimateBlock, Event, Gap, SampleBlock
@@ -66,35 +67,44 @@ def accounts_of(folder: Path) -> list[Account]:
     readers = dict(sorted(listeners.items())) | {"the recording": recorded}
     records = read_journal(folder / JOURNAL)[0]
     journal = changes_of(records)
-    stale = _heard_by_anybody(list(readers.values()))
-    accounts = [_samples(recorded), _estimates(recorded), _journal(records, readers)]
+    stale = _heard_by_anybody([*readers.values()])
+    accounts = [
+        _samples(recorded, list(listeners.values())),
+        _estimates(recorded),
+        _journal(records, readers),
+    ]
     for name, reader in readers.items():
         accounts.append(_alarms(f"alarms, {name}", journal, reader, "monitor"))
         accounts.append(_alarms(f"alarms of the witness, {name}", stale, reader, "witness"))
     return accounts
 
 
-def _samples(found: Recording) -> Account:
-    kept: dict[int, list[Span]] = {}
-    lost: dict[int, list[Span]] = {}
-    ends: set[int] = set()
-    for one in found.samples:
-        if not isinstance(one, Gap):
-            kept.setdefault(one[0], []).append(one[1])
-        elif one.last >= one.first:
-            lost.setdefault(one.boot, []).append((one.first, one.last))
-        if isinstance(one, Gap):
-            ends.add(one.boot)
-    told = {boot: [(*span, True) for span in spans] for boot, spans in lost.items()}
-    missing = sum(
-        faults([(*span, False) for span in spans] + told.get(boot, []))[0]
-        for boot, spans in kept.items()
+def _samples(found: Recording, witnesses: list[Recording]) -> Account:
+    gaps = [one for one in found.samples if isinstance(one, Gap)]
+    kept = [one for one in found.samples if not isinstance(one, Gap)]
+    told = [(one.boot, (one.first, one.last)) for one in gaps if one.last >= one.first]
+    ends: dict[int, int] = {}
+    for boot, (_, last) in kept:
+        ends[boot] = max(last, ends.get(boot, -1))
+    heard = [one for w in witnesses for one in w.samples if not isinstance(one, Gap)]
+    # The recorder joins the first boot; of the others it should have all.
+    joined = {kept[0][0]: kept[0][1][0]}
+    wanted = [(boot, (joined.get(boot, 0), last)) for boot, last in ends.items()]
+    wanted += [one for one in heard if one[1][0] >= joined.get(one[0], 0)]
+    open_ends = {one.boot for one in gaps if one.last < one.first}
+    silent = [
+        (boot, span)
+        for boot, span in spans_without(wanted, [*kept, *told])
+        if boot not in open_ends or span[0] <= ends.get(boot, -1)
+    ]
+    note = f"{_count(told)} reported lost; {len(ends)} boots, {len(open_ends)} with an open end; "
+    return Account(
+        "samples in the recording", _count(kept), _count(silent), f"{note}silent: {silent[:3]}"
     )
-    unended = [boot for boot in list(kept)[:-1] if boot not in ends]
-    total = sum(last - first + 1 for spans in kept.values() for first, last in spans)
-    gone = sum(last - first + 1 for spans in lost.values() for first, last in spans)
-    note = f"{gone} reported lost; {len(kept)} boots, {len(unended)} ended without a report"
-    return Account("samples in the recording", total, missing + len(unended), note)
+
+
+def _count(blocks: list[tuple[int, Span]]) -> int:
+    return sum(last - first + 1 for _, (first, last) in blocks)
 
 
 def _estimates(found: Recording) -> Account:
@@ -150,11 +160,6 @@ def _sender(said: Said) -> str:
     if isinstance(said, Gap):
         return said.device
     return "witness" if said.name == MONITOR_STALE else "monitor"
-
-
-def key_of(alarm: Alarm) -> tuple[str, str, int]:
-    """What tells a change of state from all others."""
-    return alarm.name, alarm.state, alarm.t_ns
 
 
 def _examples(missing: list[Alarm]) -> str:

@@ -24,6 +24,11 @@ def changes_of(records: list[AlarmRecord]) -> list[Alarm]:
     return found
 
 
+def key_of(alarm: Alarm) -> tuple[str, str, int]:
+    """What tells a change of state from all others."""
+    return alarm.name, alarm.state, alarm.t_ns
+
+
 def silent_changes(
     changes: Sequence[Alarm], due: Sequence[Alarm], said: Sequence[Said]
 ) -> tuple[list[Alarm], int]:
@@ -52,11 +57,11 @@ def silent_changes(
 
 def _first_heard(changes: Sequence[Alarm], said: Sequence[Said]) -> dict[int, int]:
     """Where each change was heard first, by its number."""
-    numbers = {(one.name, one.state, one.t_ns): number for number, one in enumerate(changes)}
+    numbers = {key_of(one): number for number, one in enumerate(changes)}
     heard: dict[int, int] = {}
     for place, one in enumerate(said):
         if isinstance(one, Alarm):
-            number = numbers.get((one.name, one.state, one.t_ns))
+            number = numbers.get(key_of(one))
             if number is not None:
                 heard.setdefault(number, place)
     return heard
@@ -89,7 +94,7 @@ def estimate_holes(
     has = [*_blocks(estimates), *((one.boot, (one.first, one.last)) for one in lost)]
     silent: list[Block] = []
     told = 0
-    for boot, (first, last) in _without(list(_blocks(samples)), has):
+    for boot, (first, last) in spans_without(list(_blocks(samples)), has):
         if _gap_at(estimates, order, (order[boot], first), (order[boot], last)):
             told += last - first + 1
         else:
@@ -101,8 +106,8 @@ def _blocks(items: Sequence[Block | Gap]) -> Iterator[Block]:
     return (one for one in items if not isinstance(one, Gap))
 
 
-def _without(wanted: list[Block], has: list[Block]) -> Iterator[Block]:
-    """The parts of `wanted` that `has` lacks, boot by boot."""
+def spans_without(wanted: list[Block], has: list[Block]) -> Iterator[Block]:
+    """The parts of `wanted` that `has` lacks, boot by boot and in order."""
     for boot in dict.fromkeys(boot for boot, _ in wanted):
         there = _joined([span for one, span in has if one == boot])
         starts = [first for first, _ in there]
