@@ -17,6 +17,7 @@ from benchmarks.processes.random_kills_places import (
     Span,
     changes_of,
     estimate_holes,
+    in_open_end,
     key_of,
     silent_changes,
     spans_without,
@@ -92,15 +93,12 @@ def _samples(found: Recording, witnesses: list[Recording]) -> Account:
     wanted = [(boot, (joined.get(boot, 0), last)) for boot, last in ends.items()]
     wanted += [one for one in heard if one[1][0] >= joined.get(one[0], 0)]
     open_ends = {one.boot for one in gaps if one.last < one.first}
-    silent = [
-        (boot, span)
-        for boot, span in spans_without(wanted, [*kept, *told])
-        if boot not in open_ends or span[0] <= ends.get(boot, -1)
-    ]
-    note = f"{_count(told)} reported lost; {len(ends)} boots, {len(open_ends)} with an open end; "
-    return Account(
-        "samples in the recording", _count(kept), _count(silent), f"{note}silent: {silent[:3]}"
-    )
+    missing = [*spans_without(wanted, [*kept, *told])]
+    silent = [one for one in missing if not in_open_end(*one, ends, open_ends, heard)]
+    unseen = len({boot for boot, _ in heard} - set(ends))
+    note = f"{_count(told)} reported lost; {len(ends)} boots, {len(open_ends)} with an open end, "
+    note += f"{unseen} others within these ends; silent: {silent[:3]}"
+    return Account("samples in the recording", _count(kept), _count(silent), note)
 
 
 def _count(blocks: list[tuple[int, Span]]) -> int:

@@ -124,6 +124,26 @@ def spans_without(wanted: list[Block], has: list[Block]) -> Iterator[Block]:
                 yield boot, (following, last)
 
 
+def in_open_end(
+    boot: int, span: Span, ends: dict[int, int], opened: set[int], heard: Sequence[Block]
+) -> bool:
+    """Whether missing samples lie where an end of unknown length is reported.
+
+    That of a boot lasts until the next one that was recorded.
+
+    Args:
+        boot, span: the missing samples.
+        ends: newest recorded sample of each boot.
+        opened: boots whose end is reported as a gap of unknown length.
+        heard: what was sent, in order.
+    """
+    if boot in ends:
+        return boot in opened and span[0] > ends[boot]
+    order = list(dict.fromkeys(one for one, _ in heard))
+    before = [one for one in order[: order.index(boot)] if one in ends]
+    return bool(before) and before[-1] in opened
+
+
 def _joined(spans: list[Span]) -> list[Span]:
     """The same numbers in as few spans as possible, in order."""
     found: list[Span] = []
