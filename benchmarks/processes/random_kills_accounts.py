@@ -4,9 +4,9 @@ samples     every one that anybody heard, and every number between two others of
 estimates   one for each recorded sample
 alarms      every change of state in the journal, and every one that anybody heard
 
-No clock decides what a report of a gap covers. A gap of known length covers its numbers. One of
-unknown length, as after a kill of the monitor, which takes its ring with it, covers what is missing
-between the message before it and the message after it: readers put gaps in their place.
+A gap of known length covers its numbers. One of unknown length, as after a kill of the monitor,
+which takes its ring with it, covers what is missing in its place: estimates between the one before
+it and the one after it, alarms between the one before it and its own report.
 """
 
 from dataclasses import dataclass
@@ -107,8 +107,8 @@ def _count(blocks: list[tuple[int, Span]]) -> int:
 
 def _estimates(found: Recording) -> Account:
     missing, told = estimate_holes(found.samples, found.estimates, found.lost_by_monitor)
-    end = _end(found.samples)
-    silent = [(boot, span) for boot, span in missing if (boot, span[0]) < end]
+    last_boot, end = _end(found.samples)
+    silent = [(boot, span) for boot, span in missing if boot != last_boot or span[0] < end]
     total = sum(one[1][1] - one[1][0] + 1 for one in found.estimates if not isinstance(one, Gap))
     note = f"{told} in a reported gap; silent: {len(silent)} holes {silent[:3]}"
     count = sum(last - first + 1 for _, (first, last) in silent)
@@ -188,7 +188,7 @@ def _take(found: Recording, item: object, reader: str) -> None:
 
 
 def _take_gap(found: Recording, gap: Gap, reader: str) -> None:
-    if gap.reporter == reader and gap.topic == "estimates":
+    if (gap.reporter, gap.topic, gap.device) == (reader, "estimates", "monitor"):
         found.estimates.append(gap)
     elif gap.reporter == reader and gap.topic == "alarms":
         found.alarms.append(gap)

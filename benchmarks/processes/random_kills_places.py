@@ -40,19 +40,32 @@ def silent_changes(
         said: messages and gaps of that sender, in the reader's order.
     """
     heard = _first_heard(changes, said)
-    gaps = [place for place, one in enumerate(said) if isinstance(one, Gap)]
     wanted = {id(one) for one in due}
     silent, told = [], 0
     for number, change in enumerate(changes):
         if id(change) not in wanted or number in heard or _said_anew(number, changes, said):
             continue
-        before = max((heard[one] for one in heard if one < number), default=-1)
-        after = min((heard[one] for one in heard if one > number), default=len(said))
-        if any(before < gap < after for gap in gaps):
+        if _in_a_gap(number, change, heard, said):
             told += 1
         else:
             silent.append(change)
     return silent, told
+
+
+def _in_a_gap(number: int, change: Alarm, heard: dict[int, int], said: Sequence[Said]) -> bool:
+    """Whether a change came after all that was heard before a gap, and before the gap's report.
+
+    What follows a gap does not bound it: the sender's next run repeats standing alarms first. No
+    margin is needed: the time of a change is not later than its message, which was lost before the
+    report, and all clocks are this machine's.
+    """
+    newest = -1
+    by_place = {place: one for one, place in heard.items()}
+    for place, one in enumerate(said):
+        newest = max(newest, by_place.get(place, -1))
+        if isinstance(one, Gap) and newest < number and change.t_ns <= one.t_ns:
+            return True
+    return False
 
 
 def _first_heard(changes: Sequence[Alarm], said: Sequence[Said]) -> dict[int, int]:
