@@ -25,7 +25,7 @@ VIEWER_PACKAGES := mesa-vulkan-drivers libvulkan1
 BROWSER_PACKAGES := chromium chromium-driver
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test sbom docs demo bench lint unit again nightly demo-headless mutate lock viewer-packages clean
+.PHONY: help setup test sbom vulnerabilities docs demo bench lint unit again nightly demo-headless mutate lock viewer-packages clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -80,7 +80,10 @@ docs: $(STAMPS)/run  ## write the pages, tables and pictures that are made by th
 	@python -m tools.benchmark_page
 
 sbom: $(STAMPS)/dev  ## software bill of materials (CycloneDX) of what is installed, in dist/rigwatch.cdx.json
-	@python -m tools.sbom dist/rigwatch.cdx.json
+	@python -m tools.supply_chain.sbom dist/rigwatch.cdx.json
+
+vulnerabilities: $(STAMPS)/dev  ## compare the locked packages with a copy of osv.dev's archive for PyPI (OSV names it)
+	@python -m tools.supply_chain.vulnerabilities $(OSV)
 
 mutate: $(STAMPS)/mutation  ## change the code a little and see which changes no test notices (MUTATE names some)
 	@mutmut run --max-children $(WORKERS) $(MUTATE)

@@ -8,9 +8,11 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from rigwatch.demo.commissioning import ensure_model
 from rigwatch.demo.rig_file import write_rig_file
@@ -20,6 +22,9 @@ from rigwatch.wire.bus.connection import connect
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from rigwatch.wire.typed_files import find_config
 from tests.waiting import wait_until
+
+if TYPE_CHECKING:
+    from tests.tooling.test_up import Rig as Up
 
 ROOT = Path(__file__).parents[2]
 START_TIMEOUT = 60.0
@@ -80,6 +85,41 @@ class LiveRig:
                 process.wait(max(0.1, deadline - time.monotonic()))
             process.kill()
             process.wait()
+
+
+class Statuses:
+    """The newest status of the supervisor, read in a thread."""
+
+    def __init__(self, up: "Up") -> None:
+        self._up, self._newest = up, dict[str, Any]()
+        threading.Thread(target=self._follow, daemon=True).start()
+
+    def _follow(self) -> None:
+        with contextlib.suppress(AssertionError):
+            while True:
+                self._newest = self._up.wait_for("status", 120.0)["processes"]
+                self._up.events.clear()
+
+    def of(self, name: str) -> dict[str, Any]:
+        """What it says of one process."""
+        return dict(self._newest.get(name, {}))
+
+    def alive(self, name: str) -> bool:
+        """Whether the process of the newest status exists."""
+        pid = int(self.of(name).get("pid", 0))
+        return pid > 0 and Path(f"/proc/{pid}").exists()
+
+    def wait(self, names: tuple[str, ...], longest: float) -> None:
+        """Wait until all processes of these names exist.
+
+        Raises:
+            TimeoutError: not within `longest` [s].
+        """
+        deadline = time.monotonic() + longest
+        while not all(self.alive(name) for name in names):
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"not all of {', '.join(names)} came up")
+            time.sleep(0.2)
 
 
 def _set_apart(path: Path) -> None:

@@ -5,8 +5,8 @@
          └ this process ─▶ two listeners, an operator who acknowledges and resets
 
 The rig is that of the demonstration, whose faults come and go, so that there are alarms of the rig
-besides those of the kills. Afterwards the recording, the alarm journal and both listeners are
-compared (`random_kills_accounts.py`).
+besides those of the kills. Afterwards the recording, the alarm journal and what both listeners
+heard are compared (`random_kills_accounts.py`).
 """
 
 import contextlib
@@ -18,18 +18,18 @@ import threading
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from benchmarks.processes.live_rig import LiveRig, live_rig
-from benchmarks.processes.random_kills_accounts import Account, heard_account, recorded_account
+from benchmarks.processes.live_rig import LiveRig, Statuses, live_rig
+from benchmarks.processes.random_kills_accounts import Account, accounts_of
 from rigwatch.wire.bus import Bus, command_alarms, connect
 from rigwatch.wire.errors import RigwatchError
-from rigwatch.wire.messages import ALARMS, Alarm, AlarmCommand, Gap
+from rigwatch.wire.messages import ALARMS, SAMPLES, AlarmCommand, Event
+from rigwatch.wire.session import SessionWriter, run_info
 from tests.tooling.test_up import Rig as Up
 from tools.benchmark_table import Row
 
-VICTIMS = ("router", "daq", "monitor", "recorder", "witness")
-MEAN_PAUSE = 5.5
+VICTIMS = ("plant", "router", "daq", "monitor", "recorder", "witness")
+MEAN_PAUSE = float(os.environ.get("RIGWATCH_KILL_PAUSE", "5.5"))
 """Mean pause before a kill or hang [s]; with the hangs themselves, a thousand in two hours."""
 LISTENERS = ("listener-1", "listener-2")
 SETTLING = 45.0
@@ -38,31 +38,34 @@ FIRST = 60.0
 """Longest start of all processes [s]."""
 
 
-@dataclass
 class Listener:
-    """A subscriber of alarms that lives for the whole run.
+    """A subscriber that lives for the whole run and keeps what it hears in a session.
 
-    Attributes:
-        heard: alarms in order of arrival.
-        gaps: of alarms, as reported.
-        ended_ns: when it ceased to listen [ns].
+    Of the samples it keeps what happens to reach it, as a witness of what was sent.
+
+    Args:
+        bus: source of the alarms and samples.
+        folder: of the session.
     """
 
-    bus: Bus
-    heard: list[Alarm] = field(default_factory=list)
-    gaps: list[Gap] = field(default_factory=list)
-    ended_ns: int = 0
+    def __init__(self, bus: Bus, folder: Path) -> None:
+        self.bus = bus
+        path = folder / f"{bus.process}.mcap"
+        self._samples = bus.subscribe_lossy(SAMPLES)
+        self._alarms = bus.listen(ALARMS, gaps_in_place=True)
+        self._heard = SessionWriter(path, run_info(bus.rig, 1.0))
 
     def run(self, stop: threading.Event) -> None:
         """Listen until `stop` is set."""
-        alarms = self.bus.listen(ALARMS)
         while not stop.is_set():
-            alarm = alarms.get(timeout=0.1)
-            if alarm is not None:
-                self.heard.append(alarm)
-            self.gaps += [one for one in alarms.reports() if isinstance(one, Gap)]
-        self.ended_ns = time.time_ns()
-        self.heard += alarms.drain()
+            said = self._alarms.get(timeout=0.1)
+            for one in [*([said] if said else []), *self._samples.drain()]:
+                self._heard.write(one)
+        ended_ns = time.time_ns()
+        for said in self._alarms.drain():
+            self._heard.write(said)
+        self._heard.write(Event(self.bus.process, ended_ns, "info", "ENDED", ""))
+        self._heard.close()
 
 
 @dataclass
@@ -85,18 +88,17 @@ class Disturbance:
 
 
 def run(quick: bool) -> list[Row]:
-    """Two minutes, or as many as RIGWATCH_KILL_MINUTES says (default 120)."""
+    """Two minutes, or as many as RIGWATCH_KILL_MINUTES says (default 120).
+
+    RIGWATCH_KILL_PAUSE is the mean pause before a kill [s], RIGWATCH_KILL_FOLDER gets a copy of
+    what was recorded and heard.
+    """
     minutes = 2.0 if quick else float(os.environ.get("RIGWATCH_KILL_MINUTES", "120"))
     with live_rig() as rig:
-        done, listeners, left = disturbed(rig, 60.0 * minutes)
-        journal = rig.folder / "alarms.jsonl"
-        accounts = [
-            heard_account(name, one.heard, one.gaps, journal, one.ended_ns)
-            for name, one in zip(LISTENERS, listeners, strict=True)
-        ]
-        accounts += recorded_account(rig.folder / "sessions", journal, [o.heard for o in listeners])
+        done, left = disturbed(rig, 60.0 * minutes)
         if kept := os.environ.get("RIGWATCH_KILL_FOLDER"):
             shutil.copytree(rig.folder, kept, ignore=shutil.ignore_patterns("serial-line"))
+        accounts = accounts_of(rig.folder)
     return [_row(one, done, minutes) for one in accounts] + [_alive(left, done)]
 
 
@@ -117,15 +119,15 @@ def _alive(left: list[str], done: Disturbance) -> Row:
     return Row("the same: processes at the end", text, "all run", "", note, passed=not left)
 
 
-def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[Listener], list[str]]:
+def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[str]]:
     """Run and disturb the rig; the processes that do not run at the end."""
     with rig.path.open("a") as file:
         file.write("\n[witness]\n")
     up, stop = Up(rig.path, "--without", "dashboard"), threading.Event()
     try:
-        statuses = _Statuses(up)
-        statuses.wait(VICTIMS)
-        listeners = [Listener(connect(rig.config, name, FIRST)) for name in LISTENERS]
+        statuses = Statuses(up)
+        statuses.wait(VICTIMS, FIRST)
+        listeners = [Listener(connect(rig.config, name, FIRST), rig.folder) for name in LISTENERS]
         threads = [threading.Thread(target=one.run, args=(stop,)) for one in listeners]
         for thread in threads:
             thread.start()
@@ -144,39 +146,10 @@ def disturbed(rig: LiveRig, seconds: float) -> tuple[Disturbance, list[Listener]
     finally:
         stop.set()
         up.end()
-    return done, listeners, left
+    return done, left
 
 
-class _Statuses:
-    """The newest status of the supervisor, read in a thread."""
-
-    def __init__(self, up: Up) -> None:
-        self._up, self._newest = up, dict[str, Any]()
-        threading.Thread(target=self._follow, daemon=True).start()
-
-    def _follow(self) -> None:
-        with contextlib.suppress(AssertionError):
-            while True:
-                self._newest = self._up.wait_for("status", 120.0)["processes"]
-                self._up.events.clear()
-
-    def of(self, name: str) -> dict[str, Any]:
-        return dict(self._newest.get(name, {}))
-
-    def alive(self, name: str) -> bool:
-        """Whether the process of the newest status exists."""
-        pid = int(self.of(name).get("pid", 0))
-        return pid > 0 and Path(f"/proc/{pid}").exists()
-
-    def wait(self, names: tuple[str, ...]) -> None:
-        deadline = time.monotonic() + FIRST
-        while not all(self.alive(name) for name in names):
-            if time.monotonic() > deadline:
-                raise TimeoutError(f"not all of {', '.join(names)} came up")
-            time.sleep(0.2)
-
-
-def _disturb(statuses: _Statuses, done: Disturbance, seconds: float) -> None:
+def _disturb(statuses: Statuses, done: Disturbance, seconds: float) -> None:
     chance, ends = random.Random(1), time.monotonic() + seconds
     time.sleep(10.0)
     while (left := ends - time.monotonic()) > 0:

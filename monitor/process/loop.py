@@ -128,8 +128,13 @@ class MonitorProcess:
         return min(left, TURN) if left > 0.0 else TURN
 
     def keep_position(self) -> None:
-        """Store the position; all samples read so far have been processed."""
-        if self._cursor and (position := self.reader.position):
+        """Store the position; all samples read so far have been processed.
+
+        While those before it are read again for the filters, the earlier run's remains.
+        """
+        position, done = self.reader.position, self._done
+        again = position and done and position[0] == done[0] and position < done
+        if self._cursor and position and not again:
             self._cursor.write(*position)
 
     def look_around(self) -> None:

@@ -18,7 +18,7 @@ class Feed:
         resume_after: (boot, seq) of the last sample stored by an earlier run of this recorder;
             later ones are fetched from the ring.
         positions: the same for numbered topics.
-        gaps_in_place: gaps are not published, and those of messages are in their place.
+        gaps_may_fill: gaps are not published yet, as another recording may fill them.
 
     Attributes:
         samples: samples delivered.
@@ -31,16 +31,20 @@ class Feed:
         resume_after: tuple[int, int] | None = None,
         positions: Positions | None = None,
         *,
-        gaps_in_place: bool = False,
+        gaps_may_fill: bool = False,
     ) -> None:
         self.samples = self.gap_samples = 0
         self._name = bus.process
-        here = not gaps_in_place
+        here = not gaps_may_fill
         self._reader = SampleReader(bus, resume_after, publish_gaps=here, patient=here)
         resumed = positions or {}
         self._numbered = {
             line.name: bus.listen(
-                line, resumed.get(line.name), gaps_in_place=gaps_in_place, patient=here
+                line,
+                resumed.get(line.name),
+                gaps_in_place=True,
+                publish_gaps=here,
+                patient=here,
             )
             for line in _SUBSCRIBED
             if line.numbered
@@ -69,12 +73,10 @@ class Feed:
                 self.gap_samples += max(0, item.last - item.first + 1)
         return found
 
-    def _drained(self, subscription: Subscription, *, own: bool = False) -> list[Message]:
+    def _drained(self, subscription: Subscription) -> list[Message]:
         if isinstance(subscription, CompleteSubscription):
-            found = subscription.catch_up(CATCH_UP)
-        else:
-            found = subscription.drain()
-        return [message for message in found if own or not self._is_own(message)]
+            return subscription.catch_up(CATCH_UP)  # its own gaps are in their place
+        return [message for message in subscription.drain() if not self._is_own(message)]
 
     def positions(self) -> Positions:
         """Positions in the numbered topics."""

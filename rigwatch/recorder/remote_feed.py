@@ -57,7 +57,7 @@ class RemoteFeed(Feed):
     """
 
     def __init__(self, bus: Bus, place: Place) -> None:
-        super().__init__(bus, place.last, place.positions, gaps_in_place=True)
+        super().__init__(bus, place.last, place.positions, gaps_may_fill=True)
         self._bus = bus
         self._streams, self._outage = resumed(place)
         self._asked: dict[str, Hole] = {}
@@ -125,7 +125,7 @@ class RemoteFeed(Feed):
             return self._of_stream(ESTIMATES.name)
         found: list[Message] = []
         numbered = subscription.topic.numbered
-        for message in self._drained(subscription, own=numbered):
+        for message in self._drained(subscription):
             if numbered and isinstance(message, Gap):
                 found += self._reported(self._outage.gap(message))
             elif self._outage.hear(message):

@@ -200,6 +200,11 @@ class Page:
                     found.add(f"{split.scheme}://{split.netloc}")
         return found
 
+    def forget(self) -> None:
+        """Empty the browser's logs: what a failed test left there is not the next one's."""
+        self.errors()
+        self.requests()
+
     def violations(self, *, dark: bool) -> list[str]:
         """What axe finds, in a light page or in a dark one."""
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -260,3 +265,4 @@ def looking(driver: webdriver.Chrome, served: Served) -> Iterator[Page]:
         assert page.requests() <= {served.address}
     finally:
         driver.get("about:blank")  # a page that stays open calls its server, also one that ended
+        page.forget()

@@ -116,6 +116,12 @@ def test_the_address_brings_the_token_once_and_leaves_it_out_of_what_others_see(
     assert answer.headers["referrer-policy"] == "no-referrer"
 
 
+def test_a_test_that_fails_leaves_no_requests_to_the_next(page: Page, root: Path) -> None:
+    with pytest.raises(ZeroDivisionError), serving(root) as other, looking(page.driver, other):
+        raise ZeroDivisionError
+    assert page.requests() <= {page.served.address}
+
+
 def test_two_servers_of_one_machine_do_not_log_each_other_out(page: Page, root: Path) -> None:
     page.open("/")
     page.find("h1, h2")

@@ -291,6 +291,31 @@ def test_a_reader_that_resumes_has_everything_since(rig: TestRig) -> None:
     assert second.ledger.lost(5) == 0
 
 
+def test_a_reader_that_was_away_for_a_whole_boot_has_it_from_the_ring() -> None:
+    network = MemoryNetwork()
+    daq = network.bus("r", "daq")
+    ring = SampleRing(daq, 1000)
+    for boot in (1, 2, 3):
+        ring.add(block(0, 50, boot=boot))
+    reader = SampleReader(network.bus("r", "reader"), resume_after=(1, 29))
+    ring.add(newest := block(50, boot=3))
+    daq.publish(SAMPLES, newest)
+    ledger = Ledger()
+
+    def complete() -> bool:
+        for item in reader.read(0.05):
+            ledger.add(item)
+        return ledger.last(3) == 50
+
+    eventually(complete, "the newest sample")
+    reader.close()
+    assert ledger.boots == [2, 3]
+    assert ledger.unknown_ends == [1]
+    ledger.assert_complete(2, 0, 49)
+    ledger.assert_complete(3, 0, 50)
+    assert ledger.lost(2) == ledger.lost(3) == 0
+
+
 def test_of_two_publishers_the_first_is_believed_by_everyone_until_it_dies(rig: TestRig) -> None:
     rig.router()
     listener = Listener(rig.bus("reader"))

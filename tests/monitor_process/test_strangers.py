@@ -95,6 +95,20 @@ def _caught_up(bench: Bench, seq: int) -> bool:
     return bench.monitor.reader.position == (7, seq)
 
 
+def test_a_monitor_killed_while_it_reads_earlier_samples_keeps_its_position(bench: Bench) -> None:
+    bench.send(wave(0, 600, 7, 0))
+    bench.turn_until(599)
+    bench.kill()
+    bench.start()
+    bench.monitor.keep_position()
+    assert bench.monitor.reader.position == (7, -1)
+    position = Path(f"{bench.config.monitor.journal}.position")  # type: ignore[union-attr]
+    assert Cursor(position).read() == (7, 599)
+    bench.send(wave(600, 1, 7, 0))
+    bench.turn_until(600)
+    assert Cursor(position).read() == (7, 600)
+
+
 @pytest.mark.parametrize("seq", [2**60, -7])
 def test_a_position_that_no_device_reaches_is_none(tmp_path: Path, seq: int) -> None:
     cursor = Cursor(tmp_path / "p")

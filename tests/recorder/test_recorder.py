@@ -144,6 +144,28 @@ def test_everything_said_is_kept_once(config: Path) -> None:
     assert len(estimates) == 100
 
 
+def test_a_gap_of_alarms_lies_between_those_before_and_after_it(config: Path) -> None:
+    network = MemoryNetwork()
+    rig = load_rig(config)
+    recorder = Recorder(rig, describe_run(config, rig), network.bus("bench1", "recorder"))
+    first = network.bus("bench1", "monitor")
+    first.publish(ALARMS, alarm(1))
+    recorder.turn(0.0, 0)
+    first.close()
+    second = network.bus("bench1", "monitor")
+    second.publish(ALARMS, alarm(2))
+
+    def known() -> bool:
+        recorder.turn(1.0, 1)
+        found = open_session(recorder.store.folder).messages(["alarms"])
+        return len(list(found)) == 2
+
+    eventually(known, "the second run's alarm")
+    recorder.close(2.0, 2)
+    kept = open_session(recorder.store.folder).messages(["alarms", "gaps"])
+    assert [item.topic.name for item in kept] == ["alarms", "gaps", "alarms"]
+
+
 @pytest.mark.parametrize("name", RECORDERS)
 def test_a_recorder_speaks_of_its_own_disk_and_keeps_that_once(
     config: Path, disk: dict[str, float], name: str

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tools.licences import is_allowed, licence_of, locked, refused
-from tools.sbom import bill
+from tools.supply_chain.licences import is_allowed, licence_of, locked, refused
+from tools.supply_chain.sbom import bill
 
 ROOT = Path(__file__).parents[2]
 BUILD = "import sys; from hatchling.build import build_wheel; print(build_wheel(sys.argv[1]))"

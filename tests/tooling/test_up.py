@@ -27,14 +27,14 @@ Events = list[dict[str, Any]]
 
 
 class Rig:
-    """A running `rigwatch up --json`."""
+    """A running `rigwatch up --json`; its command follows after `before`."""
 
-    def __init__(self, config: Path, *more: str) -> None:
+    def __init__(self, config: Path, *more: str, before: tuple[str, ...] = ()) -> None:
         self.config = config
         self.events: Events = []
         self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "rigwatch", "up", "--json", *more, str(config)],
+            [*before, sys.executable, "-m", "rigwatch", "up", "--json", *more, str(config)],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

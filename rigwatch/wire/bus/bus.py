@@ -33,11 +33,18 @@ class Bus(Member):
         capacity: int = QUEUE_CAPACITY,
         *,
         gaps_in_place: bool = False,
+        publish_gaps: bool = True,
         patient: bool = False,
     ) -> CompleteSubscription:
         """The messages of a numbered topic, after those that an earlier run has processed."""
         return CompleteSubscription(
-            self, topic, capacity, resume_after, gaps_in_place=gaps_in_place, patient=patient
+            self,
+            topic,
+            capacity,
+            resume_after,
+            gaps_in_place=gaps_in_place,
+            publish_gaps=publish_gaps,
+            patient=patient,
         )
 
     def subscribe_lossy(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:

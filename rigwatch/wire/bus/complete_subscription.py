@@ -45,7 +45,8 @@ class CompleteSubscription(Subscription):
         resume_after: run and number of the last message of each process that an earlier run of this
             subscriber has processed; a process that is not among them has begun since, and is
             followed from its first message on. None for messages from now on.
-        gaps_in_place: losses are not published but returned among the messages, in their place.
+        gaps_in_place: losses are returned among the messages, in their place, not by `reports`.
+        publish_gaps: whether losses are published and counted; not if they may still be filled.
         patient: see `SampleOrder`.
 
     Attributes:
@@ -61,11 +62,13 @@ class CompleteSubscription(Subscription):
         resume_after: Mapping[str, Place] | None = None,
         *,
         gaps_in_place: bool = False,
+        publish_gaps: bool = True,
         patient: bool = False,
     ) -> None:
         super().__init__(topic, capacity)
         self.lost = self.foreign = 0
-        self._bus, self._gaps_in_place, self._patient = bus, gaps_in_place, patient
+        self._bus, self._patient = bus, patient
+        self._gaps_in_place, self._publish_gaps = gaps_in_place, publish_gaps
         self._senders: dict[str, Sender] = {}
         self._runs: dict[int, str] = {}
         self._assumed: dict[str, int] = {}
@@ -335,10 +338,11 @@ class CompleteSubscription(Subscription):
         )  # fmt: skip
         if self._gaps_in_place:
             self._ready.append(gap)
-            return
-        self.lost += max(0, loss.last - loss.first + 1)
-        self._reports.append(gap)
-        self._bus.publish(GAPS, gap)
+        else:
+            self._reports.append(gap)
+        if self._publish_gaps:
+            self.lost += max(0, loss.last - loss.first + 1)
+            self._bus.publish(GAPS, gap)
 
     def _remark(self, process: str, remark: Remark) -> None:
         text = f"{self.topic.name} of {process}: {remark.text}"

@@ -77,6 +77,10 @@ class RingStore:
             last = int(runs[-1][-1])
         return RingReply(self.boot, last, tuple(self._block(run) for run in runs))
 
+    def first(self) -> SampleBlock:
+        """The oldest sample stored."""
+        return self._block(np.array([self._seq[self._seq >= 0].min()]))
+
     def _block(self, seq: NDArray[np.int64]) -> SampleBlock:
         rows = seq % self.capacity
         channels = tuple(
@@ -141,8 +145,13 @@ class SampleRing:
         ask = Ask.from_bytes(question)
         with self._lock:
             known = [store for store in self._stores if store.boot == ask.boot]
-            reply = known[-1].reply(ask) if known else RingReply(ask.boot, UNKNOWN, ())
+            reply = known[-1].reply(ask) if known else self._unknown(ask.boot)
         return [reply.to_bytes()]
+
+    def _unknown(self, boot: int) -> RingReply[SampleBlock]:
+        """The reply about a boot that is not here, with a sample of the previous boot."""
+        hints = tuple(store.first() for store in self._stores[:-1])
+        return RingReply(boot, UNKNOWN, hints)
 
     def close(self) -> None:
         """Stop serving and give up control."""

@@ -5,7 +5,8 @@
 
 A reply settles the samples from `first` to `settled`: those not in its blocks are lost. If
 `settled` is less than `last`, the reader queries again from there. A ring without that
-boot replies with `settled` = -1 and no block.
+boot replies with `settled` = -1, and with a sample of the boot before its present one if it has
+any: a reader that was away for the whole of that boot learns of it so.
 """
 
 import struct

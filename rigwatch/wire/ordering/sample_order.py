@@ -263,6 +263,8 @@ class SampleOrder(Generic[S]):
         self._unanswered = 0
         if reply.settled == UNKNOWN:
             self._give_up(front, ask, "the source has restarted since")
+            if front.ended:
+                self._learn_of(reply.blocks)
             return
         if reply.settled < ask.first - 1 and not front.ended:
             self._set_back(front, reply.settled + 1)
@@ -278,6 +280,15 @@ class SampleOrder(Generic[S]):
         self._skip(front, min(reply.settled, ask.last), "the ring no longer has them")
         if ask.last == OPEN and front.ended and not self._progressed(ask, front):
             self._leave(front)
+
+    def _learn_of(self, blocks: tuple[S, ...]) -> None:
+        """Put a boot that began and ended unseen before the one that has control now."""
+        for block in blocks:
+            known = block.boot in self._settled_boots or self._stream(block.boot) is not None
+            if self._line and not known:
+                unseen = Stream[S](block.boot, 0)
+                unseen.ended = True
+                self._line.appendleft(unseen)
 
     def _still_sends(self, front: Stream[S]) -> bool:
         return self.sources.is_alive(front.boot) or (bool(front.waiting) and not front.ended)

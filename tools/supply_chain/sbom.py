@@ -1,6 +1,6 @@
 """Writes the software bill of materials (CycloneDX 1.6, JSON) of what rigwatch installs and ships.
 
-    python -m tools.sbom OUT.json
+    python -m tools.supply_chain.sbom OUT.json
 
 Packages, versions and hashes are those of requirements/lock.txt, so the same lock gives the same
 bytes.
@@ -14,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from tools.licences import ALLOWED, ROOT, Locked, licence_of, locked
+from tools.supply_chain.licences import ALLOWED, ROOT, Locked, licence_of, locked
 
 UPLOT = ROOT / "rigwatch" / "browser" / "server" / "static" / "vendor" / "uPlot.js"
 _NAMESPACE = uuid.UUID("6f0d7c2e-6d0f-5d0e-9f43-0c1f3b6a9a11")

@@ -1,6 +1,6 @@
 """Licences of the locked packages, from what they declare, checked against an allow-list.
 
-python -m tools.licences      # one line per package; 1 if one is not allowed
+python -m tools.supply_chain.licences      # one line per package; 1 if one is not allowed
 """
 
 import re
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 LOCKS = ("lock", "build", "dev")
 ALLOWED = frozenset({
     "0BSD", "Apache-2.0", "BSD", "BSD-2-Clause", "BSD-3-Clause", "CC0-1.0", "EPL-2.0", "ISC",
