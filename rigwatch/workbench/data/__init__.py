@@ -18,6 +18,7 @@ from rigwatch.workbench.data.proposals import (
 )
 from rigwatch.workbench.data.recorded_columns import read_columns
 from rigwatch.workbench.data.repeats import repeat_along_motion, repeat_of
+from rigwatch.workbench.data.row_order import with_next_rows
 from rigwatch.workbench.data.signal_scales import port_sizes
 from rigwatch.workbench.data.signals import UNFILLED, Data, MotionSensor, parameters_of, prepare
 
@@ -44,4 +45,5 @@ __all__ = [
     "repeat_along_motion",
     "repeat_of",
     "with_elements",
+    "with_next_rows",
 ]
