@@ -11,7 +11,10 @@ from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.physics.engine.fit.windowed_fit import evaluate, fit
+from rigwatch.workbench.compare import open_bench
 from rigwatch.workbench.explain import explain
+from rigwatch.workbench.explain.exchange import exchange
+from rigwatch.workbench.ranking import no_progress
 from rigwatch.workbench.steps.change import add, undo
 from rigwatch.workbench.study import open_study
 from tests.workbench.dampers import damper
@@ -22,12 +25,12 @@ STIFFNESS, LIMIT, MORE, PATH = 8e3, 20.0, 0.6, 0.15
 MODEL = shipped_models()["mass-spring-damper"]
 
 
-def settling(x: np.ndarray, _: np.ndarray) -> np.ndarray:
-    """Force of a spring with a slider that begins 1 + `MORE` times as strong, stepped by hand."""
+def settling(x: np.ndarray, _: np.ndarray, more: float = MORE) -> np.ndarray:
+    """Force of a spring with a slider that begins 1 + `more` times as strong, stepped by hand."""
     stretched, slid, found = 0.0, 0.0, np.empty_like(x)
     for index, step in enumerate(np.diff(x, prepend=x[0])):
         slid += abs(step)
-        limit = LIMIT * (1 + MORE * np.exp(-slid / PATH))
+        limit = LIMIT * (1 + more * np.exp(-slid / PATH))
         stretched = float(np.clip(stretched + STIFFNESS * step, -limit, limit))
         found[index] = stretched
     return found
@@ -46,6 +49,19 @@ def test_a_slider_that_runs_in_is_offered_in_place_of_a_constant_one(tmp_path: P
     assert values["Fc"] == pytest.approx(LIMIT, rel=0.05)
     assert values["g"] == pytest.approx(MORE, rel=0.25)
     assert values["path"] == pytest.approx(PATH, rel=0.3)
+
+
+def test_what_explains_a_little_of_an_unknown_rest_is_not_offered(tmp_path: Path) -> None:
+    def disturbed(x: np.ndarray, v: np.ndarray) -> np.ndarray:
+        since = np.arange(len(x)) / 100
+        return settling(x, v, 0.3) + 3 * np.sin(2 * since**2) * np.sin(0.7 * since)
+
+    study = damper(tmp_path, disturbed)
+    before = add(study, "jenkins", "load").after
+    after = add(open_study(study.folder), "jenkins_running_in", "load", anyway=True).after
+    assert after.held_out_error < 0.9 * before.held_out_error
+    undo(open_study(study.folder))
+    assert exchange(open_bench(open_study(study.folder)), no_progress) is None
 
 
 def test_each_recording_runs_in_from_its_own_beginning(tmp_path: Path) -> None:
