@@ -19,7 +19,7 @@ from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.report.text_report import fit_lines
 from rigwatch.workbench.study.edits import keep_holds
 from rigwatch.workbench.study.study import Study, open_study, study_of
-from rigwatch.workbench.study.study_file import Span, StudyFile
+from rigwatch.workbench.study.study_file import Accepted, Span, StudyFile
 from sim_plant.oscillator import RATE, Hidden, oscillate
 
 SAMPLES, HORIZON, NOISE = 2560, 256, 2e-3
@@ -73,10 +73,13 @@ def test_rows_in_order_stay_whatever_is_missing(hidden):
     assert with_row_order(study, data) == (study, data)
 
 
-def test_what_the_study_says_is_not_tried():
+def test_with_an_order_or_an_effect_in_the_study_none_is_tried():
     study, data, _ = made(before=True)
     told = replace(study, file=structs.replace(study.file, late={"force": 0.0}))
     assert with_row_order(told, data) == (told, data)
+    accepted = (Accepted(effect="coulomb", port="load", parameters={"Fc": 0.1}),)
+    further = replace(study, file=structs.replace(study.file, effects=accepted))
+    assert with_row_order(further, data) == (further, data)
 
 
 def test_each_recording_keeps_its_last_value():

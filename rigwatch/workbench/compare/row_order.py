@@ -3,7 +3,8 @@
 Such a model answers before its input changes, which no effect explains: friction, play or a lag all
 come later, and stand in for each other until the rows are in order. A model file says that an input
 is held, but not in which row a log has its value. So the model is fitted with both orders, and the
-later one is taken only if the error falls much, in training and held out.
+later one is taken only if the error falls much, in training and held out. With effects accepted the
+order stays: a wrong one among them may be mended by a wrong order.
 """
 
 from dataclasses import replace
@@ -48,9 +49,9 @@ def with_row_order(study: Study, data: Data) -> tuple[Study, Data]:
 
 
 def _in_doubt(study: Study) -> list[str]:
-    """Driving inputs that the model file calls held; none if the study says more of any."""
-    model = study.model
-    if study.file.hold or study.file.late or not model.states or model.rough:
+    """Driving inputs that the model file calls held; none if the study says more or has effects."""
+    model, file = study.model, study.file
+    if file.hold or file.late or file.effects or not model.states or model.rough:
         return []
     if predicts_along_motion(study):
         return []

@@ -8,6 +8,7 @@ from rigwatch.workbench.data.noise_floor import (
     NoiseFloor,
     find_period,
     from_residual,
+    lowered,
     quiet_scale,
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
@@ -34,6 +35,7 @@ __all__ = [
     "along_motion",
     "find_period",
     "from_residual",
+    "lowered",
     "parameters_of",
     "port_sizes",
     "predicts_along_motion",

@@ -8,10 +8,8 @@ all there is.
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.explain.combinations import floor_of
+from rigwatch.workbench.data import lowered
 from rigwatch.workbench.ranking import Ranked
 
 
@@ -27,5 +25,6 @@ def with_lower_floor(bench: Bench, rows: Sequence[Ranked]) -> Bench:
         return bench
     best = min(accepted, key=lambda row: row.held_out_error)
     assert best.fitted is not None
-    lower = np.minimum(bench.floor.rms, floor_of(bench, best.fitted).rms)
-    return replace(bench, floor=replace(bench.floor, rms=lower))
+    found, recording = best.fitted.held_out, bench.data.held_out
+    floor = lowered(bench.floor, found, recording, bench.study.file.period, bench.data.horizon)
+    return replace(bench, floor=floor)
