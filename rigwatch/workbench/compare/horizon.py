@@ -19,7 +19,7 @@ from rigwatch.physics.engine.fit import Recording, filled
 from rigwatch.physics.engine.score import autocorrelation, first_below
 from rigwatch.wire.arrays import BoolArray, ComplexArray, FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import predicts_along_motion, prepare, quiet_scale
+from rigwatch.workbench.data import Data, predicts_along_motion, prepare, quiet_scale
 from rigwatch.workbench.fit import Fitted, eigenvalues, fit_base, with_hold
 from rigwatch.workbench.study import Study
 
@@ -54,7 +54,7 @@ def with_horizon(study: Study) -> Study:
     begin = float(np.clip(_from_correlation(data.train), least, max(longest, least)))
     study = _with_source(study, "how fast the outputs change", begin)
     try:
-        fitted = _fitted_once(study)
+        fitted, data = _fitted_once(study)
     except ModelError:
         return study
     slowest = _slowest(eigenvalues(fitted, data.train), shortest)
@@ -80,11 +80,11 @@ def _with_source(study: Study, source: str, horizon: float | None = None) -> Stu
     return replace(study, file=file, horizon_from=source)
 
 
-def _fitted_once(study: Study) -> Fitted:
-    """The model fitted to the training recordings."""
+def _fitted_once(study: Study) -> tuple[Fitted, Data]:
+    """The model fitted to the training recordings, and these, cut to whole windows."""
     data = prepare(study)
     scale = quiet_scale(data.train) if data.train.outputs.shape[1] > 1 else None
-    return fit_base(with_hold(study, data, scale), data, scale)
+    return fit_base(with_hold(study, data, scale), data, scale), data
 
 
 def _slowest(found: ComplexArray, longest: float) -> tuple[float, str] | None:

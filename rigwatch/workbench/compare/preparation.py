@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.horizon import with_horizon
+from rigwatch.workbench.compare.row_order import with_row_order
 from rigwatch.workbench.data import (
     Data,
     NoiseFloor,
@@ -67,7 +68,7 @@ def prepared(study: Study) -> tuple[Study, Data, FloatArray | None]:
     """
     check_data(study)
     study = with_horizon(study)
-    return determined_by_healthy(study, prepare(study))
+    return determined_by_healthy(*with_row_order(study, prepare(study)))
 
 
 def determined_by_healthy(study: Study, data: Data) -> tuple[Study, Data, FloatArray | None]:

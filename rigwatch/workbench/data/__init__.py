@@ -8,6 +8,7 @@ from rigwatch.workbench.data.noise_floor import (
     NoiseFloor,
     find_period,
     from_residual,
+    lowered,
     quiet_scale,
 )
 from rigwatch.workbench.data.one_rate import ALIKE as RATES_ALIKE
@@ -18,6 +19,7 @@ from rigwatch.workbench.data.proposals import (
 )
 from rigwatch.workbench.data.recorded_columns import read_columns
 from rigwatch.workbench.data.repeats import repeat_along_motion, repeat_of
+from rigwatch.workbench.data.row_order import with_next_rows
 from rigwatch.workbench.data.signal_scales import port_sizes
 from rigwatch.workbench.data.signals import UNFILLED, Data, MotionSensor, parameters_of, prepare
 
@@ -33,6 +35,7 @@ __all__ = [
     "along_motion",
     "find_period",
     "from_residual",
+    "lowered",
     "parameters_of",
     "port_sizes",
     "predicts_along_motion",
@@ -44,4 +47,5 @@ __all__ = [
     "repeat_along_motion",
     "repeat_of",
     "with_elements",
+    "with_next_rows",
 ]

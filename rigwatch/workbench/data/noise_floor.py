@@ -7,7 +7,7 @@ be white noise, gives a lower limit.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import welch
@@ -91,6 +91,24 @@ def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int
     rate = 1 / (recording.dt * factor)
     top = 0.38 if factor > 1 else 0.5
     return NoiseFloor(np.array([_quiet([c], rate, top) for c in series.T]), "quiet band")
+
+
+def lowered(
+    floor: NoiseFloor, fitted: Fit, recording: Recording, period: float, horizon: int
+) -> NoiseFloor:
+    """The floor, or that of another fit's quietest band in the channels where it is lower.
+
+    Missing physics may fill all bands of a residual, as friction that reverses does. A floor from
+    repeated periods or a healthy recording stays.
+
+    Args:
+        floor: of another fit to the same recording.
+        fitted, recording, period, horizon: as in `from_residual`.
+    """
+    if floor.method != "quiet band":
+        return floor
+    own = from_residual(fitted, recording, period, horizon)
+    return replace(floor, rms=np.minimum(floor.rms, own.rms))
 
 
 def find_period(recording: Recording) -> int:

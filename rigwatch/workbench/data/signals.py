@@ -17,6 +17,7 @@ from rigwatch.workbench.data.columns import Columns, bridged
 from rigwatch.workbench.data.derived_ends import without_ends
 from rigwatch.workbench.data.one_rate import on_one_rate
 from rigwatch.workbench.data.recorded_columns import read_columns, with_derived
+from rigwatch.workbench.data.row_order import with_next_rows
 from rigwatch.workbench.data.signal_units import check_unit
 from rigwatch.workbench.data.telling import divided
 from rigwatch.workbench.study import Span, Study, StudyFile
@@ -171,7 +172,8 @@ def _recording(
     u, y = _without_holes(study.model, u, y, use, remarks)
     if use != "telling":
         _check_excitation(study.model, u, use)
-    return Recording(tables[0].dt, u, y, thinning, parts)
+    ends = [name for name, held in study.holds.items() if held.ends]
+    return with_next_rows(study.model, Recording(tables[0].dt, u, y, thinning, parts), ends)
 
 
 def _beyond(use: str, spans: Sequence[float], horizon: float) -> str:

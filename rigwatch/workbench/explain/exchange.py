@@ -14,7 +14,6 @@ from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, bench_of, prepared, with_horizon_of
 from rigwatch.workbench.fit import held_as
 from rigwatch.workbench.ranking import (
-    MATERIAL,
     Progress,
     Ranked,
     difference,
@@ -26,6 +25,9 @@ from rigwatch.workbench.study import Study, drop_effect
 
 MOST_TRIED = 8
 """Largest number of effects of a kind that are fitted in place of one."""
+MUCH = 0.25
+"""Share of the squared error that it must explain: where nothing else explains what is left, other
+missing physics lowers the error of every refinement a little."""
 LEVEL = 0.05
 """Largest probability, corrected for those tried, that chance lowers the held-out error so far."""
 
@@ -115,6 +117,7 @@ def _in_place(bench: Bench, row: Ranked, instead_of: str, tried: int) -> Exchang
     fall = difference(bench.base.held_out, row.fitted.held_out)
     p_value = min(tried * fall.p_falls, 1.0)
     trained = row.fitted.train_error < bench.base.train_error
-    if not (trained and p_value < LEVEL and fall.relative > MATERIAL):
+    explained = 1 - (row.held_out_error / bench.base.held_out_error) ** 2
+    if not (trained and p_value < LEVEL and explained > MUCH):
         return None
     return Exchange(row.effect, row.port, instead_of, row.held_out_error, p_value)

@@ -22,6 +22,7 @@ from rigwatch.workbench.explain.adequacy import (
 from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.exchange import Exchange, exchange
 from rigwatch.workbench.explain.excitation import unexcited
+from rigwatch.workbench.explain.lower_floor import with_lower_floor
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import (
@@ -155,6 +156,7 @@ def explained(bench: Bench, progress: Progress = no_progress) -> Explained:
     """
     bench = with_adequate_base(bench, progress)
     rows, verdict = ranking(bench, progress)
+    bench = with_lower_floor(bench, rows)
     if verdict.word in STRENGTH_TOLD and bench.data.along_motion:
         progress("finding what the healthy recording leaves open of the strength")
     found = explanation(bench, rows, verdict)
@@ -178,6 +180,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
         rows = rank_all(bench.study, bench.data, bench.base)
         return rows, with_base_offered(bench, stopped)
     rows = rank(bench.study, bench.data, bench.base, bench.floor, progress)
+    bench = with_lower_floor(bench, rows)
     verdict = credible_verdict(bench, rows)
     rows, verdict = _refined(bench, rows, verdict, progress)
     along = bench.data.along_motion

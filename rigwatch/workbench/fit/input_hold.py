@@ -92,7 +92,7 @@ def with_holds(model: Model, holds: Mapping[str, tuple[Hold, float]]) -> Model:
 
 def held_as(study: Study, holds: Mapping[str, Held]) -> Study:
     """The study with the holds found for another instance of it."""
-    new = {n: (held.hold, held.late) for n, held in holds.items() if n in study.model.inputs}
+    new = {n: (held.hold, held.acting) for n, held in holds.items() if n in study.model.inputs}
     return replace(study, model=with_holds(study.model, new), holds=dict(holds))
 
 

@@ -1,7 +1,9 @@
 """Decides from the held-out recordings whether an effect is accepted.
 
 The held-out error must fall by more than chance and by a material amount, and the training fit must
-show that the effect's strength differs from zero.
+show that the effect's strength differs from zero. An effect can vanish, so a fit that is worse in
+training than the one without it has ended in a local minimum, and what it does to the held-out
+recordings says nothing.
 """
 
 from functools import cache
@@ -33,6 +35,8 @@ def judge_fit(base: Fitted, row: Ranked) -> None:
     assert row.fitted is not None
     found = difference(base.held_out, row.fitted.held_out)
     row.gain, row.reason = found.mean, _refused(found)
+    if not row.reason and row.fitted.train_error > (1 + MATERIAL) * base.train_error:
+        row.reason = "its fit ended in a local minimum: the training error rises"
     if not row.reason and (vague := _undetermined_strength(row)) is not None:
         row.reason = vague
     row.accepted = not row.reason

@@ -7,13 +7,15 @@ full. An effect is accepted only if the held-out error falls, over blocks, by mo
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
-from rigwatch.workbench.data import Data, NoiseFloor
+from rigwatch.workbench.data import Data, NoiseFloor, lowered
 from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
 from rigwatch.workbench.ranking.ranked import SAME, Ranked, in_order
 from rigwatch.workbench.ranking.refitting import (
+    Fitting,
     Progress,
     fit_each,
     no_progress,
@@ -61,7 +63,37 @@ def rank(
     while similar := _unfitted_similar(rows, floor):
         progress(f"fitting {similar.label}, which resembles the best")
         refit(study, data, base, similar, fit_model if enough else fit_with_retry)
+    for other in _elsewhere(study, data, rows, floor):
+        progress(f"fitting {other.label}, as the best may act there")
+        refit(study, data, base, other, _from(in_order(rows)[0].fitted))
     return in_order(rows)
+
+
+def _from(found: Fitted | None) -> Fitting:
+    """`fit_model` that starts from the model's parameters in another fit."""
+    own = found.train.values() if found else {}
+
+    def fitting(study: Study, *args: Any, **more: Any) -> Fitted:
+        data, placements, start, scale = args
+        known = {name: own[name] for name in study.model.parameters if name in own}
+        return fit_model(study, data, placements, {**start, **known}, scale, **more)
+
+    return fitting
+
+
+def _elsewhere(study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFloor) -> list[Ranked]:
+    """Unfitted rows with the best effect at other ports, if it leaves more than noise.
+
+    Scores are along the base model's fit: where a drive clips its parameters may be so far off that
+    they speak for a sensor that clips, and that a fit from there ends in a local minimum.
+    """
+    accepted = in_order([row for row in rows if row.accepted])
+    if not accepted or accepted[0].fitted is None:
+        return []
+    best, found = accepted[0], accepted[0].fitted.held_out
+    if lowered(floor, found, data.held_out, study.file.period, data.horizon).reached(found):
+        return []
+    return [r for r in rows if r.effect == best.effect and r.fitted is None and not r.failure]
 
 
 def _substitute_of_failed(rows: Sequence[Ranked]) -> Ranked | None:

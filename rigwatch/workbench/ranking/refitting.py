@@ -6,7 +6,7 @@ from dataclasses import replace
 from rigwatch.physics.engine.compile import cores, side_by_side
 from rigwatch.physics.engine.equations import Placement
 from rigwatch.wire.errors import ModelError
-from rigwatch.workbench.data import Data, NoiseFloor
+from rigwatch.workbench.data import Data, NoiseFloor, lowered
 from rigwatch.workbench.fit import (
     Fitted,
     fit_model,
@@ -98,9 +98,16 @@ def fit_each(  # noqa: PLR0917 -- they belong together
             ahead = {each.label: replace(each) for each in waiting[: cores()]}
             refit_all(study, data, base, list(ahead.values()), fit_model)
         _take(row, ahead[row.label])
-        if row.accepted and leaves_nothing(row, base, floor):
+        if row.accepted and leaves_nothing(row, base, _own_floor(study, data, floor, row)):
             enough.append(row)
     return enough
+
+
+def _own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> NoiseFloor:
+    """The noise floor, from the row's residual if that is quieter than the base model's."""
+    assert row.fitted is not None
+    fitted, recording = row.fitted.held_out, data.held_out
+    return lowered(floor, fitted, recording, study.file.period, data.horizon)
 
 
 def _take(row: Ranked, fitted: Ranked) -> None:

@@ -86,7 +86,9 @@ def fit_lines(found: Comparison) -> list[str]:
 def _held(held: Held) -> str:
     """An input's hold between samples, in words."""
     what = "held from sample to sample" if held.hold == "zero" else "linear between samples"
-    if held.late:
+    if held.ends:
+        what += ", recorded a sample late: a row has the value of the interval that ends there"
+    elif held.late:
         time = f" ({1e3 * held.seconds:.3g} ms)" if held.seconds else ""
         what += f", {held.late:.2g} of a sample late{time}"
     if held.source in GIVEN:

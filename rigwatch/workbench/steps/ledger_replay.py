@@ -61,6 +61,7 @@ def _check(study: Study, line: dict[str, Any], effects: list[Accepted]) -> Check
         study.model,
         study.effects,
         study.own,
+        holds=study.holds,
     )
     found = comparison(open_bench(model)).held_out_error
     recorded = float(line["held_out_error"])

@@ -73,7 +73,8 @@ class Held:
 
     Attributes:
         hold: "linear" (first-order) or "zero" (zero-order hold).
-        late: delay of a zero-order hold, as a share of the sample period.
+        late: delay of a zero-order hold, as a share of the sample period; -1 if a row has the
+            value of the interval that ends there.
         seconds: the same [s]; 0 while the sample period is unknown.
         source: where the hold comes from, in words.
         error_ratio: error with this hold over that with a linear one; None if not compared.
@@ -84,6 +85,16 @@ class Held:
     seconds: float
     source: str
     error_ratio: float | None = None
+
+    @property
+    def acting(self) -> float:
+        """The delay within the interval that a value acts in, from 0 to 1."""
+        return self.late + 1 if self.late < 0 else self.late
+
+    @property
+    def ends(self) -> bool:
+        """Whether a row has the value of the interval that ends there, not of the next."""
+        return self.late < 0
 
 
 @dataclass(frozen=True)
@@ -329,7 +340,8 @@ def _held(model: Model, file: StudyFile) -> tuple[Model, dict[str, Held]]:
         source = "the study" if hold else "the model file"
         hold = hold or own.hold or model.hold
         late = own.late if late is None else late
-        inputs[name] = structs.replace(own, hold=hold, late=late)
-        if hold and not own.constant:
-            holds[name] = Held(hold, late, 0.0, source)
+        held = Held(hold, late, 0.0, source) if hold else None
+        inputs[name] = structs.replace(own, hold=hold, late=held.acting if held else late)
+        if held and not own.constant:
+            holds[name] = held
     return structs.replace(model, inputs=inputs), holds

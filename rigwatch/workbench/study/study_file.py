@@ -9,7 +9,7 @@ from rigwatch.physics.engine.equations import (
 )
 from rigwatch.wire.typed_files import Section
 
-Lateness = Annotated[float, Meta(ge=0, le=1)]
+Lateness = Annotated[float, Meta(ge=-1, le=1)]
 
 
 class Span(Section, frozen=True, kw_only=True):
@@ -124,7 +124,10 @@ class StudyFile(Section, frozen=True, kw_only=True):
     ] = field(default_factory=dict)
     late: Annotated[
         dict[str, Lateness],
-        Meta(description="delay of held inputs, as a share of the sample period"),
+        Meta(
+            description="delay of held inputs, as a share of the sample period; -1 if a row has the"
+            " value of the interval that ends there"
+        ),
     ] = field(default_factory=dict)
     derive: Derive | None = None
     thin: Thin | None = None

@@ -99,3 +99,12 @@ def test_an_oscillation_is_followed_until_it_has_decayed(
     chosen = with_horizon(study)
     assert chosen.file.horizon == pytest.approx(periods * 2 * np.pi / 30, rel=0.06)
     assert "that decays in" in chosen.horizon_from
+
+
+@pytest.mark.parametrize("samples", [1563, 2868])
+def test_recordings_that_fill_no_number_of_horizons_do_not_end_it(
+    tmp_path: Path, samples: int
+) -> None:
+    parts = [{name: column[:samples] for name, column in fan(seed).items()} for seed in (0, 2)]
+    study = studied(tmp_path, SLOW, parts, [fan(1)], UNITS)
+    assert "time constant" in with_horizon(study).horizon_from

@@ -69,6 +69,13 @@ class EffectState(Section, frozen=True, kw_only=True):
     start: Annotated[float, Meta(description="value to start from")] = 0.0
     low: Annotated[float, Meta(description="least that it can hold")] = float("-inf")
     high: Annotated[float, Meta(description="most that it can hold")] = float("inf")
+    known: Annotated[
+        bool,
+        Meta(
+            description="starts at `start` in each recording and is not fitted, such as the path"
+            " since its beginning"
+        ),
+    ] = False
     shown: Annotated[str, Meta(description="unit to show it in, `unit` if empty")] = ""
 
     def __post_init__(self) -> None:

@@ -110,11 +110,11 @@ class Problem:
         self.initial = begun[self._cut.starts]
         self._given_initial = initial
         self._effect_states = RecordedEffectStates(
-            system, recording.inputs, begun, recording.dt, compiled.parameters
+            system, recording.inputs, begun, recording.dt, compiled.parameters, recording.slices
         )
-        known = self._effect_states.exact
-        self._every = np.arange(len(system.states))
-        self._unknown = np.array([i for i in self._every if i not in known], np.int64)
+        known, counted = self._effect_states.exact, self._effect_states.counted
+        self._every = np.setdiff1d(np.arange(len(system.states)), counted)
+        self._unknown = np.setdiff1d(self._every, known)
         shown = shown_states(system)
         self.hidden = np.array([i for i in self._unknown if i not in shown], np.int64)
         self._told = False

@@ -3,10 +3,11 @@
 The deflection of a contact or the position of a valve within its play is unknown at the first
 sample of a window, and the window may not determine it. It is computed from the signals at the
 effect's port since the start of the recording: exactly at the actuator of an input, which
-is known; elsewhere as accurately as the channels measure the signals.
+is known; elsewhere as accurately as the channels measure the signals. A state that counts from the
+beginning of each recording, such as the path since then, is known there, and is not fitted.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,22 +32,47 @@ class _PlacedStates:
 
     Attributes:
         placement: the effect.
-        states: its states.
+        states: its states, of each recording apart if they count from its beginning.
         columns: their indices among the system's states.
         signals: at the port, before any effect there.
         before: effects applied to the signal first; their own states are neglected.
+        parts: samples that each of `states` runs through.
     """
 
     placement: Placement
-    states: EffectStates
+    states: list[EffectStates]
     columns: list[int]
     signals: Signals
     before: list[Placement]
+    parts: Sequence[slice]
 
     @property
     def after_effect_with_states(self) -> bool:
         """Whether the arriving signal depends on the states of another effect."""
         return any(placement.effect.states for placement in self.before)
+
+    @property
+    def counted(self) -> list[int]:
+        """Columns of the states that are known at the beginning of each recording."""
+        states = self.placement.effect.states.values()
+        return [c for c, state in zip(self.columns, states, strict=True) if state.known]
+
+    def run(
+        self, own: Mapping[str, float], values: Mapping[str, float], dt: float
+    ) -> list[FloatArray]:
+        """Each state along all samples, shape (n,).
+
+        Args:
+            own: the effect's parameters by its own names.
+            values: all parameters by name.
+            dt: time between samples [s].
+        """
+        arriving = self.arriving(values, dt)
+        runs = [
+            states.run(own, {name: signal[part] for name, signal in arriving.items()})
+            for states, part in zip(self.states, self.parts, strict=True)
+        ]
+        return [np.concatenate([run[name] for run in runs]) for name in runs[0]]
 
     def arriving(self, values: Mapping[str, float], dt: float) -> Signals:
         """The arriving signal and its rate; empty if the effect is the first at its port."""
@@ -83,19 +109,22 @@ class RecordedEffectStates:
         states: from the channels, shape (n, states).
         dt: time between samples [s].
         parameters: all parameters, shape (n_p,), on which a port's signals may depend.
+        parts: samples of each of the joined recordings; all of one if None.
 
     Attributes:
         columns: of the effect states.
-        exact: those at the actuators of inputs, which are known.
+        counted: those known at the beginning of each recording.
+        exact: these, and those at the actuators of inputs, which are known.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0917 -- they belong together
         self,
         system: System,
         inputs: FloatArray,
         states: FloatArray,
         dt: float,
         parameters: FloatArray,
+        parts: Sequence[slice] | None = None,
     ) -> None:
         self._names = list(system.parameters)
         values = dict(zip(self._names, parameters.tolist(), strict=True))
@@ -104,21 +133,27 @@ class RecordedEffectStates:
         for placement in (each for each in system.placements if each.effect.states):
             signals = port_signals(system, placement, inputs, states, dt, values)
             port = system.model.ports[placement.port]
-            own = EffectStates(
-                placement.effect, signals, dt, hold_at(system.model, port),
-                late=delay_at(system.model, port),
-            )  # fmt: skip
+            apart = _divided(placement, parts)
+            own = [
+                EffectStates(
+                    placement.effect, {n: s[part] for n, s in signals.items()}, dt,
+                    hold_at(system.model, port), late=delay_at(system.model, port),
+                )
+                for part in apart
+            ]  # fmt: skip
             columns = [order.index(placement.prefix + name) for name in placement.effect.states]
             before = _before(system, placement)
-            self._placed.append(_PlacedStates(placement, own, columns, signals, before))
+            self._placed.append(_PlacedStates(placement, own, columns, signals, before, apart))
         known = {n for n, port in system.model.ports.items() if port.signal in system.model.inputs}
         self.columns = [c for placed in self._placed for c in placed.columns]
-        self.exact = [
+        self.counted = [c for placed in self._placed for c in placed.counted]
+        driven = [
             c
             for placed in self._placed
             if placed.placement.port in known and not placed.after_effect_with_states
             for c in placed.columns
         ]
+        self.exact = sorted({*driven, *self.counted})
 
     def at(self, parameters: FloatArray) -> dict[int, FloatArray]:
         """Each effect state by its column, shape (n,)."""
@@ -126,6 +161,11 @@ class RecordedEffectStates:
         found: dict[int, FloatArray] = {}
         for placed in self._placed:
             own = _own(placed.placement, values)
-            states = placed.states.run(own, placed.arriving(values, self._dt))
-            found |= dict(zip(placed.columns, states.values(), strict=True))
+            found |= dict(zip(placed.columns, placed.run(own, values, self._dt), strict=True))
         return found
+
+
+def _divided(placement: Placement, parts: Sequence[slice] | None) -> Sequence[slice]:
+    """The recordings apart if a state of the effect counts from their beginning."""
+    counts = any(state.known for state in placement.effect.states.values())
+    return parts if parts and counts else [slice(None)]

@@ -1,0 +1,92 @@
+"""Finds inputs that are recorded a sample late, in the rows after those from which they act.
+
+Such a model answers before its input changes, which no effect explains: friction, play or a lag all
+come later, and stand in for each other until the rows are in order. A model file says that an input
+is held, but not in which row a log has its value. So the model is fitted with both orders, and the
+later one is taken only if the error falls much, in training and held out. With effects accepted the
+order stays: a wrong one among them may be mended by a wrong order.
+"""
+
+from dataclasses import replace
+
+from rigwatch.physics.engine.fit import Fit, Recording
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
+from rigwatch.workbench.data import Data, predicts_along_motion, quiet_scale, with_next_rows
+from rigwatch.workbench.fit import Fitted, fit_base, fit_model
+from rigwatch.workbench.ranking import difference
+from rigwatch.workbench.study import Held, Study
+
+MUCH = 0.1
+"""Relative fall of the rms error that is required."""
+LEVEL = 1e-3
+"""Largest probability that chance lowers either error so far."""
+
+
+def with_row_order(study: Study, data: Data) -> tuple[Study, Data]:
+    """The study and its data, with the inputs that are recorded a sample late put right.
+
+    Args:
+        study: opened, with its horizon.
+        data: prepared for its unmodified model.
+
+    Raises:
+        ModelError: the model cannot be fitted.
+    """
+    names = _in_doubt(study)
+    if not names:
+        return study, data
+    own = data.of_healthy or data
+    scale = quiet_scale(own.train) if own.train.outputs.shape[1] > 1 else None
+    before = fit_base(study, own, scale)
+    after = _fitted_with_next_rows(study, own, names, before, scale)
+    if after is None or not _much_better(before, after):
+        return study, data
+    source = "the recordings" if data.healthy is None else "the healthy recording"
+    ratio = after.train_error / before.train_error
+    found = {name: Held("zero", -1.0, -own.train.dt, source, ratio) for name in names}
+    return replace(study, holds={**study.holds, **found}), _ordered(study, data, names)
+
+
+def _in_doubt(study: Study) -> list[str]:
+    """Driving inputs that the model file calls held; none if the study says more or has effects."""
+    model, file = study.model, study.file
+    if file.hold or file.late or file.effects or not model.states or model.rough:
+        return []
+    if predicts_along_motion(study):
+        return []
+    return [n for n in model.driving() if model.held(n) == "zero" and not model.inputs[n].late]
+
+
+def _fitted_with_next_rows(
+    study: Study, data: Data, names: list[str], before: Fitted, scale: FloatArray | None
+) -> Fitted | None:
+    """The fit with the rows put right; None if it fails."""
+    start, ordered = before.train.values(), _ordered(study, data, names)
+    try:
+        return fit_model(study, ordered, before.placements, start, scale, base=before)
+    except ModelError:
+        return None
+
+
+def _ordered(study: Study, data: Data, names: list[str]) -> Data:
+    def put_right(recording: Recording) -> Recording:
+        return with_next_rows(study.model, recording, names)
+
+    return replace(
+        data,
+        train=put_right(data.train),
+        held_out=put_right(data.held_out),
+        healthy=data.healthy and put_right(data.healthy),
+        telling=data.telling and put_right(data.telling),
+    )
+
+
+def _much_better(before: Fitted, after: Fitted) -> bool:
+    sides = (before.train, after.train), (before.held_out, after.held_out)
+    return all(_falls_much(*fits) for fits in sides)
+
+
+def _falls_much(before: Fit, after: Fit) -> bool:
+    found = difference(before, after)
+    return found.relative > MUCH and found.p_falls < LEVEL
