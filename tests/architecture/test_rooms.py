@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -83,6 +84,24 @@ def test_no_folder_holds_more_files_than_one_reads_at_a_glance():
         for folder in folders
     }
     assert {f"{f.relative_to(ROOT)}: {n}" for f, n in sizes.items() if n > MOST_FILES} == set()
+
+
+def _needed(path: Path) -> set[str]:
+    """Modules of the code that a file imports, also within functions and for types alone."""
+    names = set[str]()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    names |= {name for _, name in _imported(path)}
+    return names & MODULES.keys() - PACKAGES
+
+
+def test_no_files_import_each_other_in_a_circle():
+    files = {name: _needed(path) for name, path in MODULES.items() if name not in PACKAGES}
+    try:
+        TopologicalSorter(files).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
 
 
 def test_no_test_imports_a_benchmark():

@@ -13,7 +13,7 @@ from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.compare.compare import comparison
 from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.compare.row_order import with_row_order
-from rigwatch.workbench.data.row_order import with_next_rows
+from rigwatch.workbench.data.next_rows import with_next_rows
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.report.text_report import fit_lines

@@ -3,6 +3,7 @@
 from rigwatch.workbench.data.columns import Columns
 from rigwatch.workbench.data.healthy_elements import with_elements
 from rigwatch.workbench.data.motion import along_motion, predicts_along_motion
+from rigwatch.workbench.data.next_rows import with_next_rows
 from rigwatch.workbench.data.noise_floor import (
     METHODS,
     NoiseFloor,
@@ -19,7 +20,6 @@ from rigwatch.workbench.data.proposals import (
 )
 from rigwatch.workbench.data.recorded_columns import read_columns
 from rigwatch.workbench.data.repeats import repeat_along_motion, repeat_of
-from rigwatch.workbench.data.row_order import with_next_rows
 from rigwatch.workbench.data.signal_scales import port_sizes
 from rigwatch.workbench.data.signals import UNFILLED, Data, MotionSensor, parameters_of, prepare
 

@@ -15,9 +15,9 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.workbench.data.columns import Columns, bridged
 from rigwatch.workbench.data.derived_ends import without_ends
+from rigwatch.workbench.data.next_rows import with_next_rows
 from rigwatch.workbench.data.one_rate import on_one_rate
 from rigwatch.workbench.data.recorded_columns import read_columns, with_derived
-from rigwatch.workbench.data.row_order import with_next_rows
 from rigwatch.workbench.data.signal_units import check_unit
 from rigwatch.workbench.data.telling import divided
 from rigwatch.workbench.study import Span, Study, StudyFile
