@@ -12,8 +12,9 @@ from rigwatch.physics.engine.fit.windowed_fit import fit
 from rigwatch.physics.engine.search.convergence import promise
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
 from rigwatch.physics.engine.search.equation_error import equation_error_starts
+from rigwatch.physics.engine.search.horizons import growing_horizons
 from rigwatch.physics.engine.search.multi_start_fit import multi_start_fit
-from rigwatch.physics.engine.search.short_horizons import ShortHorizons, growing_horizons
+from rigwatch.physics.engine.search.short_horizons import ShortHorizons
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.typed_files.loading import parse
 from sim_plant.specimens.exact_mass import SAMPLES, Mass, excitation, moved

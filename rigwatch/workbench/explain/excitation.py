@@ -3,10 +3,12 @@
 Recordings at rest, or steps cut off before their transient, leave model parameters undetermined.
 Such parameters take arbitrary values, so the held-out error is no evidence for an effect. Before
 anything is ranked every parameter's interval is checked. If one is undetermined, other splits of
-the same recordings are tried, and one that determines it is proposed.
+the same recordings are tried, and one that determines it is proposed. A parameter too small to show
+is as good as known: if another split gives it a size that the training rules out, it only stands in
+there for what the model lacks.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from msgspec import structs
@@ -16,12 +18,14 @@ from rigwatch.wire.errors import RigwatchError
 from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import Data, prepare
 from rigwatch.workbench.explain.verdict import Verdict
-from rigwatch.workbench.fit import Value, fit_base, shown, values
+from rigwatch.workbench.fit import Value, fit_base, fit_model, shown, values
 from rigwatch.workbench.study import Span, Study
 
 UNDETERMINED, DETERMINED = 1.0, 0.25
 """Half-width of an interval over its value: above the first a parameter counts as undetermined,
 below the second as determined."""
+SUITS = 1.05
+"""Ratio of training errors up to which the training allows another split's values."""
 SHARES = (0.5, 2 / 3)
 """Shares of each recording tried as training data."""
 
@@ -37,7 +41,8 @@ def unexcited(bench: Bench) -> Verdict | None:
     for study in _splits(bench.study, bench.data):
         found, judged = _values(study, bench)
         determined = found and all(_width(found[name]) < DETERMINED for name in undetermined)
-        if determined and all(_width(judged[name]) < UNDETERMINED for name in undetermined):
+        told = determined and all(_width(judged[name]) < UNDETERMINED for name in undetermined)
+        if told and _suits(bench, {name: found[name].value for name in undetermined}):
             before = ", ".join(f"{name} = {shown(value)}" for name, value in undetermined.items())
             after = ", ".join(f"{name} = {shown(found[name])}" for name in undetermined)
             train, held_out = _spans_text(study.file.train), _spans_text(study.file.held_out)
@@ -60,6 +65,19 @@ def _width(value: Value) -> float:
     assert value.interval is not None
     low, high = value.interval
     return (high - low) / 2 / max(abs(value.value), 1e-300)
+
+
+def _suits(bench: Bench, told: Mapping[str, float]) -> bool:
+    """Whether the training has hardly a larger error with these values of parameters."""
+    own, base = bench.study.model.parameters, bench.base
+    held = {name: structs.replace(own[name], value=at, fixed=True) for name, at in told.items()}
+    study = replace(bench.study, model=structs.replace(bench.study.model, parameters=own | held))
+    start = base.train.values() | dict(told)
+    try:
+        found = fit_model(study, bench.data, base.placements, start, base.train.scale, base=base)
+    except RigwatchError:
+        return False
+    return found.train_error <= SUITS * base.train_error
 
 
 def _values(study: Study, bench: Bench) -> tuple[dict[str, Value], dict[str, Value]]:

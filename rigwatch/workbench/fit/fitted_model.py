@@ -28,7 +28,9 @@ from rigwatch.physics.engine.search import (
     Convergence,
     ShortHorizons,
     WholeRuns,
+    continued_spread,
     convergence,
+    has_hidden_states,
     kept_promise,
     multi_start_fit,
 )
@@ -217,7 +219,10 @@ def _trained(  # noqa: PLR0917 -- the arguments of `fit_model`
         )
     elif multi_start and not data.along_motion:
         noise = quiet_scale(data.train) if scale is None else scale
-        search = ShortHorizons(compiled, data.train, horizon, begin, scale, noise, first, substeps)
+        search = ShortHorizons(
+            compiled, data.train, horizon, begin, scale, noise, first, substeps,
+            continued=not study.model.rough,
+        )  # fmt: skip
     if search:
         found, ended = multi_start_fit(search)
         return _settled(study, data, found, horizon, substeps), ended, horizon
@@ -248,7 +253,17 @@ def _settled(study: Study, data: Data, found: Fit, horizon: int, substeps: int) 
     for placement in system.placements:
         strength = placement.effect.strength
         centre[placement.prefix + strength] = placement.effect.parameters[strength].neutral
-    return untied(found, data.train, horizon, centre, substeps)
+    judged = partial(_continued_error, recording=data.train, horizon=horizon, substeps=substeps)
+    hidden = has_hidden_states(system)
+    return untied(found, data.train, horizon, centre, substeps, judged if hidden else None)
+
+
+def _continued_error(found: Fit, recording: Recording, horizon: int, substeps: int) -> float:
+    """Error with hidden states continued; infinite if they diverge."""
+    try:
+        return continued_spread(found, recording, horizon, substeps)
+    except ModelError:
+        return math.inf
 
 
 def _judged(  # noqa: PLR0917 -- they belong together

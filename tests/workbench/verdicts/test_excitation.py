@@ -1,13 +1,18 @@
 """Training that does not excite the model is reported before a ranking, with a better split."""
 
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
+from rigwatch.workbench.compare.preparation import open_bench
+from rigwatch.workbench.explain.excitation import unexcited
 from rigwatch.workbench.explain.explain import explain
 from rigwatch.workbench.study.creation import create
 from tests.workbench.machine import recorded, studied
 from tests.workbench.studies.test_own_model import PORT, SPEED, UNITS
+
+MOTOR = (Path(str(files("rigwatch"))) / "physics" / "models" / "motor.toml").read_text()
 
 
 def motor(levels: list[float], seed: int = 0, each: int = 200) -> dict[str, np.ndarray]:
@@ -62,3 +67,34 @@ def test_training_that_tells_its_model_is_ranked(tmp_path: Path) -> None:
         studied(tmp_path, SPEED + PORT, [table], [motor([1, -1, 2, 0], 3)], UNITS, keys)
     )
     assert found.verdict == "nothing_missing"
+
+
+def wound(volts: np.ndarray, seed: int) -> dict[str, np.ndarray]:
+    """A motor with dry friction, whose winding settles within a sixth of a sample of 5 ms."""
+    resistance, inductance, constant, inertia, friction, step = 2.5, 2e-3, 0.06, 9e-5, 0.015, 5e-5
+    w = i = 0.0
+    speed = np.zeros(len(volts))
+    for row, volt in enumerate(volts.tolist()):
+        speed[row] = w
+        for _ in range(100):
+            i = (i + step * (volt - constant * w) / inductance) / (
+                1 + step * resistance / inductance
+            )
+            w += step * constant * i / inertia
+            w = float(np.sign(w)) * max(abs(w) - step * friction / inertia, 0.0)
+    return {
+        "voltage": volts,
+        "speed": speed + 0.2 * np.random.default_rng(seed).normal(size=len(volts)),
+    }
+
+
+def test_an_inductance_too_small_to_show_is_no_reason_to_refuse(tmp_path: Path) -> None:
+    generator, t = np.random.default_rng(4), 0.005 * np.arange(2600)
+    steps = np.repeat(generator.uniform(-10, 10, 60), generator.integers(50, 160, 60))[:2600]
+    swings = 3.2 * sum(np.sin(2 * np.pi * f * t + f) for f in (0.27, 0.66, 1.9))
+    slow = 6 * np.sin(2 * np.pi * 0.35 * t) + 3 * np.sin(2 * np.pi * 1.7 * t + 1)
+    text = MOTOR.replace("value = 1.0", "value = 2.5").replace("value = 0.1", "value = 0.06")
+    train, held_out = [wound(steps, 1), wound(swings, 2)], [wound(slow, 3)]
+    units, rates = {"voltage": "V", "speed": "rad/s"}, [200.0] * 3
+    study = studied(tmp_path, text, train, held_out, units, rates=rates)
+    assert unexcited(open_bench(study)) is None

@@ -7,7 +7,7 @@ posteriori), so parameters determined by the recording are unaffected. A fit wit
 unchanged.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -29,8 +29,13 @@ COSTS = 0.05
 """Relative rise of the error at which what seemed a tie is none: it is flat to first order only."""
 
 
-def untied(
-    found: Fit, recording: Recording, horizon: int, centre: Mapping[str, float], substeps: int
+def untied(  # noqa: PLR0917 -- those of `fit`
+    found: Fit,
+    recording: Recording,
+    horizon: int,
+    centre: Mapping[str, float],
+    substeps: int,
+    judged: Callable[[Fit], float] | None = None,
 ) -> Fit:
     """The fit with its ties resolved; unchanged if there are none.
 
@@ -38,6 +43,7 @@ def untied(
         found: the fit.
         recording, horizon, substeps: as in `fit`.
         centre: prior means of the parameters, by name.
+        judged: error of a fit that must not rise; that of its scaled residuals if None.
 
     Raises:
         ModelError: the model diverges.
@@ -45,6 +51,8 @@ def untied(
     names = found.compiled.system.free
     about = np.array([centre[name] for name in names])
     unit = _units(about, _values(found))
+    error = judged or _noise
+    allowed = error(found) * (1 + COSTS)
     for _ in range(ROUNDS):
         at = _values(found)
         size = np.maximum(unit * (about != 0), np.abs(at))
@@ -58,7 +66,7 @@ def untied(
             found.compiled, recording, horizon, start=found.parameters, scale=found.scale,
             initial=found.initial, substeps=substeps, prior=prior,
         )  # fmt: skip
-        if _noise(tried) > _noise(found) * (1 + COSTS):
+        if error(tried) > allowed:
             break
         found = tried
         if np.max(np.abs(_values(found) - at) / unit) < CLOSE:

@@ -60,6 +60,7 @@ def convergence(
     *,
     near_noise: bool,
     gradient: float | None = None,
+    agreeing: int | None = None,
 ) -> Convergence:
     """Convergence of the best of several fits.
 
@@ -70,9 +71,11 @@ def convergence(
         near_noise: whether its error is so small that no other optimum could be much better.
         gradient: predicted relative reduction of the cost by a further step, if the cost is not
             the squared error alone.
+        agreeing: number of fits that reached the optimum of the best; by `agrees` if None.
     """
     gradient = promise(best) if gradient is None else gradient
-    agreeing = 1 + sum(agrees(other, best) for other in others)
+    if agreeing is None:
+        agreeing = 1 + sum(agrees(other, best) for other in others)
     alone = bool(others) and agreeing == 1 and not near_noise
     steep = gradient > PROMISED
     reason = f"a further step would reduce the squared error by {gradient:.1%}" if steep else ""
@@ -104,19 +107,22 @@ def spread(fitted: Fit) -> float:
     return float(np.sqrt(np.mean((fitted.rms / fitted.scale) ** 2)))
 
 
-def agrees(other: Fit, best: Fit) -> bool:
+def agrees(other: Fit, best: Fit, errors: tuple[float, float] | None = None) -> bool:
     """Whether a fit reached the optimum of the best: the same error, or nearly the same parameters.
+
+    `errors` are those of both by which they are compared, otherwise the spreads of their residuals.
 
     The error of a machine that sticks is rough: fits stop at different heights of one valley. By
     the slopes of the best, their parameters leave the same error.
     """
-    if spread(other) <= AGREE * spread(best):
+    there, least = errors or (spread(other), spread(best))
+    if there <= AGREE * least:
         return True
     names = best.compiled.system.free
     step = np.array([other.values()[name] - best.values()[name] for name in names])
     residual = best.error.ravel()
-    there = np.linalg.norm(residual + _jacobian(best) @ step)
-    return bool(there <= AGREE * np.linalg.norm(residual))
+    moved = np.linalg.norm(residual + _jacobian(best) @ step)
+    return bool(moved <= AGREE * np.linalg.norm(residual))
 
 
 def promise(fitted: Fit) -> float:

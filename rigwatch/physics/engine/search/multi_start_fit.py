@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from rigwatch.physics.engine.fit import Fit
-from rigwatch.physics.engine.search.convergence import Convergence, convergence
+from rigwatch.physics.engine.search.convergence import Convergence, agrees, convergence
 from rigwatch.wire.errors import ModelError
 
 
@@ -65,7 +65,12 @@ def multi_start_fit(search: Search) -> tuple[Fit, Convergence]:
         raise trouble or ModelError("found no start for the fit")
     best = min(found, key=lambda each: each.cost)
     others = [each.fit for each in found if each is not best]
-    near = search.near_noise(best)
     return best.fit, convergence(
-        best.fit, others, best.begun, near_noise=near, gradient=best.gradient
-    )
+        best.fit, others, best.begun, near_noise=search.near_noise(best),
+        gradient=best.gradient, agreeing=agreeing(found, best),
+    )  # fmt: skip
+
+
+def agreeing(found: Sequence[Attempt], best: Attempt) -> int:
+    """Number of attempts that reached the optimum of the best, including itself."""
+    return sum(agrees(each.fit, best.fit, (each.error, best.error)) for each in found)

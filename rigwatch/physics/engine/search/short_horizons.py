@@ -9,7 +9,9 @@ spring too stiff to respond. A fit is therefore started from several points:
    next (the error over a short horizon has few minima);
 4. values drawn over the bounds, also over growing horizons.
 
-Further starts are tried only until two reach the same error. A diverging window is shortened.
+A state that no channel shows is free in each window, the more so the shorter it is. There, a longer
+horizon replaces the growing ones in 4, and the given values are tried that way too. Further starts
+are tried only until two reach the same error. A diverging window is shortened.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -20,10 +22,12 @@ import numpy as np
 
 from rigwatch.physics.engine.compile import CompiledSystem
 from rigwatch.physics.engine.fit import Fit, Recording, error_at, fit
-from rigwatch.physics.engine.search.convergence import PROMISED, agrees, spread
+from rigwatch.physics.engine.search.convergence import PROMISED, spread
 from rigwatch.physics.engine.search.drawn_starts import drawn_start
 from rigwatch.physics.engine.search.equation_error import equation_error_starts
-from rigwatch.physics.engine.search.multi_start_fit import Attempt
+from rigwatch.physics.engine.search.hidden_states import continued_spread, has_hidden_states
+from rigwatch.physics.engine.search.horizons import growing_horizons, longer_horizons
+from rigwatch.physics.engine.search.multi_start_fit import Attempt, agreeing
 from rigwatch.physics.engine.search.promised_step import kept_promise
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
@@ -32,10 +36,9 @@ NEAR = 2.0
 """Ratio of error to sensor noise below which no other optimum could be much better."""
 QUIET = 0.1
 """Largest ratio of noise to signal at which a fit at the noise level is conclusive."""
-GROWTH = 4
-"""Ratio of successive horizons."""
-FEWEST = 8
-"""Samples of the shortest horizon."""
+STANDS_IN = 2.0
+"""Ratio of the error with hidden states continued to the error without, above which they stand in
+for what the model lacks, and other starts are tried."""
 DRAWN = 4
 """Most random starts."""
 DEAR = 1_500_000
@@ -57,6 +60,7 @@ class ShortHorizons:
         noise: of the sensors, shape (outputs,); None if unknown.
         initial: initial states, see `fit`.
         substeps: Runge-Kutta steps between samples for non-stiff systems.
+        continued: whether optima are compared with hidden states continued from window to window.
     """
 
     compiled: CompiledSystem
@@ -67,20 +71,22 @@ class ShortHorizons:
     noise: FloatArray | None = None
     initial: FloatArray | None = None
     substeps: int = 4
+    continued: bool = False
 
     def attempts(self) -> Iterator[Callable[[], Attempt]]:
         """Attempts, most promising first."""
-        for name, where, growing in self._starts():
-            yield partial(self._attempt, name, where, growing=growing)
+        for name, where, first in self._starts():
+            yield partial(self._attempt, name, where, first)
 
     def enough(self, found: Sequence[Attempt]) -> bool:
         """Whether the best is a minimum and at noise level, or reached by two starts."""
         best = min(found, key=lambda each: each.cost)
         steep = best.gradient > PROMISED
+        if self._continues and best.error > STANDS_IN * spread(best.fit):
+            return False
         system = self.compiled.system
-        agreeing = sum(agrees(each.fit, best.fit) for each in found)
         fixed = not system.model.states or not system.free
-        return not steep and (fixed or agreeing > 1 or self.near_noise(best))
+        return not steep and (fixed or agreeing(found, best) > 1 or self.near_noise(best))
 
     def near_noise(self, best: Attempt) -> bool:
         """Whether the best error is near the noise level."""
@@ -88,32 +94,46 @@ class ShortHorizons:
             self.noise > QUIET * np.nanstd(self.recording.outputs, axis=0)
         ):
             return False
-        return float(np.sqrt(np.mean((best.fit.rms / self.noise) ** 2))) <= NEAR
+        over = float(np.sqrt(np.mean((best.fit.rms / self.noise) ** 2)))
+        continued = best.error / spread(best.fit) if self._continues else 1.0
+        return over * continued <= NEAR
 
-    def _starts(self) -> Iterator[tuple[str, FloatArray, bool]]:
-        """Starts with their names and whether their horizons grow."""
+    @property
+    def _continues(self) -> bool:
+        return self.continued and has_hidden_states(self.compiled.system)
+
+    def _starts(self) -> Iterator[tuple[str, FloatArray, Sequence[int]]]:
+        """Starts with their names and the horizons over which they are fitted first."""
         begin = self.compiled.parameters if self.start is None else self.start
+        growing = growing_horizons(self.horizon)
         balanced, closer = self._balanced(begin)
-        given = ("the given values", begin, self.horizon >= LONG)
+        given = ("the given values", begin, growing if self.horizon >= LONG else [])
         if not closer:
             yield given
         if balanced is not None:
-            yield "the balance of the equations", balanced, False
+            yield "the balance of the equations", balanced, []
             if closer:
                 yield given
-            yield "the balance of the equations, growing horizons", balanced, True
-        yield "the given values, growing horizons", begin, True
+            yield "the balance of the equations, growing horizons", balanced, growing
+        longer = longer_horizons(self.recording, self.horizon) if self._continues else []
+        if longer:
+            yield "the given values, a longer horizon first", begin, longer
+        yield "the given values, growing horizons", begin, growing
         if self._numbers() < DEAR:
             generator = np.random.default_rng(0)
             for _ in range(DRAWN):
-                yield "drawn values", drawn_start(self.compiled.system, begin, generator), True
+                drawn = drawn_start(self.compiled.system, begin, generator)
+                yield "drawn values", drawn, longer or growing
 
-    def _attempt(self, name: str, start: FloatArray, *, growing: bool) -> Attempt:
-        if growing:
-            start = self._grown(start)
+    def _attempt(self, name: str, start: FloatArray, first: Sequence[int]) -> Attempt:
+        if first:
+            start = self._fitted_over(first, start)
         found = self._fit(self.horizon, start, self.initial)
         gradient = kept_promise(found, self.recording, self.horizon, self.substeps)
-        return Attempt(name, found, spread(found), spread(found), gradient)
+        error = spread(found)
+        if self._continues:
+            error = continued_spread(found, self.recording, self.horizon, self.substeps)
+        return Attempt(name, found, error, error, gradient)
 
     def _fit(self, horizon: int, start: FloatArray, initial: FloatArray | None = None) -> Fit:
         return fit(
@@ -121,15 +141,15 @@ class ShortHorizons:
             initial=initial, substeps=self.substeps,
         )  # fmt: skip
 
-    def _grown(self, start: FloatArray) -> FloatArray:
-        """Parameters after fits over growing horizons, up to the last but one.
+    def _fitted_over(self, horizons: Sequence[int], start: FloatArray) -> FloatArray:
+        """Parameters after fits over these horizons, one after the other.
 
         Raises:
             ModelError: even the shortest diverges.
         """
         trouble: ModelError | None = None
         reached = False
-        for length in growing_horizons(self.horizon):
+        for length in horizons:
             for shorter in (length, length // 2):
                 try:
                     start = self._fit(max(shorter, 4), start).parameters
@@ -169,12 +189,3 @@ class ShortHorizons:
         columns = 1 + self.compiled.columns
         states = len(self.compiled.system.states)
         return len(self.recording) * self.substeps * states * columns
-
-
-def growing_horizons(horizon: int) -> list[int]:
-    """Horizons before the full one, shortest first."""
-    found: list[int] = []
-    while horizon // GROWTH >= FEWEST:
-        horizon //= GROWTH
-        found.append(horizon)
-    return found[::-1]
