@@ -1,0 +1,52 @@
+"""Whether the edges of an input lie between samples, as the motion shows.
+
+Intervals between edges that differ by a sample come from a generator with a clock of its own, or
+from one that updates at the instants of sampling at a frequency that does not divide the rate. The
+residual tells them apart: taken for each other they leave a response to every edge, which comes and
+goes with its place between samples, as no fault does.
+"""
+
+# Compiled functions are untyped to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import numpy as np
+from numba import njit
+
+from rigwatch.wire.arrays import FloatArray
+
+MEMORY = 64.0
+"""Of the energies that are compared [samples]."""
+CLEAR = 0.3
+"""Ratio of the energy left by one assumption to that left by the other below which it is true."""
+HELD, BETWEEN, CHOSEN = range(3)
+"""Mean squares of the residual for edges at samples and between them, and whether they are."""
+
+
+def no_edges() -> FloatArray:
+    """The figures at the start."""
+    return np.zeros(CHOSEN + 1)
+
+
+@njit()
+def corrected(error: float, moved: float, kept: FloatArray) -> float:
+    """The residual of a sample under the assumption that is taken to be true."""
+    return error - moved if kept[CHOSEN] > 0.0 else error
+
+
+@njit()
+def follow_edges(error: float, moved: float, largest: float, kept: FloatArray) -> bool:
+    """Learn from a sample; whether the assumption changes.
+
+    Args:
+        error: its residual for edges at samples.
+        moved: response of the prediction to edges between samples.
+        largest: mean square of the healthy residual at the present motion.
+        kept: the carried figures.
+    """
+    kept[HELD] += (error**2 - kept[HELD]) / MEMORY
+    kept[BETWEEN] += ((error - moved) ** 2 - kept[BETWEEN]) / MEMORY
+    now, other = (HELD, BETWEEN) if kept[CHOSEN] == 0.0 else (BETWEEN, HELD)
+    if kept[now] > largest and kept[other] < CLEAR * kept[now]:
+        kept[CHOSEN] = 1.0 - kept[CHOSEN]
+        return True
+    return False
