@@ -3,7 +3,7 @@ and edges between samples, where the motion has to tell.
 """
 
 from monitor.drives.drive_changes import Drive, DriveChanges
-from monitor.drives.edge_choice import corrected, follow_edges, no_edges
+from monitor.drives.edge_choice import corrected, edges_unsure, follow_edges, no_edges
 from monitor.drives.input_steps import InputSteps, Steps
 from monitor.drives.jittered_edges import JitteredEdges
 from monitor.drives.jittered_steps import Jittered, JitteredSteps
@@ -23,6 +23,7 @@ __all__ = [
     "SlidingSteps",
     "Steps",
     "corrected",
+    "edges_unsure",
     "follow_edges",
     "no_edges",
 ]

@@ -18,13 +18,17 @@ MEMORY = 64.0
 """Of the energies that are compared [samples]."""
 CLEAR = 0.3
 """Ratio of the energy left by one assumption to that left by the other below which it is true."""
-HELD, BETWEEN, CHOSEN = range(3)
-"""Mean squares of the residual for edges at samples and between them, and whether they are."""
+LASTS = 128.0
+"""Memory of what is not known of edges between samples [samples]."""
+HELD, BETWEEN, CHOSEN, UNSURE = range(4)
+"""Mean squares of the residual for edges at samples and between them, whether they are between, and
+mean square of what is not known of them.
+"""
 
 
 def no_edges() -> FloatArray:
     """The figures at the start."""
-    return np.zeros(CHOSEN + 1)
+    return np.zeros(UNSURE + 1)
 
 
 @njit()
@@ -50,3 +54,17 @@ def follow_edges(error: float, moved: float, largest: float, kept: FloatArray) -
         kept[CHOSEN] = 1.0 - kept[CHOSEN]
         return True
     return False
+
+
+@njit()
+def edges_unsure(unsure: float, kept: FloatArray) -> float:
+    """Mean square of the residual that edges between samples may have left; 0 for edges at samples.
+
+    When they become known, the residual before is no lateness.
+
+    Args:
+        unsure: response of the prediction to what is not known of their instants.
+        kept: the carried figures.
+    """
+    kept[UNSURE] += (unsure**2 - kept[UNSURE]) / LASTS
+    return kept[UNSURE] if kept[CHOSEN] > 0.0 else 0.0

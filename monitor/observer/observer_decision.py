@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.drives import corrected, follow_edges
+from monitor.drives import corrected, edges_unsure, follow_edges
 from monitor.observer.decision_state import (
     AMPLITUDE,
     ARMING,
@@ -203,7 +203,8 @@ def _follow_inputs(
     row[E] = corrected(row[E], row[MOVED], kept.edges)
     if not judging or (count[ONSET] < 0 and (count[ABOVE] == 0 or is_late(kept.lateness))):
         largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
-        follow_lateness(row, largest * _variance(kept, rules), judging, kept.lateness)
+        variance = _variance(kept, rules) + edges_unsure(row[UNSURE_INPUT], kept.edges)
+        follow_lateness(row, largest * variance, judging, kept.lateness)
     if not judging and lateness_changes(kept.lateness):
         count[CHANGED] = -LONG
 

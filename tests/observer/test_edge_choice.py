@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from monitor.drives import corrected, follow_edges, no_edges
+from monitor.drives import corrected, edges_unsure, follow_edges, no_edges
 
 N, NOISE = 600, 0.1
 AT = np.arange(N)
@@ -42,3 +42,16 @@ def test_friction_is_no_edge_between_samples() -> None:
     friction = 2.0 * np.sign(np.sin(2.0 * np.pi * AT / 32.0 + 0.5))
 
     assert not followed(friction + NOISY, no_edges())
+
+
+def test_what_was_not_known_of_edges_between_samples_is_remembered() -> None:
+    kept = no_edges()
+    followed(RESPONSE + NOISY, kept)
+
+    before = [edges_unsure(0.8, kept) for _ in range(N)][-1]
+    after = [edges_unsure(0.0, kept) for _ in range(64)][-1]
+    assert 0.5 * before < after < 0.8 * before
+
+
+def test_edges_at_samples_are_sure() -> None:
+    assert edges_unsure(0.8, no_edges()) == 0.0
