@@ -1,11 +1,13 @@
-"""What the generator of an input does, from the input alone: new frequencies, steps that slide or
-jitter.
+"""What the generator of an input does, from the input: new frequencies, steps that slide or jitter,
+and edges between samples, where the motion has to tell.
 """
 
 from monitor.drives.drive_changes import Drive, DriveChanges
+from monitor.drives.edge_choice import corrected, edges_unsure, follow_edges, no_edges
 from monitor.drives.input_steps import InputSteps, Steps
 from monitor.drives.jittered_edges import JitteredEdges
 from monitor.drives.jittered_steps import Jittered, JitteredSteps
+from monitor.drives.sliding_edges import Moved, SlidingEdges
 from monitor.drives.sliding_steps import Sliding, SlidingSteps
 
 __all__ = [
@@ -15,7 +17,13 @@ __all__ = [
     "Jittered",
     "JitteredEdges",
     "JitteredSteps",
+    "Moved",
     "Sliding",
+    "SlidingEdges",
     "SlidingSteps",
     "Steps",
+    "corrected",
+    "edges_unsure",
+    "follow_edges",
+    "no_edges",
 ]

@@ -6,6 +6,7 @@ import numpy as np
 
 from monitor.drives.jittered_edges import JitteredEdges
 from monitor.drives.jittered_steps import JitteredSteps
+from monitor.drives.sliding_edges import SlidingEdges
 from monitor.drives.sliding_steps import SlidingSteps
 from monitor.signals import Codes
 from rigwatch.wire.arrays import BoolArray, FloatArray
@@ -22,12 +23,16 @@ class Steps(NamedTuple):
     Attributes:
         mean: its mean until the next sample; 0 with too few samples.
         known: False while its steps slide and their clock is not yet known.
-        unsure: standard deviation of the instants of its steps [samples].
+        unsure: uncertainty of the instants of its steps [samples].
+        moved: what the mean gains if edges lie between samples, see `sliding_edges`.
+        moves: whether that is known.
     """
 
     mean: FloatArray
     known: BoolArray
     unsure: FloatArray
+    moved: FloatArray
+    moves: BoolArray
 
 
 class InputSteps:
@@ -41,14 +46,19 @@ class InputSteps:
         self._sliding = SlidingSteps(half_width)
         self._jittered = JitteredSteps(half_width)
         self._edges = JitteredEdges()
+        self._regular = SlidingEdges(half_width)
 
     def update(self, signal: FloatArray, code: Codes) -> Steps:
         """The next samples of the input, shape (n,), with states of the admission."""
         slides = self._sliding.update(signal, code)
         found = self._jittered.update(signal, code)
         edges = self._edges.update(signal, code)
+        regular = self._regular.update(signal, code)
         # Steps that slide and jitter do the latter only where they meet the samples.
         jitters = np.where(slides.followed, found.shows, found.jitters)
         mean = np.where(jitters, found.value, slides.mean)
         unsure = np.where(edges, EDGES, np.where(jitters, JITTER, 0.0))
-        return Steps(mean, slides.known | jitters, unsure)
+        unsure = np.where(regular.shows, regular.unsure, unsure)
+        mean = np.where(regular.shows, regular.held, mean)
+        known = slides.known | jitters | regular.shows
+        return Steps(mean, known, unsure, regular.gained, regular.shows)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from monitor.drives import no_edges
 from monitor.model import HealthyLimits
 from monitor.observer.input_lateness import no_lateness
 from rigwatch.wire.arrays import FloatArray
@@ -69,6 +70,7 @@ class DecisionState(NamedTuple):
         value: verdict, named force, and energies of the drive recently and before.
         lasting: the last judged energies, relative to their limit, shape (LASTING,).
         lateness: of the inputs, see `input_lateness`.
+        edges: of the inputs, see `monitor.drives.edge_choice`.
     """
 
     rows: FloatArray
@@ -76,6 +78,7 @@ class DecisionState(NamedTuple):
     value: FloatArray
     lasting: FloatArray
     lateness: FloatArray
+    edges: FloatArray
 
 
 def new_state(levels: int) -> DecisionState:
@@ -88,7 +91,8 @@ def new_state(levels: int) -> DecisionState:
     count[AT.since_onset] = -1
     count[AT.since_jump] = WAKE
     rows = np.zeros((HISTORY, LEVELS + levels))
-    return DecisionState(rows, count, np.zeros(4), np.zeros(LASTING), no_lateness())
+    lasting = np.zeros(LASTING)
+    return DecisionState(rows, count, np.zeros(4), lasting, no_lateness(), no_edges())
 
 
 class DecisionRules(NamedTuple):

@@ -3,6 +3,7 @@
     e  = H[ y - ŷ - w·φ(z) ],   φ(z) = (z_i, z_i·z_j),   z = (motion, hidden states), scaled
     g1 = H[ŷ with one newton of dry friction - ŷ],   g2 = the same for viscous friction
     s  = H[ŷ + w·φ(z) with inputs late by one sample - ŷ - w·φ(z)]
+    l  = H[ŷ + w·φ(z) with the inputs' edges between samples - ŷ - w·φ(z)]
 
 In an integrating plant, small errors of flows accumulate to slow errors of forces. All signals are
 therefore judged above a corner frequency: H is a second-order Butterworth high-pass.
@@ -23,8 +24,10 @@ from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
-COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured", "late")
-E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, LATE_UNIT, UNSURE_INPUT = range(8)
+COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured", "late", "moved")
+(
+    E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, LATE_UNIT, MOVED, UNSURE_INPUT,
+) = range(9)  # fmt: skip
 """Judged columns: those above, high-passed, and s for what is not known of the inputs' instants."""
 LATER = 0.5
 """Lateness of the inputs of which the response is taken [samples]."""
@@ -78,18 +81,26 @@ class HighPassed:
         self._remainder = polynomial(remainder)
 
     def update(
-        self, columns: FloatArray, z: FloatArray, later: FloatArray, state: np.ndarray
+        self,
+        columns: FloatArray,
+        z: FloatArray,
+        later: FloatArray,
+        moved: FloatArray,
+        state: np.ndarray,
     ) -> FloatArray:
-        """High-passed columns, shape (n, 7), from raw columns and the remainder's signals.
+        """High-passed columns, shape (n, 8), from raw columns and the remainder's signals.
 
         Args:
             columns: raw.
             z: signals of the remainder.
             later: the same with inputs that are late.
+            moved: the same with edges between samples.
             state: of each row.
         """
         out = np.zeros_like(columns)
-        _advance(columns, z, later, state, self._remainder, self._b, self._a, self._state, out)
+        _advance(
+            columns, z, later, moved, state, self._remainder, self._b, self._a, self._state, out
+        )
         return out
 
 
@@ -98,6 +109,7 @@ def _advance(  # noqa: PLR0917 -- a kernel
     columns: FloatArray,
     z: FloatArray,
     later: FloatArray,
+    moved: FloatArray,
     state: np.ndarray,
     known: Polynomial,
     b: FloatArray,
@@ -119,6 +131,8 @@ def _advance(  # noqa: PLR0917 -- a kernel
                 value -= remainder
             elif c == LATE_UNIT:
                 value = (value + change) / LATER
+            elif c == MOVED:
+                value += _remainder(moved[k], known, scaled) - remainder
             out[k, c] = filter_sample(b, a, kept[c], value)
 
 

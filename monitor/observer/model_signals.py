@@ -93,7 +93,8 @@ class Observed:
         rows: inputs and motion, shape (n, inputs).
         measured: the measured output, shape (n,).
         predicted: the columns of the prediction.
-        judged: high-passed columns, see `missing_force`, shape (n, 8).
+        judged: high-passed columns, see `missing_force`, shape (n, 9); the decision corrects the
+            residual for the inputs' edges.
         steady: False where an input changes suddenly, or steps between samples at a place that is
             not known yet, shape (n,).
         drive: pace of the first input, see `monitor.drives.Drive`, shape (n,).
@@ -134,15 +135,22 @@ class LaggedSignals:
         self._inputs = [InputSteps(half_width) for _ in range(layout.motions[0])]
 
     def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes, Steps]:
-        """Columns, states, and what is known of the inputs' steps, for the next samples."""
+        """Columns, states, and what is known of the inputs' steps, for the next samples.
+
+        The steps are of all inputs: `mean` and `moved` have a column for each.
+        """
         columns, state = self._motion.update(signals, code)
         known, unsure = np.ones(code.size, np.bool_), np.zeros(code.size)
+        moved, moves = np.zeros((code.size, len(self._inputs))), np.zeros(code.size, np.bool_)
         for place, steps in enumerate(self._inputs):
             found = steps.update(signals[:, place], code)
             columns[:, place] = np.where(state == EMPTY, 0.0, found.mean)
             known &= found.known
             unsure = np.maximum(unsure, found.unsure)
-        return columns, state, Steps(np.zeros(0), known, unsure)
+            moved[:, place] = np.where(found.moves, found.moved, 0.0)
+            moves |= found.moves
+        mean = columns[:, : len(self._inputs)]
+        return columns, state, Steps(mean, known, unsure, moved, moves)
 
 
 class ObserverSignals:
@@ -172,18 +180,21 @@ class ObserverSignals:
         inputs = self.layout.inputs
         rows, measured = columns[:, :inputs], columns[:, inputs]
         disagreement = columns[:, inputs + 2] - columns[:, inputs + 1]
-        predicted = self._along.update(rows, columns[:, inputs + 3 :], state)
+        predicted = self._along.update(
+            rows, columns[:, inputs + 3 :], steps.moved, state, steps.moves
+        )
         raw = np.column_stack(
             [
                 measured - predicted.output, predicted.dry, predicted.viscous, predicted.output,
                 disagreement, measured, predicted.late - predicted.output,
+                predicted.moved - predicted.output,
             ]
         )  # fmt: skip
-        z, later = (
+        z, later, moved = (
             remainder_signals(rows, hidden, self.layout)
-            for hidden in (predicted.hidden, predicted.late_hidden)
+            for hidden in (predicted.hidden, predicted.late_hidden, predicted.moved_hidden)
         )
-        judged = self._high_passed.update(raw, z, later, state)
+        judged = self._high_passed.update(raw, z, later, moved, state)
         judged = np.column_stack([judged, steps.unsure * judged[:, LATE_UNIT]])
         drives = [own.update(signals[:, place], code) for place, own in enumerate(self._drives)]
         for own in drives:

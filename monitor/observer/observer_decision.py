@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from monitor.drives import corrected, edges_unsure, follow_edges
 from monitor.observer.decision_state import (
     AMPLITUDE,
     ARMING,
@@ -68,7 +69,7 @@ from monitor.observer.input_lateness import (
     rubs,
 )
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
-from monitor.observer.missing_force import LATE_UNIT, UNSURE_INPUT
+from monitor.observer.missing_force import LATE_UNIT, MOVED, UNSURE_INPUT, E
 from monitor.observer.window_statistics import (
     dry_force,
     friction,
@@ -138,7 +139,7 @@ def decide(  # noqa: PLR0917 -- a kernel
             _restart(kept)
         _follow_drive(drive[k], steady[k], kept)
         if state[k] != TAINTED:
-            _follow_lateness(kept, judged[k], usual[:, k], rules)
+            _follow_inputs(kept, judged[k], usual[:, k], rules)
             _remember(kept, judged[k], speed[k], levels[k])
         _follow_jumps(jumped[k], kept)
         _one(k, inside[k], usual[:, k], rules, kept, out)
@@ -153,6 +154,7 @@ def _restart(kept: DecisionState) -> None:
     kept.value[:] = 0.0
     kept.value[0] = UNNAMED
     forget_lateness(kept.lateness)
+    kept.edges[:] = 0.0
 
 
 @njit()
@@ -183,15 +185,26 @@ def _follow_jumps(jumped: bool, kept: DecisionState) -> None:
 
 
 @njit()
-def _follow_lateness(
+def _follow_inputs(
     kept: DecisionState, row: FloatArray, usual: FloatArray, rules: DecisionRules
 ) -> None:
-    """Learn the inputs' lateness, except in an episode; while it changes, the rig is not armed."""
+    """Learn the inputs' edges and lateness, except in an episode, and correct the residual.
+
+    While they change, the rig is not armed.
+    """
     count = kept.counts
     judging = count[WAS_JUDGING] == 1
+    if count[ONSET] < 0:
+        largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
+        largest *= _variance(kept, rules)
+        if follow_edges(row[E], row[MOVED], largest, kept.edges):
+            forget_lateness(kept.lateness)
+            count[CHANGED] = 0
+    row[E] = corrected(row[E], row[MOVED], kept.edges)
     if not judging or (count[ONSET] < 0 and (count[ABOVE] == 0 or is_late(kept.lateness))):
         largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
-        follow_lateness(row, largest * _variance(kept, rules), judging, kept.lateness)
+        variance = _variance(kept, rules) + edges_unsure(row[UNSURE_INPUT], kept.edges)
+        follow_lateness(row, largest * variance, judging, kept.lateness)
     if not judging and lateness_changes(kept.lateness):
         count[CHANGED] = -LONG
 

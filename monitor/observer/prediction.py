@@ -4,7 +4,8 @@ Two further predictions run with unit dry and unit viscous friction at the force
 differences to the plain prediction are the responses of the predicted output to friction of 1 N and
 of 1 N s/m, including everything in between (an inertia, the sensor's own high-pass). As the motion
 is given, the response is linear in the force. A fourth runs with inputs late by `LATER`, which
-gives the response to inputs late by one sample.
+gives the response to inputs late by one sample. A fifth runs with the inputs' edges between
+samples, where they are known to be regular.
 """
 
 import dataclasses
@@ -121,8 +122,9 @@ def _fixed(effect: Effect) -> Effect:
 class Predicted:
     """Columns of the prediction, each of shape (n,) or (n, hidden states).
 
-    `late` and `late_hidden` are output and hidden states with inputs late by `LATER`; `reset` marks
-    samples at which the states diverged and were started anew.
+    `late` and `late_hidden` are output and hidden states with inputs late by `LATER`, `moved` and
+    `moved_hidden` those with edges between samples; `reset` marks samples at
+    which the states diverged and were started anew.
     """
 
     output: FloatArray
@@ -131,6 +133,8 @@ class Predicted:
     late: FloatArray
     hidden: FloatArray
     late_hidden: FloatArray
+    moved: FloatArray
+    moved_hidden: FloatArray
     reset: BoolArray
 
 
@@ -153,63 +157,83 @@ class AlongMotion:
         values = dict(zip(plant.names, plant.values, strict=True))
         healthy = values | {strengths[0]: plant.coulomb, strengths[1]: 0.0}
         cases = [healthy, *(healthy | {name: healthy[name] + 1.0} for name in strengths)]
-        self._parameters = [self._compiled.vector(case) for case in (*cases, healthy)]
+        self._parameters = [self._compiled.vector(case) for case in (*cases, healthy, healthy)]
         self._states = [np.zeros(0)] * len(self._parameters)
-        self._last = np.zeros((2, 0))
+        self._last = np.zeros((3, 0))
 
-    def update(self, rows: FloatArray, steps: FloatArray, state: Codes) -> Predicted:
+    def update(
+        self,
+        rows: FloatArray,
+        steps: FloatArray,
+        moved: FloatArray,
+        state: Codes,
+        moves: BoolArray,
+    ) -> Predicted:
         """Predict the next rows of inputs and motion, shape (n, inputs); 0 without a kernel.
 
         Args:
             rows: inputs, then motion.
             steps: changes of the inputs per sample, shape (n, inputs other than motion).
+            moved: what their means gain by edges between samples, of the same shape.
             state: of each row.
+            moves: whether that is known, shape (n,).
         """
         n = len(rows)
         later = rows.copy()
         later[:, : steps.shape[1]] -= LATER * steps
-        output, dry, viscous, late = np.zeros((4, n))
-        hidden, late_hidden = np.zeros((2, n, self.hidden))
+        between = rows.copy()
+        between[:, : moved.shape[1]] += moved
+        output, dry, viscous, late, edged = np.zeros((5, n))
+        hidden, late_hidden, edged_hidden = np.zeros((3, n, self.hidden))
         reset = np.zeros(n, np.bool_)
-        out = Predicted(output, dry, viscous, late, hidden, late_hidden, reset)
-        for begin, end in _stretches(state):
+        out = Predicted(output, dry, viscous, late, hidden, late_hidden, edged, edged_hidden, reset)
+        for begin, end in _stretches(state, moves):
             if state[begin] == FIRST:
                 self._begin(rows[begin])
             done = begin
             while done < end:
-                done += self._run(rows[done:end], later[done:end], done, out)
+                given = [each[done:end] for each in (rows, later, between)]
+                done += self._run(given, bool(moves[begin]), done, out)
         return out
 
     def _begin(self, row: FloatArray) -> None:
         """Hidden states in equilibrium with a row, with the motion at rest."""
-        self._last = np.stack([row, row])
+        self._last = np.stack([row, row, row])
         still = np.repeat(row[None, :], round(SETTLING / self._dt), axis=0)
         still[:, self._rates] = 0.0
         for case, parameters in enumerate(self._parameters):
             self._states[case] = balanced(self._compiled, parameters, still, self._dt)
 
-    def _run(self, rows: FloatArray, later: FloatArray, first: int, out: Predicted) -> int:
-        """Run along the rows until they end or a state diverges; returns the number done."""
-        plain, shifted = (
-            np.concatenate([last[None, :], own])
-            for last, own in zip(self._last, (rows, later), strict=True)
+    def _run(self, rows: list[FloatArray], moves: bool, first: int, out: Predicted) -> int:
+        """Run along the rows until they end or a state diverges; returns the number done.
+
+        Args:
+            rows: as they are, late, and with edges between samples.
+            moves: whether the last differ from the first.
+            first: index of the first row.
+            out: to be filled.
+        """
+        plain, shifted, between = (
+            np.concatenate([last[None, :], own]) for last, own in zip(self._last, rows, strict=True)
         )
-        given = [plain] * (len(self._parameters) - 1) + [shifted]
+        given = [plain] * (len(self._parameters) - 2) + [shifted]
         made = [self._simulated(case, own) for case, own in enumerate(given)]
+        made.append(self._simulated(len(given), between) if moves else made[0])
         outputs = np.stack([one.outputs[0, 1:] for one in made])
         finite = np.isfinite(outputs).all(axis=(0, 2))
         if good := bool(finite.all()):
             self._states = [one.last[0] for one in made]
-            self._last = np.stack([rows[-1], later[-1]])
-        done = len(rows) if good else int(np.argmin(finite)) + 1
+            self._last = np.stack([own[-1] for own in rows])
+        done = len(plain) - 1 if good else int(np.argmin(finite)) + 1
         at, outputs = slice(first, first + done), np.nan_to_num(outputs[:, :done])
         out.output[at], out.hidden[at] = outputs[0, :, 0], outputs[0, :, 1:]
         out.dry[at] = outputs[1, :, 0] - outputs[0, :, 0]
         out.viscous[at] = outputs[2, :, 0] - outputs[0, :, 0]
         out.late[at], out.late_hidden[at] = outputs[3, :, 0], outputs[3, :, 1:]
+        out.moved[at], out.moved_hidden[at] = outputs[4, :, 0], outputs[4, :, 1:]
         if not good:
             out.reset[first + done - 1] = True
-            self._begin(rows[done - 1])
+            self._begin(plain[done])
         return done
 
     def _simulated(self, case: int, inputs: FloatArray) -> Simulation:
@@ -221,11 +245,12 @@ class AlongMotion:
             )  # fmt: skip
 
 
-def _stretches(state: Codes) -> Iterator[tuple[int, int]]:
-    """Runs of samples with a complete kernel; a start begins a new run."""
+def _stretches(state: Codes, moves: BoolArray) -> Iterator[tuple[int, int]]:
+    """Runs of samples with a complete kernel; a start begins a new run, and so does a change."""
     begin = -1
     for k in range(state.size):
-        if begin >= 0 and state[k] in (EMPTY, FIRST):
+        changes = k > 0 and moves[k] != moves[k - 1]
+        if begin >= 0 and (changes or state[k] in (EMPTY, FIRST)):
             yield begin, k
             begin = -1
         if begin < 0 and state[k] != EMPTY:
