@@ -258,6 +258,8 @@ def serving(folder: Path, *arguments: str, cwd: Path | None = None) -> Iterator[
 def looking(driver: webdriver.Chrome, served: Served) -> Iterator[Page]:
     """The browser at a server: in the end no page has failed or asked for anything elsewhere."""
     page = Page(driver, served)
+    driver.get("about:blank")  # an earlier page may still ask its own server
+    page.forget()
     page.enter()
     try:
         yield page
