@@ -38,7 +38,16 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
         "Real processes, a real serial line and a real router on one machine. Latency needs the "
         "real-time scheduling class (root, `LimitRTPRIO`, or the compose file's `ulimits`); "
         "without it, p99 grows to tens of milliseconds on a machine that is busy with other work.",
-        ("latency", "notification", "losses", "rogue_client", "replay", "windowed_least_squares"),
+        (
+            "latency",
+            "notification",
+            "losses",
+            "random_kills",
+            "rogue_client",
+            "fuzzing",
+            "replay",
+            "windowed_least_squares",
+        ),
     ),
     (
         "Many recordings and archives",
