@@ -194,16 +194,15 @@ def _follow_inputs(
     """
     count = kept.counts
     judging = count[WAS_JUDGING] == 1
-    if count[ONSET] < 0:
-        largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
-        largest *= _variance(kept, rules)
-        if follow_edges(row[E], row[MOVED], largest, kept.edges):
-            forget_lateness(kept.lateness)
-            count[CHANGED] = 0
+    calm = count[ONSET] < 0
+    largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
+    variance = _variance(kept, rules) if calm or not judging else 0.0
+    if calm and follow_edges(row[E], row[MOVED], largest * variance, kept.edges):
+        forget_lateness(kept.lateness)
+        count[CHANGED] = 0
     row[E] = corrected(row[E], row[MOVED], kept.edges)
-    if not judging or (count[ONSET] < 0 and (count[ABOVE] == 0 or is_late(kept.lateness))):
-        largest = min(rules.medium / rules.lasting, usual[USUAL_MEDIUM])
-        variance = _variance(kept, rules) + edges_unsure(row[UNSURE_INPUT], kept.edges)
+    if not judging or (calm and (count[ABOVE] == 0 or is_late(kept.lateness))):
+        variance += edges_unsure(row[UNSURE_INPUT], kept.edges)
         follow_lateness(row, largest * variance, judging, kept.lateness)
     if not judging and lateness_changes(kept.lateness):
         count[CHANGED] = -LONG

@@ -123,8 +123,8 @@ class Predicted:
     """Columns of the prediction, each of shape (n,) or (n, hidden states).
 
     `late` and `late_hidden` are output and hidden states with inputs late by `LATER`, `moved` and
-    `moved_hidden` those with edges between samples; `reset` marks samples at
-    which the states diverged and were started anew.
+    `moved_hidden` those with edges between samples; `reset` marks samples at which the states
+    diverged and were started anew.
     """
 
     output: FloatArray

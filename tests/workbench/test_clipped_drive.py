@@ -1,19 +1,13 @@
 """A drive that clips is told from a sensor that does, though friction hides the noise of both."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from msgspec import structs
 
-from rigwatch.physics.engine.equations.effect_files import library
-from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording, joined
 from rigwatch.workbench.compare.preparation import bench_of
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.ranking import rank
-from rigwatch.workbench.study.study import Study
-from rigwatch.workbench.study.study_file import Span, StudyFile
+from tests.workbench.motors import motor_study
 
 STEP, EVERY, CLIPPED = 5e-5, 80, 7.0
 K, R, L, J, B, PUSHED, PULLED = 0.045, 1.2, 0.9e-3, 5.5e-5, 1.5e-5, 0.009, 0.006
@@ -51,15 +45,7 @@ def swinging(samples: int, lines: tuple[float, ...], seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", [5, 6])
 def test_a_sensor_that_clips_does_not_stand_in_for_a_drive_that_does(seed: int) -> None:
-    model = shipped_models()["motor"]
-    known = {"R": R, "K": K}
-    parameters = {
-        n: structs.replace(p, value=known.get(n, p.value)) for n, p in model.parameters.items()
-    }
-    span = (Span(session="simulated"),)
-    file = StudyFile(model="motor", train=span, held_out=span)
-    model = structs.replace(model, parameters=parameters)
-    study = Study(Path(), file, model, library(), frozenset())
+    study = motor_study(R, K)
     train = [stepped(2400, seed), swinging(2400, (0.23, 0.7, 1.7), seed)]
     held_out = swinging(2400, (0.4, 1.1, 2.1), seed + 10)
     made = joined([driven(volts, index) for index, volts in enumerate(train)])

@@ -1,18 +1,12 @@
 """A motor's current, which no channel shows, does not stand in for its friction."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from msgspec import structs
 
-from rigwatch.physics.engine.equations.effect_files import library
-from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording, joined
 from rigwatch.workbench.compare.preparation import Bench, bench_of
 from rigwatch.workbench.data.signals import Data
-from rigwatch.workbench.study.study import Study
-from rigwatch.workbench.study.study_file import Span, StudyFile
+from tests.workbench.motors import motor_study
 
 EVERY, PARTS = 0.006, 120
 """Time between samples [s], and steps of the simulation in each."""
@@ -41,17 +35,8 @@ def levels(seed: int, samples: int = 1600) -> np.ndarray:
 
 
 def bench(horizon: int, seed: int) -> Bench:
-    model = shipped_models()["motor"]
-    known = {"R": R, "K": K}
-    parameters = {
-        n: structs.replace(p, value=known.get(n, p.value)) for n, p in model.parameters.items()
-    }
-    span = (Span(session="simulated"),)
-    file = StudyFile(model="motor", train=span, held_out=span)
-    model = structs.replace(model, parameters=parameters)
-    study = Study(Path(), file, model, library(), frozenset())
     train = joined([turned(levels(seed + each), each) for each in (1, 2)])
-    return bench_of(study, Data(train, turned(levels(seed + 3), 3), None, horizon, ()))
+    return bench_of(motor_study(R, K), Data(train, turned(levels(seed + 3), 3), None, horizon, ()))
 
 
 @pytest.mark.parametrize("seed", [0, 10])

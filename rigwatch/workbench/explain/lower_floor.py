@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from rigwatch.workbench.compare import Bench
-from rigwatch.workbench.data import lowered
-from rigwatch.workbench.ranking import Ranked
+from rigwatch.workbench.ranking import Ranked, own_floor
 
 
 def with_lower_floor(bench: Bench, rows: Sequence[Ranked]) -> Bench:
@@ -24,7 +23,4 @@ def with_lower_floor(bench: Bench, rows: Sequence[Ranked]) -> Bench:
     if not accepted:
         return bench
     best = min(accepted, key=lambda row: row.held_out_error)
-    assert best.fitted is not None
-    found, recording = best.fitted.held_out, bench.data.held_out
-    floor = lowered(bench.floor, found, recording, bench.study.file.period, bench.data.horizon)
-    return replace(bench, floor=floor)
+    return replace(bench, floor=own_floor(bench.study, bench.data, bench.floor, best))

@@ -12,7 +12,13 @@ from rigwatch.workbench.ranking.paired_test import difference
 from rigwatch.workbench.ranking.rank import AGAIN, MUCH_WORSE, rank
 from rigwatch.workbench.ranking.ranked import SAME, SIMILAR, Ranked, accepted_from, in_order
 from rigwatch.workbench.ranking.refinements import with_refinements
-from rigwatch.workbench.ranking.refitting import Progress, no_progress, refit, refit_all
+from rigwatch.workbench.ranking.refitting import (
+    Progress,
+    no_progress,
+    own_floor,
+    refit,
+    refit_all,
+)
 from rigwatch.workbench.ranking.scoring import rank_all, rank_only, score_all, scored
 
 __all__ = [
@@ -32,6 +38,7 @@ __all__ = [
     "judge_fit",
     "left_over",
     "no_progress",
+    "own_floor",
     "rank",
     "rank_all",
     "rank_only",

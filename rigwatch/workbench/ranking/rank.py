@@ -9,7 +9,7 @@ full. An effect is accepted only if the held-out error falls, over blocks, by mo
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rigwatch.workbench.data import Data, NoiseFloor, lowered
+from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
 from rigwatch.workbench.ranking.candidates import candidates
 from rigwatch.workbench.ranking.fit_selection import select_for_fit
@@ -19,6 +19,7 @@ from rigwatch.workbench.ranking.refitting import (
     Progress,
     fit_each,
     no_progress,
+    own_floor,
     refit,
     refit_elsewhere,
 )
@@ -90,8 +91,8 @@ def _elsewhere(study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFlo
     accepted = in_order([row for row in rows if row.accepted])
     if not accepted or accepted[0].fitted is None:
         return []
-    best, found = accepted[0], accepted[0].fitted.held_out
-    if lowered(floor, found, data.held_out, study.file.period, data.horizon).reached(found):
+    best = accepted[0]
+    if own_floor(study, data, floor, best).reached(accepted[0].fitted.held_out):
         return []
     return [r for r in rows if r.effect == best.effect and r.fitted is None and not r.failure]
 

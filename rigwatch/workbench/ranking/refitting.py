@@ -98,13 +98,16 @@ def fit_each(  # noqa: PLR0917 -- they belong together
             ahead = {each.label: replace(each) for each in waiting[: cores()]}
             refit_all(study, data, base, list(ahead.values()), fit_model)
         _take(row, ahead[row.label])
-        if row.accepted and leaves_nothing(row, base, _own_floor(study, data, floor, row)):
+        if row.accepted and leaves_nothing(row, base, own_floor(study, data, floor, row)):
             enough.append(row)
     return enough
 
 
-def _own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> NoiseFloor:
-    """The noise floor, from the row's residual if that is quieter than the base model's."""
+def own_floor(study: Study, data: Data, floor: NoiseFloor, row: Ranked) -> NoiseFloor:
+    """The noise floor, from a fitted row's residual if that is quieter than the base model's.
+
+    A floor from a healthy recording or from repeated periods stays.
+    """
     assert row.fitted is not None
     fitted, recording = row.fitted.held_out, data.held_out
     return lowered(floor, fitted, recording, study.file.period, data.horizon)
