@@ -72,6 +72,7 @@ class Acquisition:
             "lost_samples": self.tracker.lost,
             "duplicates": self.tracker.duplicates,
             "drift_ppm": self.clock.drift_ppm,
+            "certain_drift_ppm": self.clock.certain_drift_ppm,
             "clock_jumps": self.clock.jumps,
         }
         return [*stepped, *self.watch.tick(now_ns, self.clock.unix_ns(now_ns), link, figures)]

@@ -6,8 +6,13 @@ Line and host delay a sample, and never make it early. So the least delayed samp
 second counts, and a line touches those of the last minute from below. Its slope is the median of
 slopes (Theil and Sen), which ignores the seconds in which the host slept. Where delays scatter too
 much to tell it, as those of samples that waited in the line's buffer at the start, the clocks are
-taken to agree. A jump of the device's clock shows within one sample: its microseconds disagree with
-its sample numbers and with the host's clock.
+taken to agree.
+
+A host that becomes busy delays all samples from then on: a step, no drift, yet it tilts the line.
+Certain is only what shows from each eighth of the time to the next.
+
+A jump of the device's clock shows within one sample: its microseconds disagree with its sample
+numbers and with the host's clock.
 """
 
 from collections import deque
@@ -23,6 +28,7 @@ _BIN_US = 250_000
 _BINS = 240
 _BINS_FOR_LINE = 8
 _BINS_FOR_DRIFT = 80
+_PARTS = 8
 _FIT_EVERY = 4
 """Quarter seconds from one fit of a line of so many to the next: it hardly changes in a second."""
 _USUAL_DRIFT = 1e-3
@@ -42,13 +48,14 @@ class DeviceClock:
     Attributes:
         drift_ppm: how much faster the device's clock runs than the host's [1e-6]; 0 for the first
             20 s, when late arrivals would look like drift.
+        certain_drift_ppm: the part of it that delays of the host cannot explain.
         jumps: jumps of the device's clock so far.
     """
 
     def __init__(
         self, rate: float, clock_rate: float = 1.0, unix_minus_monotonic_ns: int = 0
     ) -> None:
-        self.drift_ppm = 0.0
+        self.drift_ppm = self.certain_drift_ppm = 0.0
         self.jumps = 0
         self._period_us = 1e6 / rate
         self._ns_per_us = 1000.0 / clock_rate
@@ -146,7 +153,12 @@ class DeviceClock:
         self._centre = float(relative[-1])
         self._offset = float(np.min(late - self._slope * (relative - self._centre)))
         if len(self._bins) > _BINS_FOR_DRIFT:
-            self.drift_ppm = 1e6 * (self._ns_per_us / (self._ns_per_us + self._slope) - 1.0)
+            self.drift_ppm = self._ppm(self._slope)
+            self.certain_drift_ppm = self._ppm(_common_slope(relative, late, self._slope))
+
+    def _ppm(self, slope: float) -> float:
+        """Drift of the device's clock if samples come later by `slope` [ns] each microsecond."""
+        return 1e6 * (self._ns_per_us / (self._ns_per_us + slope) - 1.0)
 
 
 def _likely_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
@@ -162,6 +174,18 @@ def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
     """Median of slopes between points half the span apart, which needs n/2 of them and not n²."""
     half = len(x) // 2
     return float(np.median((y[half : 2 * half] - y[:half]) / (x[half : 2 * half] - x[:half])))
+
+
+def _common_slope(x: NDArray[np.float64], y: NDArray[np.float64], slope: float) -> float:
+    """The least slope from one part's earliest point to the next part's; 0 if they differ in sign.
+
+    Earliest are the points that lie lowest under a line of this slope.
+    """
+    parts = zip(np.array_split(x, _PARTS), np.array_split(y - slope * x, _PARTS), strict=True)
+    middle, lowest = np.array([(part_x.mean(), part_y.min()) for part_x, part_y in parts]).T
+    slopes = slope + np.diff(lowest) / np.diff(middle)
+    least = float(slopes[np.argmin(np.abs(slopes))])
+    return least if np.all(slopes * least > 0.0) else 0.0
 
 
 def host_offset_ns() -> int:

@@ -191,11 +191,11 @@ class Watch:
         return share if good else f"{share}: wrong baud rate, or not a device of rigwatch?"
 
     def _drift(self, unix_ns: int, counters: Mapping[str, float]) -> list[Message]:
-        drift = counters.get("drift_ppm", 0.0)
-        severity: Severity = next((s for limit, s in _DRIFT_LIMITS if abs(drift) > limit), "info")
+        certain = abs(counters.get("certain_drift_ppm", 0.0))
+        severity: Severity = next((s for limit, s in _DRIFT_LIMITS if certain > limit), "info")
         if severity == self._drift_severity:
             return []
-        self._drift_severity = severity
+        self._drift_severity, drift = severity, counters.get("drift_ppm", 0.0)
         text = f"the device's clock is off by {drift:+.0f} ppm"
         return [Event(self._source, unix_ns, severity, "clock_drift", text)]
 

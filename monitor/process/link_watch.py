@@ -4,7 +4,7 @@ Each alarm clears when its cause is gone. `LinkWatch` receives the time and the 
 arguments and reads neither clock nor bus.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from monitor.alarms import Occasion
@@ -98,12 +98,18 @@ def device_reports(
     state, text = (daq.state, daq.text) if daq else ("", "")
     yield "line_noise", _occasion(seen, text=text), state == "garbage"
     yield "slow_device", _occasion(seen, text=text), state == "slow"
-    drift = abs(daq.counters.get("drift_ppm", 0.0)) if daq else 0.0
+    drift, certain = _drift(daq.counters if daq else {})
     at = _occasion(seen, drift, DRIFT_PPM, f"off by {drift:.0f} ppm")
-    yield "clock_drift", at, drift > DRIFT_PPM
+    yield "clock_drift", at, certain > DRIFT_PPM
     at = _occasion(seen, drift, WRONG_PPM, f"off by {drift:.0f} ppm")
-    yield "clock_wrong", at, drift > WRONG_PPM
+    yield "clock_wrong", at, certain > WRONG_PPM
     yield "estimates_missing", _occasion(seen, text=why), unjudged_s > UNJUDGED_S
+
+
+def _drift(counters: Mapping[str, float]) -> tuple[float, float]:
+    """Size of the drift and what of it is certain [ppm]; a daq of an earlier version tells one."""
+    drift = counters.get("drift_ppm", 0.0)
+    return abs(drift), abs(counters.get("certain_drift_ppm", drift))
 
 
 def disk_reports(

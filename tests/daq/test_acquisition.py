@@ -1,5 +1,7 @@
 """Raw blocks to messages: long blocks, the host's clock, and what is said about the device's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,18 @@ def test_drift_is_reported_once_with_its_severity(ppm: float, severity: str) -> 
         events += [m for m in said if isinstance(m, Event) and m.code == "clock_drift"]
     assert [event.severity for event in events] == [severity]
     assert f"{ppm:+.0f} ppm" in events[0].text
+
+
+def test_a_drift_that_may_be_delays_is_not_reported() -> None:
+    acquiring, _ = acquisition()
+    figures: dict[str, float] = {}
+    for second in range(30):
+        raw = raw_of(second * 256, 256)
+        acquiring.update(replace(raw, arrived_ns=raw.arrived_ns + 20_000_000 * (second > 11)))
+        said = acquiring.tick((second + 1) * SECOND, UP, {})
+        assert not [m for m in said if isinstance(m, Event) and m.code == "clock_drift"]
+        figures = next((m.counters for m in said if isinstance(m, Health)), figures)
+    assert abs(figures["certain_drift_ppm"]) < 100.0
 
 
 def test_health_says_the_rate_now_on_average_and_at_worst() -> None:

@@ -33,6 +33,28 @@ def test_drift_is_found_and_followed(drift: float) -> None:
     assert np.abs(error[2560:]).max() < 200_000
 
 
+@pytest.mark.parametrize("drift", [-1e-3, 7e-4])
+def test_a_drift_is_certain_within_a_minute(drift: float) -> None:
+    late = np.random.default_rng(1).exponential(3e6, 256 * 60).astype(np.int64)
+    clock = DeviceClock(256.0)
+    clock.stamp(run_of(256 * 60, drift=drift, late_ns=late))
+    assert clock.certain_drift_ppm == pytest.approx(1e6 * drift, rel=0.1)
+
+
+@pytest.mark.parametrize(("begin", "end"), [(11, 30), (11, 22), (0, 14)])
+def test_a_host_that_becomes_busy_or_free_is_no_drift(begin: int, end: int) -> None:
+    late = np.random.default_rng(1).exponential(1e6, 256 * 30)
+    late[256 * begin : 256 * end] += 20e6
+    clock, certain, seeming = DeviceClock(256.0), [], []
+    for second in range(30):
+        part = slice(256 * second, 256 * (second + 1))
+        clock.stamp(run_of(256, first=256 * second, late_ns=late[part].astype(np.int64)))
+        certain.append(abs(clock.certain_drift_ppm))
+        seeming.append(abs(clock.drift_ppm))
+    assert max(seeming) > 500.0
+    assert max(certain) < 100.0
+
+
 def test_what_waited_in_the_lines_buffer_at_the_start_does_not_stretch_time() -> None:
     waited = np.clip(700e6 - np.arange(2560) * PERIOD_NS, 0.0, None).astype(np.int64)
     late = waited + np.random.default_rng(2).exponential(1e6, 2560).astype(np.int64)

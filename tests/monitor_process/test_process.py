@@ -339,6 +339,7 @@ def test_the_recorders_troubles_are_alarms_and_clear(bench: Bench) -> None:
         ("slow_device", "slow", {}),
         ("clock_drift", "running", {"drift_ppm": -600.0}),
         ("clock_wrong", "running", {"drift_ppm": 6000.0}),
+        ("clock_drift", "running", {"drift_ppm": 800.0, "certain_drift_ppm": 600.0}),
     ],
 )
 def test_what_daq_says_of_its_device_is_an_alarm_and_clears(
@@ -350,6 +351,13 @@ def test_what_daq_says_of_its_device_is_an_alarm_and_clears(
         bench.turn()
         told += [change for change in bench.alarm_states() if change[0] == alarm]
     assert told == [(alarm, "unacknowledged"), (alarm, "cleared_unacknowledged")]
+
+
+def test_a_drift_that_is_not_certain_is_no_alarm(bench: Bench) -> None:
+    figures = {"drift_ppm": 6000.0, "certain_drift_ppm": 100.0}
+    bench.daq.publish(HEALTH, Health("daq/rig", 1, "running", "", figures))
+    bench.turn()
+    assert not {name for name, _ in bench.alarm_states()} & {"clock_drift", "clock_wrong"}
 
 
 def test_samples_without_estimates_are_an_alarm(bench: Bench) -> None:
