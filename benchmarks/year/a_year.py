@@ -189,11 +189,10 @@ def _memory_row(what: str, done: Year, name: str) -> Row:
 
 def _alive(what: str, done: Year) -> Row:
     planned = sum(reason.what.endswith("killed") for reason in done.reasons)
-    endings = [one for one in done.rig.endings if one["event"] == "ended"]
-    left = [name for name in PROCESSES if not done.rig.alive(name)]
-    note = "; ".join(
-        [*done.gone, *left, *(f"{e['process']} {e['text']}" for e in endings[planned:][:4])]
-    )
+    endings = [one for one in done.rig.endings if one["event"] in ("ended", "ill")]
+    unplanned = [one for one in endings if not one["text"].startswith("ended by SIGKILL")]
+    left = [f"{name} is missing at the end" for name in PROCESSES if not done.rig.alive(name)]
+    note = "; ".join([*done.gone, *left, *(f"{e['process']} {e['text']}" for e in unplanned[:4])])
     return Row(f"{what}: processes that ended by themselves", f"{len(endings) - planned}", "0", "",
                note, passed=len(endings) == planned and not left and not done.gone)  # fmt: skip
 

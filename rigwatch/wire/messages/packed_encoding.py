@@ -18,6 +18,9 @@ _TAGS = {kind: schema.field_tags(kind) for kind in (Column, SampleBlock, Estimat
 _NAME, _UNIT, _VALUES, _QUALITY = (bytes([tag]) for tag in _TAGS[Column].values())
 _FLOAT, _INT, _BYTE = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
 _LARGEST = 1 << 63
+LENGTHS_KEPT = 512
+"""Columns and lengths whose heads are kept: a live block has few lengths, a recorded one any, and
+ten times as many would take 2 MB before they serve again."""
 
 
 def encode_block(block: Block) -> bytes:
@@ -52,7 +55,7 @@ def _column(tag: bytes, column: Column) -> bytes:
     return head + values + middle + quality
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=LENGTHS_KEPT)
 def _around(tag: bytes, name: str, unit: str, values: int, quality: int) -> tuple[bytes, bytes]:
     """The bytes before a column's values, and those between its values and its quality."""
     first = _part(_NAME, name.encode()) + _part(_UNIT, unit.encode()) + _head(_VALUES, values)

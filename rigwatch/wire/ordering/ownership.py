@@ -5,6 +5,9 @@ process that declared it, and the bus gives the sender of each message. A boot k
 the owner's token is gone, even if other processes declare tokens for it.
 """
 
+MOST_UNPROVED = 64
+"""Boots without a token whose first sender is known: any sender can make up more of them."""
+
 
 class Owners:
     """The owner of each boot, updated as tokens appear and vanish."""
@@ -29,8 +32,15 @@ class Owners:
             self._owners[boot] = token
         if boot not in self._owners:
             # No token yet: the first sender, until a token shows the owner.
+            self._make_room()
             self._owners[boot] = (None, sender)
         return self._owners[boot][1] == sender
+
+    def _make_room(self) -> None:
+        """Forget the oldest boot without a token if there are too many."""
+        unproved = [boot for boot, (since, _) in self._owners.items() if since is None]
+        if len(unproved) >= MOST_UNPROVED:
+            del self._owners[unproved[0]]
 
     def _first(self, boot: int) -> tuple[int, str] | None:
         """The oldest token of a boot: its start and its owner."""

@@ -24,7 +24,7 @@ from rigwatch.wire.ordering.outcomes import (
     Remark,
 )
 from rigwatch.wire.ordering.ring_protocol import OPEN, UNKNOWN, Ask, RingReply, S
-from rigwatch.wire.ordering.source_arbitration import Sources
+from rigwatch.wire.ordering.source_arbitration import REMEMBERED, Sources
 from rigwatch.wire.ordering.stream import Stream, from_number, up_to_number
 
 LARGEST_SEQ = 2**53
@@ -357,4 +357,6 @@ class SampleOrder(Generic[S]):
 
     def _leave(self, front: Stream[S]) -> None:
         self._settled_boots[front.boot] = front.next
+        if len(self._settled_boots) > REMEMBERED:
+            del self._settled_boots[next(iter(self._settled_boots))]
         self._line.popleft()

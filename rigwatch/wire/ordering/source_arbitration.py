@@ -14,6 +14,10 @@ from rigwatch.wire.ordering.numbered import Numbered
 
 OLD_NS = 5_000_000_000
 """Age of samples, relative to the last, from which a new boot without token is a replay [ns]."""
+REMEMBERED = 64
+"""Sources that are gone and still known: in a year a rig has thousands of them."""
+MOST_RIVALS = 16
+"""Sources without a token that are followed at a time: any sender can make up more of them."""
 
 
 @dataclass(slots=True)
@@ -50,7 +54,6 @@ class Sources:
         self._since: dict[int, int] = {}
         self._in_control_since: dict[int, int] = {}
         self._interrupted: set[int] = set()
-        self._had_token: set[int] = set()
         self._silent = False
         self._latest_ns = -(2**62)
         self._rivals: dict[int, Rival] = {}
@@ -68,7 +71,7 @@ class Sources:
     def contested(self) -> bool:
         """Whether a second source sends samples besides the one in control."""
         return any(
-            rival.told and (boot in self._alive or boot not in self._had_token)
+            rival.told and (boot in self._alive or boot not in self._since)
             for boot, rival in self._rivals.items()
         )
 
@@ -76,10 +79,11 @@ class Sources:
         """The boot's token has appeared, declared at `since_ns`."""
         if boot not in self._alive and self._since.get(boot) == since_ns:
             self._interrupted.add(boot)
+        self._since.pop(boot, None)
         self._alive[boot] = self._since[boot] = since_ns
-        self._had_token.add(boot)
         if boot == self.current:
             self._in_control_since[boot] = since_ns
+        self._forget()
 
     def returns(self, boot: int) -> bool:
         """Whether the boot was in control, and its token was gone only with the router.
@@ -158,6 +162,7 @@ class Sources:
             return Verdict()
         rival = self._rivals.get(boot)
         if rival is None:
+            self._make_room(boot)
             rival = self._rivals[boot] = Rival(block.seq, end, 0)
         rival.last = max(rival.last, end)
         if self._released():
@@ -165,16 +170,31 @@ class Sources:
         certain = self.is_alive(boot) and self.current in self._alive
         return Verdict(remark=self._conflict(boot)) if certain and not rival.told else Verdict()
 
+    def _make_room(self, boot: int) -> None:
+        """Drop the oldest rival without a token if another one is too many."""
+        unproved = [rival for rival in self._rivals if rival not in self._since]
+        if boot not in self._since and len(unproved) >= MOST_RIVALS:
+            del self._rivals[unproved[0]]
+
+    def _forget(self) -> None:
+        """Forget the sources that have been gone for longest."""
+        kept = {self.current, *self._alive, *self._rivals}
+        gone = [boot for boot in self._since if boot not in kept]
+        for boot in gone[: max(0, len(gone) - REMEMBERED)]:
+            del self._since[boot]
+            self._in_control_since.pop(boot, None)
+            self._interrupted.discard(boot)
+
     def _is_past(self, block: SampleBlock | Numbered) -> bool:
         """Whether a block is a late one of a source that is gone, or a recording."""
-        return block.boot in self._had_token or int(block.t_ns[0]) < self._latest_ns - OLD_NS
+        return block.boot in self._since or int(block.t_ns[0]) < self._latest_ns - OLD_NS
 
     def _conflict(self, boot: int) -> str:
         self._rivals[boot].told = True
         return f"boot {boot} sends samples too; boot {self.current} came first and keeps control"
 
     def _released(self) -> bool:
-        if self.current in self._had_token:
+        if self.current in self._since:
             return self.current not in self._alive
         return self._silent
 
