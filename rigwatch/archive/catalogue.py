@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from rigwatch.archive.entry import DUPLICATE, UNREADABLE
+from rigwatch.archive.entry import DUPLICATE, THINNED, UNREADABLE
 from rigwatch.archive.layout import ALARMS, INDEX, LOSSES, SECONDS, SESSIONS
 from rigwatch.archive.store import Store
 from rigwatch.archive.tables import (
@@ -74,6 +74,10 @@ class Catalogue:
             for name, row in same.items()
             if row["status"] != DUPLICATE or row["content"] in originals
         }
+
+    def with_recording(self) -> set[str]:
+        """Sessions of which more than the figures per second should be there."""
+        return {name for name, row in self.sessions.items() if row["status"] != THINNED}
 
     def files(self) -> set[str]:
         """Names of all files of figures per second."""

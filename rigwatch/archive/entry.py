@@ -19,12 +19,13 @@ from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import PROBABLY_MISSING, EstimateBlock, Event, Gap, Message
 from rigwatch.wire.session import SUFFIX, Session, Summary, is_segment, open_session, summarise
 
-OK, DAMAGED, UNFINISHED, UNREADABLE, DUPLICATE = (
+OK, DAMAGED, UNFINISHED, UNREADABLE, DUPLICATE, THINNED = (
     "ok",
     "damaged",
     "unfinished",
     "unreadable",
     "duplicate",
+    "thinned",
 )
 
 
@@ -116,7 +117,7 @@ def _read(store: Store, session: Session, content: str) -> dict[str, Any]:
         | _condition(summary)
         | {
             "probably_missing": seen.probable,
-            "files": _stored_seconds(store, seen.seconds, rig, content),
+            "files": stored_seconds(store, seen.seconds, rig, content[:16]),
             "alarm_rows": [_alarm_row(alarm) for alarm in summary.alarms],
             "loss_rows": _loss_rows(summary, seen.gaps),
         }
@@ -184,14 +185,12 @@ def _loss(what: str, t_ns: int, count: int, reason: str) -> dict[str, Any]:
     return {"what": what, "t_ns": t_ns, "count": count, "reason": reason}
 
 
-def _stored_seconds(store: Store, seconds: SecondAggregates, rig: str, content: str) -> list[str]:
-    """Store the figures of each day; names of the files."""
+def stored_seconds(store: Store, seconds: SecondAggregates, rig: str, part: str) -> list[str]:
+    """Store the figures of each day, each in a file `part`; names of the files."""
     names = []
     with TemporaryDirectory(prefix="rigwatch-") as folder:
         for day, table in seconds.days():
-            name = (
-                f"{SECONDS}/rig={quote(rig, safe='') or 'unknown'}/day={day}/{content[:16]}.parquet"
-            )
+            name = f"{SECONDS}/rig={quote(rig, safe='') or 'unknown'}/day={day}/{part}.parquet"
             write_seconds(Path(folder, "part"), table)
             store.put(Path(folder, "part"), name)
             names.append(name)

@@ -64,7 +64,7 @@ def index(
     found = {entry.name: entry for entry in entries(outside_index(store))}
     kept = load(store)
     due = sorted(set(found) - kept.still_right({name: e.stamp for name, e in found.items()}))
-    gone = set(kept.sessions) - set(found)
+    gone = kept.with_recording() - set(found)
     kept.forget(gone | set(due))
     for start in range(0, max(1, len(due)), batch):
         part = [found[name] for name in due[start : start + batch]]

@@ -61,7 +61,8 @@ QUESTIONS: dict[str, Question] = {
     ),
     "unsound": Question(
         "sessions that are damaged, unfinished, unreadable or copies",
-        "select session, status, remark from sessions where status <> 'ok' order by session",
+        "select session, status, remark from sessions where status not in ('ok', 'thinned') "
+        "order by session",
     ),
     "overlaps": Question(
         "sessions of one rig that overlap in time: clocks or recorders that disagree",

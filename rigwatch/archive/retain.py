@@ -10,11 +10,12 @@ from datetime import UTC, datetime
 from itertools import groupby
 
 from rigwatch.archive.catalogue import FAILED, Catalogue, Row, load, save
-from rigwatch.archive.entry import UNFINISHED, UNREADABLE, Entry, entries
+from rigwatch.archive.entry import THINNED, UNFINISHED, UNREADABLE, Entry, entries
 from rigwatch.archive.indexing import outside_index, remove_unused
 from rigwatch.archive.store import Store
+from rigwatch.archive.thinning import thin
 from rigwatch.recorder import POSITIONS, expired
-from rigwatch.wire.errors import ArchiveError
+from rigwatch.wire.errors import ArchiveError, SessionError
 from rigwatch.wire.rig_config import RecorderSection
 
 _STAYS = (UNFINISHED, UNREADABLE, FAILED)
@@ -57,6 +58,7 @@ def retain(
     rig: str | None = None,
     now: datetime | None = None,
     remove: bool = False,
+    keep_seconds: bool = False,
     say: Callable[[str], None] = lambda _: None,
 ) -> Retained:
     """Find the sessions that rules remove from an archive, rig by rig, and remove them if wanted.
@@ -67,6 +69,7 @@ def retain(
         rig: only this one.
         now: present time; by default the clock's.
         remove: remove the files; otherwise only find them.
+        keep_seconds: keep the row, figures per second, alarms and losses of what is removed.
         say: called with progress.
 
     Raises:
@@ -84,6 +87,8 @@ def retain(
     for _, of_rig in groupby(old, key=lambda one: one.rig):
         done.expired += expired(of_rig, rules, now_s)
     if remove and done.expired:
+        if keep_seconds:
+            _thin(store, kept, found, done)
         _remove(store, kept, found, done, say)
     return done
 
@@ -101,6 +106,17 @@ def _old(row: Row) -> Old | None:
     return Old(row["session"], row["rig"], ended, row["bytes"], alarms)
 
 
+def _thin(store: Store, kept: Catalogue, found: dict[str, Entry], done: Retained) -> None:
+    """Figures first: a recording goes only once the catalogue holds what stays of it."""
+    for one in tuple(done.expired):
+        try:
+            thin(store, found[one.session], kept.sessions[one.session])
+        except (ArchiveError, SessionError) as error:
+            done.expired.remove(one)
+            done.failures.append(f"{one.session}: {error}")
+    save(store, kept)
+
+
 def _remove(
     store: Store,
     kept: Catalogue,
@@ -116,7 +132,7 @@ def _remove(
             gone.add(one.session)
         else:
             done.failures.append(f"{one.session}: {failure}")
-    kept.forget(gone)
+    kept.forget({name for name in gone if kept.sessions[name]["status"] != THINNED})
     save(store, kept)
     remove_unused(store, kept)
     done.removed = len(gone)

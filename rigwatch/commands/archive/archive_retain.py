@@ -15,6 +15,7 @@ HELP = "show which sessions are older or larger than wanted, and remove them wit
 EXAMPLE = """\
   rigwatch archive retain sessions --keep-days 90 --keep-alarm-days 730
   rigwatch archive retain sessions --keep-days 90 --keep-alarm-days 730 --remove
+  rigwatch archive retain sessions --keep-days 90 --keep-seconds --remove
   rigwatch archive retain s3://recordings/rigs --rig bench1 --keep-gigabytes 500 --remove"""
 EXIT_FAILED = 1
 _LIMITS = {
@@ -32,6 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(option, type=float, default=0.0, metavar="N", help=help_)
     parser.add_argument("--rig", help="only sessions of this rig")
     parser.add_argument("--remove", action="store_true", help="remove them; else they are shown")
+    parser.add_argument(
+        "--keep-seconds",
+        action="store_true",
+        help="keep the least, mean and largest value of each second, alarms and losses",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -43,6 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
         _rules(arguments),
         rig=arguments.rig,
         remove=arguments.remove,
+        keep_seconds=arguments.keep_seconds,
         say=say,
     )
     if arguments.json:

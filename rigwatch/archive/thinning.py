@@ -1,0 +1,44 @@
+"""Thins a session: of its samples and estimates stay the figures per second.
+
+The index has those of the estimates already; those of the samples are stored beside them, as names
+`samples.<channel>`. Values with a quality flag do not count.
+"""
+
+import numpy as np
+
+from rigwatch.archive.catalogue import Row
+from rigwatch.archive.entry import THINNED, Entry, stored_seconds
+from rigwatch.archive.second_aggregates import SecondAggregates
+from rigwatch.archive.store import Store
+from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
+from rigwatch.wire.session import open_session
+
+REMARK = "its recording is removed, its figures per second are kept"
+
+
+def thin(store: Store, entry: Entry, row: Row) -> None:
+    """Store the figures per second of a session's samples; its row says that it is thinned.
+
+    Raises:
+        ArchiveError: the store cannot be read or written.
+        SessionError: the session cannot be read.
+    """
+    if row["status"] == THINNED:
+        return
+    seconds = SecondAggregates()
+    with store.local([file.name for file in entry.files]) as paths:
+        for block in open_session(paths[0] if len(paths) == 1 else paths[0].parent).samples():
+            seconds.add(_as_figures(block))
+    names = stored_seconds(store, seconds, row["rig"], f"{row['content'][:16]}-samples")
+    row |= {"files": [*(row["files"] or ()), *names], "status": THINNED, "remark": REMARK}
+
+
+def _as_figures(block: SampleBlock) -> EstimateBlock:
+    """The channels as columns, with NaN for values that do not count."""
+    columns = [
+        Column(f"samples.{one.name}", one.unit, np.where(one.quality == 0, one.values, np.nan))
+        if len(one.quality)
+        else Column(f"samples.{one.name}", one.unit, one.values)
+        for one in block.channels
+    ]
+    return EstimateBlock(block.device, block.boot, block.seq, block.t_ns, tuple(columns))
