@@ -14,6 +14,7 @@ import os
 import shutil
 import sys
 import tempfile
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -112,8 +113,12 @@ def _told(name: str) -> tuple[str, ...]:
 
 
 def run(quick: bool) -> list[Row]:
-    """Eight sessions, or as many as RIGWATCH_YEAR_SESSIONS says (default 1000, about an hour)."""
+    """Eight sessions, or as many as RIGWATCH_YEAR_SESSIONS says (default 1000, about an hour).
+
+    After RIGWATCH_YEAR_MINUTES it ends with those that it has run.
+    """
     count = 8 if quick else int(os.environ.get("RIGWATCH_YEAR_SESSIONS", str(SESSIONS)))
+    until = time.monotonic() + 60.0 * float(os.environ.get("RIGWATCH_YEAR_MINUTES", "inf"))
     if IN_MEMORY.is_dir():
         os.environ["TMPDIR"] = tempfile.tempdir = str(IN_MEMORY)
     with live_rig() as rig:
@@ -124,8 +129,11 @@ def run(quick: bool) -> list[Row]:
             done = Year(processes)
             for session in year(count):
                 done.run(session)
+                if time.monotonic() > until:
+                    break
             done.end()
-            rows = _rows(done, f"a year, {count} sessions", limit)
+            ran = "" if session.index + 1 == count else f"{session.index + 1} of "
+            rows = _rows(done, f"a year, {ran}{count} sessions", limit)
         if kept := os.environ.get("RIGWATCH_YEAR_FOLDER"):
             shutil.copytree(rig.folder, kept, ignore=shutil.ignore_patterns("serial-line"))
     return rows
