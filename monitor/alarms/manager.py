@@ -43,14 +43,19 @@ class AlarmManager:
     Args:
         settings: sections by alarm or kind of alarm, from [monitor.alarms].
         file: the configuration's name, for errors.
+        longest_hold: missing samples that the estimates bridge.
 
     Raises:
         ConfigError: a section names no alarm.
     """
 
     def __init__(
-        self, settings: Mapping[str, AlarmSection] | None = None, file: str = "configuration"
+        self,
+        settings: Mapping[str, AlarmSection] | None = None,
+        file: str = "configuration",
+        longest_hold: int = 0,
     ) -> None:
+        self._longest_hold = longest_hold
         self._settings = dict(settings or {})
         check_settings(self._settings, file)
         self._alarms: dict[str, AlarmInstance] = {}
@@ -79,10 +84,7 @@ class AlarmManager:
             t_ns: shape (n,), their times [ns].
             conditions: each over the same n samples; one that is missing keeps its level.
         """
-        if self._next != (boot, seq):
-            for debouncer in self._debouncers.values():
-                debouncer.interrupt()
-        self._next = (boot, seq + len(t_ns))
+        self._follow(boot, seq, len(t_ns))
         for index, name, rising, at in sorted(
             self._edges(device, boot, seq, t_ns, conditions), key=lambda row: row[:2]
         ):
@@ -171,6 +173,16 @@ class AlarmManager:
         self._debouncer(said.name).level = record.active
         if said.first_out and said.state != "normal":
             self._first_out = said.name
+
+    def _follow(self, boot: int, seq: int, count: int) -> None:
+        """Interrupt the debouncers where the samples do not follow the last ones."""
+        before, self._next = self._next, (boot, seq + count)
+        if before == (boot, seq):
+            return
+        missing = seq - before[1] if before and before[0] == boot else 0
+        bridged = 0 < missing <= self._longest_hold
+        for debouncer in self._debouncers.values():
+            debouncer.interrupt(bridged=bridged)
 
     def _edges(
         self, device: str, boot: int, seq: int, t_ns: IntArray, conditions: Iterable[Condition]

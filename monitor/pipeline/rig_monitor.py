@@ -60,7 +60,7 @@ class RigMonitor:
         file: str = "configuration",
         friction: bool = True,
     ) -> None:
-        self.alarms = AlarmManager(settings, file)
+        self.alarms = AlarmManager(settings, file, model.decision.longest_hold)
         self._friction = friction
         self._pipeline = scheme_of(model)
         self._detectors = tuple(detectors)

@@ -27,6 +27,18 @@ def test_without_the_friction_scheme_its_alarms_stay_away_and_others_do_not() ->
     assert without <= {"gap", "sensor_invalid"}
 
 
+def test_friction_that_has_gone_clears_on_a_line_that_loses_a_sample_every_second() -> None:
+    watching, states = RigMonitor(model()), []
+    channels = run(SINE, 14.0, (*friction(8.0), *friction(9.0, 0.0)))
+    for first in range(0, 14 * 256, 256):
+        lost = 1 if first >= 6 * 256 else 0
+        watched = watching.update(block(channels, first + lost, first + 256))
+        assert watched is not None
+        said = (one for one in watched.announcements if isinstance(one, Alarm))
+        states += [alarm.state for alarm in said if alarm.name == "dry_friction"]
+    assert states == ["unacknowledged", "cleared_unacknowledged"]
+
+
 def test_estimates_are_made_with_and_without_the_friction_scheme() -> None:
     samples = block(run(SINE, 6.0))
     both = [RigMonitor(model(), friction=wanted).update(samples) for wanted in (True, False)]
