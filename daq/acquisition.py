@@ -13,11 +13,20 @@ from daq.clock import DeviceClock, host_offset_ns
 from daq.conditioning import Conditioner
 from daq.sequence import Hole, Restart, SequenceTracker
 from daq.watch import Link, Watch
-from rigwatch.wire.messages import Event, Gap, Message, SampleBlock, Severity
+from rigwatch.wire.bus import MAX_PAYLOAD
+from rigwatch.wire.messages import (
+    BlockSize,
+    Event,
+    Gap,
+    Message,
+    SampleBlock,
+    Severity,
+    pieces,
+)
 from rigwatch.wire.rig_config import RigConfig
 
 LONGEST_BLOCK = 1024
-"""Largest number of samples in a block, which keeps messages below the limit of the bus."""
+"""Largest number of samples in a block; many channels make it less, as the bus limits messages."""
 
 
 class Acquisition:
@@ -39,6 +48,7 @@ class Acquisition:
         self.device = config.daq.name
         self.source = f"daq/{config.daq.name}"
         self.samples = 0
+        self._most = 0
         self._host_offset_ns = host_offset_ns
         self.clock = DeviceClock(rate, clock_rate, host_offset_ns())
         self.tracker = SequenceTracker(rate)
@@ -98,7 +108,9 @@ class Acquisition:
                 text = f"the device's clock jumped by {jump:+.6f} s, its time is anchored anew"
                 messages.append(self._event(int(part.arrived_ns[0]), "warning", "clock_jump", text))
             block = self.conditioner.condition(part, stamps)
-            messages.append(self._counted(block, int(part.arrived_ns[-1])))
+            counted = self._counted(block, int(part.arrived_ns[-1]))
+            self._most = self._most or BlockSize.of(block).samples_in(MAX_PAYLOAD)
+            messages += pieces(counted, self._most)
         return messages
 
     def _counted(self, block: SampleBlock, arrived_ns: int) -> SampleBlock:

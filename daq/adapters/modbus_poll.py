@@ -2,9 +2,9 @@
 
     32 times a second:  header ─▶ how many samples are new ─▶ their slots ─▶ RawBlock
 
-The same for TCP and RTU, which differ in the `Registers` passed in. A failed poll is counted, and
-its samples stay in the device's ring for the next one; after several failures in a row the client
-reconnects.
+The same for TCP and RTU, which differ in the `Registers` passed in. A failed poll is counted. What
+it has read until then counts, and the rest stays in the device's ring for the next one; after
+several polls in a row that read nothing the client reconnects.
 """
 
 import time
@@ -98,7 +98,7 @@ class ModbusAdapter:
         """The new samples at the next poll, if it is due within `timeout` [s].
 
         Raises:
-            DeviceError: the link is gone, or several polls in a row failed.
+            DeviceError: the link is gone, or several polls in a row failed without a sample.
             ModbusError: the device refuses, or does not match the configuration.
         """
         wait = (self._next_poll - self._clock()) * 1e-9
@@ -107,14 +107,13 @@ class ModbusAdapter:
             return ()
         self._next_poll = max(self._next_poll + self._period_ns, self._clock())
         self._counts["polls"] += 1
+        blocks: list[RawBlock] = []
         try:
-            blocks = self._poll()
-        except RefusedError:
-            raise
-        except ModbusError as error:
-            self._count_failure(error)
-            return ()
-        self._failed = 0
+            self._poll(blocks)
+        except (ModbusError, DeviceError) as error:
+            self._fail(error, has_read=bool(blocks))
+        else:
+            self._failed = 0
         return blocks
 
     def close(self) -> None:
@@ -125,10 +124,15 @@ class ModbusAdapter:
         """Number of polls, and of failed polls."""
         return dict(self._counts)
 
-    def _count_failure(self, error: ModbusError) -> None:
+    def _fail(self, error: ModbusError | DeviceError, *, has_read: bool) -> None:
+        """Count a failed poll; an error that lasts is raised by the next one that reads nothing."""
         self._counts["failed_polls"] += 1
         self.trouble = str(error)
-        self._failed += 1
+        self._failed = 0 if has_read else self._failed + 1
+        if has_read:
+            return
+        if isinstance(error, RefusedError | DeviceError):
+            raise error
         if self._failed >= _FAILURES:
             raise DeviceError(f"{self._failed} polls in a row failed, the last: {error}") from error
 
@@ -139,17 +143,16 @@ class ModbusAdapter:
             raise RefusedError(f"{found}, the configuration has {self._channels}")
         return header
 
-    def _poll(self) -> list[RawBlock]:
+    def _poll(self, blocks: list[RawBlock]) -> None:
+        """Read the new samples into `blocks`, which has those read so far if it fails."""
         header = self._header()
         new = self._new(header)
         arrived = self._clock()
-        blocks = []
         while new > 0:
             count = min(new, header.slots_a_read, header.slots - self._next_seq % header.slots)
             blocks.append(self._slots(header, count, arrived))
             self._next_seq = (self._next_seq + count) % _U32
             new -= count
-        return blocks
 
     def _new(self, header: Header) -> int:
         """Samples to read, from `_next_seq` on."""

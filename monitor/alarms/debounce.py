@@ -2,7 +2,8 @@
 
 The level rises at the `persistence`-th consecutive sample with the condition and falls at the
 `clear_after`-th consecutive sample without it, independently of how samples are divided into
-blocks.
+blocks. A run of samples with the condition ends at a gap. One of samples without it continues where
+the gap was bridged: else no alarm would clear on a line that loses a sample now and then.
 """
 
 from dataclasses import dataclass
@@ -46,9 +47,14 @@ class Debouncer:
         self._run = 0
         self._onset_seq = -1
 
-    def interrupt(self) -> None:
-        """Discard a run in progress: the next sample does not follow the last one."""
-        self._run = 0
+    def interrupt(self, *, bridged: bool = False) -> None:
+        """Discard a run in progress: the next sample does not follow the last one.
+
+        Args:
+            bridged: so few samples are missing that estimates continue; a falling run does, too.
+        """
+        if not (bridged and self.level):
+            self._run = 0
 
     def update(self, active: NDArray[np.uint8], first_seq: int) -> list[Edge]:
         """Edges within a block whose first sample is `first_seq`; `active` has shape (n,)."""

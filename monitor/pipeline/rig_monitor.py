@@ -60,7 +60,7 @@ class RigMonitor:
         file: str = "configuration",
         friction: bool = True,
     ) -> None:
-        self.alarms = AlarmManager(settings, file)
+        self.alarms = AlarmManager(settings, file, model.decision.longest_hold)
         self._friction = friction
         self._pipeline = scheme_of(model)
         self._detectors = tuple(detectors)
@@ -104,7 +104,10 @@ class RigMonitor:
 
     def announce(self, at: EstimateBlock, conditions: tuple[Condition, ...]) -> list[Announcement]:
         """Messages of the alarms for conditions, in order."""
-        return self.alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
+        said = self.alarms.update(at.device, at.boot, at.seq, at.t_ns, conditions)
+        if self.alarms.has_inherited:
+            said += self.alarms.retire((c.name for c in conditions), int(at.t_ns[-1]))
+        return said
 
     @property
     def model(self) -> RigModel:

@@ -164,6 +164,34 @@ def test_a_run_does_not_continue_across_missing_samples():
     assert said[0].onset_seq == 500
 
 
+def lossy(missing: int) -> AlarmManager:
+    """A departure that has gone, on a line that loses `missing` samples after every eight."""
+    alarms = AlarmManager({"departure": GONE_AFTER}, longest_hold=4)
+    run(alarms, [condition("departure", spell(20, (0, 20)))])
+    for first in range(20, 120, 8 + missing):
+        alarms.update("rig", 7, first, times(8, first), [condition("departure", [0] * 8)])
+    return alarms
+
+
+@pytest.mark.parametrize(("missing", "clears"), [(1, True), (4, True), (5, False)])
+def test_a_condition_that_has_gone_clears_across_gaps_that_the_estimates_bridge(missing, clears):
+    gone = lossy(missing).standing()[0].state == "cleared_unacknowledged"
+    assert gone == clears
+
+
+def test_samples_lost_in_a_gap_do_not_count_as_samples_without_the_condition():
+    alarms = AlarmManager({"departure": GONE_AFTER}, longest_hold=4)
+    run(alarms, [condition("departure", spell(28, (0, 20)))])
+    said = alarms.update("rig", 7, 31, times(8, 31), [condition("departure", [0] * 8)])
+    assert steps(said) == [("departure", "cleared_unacknowledged", 32)]
+
+
+def test_persistence_does_not_count_across_a_bridged_gap_either():
+    alarms = AlarmManager({"departure": LATCHED}, longest_hold=4)
+    alarms.update("rig", 7, 0, times(2), [condition("departure", [1, 1])])
+    assert alarms.update("rig", 7, 3, times(2, 3), [condition("departure", [1, 1])]) == []
+
+
 def _quiet(n: int):
     return times(n, 20), [condition("departure", [0] * n)]
 

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
 from daq.acquisition import LONGEST_BLOCK, Acquisition
 from daq.adapter import RawBlock
 from daq.watch import Link
+from rigwatch.wire.bus import MAX_PAYLOAD
 from rigwatch.wire.messages.message_types import Event, Health, SampleBlock
 from rigwatch.wire.messages.protobuf import decode, encode
 from tests.daq.rig import codes_of, config_of
@@ -34,6 +36,18 @@ def test_long_blocks_are_cut_to_what_a_message_carries() -> None:
     blocks = acquiring.update(raw_of(0, 3 * LONGEST_BLOCK + 5))
     assert [len(block) for block in blocks] == [LONGEST_BLOCK] * 3 + [5]  # type: ignore[arg-type]
     assert acquiring.samples == 3 * LONGEST_BLOCK + 5
+
+
+def test_blocks_of_many_channels_are_cut_to_what_the_bus_carries() -> None:
+    config = config_of('adapter = "serial"\nport = "x"')
+    many = tuple(msgspec.structs.replace(config.channels[0], name=f"c{k}") for k in range(48))
+    acquiring = Acquisition(msgspec.structs.replace(config, channels=many))
+    raw = raw_of(0, LONGEST_BLOCK + 5)
+    wide = replace(raw, codes=np.tile(raw.codes, 16))
+    blocks = [block for block in acquiring.update(wide) if isinstance(block, SampleBlock)]
+    assert max(len(encode(block)) for block in blocks) <= MAX_PAYLOAD
+    assert [n for b in blocks for n in range(b.seq, b.seq + len(b))] == list(range(1029))
+    assert acquiring.samples == 1029
 
 
 def test_messages_survive_the_wire() -> None:

@@ -12,7 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ import pytest
 
 from daq.adapters import adapter_for
 from daq.adapters.modbus_poll import ModbusAdapter, RefusedError
-from rigwatch.wire.device.modbus_map import Header, encode_header
+from rigwatch.wire.device.modbus_map import Header, encode_header, encode_slot
 from rigwatch.wire.errors import DeviceError, ModbusError
 from rigwatch.wire.host.ports import free_port
 from sim_plant.serve.modbus_server import ModbusServer
@@ -261,12 +261,57 @@ def test_another_number_of_channels_is_refused() -> None:
         adapter.open()
 
 
+class Slots(Still):
+    """A ring of slots whose `fails_at`-th read from now on fails with `error`."""
+
+    def __init__(self) -> None:
+        super().__init__(Header(3, 1, 1, 0, 1024))
+        self.fails_at, self.error = 0, ModbusError("no valid answer in time")
+
+    def read(self, address: int, count: int) -> list[int]:
+        self.fails_at -= 1
+        if self.fails_at == 0:
+            raise self.error
+        if address == 0:
+            return super().read(address, count)
+        first = (address - self.header.address(0)) // self.header.slot_length
+        slots = range(first, first + count // self.header.slot_length)
+        return [word for seq in slots for word in encode_slot(seq, seq * 3906, [seq, 0, 0])]
+
+
+@pytest.mark.parametrize("error", [ModbusError("late"), RefusedError("no"), DeviceError("gone")])
+def test_a_poll_that_fails_halfway_loses_nothing_of_what_it_has_read(error: Exception) -> None:
+    registers = Slots()
+    adapter = ModbusAdapter(registers, channels=3, sleep=lambda seconds: None, polls=1e6)
+    adapter.open()
+    before = adapter.read(1.0)
+    registers.header = replace(registers.header, samples=77)
+    registers.fails_at, registers.error = 4, error
+    halfway = adapter.read(1.0)
+    assert adapter.counters()["failed_polls"] == 1
+    blocks = [*before, *halfway, *adapter.read(1.0)]
+    assert [seq for block in blocks for seq in block.seq] == list(range(77))
+    assert [code for block in blocks for code in block.codes[:, 0]] == list(range(77))
+
+
+@pytest.mark.parametrize("error", [RefusedError("no"), DeviceError("gone")])
+def test_an_error_after_which_no_poll_helps_ends_the_poll_that_reads_nothing(
+    error: Exception,
+) -> None:
+    registers = Slots()
+    adapter = ModbusAdapter(registers, channels=3, sleep=lambda seconds: None, polls=1e6)
+    adapter.open()
+    registers.fails_at, registers.error = 2, error
+    with pytest.raises(type(error)):
+        adapter.read(1.0)
+
+
 def test_a_device_that_always_fails_is_given_up_and_opened_anew() -> None:
     registers = Still(Header(3, 1, 0, 0, 64))
     adapter = ModbusAdapter(registers, channels=3, sleep=lambda seconds: None, polls=1e6)
     adapter.open()
     registers.read = lambda address, count: [0] * (count - 1)  # type: ignore[method-assign]
-    assert [adapter.read(1.0), adapter.read(1.0)] == [(), ()]
+    assert [adapter.read(1.0), adapter.read(1.0)] == [[], []]
     with pytest.raises(DeviceError, match="3 polls in a row failed, the last: a reply of 15 reg"):
         adapter.read(1.0)
     with pytest.raises(ModbusError):

@@ -11,15 +11,17 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from rigwatch.wire.bus import Bus
-from rigwatch.wire.messages import RING_KEY, Column, SampleBlock
+from rigwatch.wire.bus import MAX_PAYLOAD, Bus
+from rigwatch.wire.messages import RING_KEY, BlockSize, Column, SampleBlock
 from rigwatch.wire.ordering import UNKNOWN, Ask, RingReply
 
 SOURCE_KEY = "source"
 """Place of source tokens, named `<boot>/<start as Unix time in ns>/<identity on the bus>`."""
-SAMPLES_PER_REPLY = 1024
-RUNS_PER_REPLY = 64
-"""Largest number of samples in a reply, so that replying never delays the publishing of samples."""
+SAMPLES_PER_REPLY, RUNS_PER_REPLY = 1024, 64
+"""Largest numbers of samples and of runs of them in a reply, so that replying never delays the
+publishing of samples."""
+REPLY_BYTES = MAX_PAYLOAD // 2
+"""Largest size of a reply [bytes]: samples of many channels fill it before they are too many."""
 
 
 class RingStore:
@@ -35,6 +37,7 @@ class RingStore:
         self.device, self.boot, self.capacity = head.device, head.boot, capacity
         self.layout = _layout(head)
         self.newest = -1
+        self._size = BlockSize.of(head)
         self._seq = np.full(capacity, -1, np.int64)
         self._device_us = np.zeros(capacity, np.int64)
         self._t_ns = np.zeros(capacity, np.int64)
@@ -69,13 +72,20 @@ class RingStore:
         last = min(ask.last, self.newest)
         first = min(max(ask.first, self.newest - self.capacity + 1, 0), last + 1)
         # Samples older than the ring are settled as well: they are permanently lost.
-        last = min(last, first + SAMPLES_PER_REPLY - 1)
+        most = min(SAMPLES_PER_REPLY, self._size.samples_in(REPLY_BYTES))
+        last = min(last, first + most - 1)
         seq = np.arange(first, last + 1)
         runs = _runs(seq[self._seq[seq % self.capacity] == seq])
-        if len(runs) > RUNS_PER_REPLY:
-            runs = runs[:RUNS_PER_REPLY]
-            last = int(runs[-1][-1])
-        return RingReply(self.boot, last, tuple(self._block(run) for run in runs))
+        fitting = self._fitting(runs)
+        if len(fitting) < len(runs):
+            last = int(fitting[-1][-1])
+        return RingReply(self.boot, last, tuple(self._block(run) for run in fitting))
+
+    def _fitting(self, runs: list[NDArray[np.int64]]) -> list[NDArray[np.int64]]:
+        """The first runs, as many as fit into one reply."""
+        sizes = np.cumsum([self._size.frame + self._size.sample * len(run) for run in runs])
+        count = int(np.searchsorted(sizes, REPLY_BYTES, side="right"))
+        return runs[: min(max(count, 1), RUNS_PER_REPLY)]
 
     def first(self) -> SampleBlock:
         """The oldest sample stored."""

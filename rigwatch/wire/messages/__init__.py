@@ -2,10 +2,12 @@
 
 `message_types` declares every message, `protobuf` turns it into bytes, `topics` is the
 table of topics. `packed` reads the arrays of long blocks in place, `gathered` those of short ones
-in one go. `blocks` cuts and joins blocks of samples without touching a value.
+in one go. `blocks` cuts and joins blocks of samples without touching a value; `block_size` tells
+how many samples a message holds.
 """
 
 from rigwatch.wire.messages import blocks, protobuf_schema, quality_flags
+from rigwatch.wire.messages.block_size import BlockSize
 from rigwatch.wire.messages.blocks import (
     Block,
     columns_of,
@@ -94,6 +96,7 @@ __all__ = [
     "AlarmCommand",
     "AlarmState",
     "Block",
+    "BlockSize",
     "ByteArray",
     "Column",
     "EstimateBlock",
