@@ -55,7 +55,7 @@ demo-headless: $(STAMPS)/run
 unit: $(STAMPS)/dev viewer-packages
 	@if [ "$${CI:-}" = true ] && [ ! -d "$${RIGWATCH_DATA:-}" ]; then \
 		echo "test: RIGWATCH_DATA names no folder with the measured data sets" >&2; exit 1; fi
-	@pytest -n $(WORKERS) --dist loadgroup --cache-clear $(TESTS) || $(MAKE) --no-print-directory again
+	@pytest -n $(WORKERS) --dist loadgroup --no-loadscope-reorder --cache-clear $(TESTS) || $(MAKE) --no-print-directory again
 
 # Real processes, lines and browsers beside each other on a busy machine may miss a moment. What
 # fails twice, the second time alone, fails; the first failure remains printed above.

@@ -24,6 +24,12 @@ settings.register_profile(
 settings.load_profile("rigwatch")
 
 
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Keep a file's tests in one worker, which makes what they share only once."""
+    if item.get_closest_marker("xdist_group") is None:
+        item.add_marker(pytest.mark.xdist_group(item.location[0]))
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin what takes long, so that no worker is left with it at the end."""
     items.sort(key=lambda item: item.get_closest_marker("long") is None)

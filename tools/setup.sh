@@ -42,9 +42,30 @@ fi
 
 # Some rivals in the benchmarks are published as source only: they are built with the locked tools
 # that are already in the environment, so that nothing unlocked is fetched.
+install() {
+    PIP_DISABLE_PIP_VERSION_CHECK=1 "$venv/bin/python" -m pip install --progress-bar off \
+        --require-hashes --no-deps --no-build-isolation -r "$1" 2>"$venv/setup-errors.txt"
+}
+
+# Tells of pip's output, which comes on standard input, how far it is: progress PACKAGES.
+progress() {
+    count=0
+    while read -r word rest; do
+        case "$word $rest" in
+        *" (from -r "*)
+            count=$((count + 1))
+            if [ $((count % 10)) = 0 ]; then echo "setup:   $count of $1 packages are here"; fi
+            ;;
+        "Installing collected packages"*) echo "setup:   they are being installed" ;;
+        "setup failed") return 1 ;;
+        esac
+    done
+}
+
 for lock in "$@"; do
-    echo "setup: $lock"
-    PIP_DISABLE_PIP_VERSION_CHECK=1 "$venv/bin/python" -m pip install --quiet --quiet \
-        --require-hashes --no-deps --no-build-isolation -r "$lock"
+    packages=$(grep -c '^[A-Za-z0-9]' "$lock")
+    echo "setup: $lock: $packages packages, usually about a minute, more where the network is slow"
+    { install "$lock" || { cat "$venv/setup-errors.txt" >&2 && echo "setup failed"; }; } \
+        | progress "$packages"
 done
 "$venv/bin/python" -m pip install --quiet --quiet --no-deps --no-build-isolation --editable .

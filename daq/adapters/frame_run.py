@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 
 from daq.adapter import RawBlock
 from rigwatch.wire.arrays import IntArray
-from rigwatch.wire.device import VERSION
+from rigwatch.wire.device import CRC_SIZE, HEAD_SIZE, LONGEST, VERSION
 from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import ByteArray
 
-_HEAD, _CRC, _LARGEST = 13, 4, 254
-"""Bytes before the codes, those of the checksum, and most that a frame may have."""
 _POLYNOMIAL = 0xEDB88320
 
 
@@ -38,7 +36,7 @@ def read_run(whole: bytes, channels: int, arrived_ns: int) -> RawBlock | None:
     Returns:
         None if a frame is damaged, of another shape, or not of the first one's boot.
     """
-    most = len(whole) // (_HEAD + 2 * channels + _CRC) + 1
+    most = len(whole) // (HEAD_SIZE + 2 * channels + CRC_SIZE) + 1
     numbers, codes = np.empty((2, most), np.int64), np.empty((most, channels), np.int16)
     boot = np.empty(1, np.int64)
     found = _read(np.frombuffer(whole, np.uint8), VERSION, boot, numbers, codes)
@@ -54,8 +52,8 @@ def _read(
 ) -> int:
     """Number of frames, whose contents are written to the arrays; -1 if one is not usual."""
     channels = codes.shape[1]
-    size = _HEAD + 2 * channels + _CRC
-    frame = np.empty(_LARGEST, np.uint8)
+    size = HEAD_SIZE + 2 * channels + CRC_SIZE
+    frame = np.empty(LONGEST, np.uint8)
     at = found = 0
     while at < data.size:
         end = at
@@ -63,14 +61,14 @@ def _read(
             end += 1
         if _unstuff(data, at, end, frame) != size or frame[0] != version:
             return -1
-        if _checksum(frame, size - _CRC) != _u32(frame, size - _CRC):
+        if _checksum(frame, size - CRC_SIZE) != _u32(frame, size - CRC_SIZE):
             return -1
         if found > 0 and _u32(frame, 1) != boot[0]:
             return -1
         boot[0] = _u32(frame, 1)
         numbers[0, found], numbers[1, found] = _u32(frame, 5), _u32(frame, 9)
         for k in range(channels):
-            place = _HEAD + 2 * k
+            place = HEAD_SIZE + 2 * k
             code = np.int64(frame[place]) | np.int64(frame[place + 1]) << 8
             codes[found, k] = code - 65536 if code >= 32768 else code
         found += 1

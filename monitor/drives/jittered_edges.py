@@ -11,22 +11,15 @@ over the samples. Where between samples they are cannot be told, as it can be of
 # Compiled functions are untyped to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from monitor.drives.edges import LARGEST, LAST, SHORTEST, edge
 from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
 
-EDGE = 0.25
-"""Step, relative to the largest, above which it is an edge."""
-KEEPS = 0.9999
-"""What is left of the largest after a sample."""
-SHORTEST = 6.0
-"""Interval above which a step is an edge, and not part of a smooth drive or of noise [samples]."""
 COUNT, NEAR = 8, 2.0
 """Intervals that are compared, and difference of two above which the wave is not steady."""
 LATE = 2.0
@@ -41,7 +34,7 @@ class JitteredEdges:
     def __init__(self) -> None:
         self._intervals = np.zeros((2, COUNT))
         self._ways = np.zeros((2, 2))
-        self._kept = np.zeros(len(_AT))
+        self._kept = np.zeros(4)
 
     def update(self, signal: FloatArray, code: Codes) -> BoolArray:
         """Whether its edges jitter or slide, shape (n,), with states of the admission."""
@@ -50,17 +43,8 @@ class JitteredEdges:
         return found
 
 
-class _At(NamedTuple):
-    """Indices of the carried figures."""
-
-    last: int = 0
-    largest: int = 1
-    age: int = 2
-    ago: int = 3
-
-
-_AT = _At()
-LAST, LARGEST, AGE, AGO = _AT
+AGE, AGO = LARGEST + 1, LARGEST + 2
+"""Carried figures beside those of `edge`: samples since the last, and since edges jittered."""
 OWN_AGE, FILLED = range(2)
 """Carried figures of edges that rise and of those that fall: age of the last, and number of
 intervals, below 0 without an edge.
@@ -84,13 +68,11 @@ def _advance(  # noqa: PLR0917 -- a kernel
             ways[:, FILLED] = -1.0
         if code[k] == DEAD:
             continue
-        step = signal[k] - kept[LAST]
-        kept[LAST] = signal[k]
-        kept[LARGEST] = max(KEEPS * kept[LARGEST], abs(step))
+        step = edge(signal[k], kept)
         kept[AGE] += 1.0
         ways[:, OWN_AGE] += 1.0
         kept[AGO] = min(kept[AGO] + 1.0, REMEMBERED)
-        if abs(step) > EDGE * kept[LARGEST]:
+        if step != 0.0:
             if kept[AGE] < SHORTEST:
                 ways[:, FILLED] = -1.0
             else:

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from monitor.drives.jittered_edges import EDGE, KEEPS, SHORTEST
+from monitor.drives.edges import LARGEST, LAST, SHORTEST, edge
 from monitor.signals import DEAD, NEW_BOOT, RESTART, Codes
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
@@ -95,7 +95,8 @@ class _Own(NamedTuple):
 
 _OWN = _Own()
 FILLED, AGE, INTERVAL, EARLY, SPREAD, LOCATED = _OWN
-LAST, LARGEST, FOLLOWS = range(3)
+FOLLOWS = LARGEST + 1
+"""Carried figure beside those of `edge`: share of the last edge that this sample takes."""
 SAMPLE, GAIN = range(2)
 
 
@@ -119,14 +120,12 @@ def _advance(  # noqa: PLR0917 -- a kernel
             _forget(ways)
         if code[k] == DEAD:
             continue
-        step = signal[k] - kept[LAST]
-        kept[LAST] = signal[k]
-        kept[LARGEST] = max(KEEPS * kept[LARGEST], abs(step))
+        step = edge(signal[k], kept)
         ways[:, AGE] += 1.0
         delayed[:, :-1] = delayed[:, 1:]
         delayed[SAMPLE, -1], delayed[GAIN, -1] = signal[k], kept[FOLLOWS]
         kept[FOLLOWS] = 0.0
-        if abs(step) > EDGE * kept[LARGEST]:
+        if step != 0.0:
             if ways[:, AGE].min() < SHORTEST:
                 _forget(ways)
             way = 1 if step > 0.0 else 0

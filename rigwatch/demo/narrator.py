@@ -20,11 +20,10 @@ NAMELESS = "departure"
 
 @dataclass(frozen=True, slots=True)
 class Act:
-    """A change to the simulated rig: its sample, and a description."""
+    """A change to the simulated rig: its sample, whether a fault begins with it, a description."""
 
     seq: int
-    effect: str
-    value: float
+    begins: bool
     text: str
 
 
@@ -35,9 +34,10 @@ def acts(scenario: Scenario) -> Iterator[Act]:
         for event in sorted(scenario.events, key=lambda event: event.at_s):
             words = f"{event.effect} becomes {{value:g}}"
             begins, ends = ACTS.get(event.effect, (words, words))
-            text = ends if event.value == NEUTRAL.get(event.effect) else begins
+            faulty = event.value != NEUTRAL.get(event.effect)
+            text = begins if faulty else ends
             seq = round((cycle + event.at_s) * rate)
-            yield Act(seq, event.effect, event.value, text.format(value=event.value))
+            yield Act(seq, faulty, text.format(value=event.value))
         if not scenario.cycle_s:
             return
         cycle += scenario.cycle_s
@@ -69,6 +69,14 @@ class Narrator:
             self._last = self._next
             self._say(f"{self._time(self._last.seq)} the rig: {self._last.text}")
             self._next = next(self._acts, None)
+            if not self._last.begins:
+                self.announce(self._last.seq)
+
+    def announce(self, seq: int) -> None:
+        """Say how long after this sample the next fault comes; nothing if none does."""
+        if self._next is not None and self._next.begins:
+            wait = (self._next.seq - seq) / self._rate
+            self._say(f"            the next fault comes in {wait:.0f} s; Ctrl-C ends the demo")
 
     def judged(self, seq: int) -> None:
         """Report the end of an alarm once the monitor is a second of samples past it.

@@ -113,8 +113,9 @@ class Show:
 
     def _take(self, blocks: list[SampleBlock]) -> None:
         if not self._seen:
-            self._say("samples arrive: the rig moves, healthy so far; Ctrl-C ends the demo")
+            self._say("samples arrive: the rig moves, healthy so far")
             self._first = blocks[0].seq
+            self._narrator.announce(self._first)
         self._seen = blocks[-1].seq + len(blocks[-1])
         self._narrator.samples(self._seen)
 

@@ -6,6 +6,7 @@ the foreign rig's folder lacks. Strengths are drawn from the member's seed and t
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -77,12 +78,14 @@ class Strengths:
         return {"dry": float(np.clip(self(0.17, 0.25) * self.force, 0.5, 0.9))}
 
 
+@cache
 def tuned_force(member: Member) -> float:
     """Largest force on the healthy mass [N] with 1.4 V at 8 Hz."""
     out = free_run(member, voltage(SINE8, member, 4.0)[:, 0], member.rest.copy())
     return float(member["mass"] * np.ptp(out[-round(RATE) :, 2]) / 2)
 
 
+@cache
 def held_back(member: Member, drive: Drive, seconds: float, most: float) -> Drive:
     """The drive with the voltage at which the healthy mass stays within `most` [m]."""
     for _ in range(4):

@@ -204,6 +204,7 @@ class Field:
         model: RigModel = MODEL,
     ) -> None:
         self.folder, self.journal = folder, folder / "alarms.jsonl"
+        self._read: tuple[tuple[int, int, int], list[AlarmRecord]] = (0, 0, 0), []
         self.rig = TestRig(folder, lease=lease)
         names = [(name, (keys or {}).get(name, "")) for name in GAINS]
         channels = "".join(
@@ -285,7 +286,7 @@ class Field:
             topic: self.bus.subscribe(topic) for topic in (ALARMS, ESTIMATES, EVENTS, GAPS, HEALTH)
         }
         subscriptions[SAMPLES] = self.bus.subscribe_lossy(SAMPLES)
-        while not stop.wait(0.005):
+        while not stop.wait(0.02):
             for topic, subscription in subscriptions.items():
                 self.heard.of(topic).extend(subscription.drain())
 
@@ -315,8 +316,10 @@ class Field:
         """Values and quality flags of the samples from `first` to `last`, once they have come."""
         found: dict[int, tuple[float, int]] = {}
 
+        newest = since_last(self.samples)
+
         def there() -> bool:
-            for block in [b for b in list(self.samples) if b.boot == boot]:
+            for block in [b for b in newest() if b.boot == boot]:
                 read = block.channel(channel)
                 pairs = zip(read.values, read.quality, strict=True)
                 found.update({block.seq + i: pair for i, pair in enumerate(pairs)})
@@ -363,7 +366,18 @@ class Field:
 
     def journalled(self, name: str) -> list[AlarmRecord]:
         """Every transition of an alarm, also of those that a flood groups."""
-        return [one for one in read_journal(self.journal)[0] if one.alarm.name == name]
+        return [one for one in self._journal() if one.alarm.name == name]
+
+    def _journal(self) -> list[AlarmRecord]:
+        """All records; the file is read only where it has changed."""
+        try:
+            found = self.journal.stat()
+        except FileNotFoundError:
+            return []
+        state = found.st_ino, found.st_size, found.st_mtime_ns
+        if self._read[0] != state:
+            self._read = state, read_journal(self.journal)[0]
+        return self._read[1]
 
     def raised(self, name: str, *, after_ns: int = 0, after_seq: int = -1) -> Alarm:
         """The alarm raised first since a moment, or from a sample on; waits for it."""
@@ -402,10 +416,9 @@ class Field:
 
     def judged(self, boot: int, seq: int) -> None:
         """Wait until the monitor has estimated a sample."""
+        newest = since_last(self.estimates())
         eventually(
-            lambda: any(
-                b.boot == boot and b.seq + len(b) > seq for b in reversed(self.estimates())
-            ),
+            lambda: any(b.boot == boot and b.seq + len(b) > seq for b in newest()),
             f"estimates up to sample {seq}",
         )
 
@@ -418,6 +431,19 @@ class Field:
 
         eventually(there, what)
         return got[0]
+
+
+def since_last(growing: list[Any]) -> Callable[[], list[Any]]:
+    """What has been added to a list since the last call; all of it at the first."""
+    seen = 0
+
+    def newest() -> list[Any]:
+        nonlocal seen
+        found = growing[seen:]
+        seen += len(found)
+        return found
+
+    return newest
 
 
 def numbers(blocks: list[Any], boot: int) -> list[int]:

@@ -60,9 +60,13 @@ def lost(rig: Field, since: int) -> list[tuple[int, int]]:
 def estimated(rig: Field, boot: int, first: int, last: int, column: str = "") -> np.ndarray:
     """Numbers of the samples with estimates, or a column of them, once all have come."""
     rig.judged(boot, last)
-    blocks = [b for b in rig.estimates() if b.boot == boot]
-    seqs = np.concatenate([np.arange(b.seq, b.seq + len(b)) for b in blocks])
-    values = np.concatenate([b.column(column).values for b in blocks]) if column else seqs
+    near = [
+        b for b in rig.estimates() if b.boot == boot and b.seq <= last and b.seq + len(b) > first
+    ]
+    if not near:
+        return np.zeros(0)
+    seqs = np.concatenate([np.arange(b.seq, b.seq + len(b)) for b in near])
+    values = np.concatenate([b.column(column).values for b in near]) if column else seqs
     return values[(seqs >= first) & (seqs <= last)]
 
 

@@ -2,11 +2,8 @@
 
 import errno
 import os
-import resource
-import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +26,7 @@ from rigwatch.wire.messages.protobuf_schema import file_descriptor_set, type_nam
 from rigwatch.wire.session import LARGEST_BLOCK, SessionWriter, open_session, run_info
 from rigwatch.wire.session.merging import merge_pending
 from rigwatch.wire.session.writer import SPILL, message_time
+from tests.recorder.full_disk import largest_file
 
 RUN = run_info("bench1", 256.0, t_ns=1)
 Write = Callable[[int, bytes], int]
@@ -264,19 +262,6 @@ def test_an_existing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(SessionError) as refused:
         SessionWriter(path, RUN)
     assert str(refused.value) == f"{path}: the file exists already and is not overwritten"
-
-
-@contextmanager
-def largest_file(size: int) -> Iterator[None]:
-    """The kernel refuses to let any file grow beyond `size` bytes."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        signal.signal(signal.SIGXFSZ, ignored)
 
 
 def test_a_file_whose_head_cannot_be_written_is_taken_away(tmp_path: Path) -> None:

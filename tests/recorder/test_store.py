@@ -1,9 +1,5 @@
 """The recorder's store against a disk that fills up, is missing, and comes back."""
 
-import resource
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +10,7 @@ from rigwatch.recorder.store import Store
 from rigwatch.wire.host import free_share
 from rigwatch.wire.messages.message_types import Column, Event, Health, SampleBlock
 from rigwatch.wire.session import open_session, run_info
+from tests.recorder.full_disk import largest_file
 
 RUN = run_info("bench1", 256.0, t_ns=1)
 
@@ -31,19 +28,6 @@ def recorded(folder: Path) -> list[int]:
     found = list(session.samples())
     assert session.lost == ()
     return [seq for b in found for seq in range(b.seq, b.seq + len(b))]
-
-
-@contextmanager
-def largest_file(size: int) -> Iterator[None]:
-    """The kernel refuses to let any file grow beyond `size` bytes: a disk that is full."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        signal.signal(signal.SIGXFSZ, ignored)
 
 
 def codes(events: list[Event]) -> list[str]:

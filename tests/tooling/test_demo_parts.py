@@ -118,6 +118,19 @@ def test_an_alarm_is_reported_with_its_cause_and_its_delay_after_what_was_done()
     assert "raised after 125 ms" in said[3]
 
 
+def test_the_wait_for_the_next_fault_is_told_at_the_start_and_after_each_one() -> None:
+    said: list[str] = []
+    narrator = Narrator(load_scenario(find_config("scenarios/demo.toml")), said.append)
+    narrator.announce(5 * RATE)
+    assert "the next fault comes in 15 s; Ctrl-C ends the demo" in said[-1]
+    narrator.samples(40 * RATE)
+    assert "dry friction" in said[-1]
+    narrator.samples(46 * RATE)
+    assert "the next fault comes in 30 s" in said[-1]
+    narrator.samples(96 * RATE)
+    assert "the next fault comes in 45 s" in said[-1]  # the scenario has begun anew
+
+
 def test_a_departure_that_gets_a_name_has_not_gone() -> None:
     said: list[str] = []
     narrator = Narrator(load_scenario(find_config("scenarios/demo.toml")), said.append)

@@ -106,6 +106,45 @@ def test_without_a_suitable_python_the_suitable_ones_are_named(
     assert not (tmp_path / "venv").exists()
 
 
+@pytest.fixture
+def environment(bare_path: Path, tmp_path: Path) -> Path:
+    """An environment with a pip that takes the packages of a lock file, but no refused one."""
+    for tool in ("sed", "cat"):
+        found = shutil.which(tool)
+        assert found is not None
+        (bare_path / tool).symlink_to(found)
+    (tmp_path / "venv" / "bin").mkdir(parents=True)
+    script(
+        tmp_path / "venv" / "bin" / "python",
+        """for last in "$@"; do :; done
+[ -f "$last" ] || exit 0
+sed -n 's/^[a-z].*/Collecting & (from -r lock.txt (line 1))/p' "$last"
+if grep -q refused "$last"; then echo 'ERROR: wrong hash' >&2; exit 1; fi
+echo 'Installing collected packages: all'""",
+    )
+    return tmp_path / "venv"
+
+
+def test_the_set_up_says_how_far_it_is(environment: Path, bare_path: Path, tmp_path: Path) -> None:
+    lock = tmp_path / "lock.txt"
+    lock.write_text("".join(f"package{n}==1\n    --hash=sha256:0\n" for n in range(25)))
+    done = run_tool("setup.sh", str(environment), str(lock), path=bare_path)
+    first, *rest = done.stdout.splitlines()
+    assert "lock.txt: 25 packages" in first
+    assert [line.split(":")[1].split()[0] for line in rest] == ["10", "20", "they"]
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_set_up_that_fails_says_why_and_ends_with_an_error(
+    environment: Path, bare_path: Path, tmp_path: Path
+) -> None:
+    lock = tmp_path / "lock.txt"
+    lock.write_text("refused==1\n")
+    done = run_tool("setup.sh", str(environment), str(lock), path=bare_path)
+    assert done.returncode != 0
+    assert done.stderr == "ERROR: wrong hash\n"
+
+
 def test_missing_debian_packages_are_reported_with_the_one_command_that_installs_them(
     bare_path: Path,
 ) -> None:

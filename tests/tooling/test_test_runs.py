@@ -11,11 +11,23 @@ from tools.failed_tests import failed_tests
 
 @pytest.mark.xdist_group("one")
 def test_tests_of_one_group_run_in_one_worker(request: pytest.FixtureRequest) -> None:
-    # xdist hands out tests by what it appends to their names; without it, each test of a group
-    # may set up its rig or its browser once more, beside the others.
-    if not request.config.getoption("loadgroup", False):
-        pytest.skip("one process runs all tests")
-    assert request.node.nodeid.endswith("@one")
+    assert group(request) == "one"
+
+
+def test_without_a_group_those_of_a_file_run_in_one_worker(request: pytest.FixtureRequest) -> None:
+    assert group(request) == "tests/tooling/test_test_runs.py"
+
+
+def group(request: pytest.FixtureRequest) -> str:
+    """What xdist hands out a test by.
+
+    Without it, each test of a group or a file may set up its rig, its browser or its fit once more.
+    """
+    if request.config.getoption("loadgroup", False):
+        return str(request.node.nodeid.rpartition("@")[2])
+    marker = request.node.get_closest_marker("xdist_group")
+    assert marker is not None
+    return str(marker.args[0])
 
 
 def test_what_fails_in_a_group_is_found_again(tmp_path: Path) -> None:

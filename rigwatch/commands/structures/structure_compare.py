@@ -7,7 +7,7 @@ from rigwatch.commands.structures.structure_files import (
     add_problem,
     add_report,
     as_written,
-    figures,
+    lines_of,
     plain,
     problem_from,
     units_of,
@@ -54,17 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     else:
         for method, result in written.items():
-            _print(method, result, units)
+            told = [f"{method}: {result}"] if isinstance(result, str) else lines_of(result, units)
+            print("\n".join(told))
     good = any(not isinstance(r, str) and r.converged for r in results.values())
     return 0 if good else 1
-
-
-def _print(method: str, result: object, units: dict[str, str]) -> None:
-    from rigwatch.structures.identification import Identification
-
-    if not isinstance(result, Identification):
-        print(f"{method}: {result}")
-        return
-    state = "converged" if result.converged else "did not converge"
-    print(f"{method}: {state} in {len(result.iterations)} iterations, {result.seconds:.2f} s")
-    print("\n".join([*figures(result, units), *(f"  note: {remark}" for remark in result.remarks)]))

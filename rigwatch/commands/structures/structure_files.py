@@ -174,6 +174,13 @@ def figures(found: "Identification", units: Mapping[str, str] | None = None) -> 
     return lines
 
 
+def lines_of(found: "Identification", units: Mapping[str, str]) -> list[str]:
+    """How it ended, its figures, and its remarks."""
+    state = "converged" if found.converged else "did not converge"
+    ended = f"{found.method}: {state} in {len(found.iterations)} iterations, {found.seconds:.2f} s"
+    return [ended, *figures(found, units), *(f"  note: {remark}" for remark in found.remarks)]
+
+
 def plain(found: "Identification", units: Mapping[str, str]) -> dict[str, object]:
     """The identification as plain data with the unknowns' units, for JSON."""
     return {

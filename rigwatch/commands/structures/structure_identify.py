@@ -7,7 +7,7 @@ from rigwatch.commands.structures.structure_files import (
     add_problem,
     add_report,
     as_written,
-    figures,
+    lines_of,
     plain,
     problem_from,
     units_of,
@@ -55,12 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json(plain(found, units))
     else:
-        state = "converged" if found.converged else "did not converge"
-        print(
-            f"{found.method}: {state} in {len(found.iterations)} iterations, {found.seconds:.2f} s"
-        )
-        remarks = [f"  note: {remark}" for remark in found.remarks]
-        print("\n".join([*figures(found, units), *remarks]))
+        print("\n".join(lines_of(found, units)))
     return 0 if found.converged else 1
 
 

@@ -107,13 +107,12 @@ class Ranking:
         return (self.best,) if self.second is None else (self.best, self.second)
 
 
-def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Ranking:
+def locate(stretch: Stretch, path: FloatArray) -> Ranking:
     """Rank every coefficient of every spring as the place of the damage.
 
     Args:
         stretch: data after the damage, with the undamaged parameters.
         path: the undamaged model's states over the whole record, shape (samples, n).
-        refitted: number of candidates in the second pass.
     """
     model, count = stretch.model, len(stretch.model.candidates)
     residual, rows, fitted, scores = scored(stretch, path)
@@ -121,7 +120,7 @@ def locate(stretch: Stretch, path: FloatArray, refitted: int = REFITTED) -> Rank
     state = model.shown_state(path, stretch.first)
     ranked = standings(model.candidates, scores, scores.corrected)
     listed = [_first_pass(stretch, standing) for standing in ranked]
-    chosen = [c for c in listed[:refitted] if c.score >= WORTH * listed[0].score]
+    chosen = [c for c in listed[:REFITTED] if c.score >= WORTH * listed[0].score]
     places = {name: i for i, name in enumerate(model.candidates)}
     done = [_refitted(stretch, c, state + shifts[places[c.name]], SCREENING) for c in chosen]
     done.sort(key=lambda c: c.chi2)

@@ -1,7 +1,15 @@
 """Device formats: serial frames, Modbus registers, and the calibration of channels to SI."""
 
 from rigwatch.wire.device.calibration import Calibration
-from rigwatch.wire.device.frame import VERSION, Frame, FrameDecoder, encode
+from rigwatch.wire.device.frame import (
+    CRC_SIZE,
+    HEAD_SIZE,
+    LONGEST,
+    VERSION,
+    Frame,
+    FrameDecoder,
+    encode,
+)
 from rigwatch.wire.device.modbus_map import (
     HEADER_LENGTH,
     Header,
@@ -13,7 +21,10 @@ from rigwatch.wire.device.modbus_map import (
 )
 
 __all__ = [
+    "CRC_SIZE",
     "HEADER_LENGTH",
+    "HEAD_SIZE",
+    "LONGEST",
     "VERSION",
     "Calibration",
     "Frame",

@@ -28,8 +28,10 @@ DELIMITER = b"\0"
 MAX_CHANNELS = 64
 _HEAD = struct.Struct("<BIII")
 _CRC = struct.Struct("<I")
-_SHORTEST = _HEAD.size + 2 + _CRC.size
-_LONGEST_ENCODED = _HEAD.size + 2 * MAX_CHANNELS + _CRC.size + 1
+HEAD_SIZE, CRC_SIZE = _HEAD.size, _CRC.size
+"""Bytes of the payload before the codes, and of the checksum after them."""
+LONGEST = HEAD_SIZE + 2 * MAX_CHANNELS + CRC_SIZE + 1
+"""Most bytes of an encoded frame, without its delimiter."""
 R = TypeVar("R", bound=Sized)
 _CODES = [struct.Struct(f"<{n}h") for n in range(MAX_CHANNELS + 1)]
 
@@ -76,10 +78,10 @@ def decode(encoded: bytes) -> Frame:
         FrameError: framing, length or version is wrong.
     """
     payload = _unstuff(encoded)
-    n, odd = divmod(len(payload) - _HEAD.size - _CRC.size, 2)
-    if len(payload) < _SHORTEST or odd or n > MAX_CHANNELS:
+    n, odd = divmod(len(payload) - HEAD_SIZE - CRC_SIZE, 2)
+    if n < 1 or odd or n > MAX_CHANNELS:
         raise FrameError(f"{len(payload)} bytes are no frame")
-    if zlib.crc32(payload[: -_CRC.size]) != _CRC.unpack_from(payload, len(payload) - _CRC.size)[0]:
+    if zlib.crc32(payload[:-CRC_SIZE]) != _CRC.unpack_from(payload, len(payload) - CRC_SIZE)[0]:
         raise ChecksumError("the CRC-32 of a frame does not match")
     version, boot, seq, device_us = _HEAD.unpack_from(payload)
     if version != VERSION:
@@ -113,10 +115,10 @@ class FrameDecoder:
         """The frames that `data` completes, in order; never raises."""
         *pieces, self._rest = (self._rest + data).split(DELIMITER)
         frames = [frame for piece in pieces if piece and (frame := self._try(piece))]
-        if len(self._rest) > _LONGEST_ENCODED:
+        if len(self._rest) > LONGEST:
             # Longer than any frame without a delimiter: keep a bounded tail only.
-            self._skip(len(self._rest) - _LONGEST_ENCODED)
-            self._rest = self._rest[-_LONGEST_ENCODED:]
+            self._skip(len(self._rest) - LONGEST)
+            self._rest = self._rest[-LONGEST:]
         return frames
 
     def feed_run(self, data: bytes, read: Callable[[bytes], R | None]) -> R | None:
@@ -130,7 +132,7 @@ class FrameDecoder:
             None if `data` is to be fed with `feed`: nothing has been taken from it.
         """
         whole, found, rest = (self._rest + data).rpartition(DELIMITER)
-        if not found or self._lost or len(rest) > _LONGEST_ENCODED:
+        if not found or self._lost or len(rest) > LONGEST:
             return None
         run = read(whole)
         if run is not None:

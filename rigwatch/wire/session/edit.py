@@ -1,7 +1,7 @@
 """Writes new files from recorded sessions: `recover` saves intact data, `trim` cuts by time."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -126,19 +126,13 @@ def _part(session: Session, start: int | None, end: int | None) -> Iterator[Reco
     yield from session.messages(start=start, end=end)
 
 
-def copy_messages(
-    messages: Iterable[Recorded],
-    run: RunInfo,
-    target: Path,
-    progress: Callable[[int], None] = lambda _: None,
-) -> Written:
+def copy_messages(messages: Iterable[Recorded], run: RunInfo, target: Path) -> Written:
     """A new file at `target` with `run` at its head, followed by `messages`, each sample once.
 
     Args:
         messages: messages to copy; descriptions of runs only if they are new.
         run: is written at the head.
         target: the new file.
-        progress: called with the time of each message [ns].
 
     Raises:
         SessionError: the target exists or cannot be written.
@@ -146,18 +140,13 @@ def copy_messages(
     writer = SessionWriter(target, run, sync=False)
     try:
         with writer:
-            return _copy(messages, run, writer, progress)
+            return _copy(messages, run, writer)
     except BaseException:
         target.unlink(missing_ok=True)
         raise
 
 
-def _copy(
-    messages: Iterable[Recorded],
-    run: RunInfo,
-    writer: SessionWriter,
-    progress: Callable[[int], None],
-) -> Written:
+def _copy(messages: Iterable[Recorded], run: RunInfo, writer: SessionWriter) -> Written:
     counts: Counter[str] = Counter(run=1)
     following: dict[tuple[str, int], int] = {}
     samples = 0
@@ -165,7 +154,6 @@ def _copy(
         message = _new_part(item.message, following)
         if message is None or (isinstance(message, RunInfo) and _same_run(message, run)):
             continue
-        progress(item.t_ns)
         writer.write(message)
         counts[item.topic.name] += 1
         samples += len(message) if isinstance(message, SampleBlock) else 0

@@ -23,6 +23,7 @@ from tests.workbench.black_box import record, study
 
 HORIZON = 512
 Case = tuple[Study, Recording]
+Taught = Callable[[int], Learned]
 TOGETHER = ("products of three", "products of two")
 
 
@@ -44,82 +45,88 @@ def healthy(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Case]:
 
 
 @pytest.fixture(scope="module")
-def taught(healthy: Callable[[int], Case]) -> Learned:
-    return learn_terms(*healthy(2), HORIZON)
+def taught(healthy: Callable[[int], Case]) -> Taught:
+    """What the terms learn, by the same seed."""
+    return cache(lambda seed: learn_terms(*healthy(seed), HORIZON))
 
 
-def bare(case: Case) -> Learned:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(term_selection, "TERMS", {})
-        return learn_terms(*case, HORIZON)
+@pytest.fixture(scope="module")
+def bare(healthy: Callable[[int], Case]) -> Taught:
+    """The same without terms."""
+
+    @cache
+    def made(seed: int) -> Learned:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(term_selection, "TERMS", {})
+            return learn_terms(*healthy(seed), HORIZON)
+
+    return made
 
 
 @pytest.mark.parametrize("seed", [2, 3, 6])
-def test_products_are_learned_from_any_excitation(
-    healthy: Callable[[int], Case], seed: int
-) -> None:
-    found = learn_terms(*healthy(seed), HORIZON)
+def test_products_are_learned_from_any_excitation(taught: Taught, bare: Taught, seed: int) -> None:
+    found = taught(seed)
 
     assert set(found.steps) >= set(TOGETHER)
     assert found.fitted.convergence is not None
     assert found.fitted.convergence.converged
-    assert found.fitted.train_error < 0.5 * bare(healthy(seed)).fitted.train_error
+    assert found.fitted.train_error < 0.5 * bare(seed).fitted.train_error
 
 
 def test_what_is_learned_does_not_hinge_on_the_last_digits(
-    healthy: Callable[[int], Case], taught: Learned
+    healthy: Callable[[int], Case], taught: Taught
 ) -> None:
     opened, recording = healthy(2)
     last = 1 + 1e-12 * np.random.default_rng(0).standard_normal(recording.outputs.shape)
 
     found = learn_terms(opened, replace(recording, outputs=recording.outputs * last), HORIZON)
 
-    assert found.steps == taught.steps
-    assert found.fitted.train_error == pytest.approx(taught.fitted.train_error, rel=1e-3)
+    assert found.steps == taught(2).steps
+    assert found.fitted.train_error == pytest.approx(taught(2).fitted.train_error, rel=1e-3)
 
 
 def test_the_order_of_terms_makes_no_difference(
-    healthy: Callable[[int], Case], taught: Learned, monkeypatch: pytest.MonkeyPatch
+    healthy: Callable[[int], Case], taught: Taught, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     backwards = dict(reversed(term_selection.TERMS.items()))
     monkeypatch.setattr(term_selection, "TERMS", backwards)
 
     found = learn_terms(*healthy(2), HORIZON)
 
-    assert set(found.steps) == set(taught.steps)
-    assert found.fitted.train_error == pytest.approx(taught.fitted.train_error, rel=0.03)
+    assert set(found.steps) == set(taught(2).steps)
+    assert found.fitted.train_error == pytest.approx(taught(2).fitted.train_error, rel=0.03)
 
 
 def test_a_fit_that_begins_blown_up_ends_as_one_that_is_not(
-    healthy: Callable[[int], Case], taught: Learned
+    healthy: Callable[[int], Case], taught: Taught, bare: Taught
 ) -> None:
     opened, recording = healthy(2)
     data = term_selection._split(recording, HORIZON)
-    start = taught.fitted.train.values() | {f"{LEARNED}push_push_push": 1e4}
+    start = taught(2).fitted.train.values() | {f"{LEARNED}push_push_push": 1e4}
 
-    found = fit_whole(opened, taught.model, data, start)
+    found = fit_whole(opened, taught(2).model, data, start)
 
-    assert found.train_error < bare(healthy(2)).fitted.train_error
+    assert found.train_error < bare(2).fitted.train_error
 
 
 def test_a_model_with_equilibria_that_nobody_has_seen_does_not_stay(
-    healthy: Callable[[int], Case], taught: Learned
+    healthy: Callable[[int], Case], taught: Taught, bare: Taught
 ) -> None:
     _, recording = healthy(2)
-    test = BoundednessTest(bare(healthy(2)).fitted, recording)
-    assert test.passes(taught.fitted)
-    compiled = taught.fitted.compiled
-    values = taught.fitted.train.values() | {f"{LEARNED}push_push_push": 1e5}
-    pushed = replace(taught.fitted.train, parameters=compiled.vector(values))
+    test = BoundednessTest(bare(2).fitted, recording)
+    assert test.passes(taught(2).fitted)
+    compiled = taught(2).fitted.compiled
+    values = taught(2).fitted.train.values() | {f"{LEARNED}push_push_push": 1e5}
+    pushed = replace(taught(2).fitted.train, parameters=compiled.vector(values))
 
-    assert not test.passes(replace(taught.fitted, train=pushed))
+    assert not test.passes(replace(taught(2).fitted, train=pushed))
 
 
 def test_coefficients_move_the_output_alike_whatever_their_units(
-    healthy: Callable[[int], Case],
+    healthy: Callable[[int], Case], bare: Taught
 ) -> None:
     _, recording = healthy(2)
-    fitted = bare(healthy(2)).fitted
+    fitted = bare(2).fitted
     sizes = BoundednessTest(fitted, recording).sizes
     larger = with_products(fitted.compiled.system.model, sizes, 2)
     compiled = compile_system(compose(larger))

@@ -1,5 +1,6 @@
 """The black box on a rig that nobody here built: what is hidden in it, and what cannot be said."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import pytest
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.workbench.compare.preparation import Bench, bench_of, determined_by_healthy
+from rigwatch.workbench.data.motion import along_motion
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.explain.rough_verdict import MOTION_ALLOWANCE, limited_verdict
@@ -28,9 +31,8 @@ def recorded(case: str, begin: int, end: int | None = None) -> Recording:
     return Recording(1 / RATE, rows[:, 1:2], rows[:, 2:], parts=(len(rows),))
 
 
-@cache
-def bench(case: str) -> Bench:
-    """The black box that a healthy recording has taught, beside one with something hidden."""
+def opened(case: str) -> tuple[Study, Data]:
+    """The black box, and a healthy recording beside one with something hidden."""
     span = (Span(session="recorded"),)
     file = StudyFile(model="fourth-order", train=span, held_out=span)
     study = Study(Path(), file, shipped_models()["fourth-order"], library(), frozenset())
@@ -38,7 +40,20 @@ def bench(case: str) -> Bench:
         recorded(case, SETTLED, HALF), recorded(case, HALF), recorded("healthy", SETTLED),
         RATE // 2, (),
     )  # fmt: skip
-    return bench_of(*determined_by_healthy(study, data))
+    return study, data
+
+
+@cache
+def taught() -> tuple[Study, Data, FloatArray | None]:
+    """What the healthy recording teaches, which is the same beside every other one."""
+    return determined_by_healthy(*opened("none"))
+
+
+def bench(case: str) -> Bench:
+    """The black box that the healthy recording has taught, beside one with something hidden."""
+    study, data, scale = taught()
+    _, driven = along_motion(*opened(case))
+    return bench_of(study, replace(driven, horizon=data.horizon), scale)
 
 
 def test_nothing_is_missing_where_nothing_is_hidden() -> None:
