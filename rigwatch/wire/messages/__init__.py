@@ -43,7 +43,14 @@ from rigwatch.wire.messages.message_types import (
     Severity,
 )
 from rigwatch.wire.messages.packed import decode_block
-from rigwatch.wire.messages.quality_flags import NON_FINITE, SATURATED, SPIKE, STALE, valid
+from rigwatch.wire.messages.quality_flags import (
+    NON_FINITE,
+    RESAMPLED,
+    SATURATED,
+    SPIKE,
+    STALE,
+    valid,
+)
 from rigwatch.wire.messages.topics import (
     ALARMS,
     ALIVE_KEY,
@@ -83,6 +90,7 @@ __all__ = [
     "PROBABLY_MISSING",
     "PROVED",
     "RECORDERS",
+    "RESAMPLED",
     "RING_KEY",
     "RUN",
     "SAMPLES",
