@@ -2,6 +2,7 @@
 and edges between samples, where the motion has to tell.
 """
 
+from monitor.drives.bridged_edges import BridgedEdges
 from monitor.drives.drive_changes import Drive, DriveChanges
 from monitor.drives.edge_choice import corrected, edges_unsure, follow_edges, no_edges
 from monitor.drives.input_steps import InputSteps, Steps
@@ -11,6 +12,7 @@ from monitor.drives.sliding_edges import Moved, SlidingEdges
 from monitor.drives.sliding_steps import Sliding, SlidingSteps
 
 __all__ = [
+    "BridgedEdges",
     "Drive",
     "DriveChanges",
     "InputSteps",

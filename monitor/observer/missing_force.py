@@ -2,6 +2,7 @@
 
     e  = H[ y - ŷ - w·φ(z) ],   φ(z) = (z_i, z_i·z_j),   z = (motion, hidden states), scaled
     g1 = H[ŷ with one newton of dry friction - ŷ],   g2 = the same for viscous friction
+    d  = H[ŷ + w·φ(z) with weaker inputs - ŷ - w·φ(z)]
     s  = H[ŷ + w·φ(z) with inputs late by one sample - ŷ - w·φ(z)]
     l  = H[ŷ + w·φ(z) with the inputs' edges between samples - ŷ - w·φ(z)]
 
@@ -24,13 +25,15 @@ from rigwatch.physics.transfer import filter_sample
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 
-COLUMNS = ("residual", "dry", "viscous", "predicted", "disagreement", "measured", "late", "moved")
+COLUMNS = (
+    "residual", "dry", "viscous", "predicted", "disagreement", "measured", "weak", "late", "moved",
+)  # fmt: skip
 (
-    E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, LATE_UNIT, MOVED, UNSURE_INPUT,
-) = range(9)  # fmt: skip
+    E, DRY_UNIT, VISCOUS_UNIT, PREDICTED, DISAGREE, MEASURED, WEAK, LATE_UNIT, MOVED, UNSURE_INPUT,
+) = range(10)  # fmt: skip
 """Judged columns: those above, high-passed, and s for what is not known of the inputs' instants."""
-LATER = 0.5
-"""Lateness of the inputs of which the response is taken [samples]."""
+WEAKER, LATER = 0.05, 0.5
+"""Loss of the inputs of which the response is taken, and their lateness [samples]."""
 
 
 class Polynomial(NamedTuple):
@@ -84,23 +87,20 @@ class HighPassed:
         self,
         columns: FloatArray,
         z: FloatArray,
-        later: FloatArray,
-        moved: FloatArray,
+        changed: FloatArray,
         state: np.ndarray,
     ) -> FloatArray:
-        """High-passed columns, shape (n, 8), from raw columns and the remainder's signals.
+        """High-passed columns, shape (n, 9), from raw columns and the remainder's signals.
 
         Args:
             columns: raw.
-            z: signals of the remainder.
-            later: the same with inputs that are late.
-            moved: the same with edges between samples.
+            z: signals of the remainder, shape (n, signals).
+            changed: the same with inputs that are weaker, late, and with edges between samples,
+                shape (3, n, signals).
             state: of each row.
         """
         out = np.zeros_like(columns)
-        _advance(
-            columns, z, later, moved, state, self._remainder, self._b, self._a, self._state, out
-        )
+        _advance(columns, z, changed, state, self._remainder, self._b, self._a, self._state, out)
         return out
 
 
@@ -108,8 +108,7 @@ class HighPassed:
 def _advance(  # noqa: PLR0917 -- a kernel
     columns: FloatArray,
     z: FloatArray,
-    later: FloatArray,
-    moved: FloatArray,
+    changed: FloatArray,
     state: np.ndarray,
     known: Polynomial,
     b: FloatArray,
@@ -124,15 +123,14 @@ def _advance(  # noqa: PLR0917 -- a kernel
         if state[k] == FIRST:
             _at_rest(columns[k], kept, b)
         remainder = _remainder(z[k], known, scaled)
-        change = _remainder(later[k], known, scaled) - remainder
         for c in range(columns.shape[1]):
             value = columns[k, c]
             if c == E:
                 value -= remainder
-            elif c == LATE_UNIT:
-                value = (value + change) / LATER
-            elif c == MOVED:
-                value += _remainder(moved[k], known, scaled) - remainder
+            elif c >= WEAK:
+                value += _remainder(changed[c - WEAK, k], known, scaled) - remainder
+            if c == LATE_UNIT:
+                value /= LATER
             out[k, c] = filter_sample(b, a, kept[c], value)
 
 

@@ -93,7 +93,7 @@ class Observed:
         rows: inputs and motion, shape (n, inputs).
         measured: the measured output, shape (n,).
         predicted: the columns of the prediction.
-        judged: high-passed columns, see `missing_force`, shape (n, 9); the decision corrects the
+        judged: high-passed columns, see `missing_force`, shape (n, 10); the decision corrects the
             residual for the inputs' edges.
         steady: False where an input changes suddenly, or steps between samples at a place that is
             not known yet, shape (n,).
@@ -186,15 +186,18 @@ class ObserverSignals:
         raw = np.column_stack(
             [
                 measured - predicted.output, predicted.dry, predicted.viscous, predicted.output,
-                disagreement, measured, predicted.late - predicted.output,
-                predicted.moved - predicted.output,
+                disagreement, measured, predicted.weak - predicted.output,
+                predicted.late - predicted.output, predicted.moved - predicted.output,
             ]
         )  # fmt: skip
-        z, later, moved = (
+        z, *changed = (
             remainder_signals(rows, hidden, self.layout)
-            for hidden in (predicted.hidden, predicted.late_hidden, predicted.moved_hidden)
-        )
-        judged = self._high_passed.update(raw, z, later, moved, state)
+            for hidden in (
+                predicted.hidden, predicted.weak_hidden, predicted.late_hidden,
+                predicted.moved_hidden,
+            )
+        )  # fmt: skip
+        judged = self._high_passed.update(raw, z, np.stack(changed), state)
         judged = np.column_stack([judged, steps.unsure * judged[:, LATE_UNIT]])
         drives = [own.update(signals[:, place], code) for place, own in enumerate(self._drives)]
         for own in drives:

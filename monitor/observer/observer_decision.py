@@ -71,6 +71,7 @@ from monitor.observer.input_lateness import (
 from monitor.observer.lagged_motion import EMPTY, FIRST, TAINTED
 from monitor.observer.missing_force import LATE_UNIT, MOVED, UNSURE_INPUT, E
 from monitor.observer.window_statistics import (
+    drive_explains,
     dry_force,
     friction,
     lasting_energy,
@@ -99,6 +100,11 @@ LEFT, LEFT_EARLY = 0.55, 0.8
 """Shares of the force of dry friction alone that must be left beside viscous friction, over longer
 windows and over those shorter than `MEDIUM`, which hardly tell the two apart: what grows with the
 speed, as drag, a saturated drive and a lost gain of it do, leaves less.
+"""
+OUTDONE, NOISE = 3.0, 0.02
+"""Ratio of the energy that friction leaves to that which a weaker drive leaves above which it is
+the drive, and share below which what is left is not told from noise: a saturated drive, a dead band
+and a lost gain leave much of what dry friction alone would explain, at motions in phase with them.
 """
 AT_REST, STUCK = 0.25, 0.5
 """Share of the time at rest above which it is stiction."""
@@ -370,6 +376,8 @@ def _verdict(
     out[SHARE, k], out[DRY_SHARE, k] = share, dry
     least = LEFT_EARLY if length < MEDIUM else LEFT
     fits = share > FITS and dry > DRY_PART and force > 0.0 and beside > least * force
+    drive = drive_explains(kept, length, spread)
+    fits = fits and 1.0 - share < OUTDONE * max(1.0 - drive, NOISE)
     turned = reversals(kept, length, rules.speed_noise) > 0
     still = rest(kept, length, rules.speed_noise)
     sticks = since >= LONG // 2 and still > AT_REST and out[DEPARTED, k] > 0.0

@@ -3,9 +3,10 @@
 Two further predictions run with unit dry and unit viscous friction at the force port. Their
 differences to the plain prediction are the responses of the predicted output to friction of 1 N and
 of 1 N s/m, including everything in between (an inertia, the sensor's own high-pass). As the motion
-is given, the response is linear in the force. A fourth runs with inputs late by `LATER`, which
-gives the response to inputs late by one sample. A fifth runs with the inputs' edges between
-samples, where they are known to be regular.
+is given, the response is linear in the force. A fourth runs with inputs weaker by `WEAKER`, as of
+a drive that lost gain. A fifth runs with inputs late by `LATER`, which gives the response to inputs
+late by one sample. A sixth runs with the inputs' edges between samples, where they are known to be
+regular.
 """
 
 import dataclasses
@@ -18,7 +19,7 @@ from msgspec.structs import replace
 
 from monitor.model import EquationsPlant
 from monitor.observer.lagged_motion import EMPTY, FIRST
-from monitor.observer.missing_force import LATER
+from monitor.observer.missing_force import LATER, WEAKER
 from monitor.signals import Codes
 from rigwatch.physics.engine.compile import CompiledSystem, Simulation, compile_system
 from rigwatch.physics.engine.equations import (
@@ -122,16 +123,18 @@ def _fixed(effect: Effect) -> Effect:
 class Predicted:
     """Columns of the prediction, each of shape (n,) or (n, hidden states).
 
-    `late` and `late_hidden` are output and hidden states with inputs late by `LATER`, `moved` and
-    `moved_hidden` those with edges between samples; `reset` marks samples at which the states
-    diverged and were started anew.
+    `weak` and `weak_hidden` are output and hidden states with inputs weaker by `WEAKER`, `late` and
+    `late_hidden` those with inputs late by `LATER`, `moved` and `moved_hidden` those with edges
+    between samples; `reset` marks samples at which the states diverged and were started anew.
     """
 
     output: FloatArray
     dry: FloatArray
     viscous: FloatArray
+    weak: FloatArray
     late: FloatArray
     hidden: FloatArray
+    weak_hidden: FloatArray
     late_hidden: FloatArray
     moved: FloatArray
     moved_hidden: FloatArray
@@ -157,9 +160,9 @@ class AlongMotion:
         values = dict(zip(plant.names, plant.values, strict=True))
         healthy = values | {strengths[0]: plant.coulomb, strengths[1]: 0.0}
         cases = [healthy, *(healthy | {name: healthy[name] + 1.0} for name in strengths)]
-        self._parameters = [self._compiled.vector(case) for case in (*cases, healthy, healthy)]
+        self._parameters = [self._compiled.vector(case) for case in (*cases, *[healthy] * 3)]
         self._states = [np.zeros(0)] * len(self._parameters)
-        self._last = np.zeros((3, 0))
+        self._last = np.zeros((4, 0))
 
     def update(
         self,
@@ -179,26 +182,30 @@ class AlongMotion:
             moves: whether that is known, shape (n,).
         """
         n = len(rows)
-        later = rows.copy()
+        weaker, later = rows.copy(), rows.copy()
+        weaker[:, : steps.shape[1]] *= 1.0 - WEAKER
         later[:, : steps.shape[1]] -= LATER * steps
         between = rows.copy()
         between[:, : moved.shape[1]] += moved
-        output, dry, viscous, late, edged = np.zeros((5, n))
-        hidden, late_hidden, edged_hidden = np.zeros((3, n, self.hidden))
+        output, dry, viscous, weak, late, edged = np.zeros((6, n))
+        hidden, weak_hidden, late_hidden, edged_hidden = np.zeros((4, n, self.hidden))
         reset = np.zeros(n, np.bool_)
-        out = Predicted(output, dry, viscous, late, hidden, late_hidden, edged, edged_hidden, reset)
+        out = Predicted(
+            output, dry, viscous, weak, late, hidden, weak_hidden, late_hidden, edged, edged_hidden,
+            reset,
+        )  # fmt: skip
         for begin, end in _stretches(state, moves):
             if state[begin] == FIRST:
                 self._begin(rows[begin])
             done = begin
             while done < end:
-                given = [each[done:end] for each in (rows, later, between)]
+                given = [each[done:end] for each in (rows, weaker, later, between)]
                 done += self._run(given, bool(moves[begin]), done, out)
         return out
 
     def _begin(self, row: FloatArray) -> None:
         """Hidden states in equilibrium with a row, with the motion at rest."""
-        self._last = np.stack([row, row, row])
+        self._last = np.stack([row] * 4)
         still = np.repeat(row[None, :], round(SETTLING / self._dt), axis=0)
         still[:, self._rates] = 0.0
         for case, parameters in enumerate(self._parameters):
@@ -208,15 +215,15 @@ class AlongMotion:
         """Run along the rows until they end or a state diverges; returns the number done.
 
         Args:
-            rows: as they are, late, and with edges between samples.
+            rows: as they are, weaker, late, and with edges between samples.
             moves: whether the last differ from the first.
             first: index of the first row.
             out: to be filled.
         """
-        plain, shifted, between = (
+        plain, weaker, shifted, between = (
             np.concatenate([last[None, :], own]) for last, own in zip(self._last, rows, strict=True)
         )
-        given = [plain] * (len(self._parameters) - 2) + [shifted]
+        given = [plain] * (len(self._parameters) - 3) + [weaker, shifted]
         made = [self._simulated(case, own) for case, own in enumerate(given)]
         made.append(self._simulated(len(given), between) if moves else made[0])
         outputs = np.stack([one.outputs[0, 1:] for one in made])
@@ -229,8 +236,9 @@ class AlongMotion:
         out.output[at], out.hidden[at] = outputs[0, :, 0], outputs[0, :, 1:]
         out.dry[at] = outputs[1, :, 0] - outputs[0, :, 0]
         out.viscous[at] = outputs[2, :, 0] - outputs[0, :, 0]
-        out.late[at], out.late_hidden[at] = outputs[3, :, 0], outputs[3, :, 1:]
-        out.moved[at], out.moved_hidden[at] = outputs[4, :, 0], outputs[4, :, 1:]
+        out.weak[at], out.weak_hidden[at] = outputs[3, :, 0], outputs[3, :, 1:]
+        out.late[at], out.late_hidden[at] = outputs[4, :, 0], outputs[4, :, 1:]
+        out.moved[at], out.moved_hidden[at] = outputs[5, :, 0], outputs[5, :, 1:]
         if not good:
             out.reset[first + done - 1] = True
             self._begin(plain[done])

@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 
 from monitor.observer.decision_state import (
+    DRIVEN,
     DRY,
     ERROR,
     HISTORY,
@@ -120,6 +121,27 @@ def dry_force(kept: DecisionState, length: int) -> float:
         a += row[DRY] * row[DRY]
         p += row[DRY] * row[ERROR]
     return p / a if a > 0.0 else 0.0
+
+
+@njit()
+def drive_explains(kept: DecisionState, length: int, spread: float) -> float:
+    """Share of the residual beyond its healthy variance that a weaker drive explains.
+
+    Of the same samples as the shares of `friction`.
+    """
+    n = min(length, kept.counts[FILLED])
+    used = 0
+    a = p = yy = 0.0
+    for ago in range(1, n + 1):
+        if not _slides(kept, ago):
+            continue
+        row = kept.rows[(kept.counts[HEAD] - ago) % HISTORY]
+        used += 1
+        a += row[DRIVEN] * row[DRIVEN]
+        p += row[DRIVEN] * row[ERROR]
+        yy += row[ERROR] * row[ERROR]
+    beyond = max(yy - used * spread * spread, 0.2 * yy)
+    return p * p / (a * beyond) if p > 0.0 and a > 0.0 and yy > 0.0 else 0.0
 
 
 @njit()

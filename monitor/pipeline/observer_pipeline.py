@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from monitor.clipping import Clipping
+from monitor.drives import BridgedEdges
 from monitor.model import EquationsPlant, RigModel
 from monitor.observer import (
     EMPTY,
@@ -60,6 +61,7 @@ class ObserverMonitor:
         assert model.motion_range is not None
         equations, channels = base_model(plant.model), self._signals.layout.channels
         self._jumps = ChannelJumps(model.motion_range, equations, channels)
+        self._edges = [BridgedEdges() for _ in range(self._signals.layout.motions[0])]
         self._state = d.new_state(1 + 2 * len(self._signals.layout.motions))
         self._since = 0
         self._follow(model)
@@ -88,6 +90,7 @@ class ObserverMonitor:
         seen = self._signals.update(admitted.signals, admitted.code)
         motion = self._range.motion(seen)
         far = self._range.distance(seen, motion)
+        steady = seen.steady & ~self._hidden_edges(admitted)
         jumped = self._jumps.update(admitted.signals, admitted.code)
         out = np.zeros((len(d.OUTPUTS), len(far)))
         layout, remainder = self._signals.layout, self.model.remainder
@@ -101,12 +104,19 @@ class ObserverMonitor:
         usual = self._usual.update(motion, seen.drive)
         decide(
             seen.judged, speed, grown, drive, inside, np.asarray(jumped.any(axis=1)),
-            seen.steady, usual, seen.state, self.rules, self._state, out,
+            steady, usual, seen.state, self.rules, self._state, out,
         )  # fmt: skip
         conditions = self._conditions(admitted, seen, far, out)
         sensors = (*self._jump_conditions(admitted, jumped, out), *self._clipping.update(admitted))
         limit = self._force_limit(out, usual[d.USUAL_FRICTION])
         return Result(self._estimates(block, admitted, seen, out, limit), (*conditions, *sensors))
+
+    def _hidden_edges(self, admitted: Admitted) -> NDArray[np.bool_]:
+        """Whether missing samples have hidden an edge of an input, shape (n,)."""
+        found = np.zeros(admitted.code.size, np.bool_)
+        for place, edges in enumerate(self._edges):
+            found |= edges.update(admitted.signals[:, place], admitted.bridged, admitted.code)
+        return found
 
     def _jump_conditions(
         self, admitted: Admitted, jumped: NDArray[np.bool_], out: FloatArray

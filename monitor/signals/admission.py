@@ -16,6 +16,7 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import (
     NON_FINITE,
+    RESAMPLED,
     SATURATED,
     SPIKE,
     STALE,
@@ -54,6 +55,7 @@ class Admitted:
         missing: samples known to be missing before the block, -1 for an unknown number.
         invalid_run: samples without a good reading up to and with this one, shape (n,).
         good: whether each reading is one, shape (n, c).
+        bridged: whether a needed reading is held or interpolated, shape (n,).
     """
 
     signals: FloatArray
@@ -64,6 +66,7 @@ class Admitted:
     missing: int
     invalid_run: Codes
     good: NDArray[np.bool_]
+    bridged: NDArray[np.bool_]
 
 
 class Admission:
@@ -107,7 +110,7 @@ class Admission:
         padding = missing if missing <= self._hold else 0
         if missing > self._hold or new_boot:
             self._run[0] = self._hold + max(missing, 1)
-        values, good = self._columns(block, seen, padding)
+        values, good, made = self._columns(block, seen, padding)
         broken = np.zeros(len(values), np.bool_)
         self._clock[0], self._clock[1] = missing, new_boot
         _find_breaks(block.device_us[seen:], self._period_us, self._clock, broken[padding:])
@@ -121,7 +124,8 @@ class Admission:
         position_valid = good[:, min(1, good.shape[1] - 1)]
         seq = np.arange(first, first + len(values), dtype=np.int64)
         valid_position = position_valid.astype(np.uint8)
-        return Admitted(values, code, valid_position, seq, padding, missing, run, good)
+        bridged = (code == HELD) | made[:, self._needed].any(axis=1)
+        return Admitted(values, code, valid_position, seq, padding, missing, run, good, bridged)
 
     def _mark_new_boot(self, code: Codes) -> None:
         """The first good sample of a boot restarts more than the filters."""
@@ -134,7 +138,8 @@ class Admission:
 
     def _columns(
         self, block: SampleBlock, seen: int, padding: int
-    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+    ) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Values, whether each is good, and whether it is interpolated, all of shape (n, c)."""
         n = len(block) - seen + padding
         values = np.zeros((n, len(self._channels)))
         flags = np.zeros(values.shape, np.uint8)
@@ -145,7 +150,7 @@ class Admission:
                 flags[padding:, place] = column.quality[seen:]
         good = np.zeros(values.shape, np.bool_)
         _find_good(values, flags, padding, good)
-        return values, good
+        return values, good, (flags & RESAMPLED) > 0
 
 
 @kernel()

@@ -3,10 +3,12 @@
     A(f) = H·(-(2πf)²·X(f))        H = 1 for sensors that show the same motion
 
     X, A    spectra of position [m] and acceleration [m/s²] over a window
-    H       least-squares ratio over the frequencies at which the position stands out of its noise
+    H       least-squares ratio over the frequencies at which the position stands out of its noise,
+            and its second derivative out of that of the acceleration
 
 A sensor's filter, high-pass or delay turns H by some tens of degrees; a reversed sensor turns it by
-180°, a wrong unit or gain changes its size, and swapped channels change both.
+180°, a wrong unit or gain changes its size, and swapped channels change both. Noise includes that
+of the resolution: at rest, a coarse position that steps once in a while is no motion.
 """
 
 from dataclasses import dataclass
@@ -19,8 +21,10 @@ LOWEST = 1.0
 """Frequencies below are left to slow drifts and high-pass filters [Hz]."""
 MOTION, NOISE = 0.25, 0.6
 """Shares of half the sample rate: motion is sought below the first, noise above the second."""
-STANDS_OUT = 1000.0
-"""Power over the noise's median power from which a frequency counts."""
+STANDS_OUT, SHOWS = 1000.0, 10.0
+"""Power of the position over that of its noise from which a frequency counts, and of its second
+derivative over that of the acceleration's noise.
+"""
 FEWEST = 2
 """Frequencies that a window needs."""
 
@@ -51,11 +55,21 @@ def motion_ratio(position: FloatArray, acceleration: FloatArray, rate: float) ->
     x = np.fft.rfft(taper * (position - position.mean()))
     a = np.fft.rfft(taper * (acceleration - acceleration.mean()))
     power = np.abs(x) ** 2
-    noise = float(np.median(power[frequency > NOISE * rate / 2]))
+    upper = frequency > NOISE * rate / 2
     within = (frequency >= LOWEST) & (frequency <= MOTION * rate / 2)
-    strong = within & (power > STANDS_OUT * noise)
+    expected = -((2 * np.pi * frequency) ** 2) * x
+    strong = within & (power > STANDS_OUT * _noise(position, power[upper], taper))
+    strong &= np.abs(expected) ** 2 > SHOWS * _noise(acceleration, np.abs(a[upper]) ** 2, taper)
     if strong.sum() < FEWEST:
         return None
-    expected = -((2 * np.pi * frequency[strong]) ** 2) * x[strong]
+    expected = expected[strong]
     h = np.vdot(expected, a[strong]) / np.vdot(expected, expected).real
     return MotionRatio(float(abs(h)), float(np.degrees(np.angle(h))))
+
+
+def _noise(signal: FloatArray, powers: FloatArray, taper: FloatArray) -> float:
+    """Power of a signal's noise at one frequency: the median of some, at least its resolution's."""
+    steps = np.abs(np.diff(signal))
+    resolution = steps[steps > 0.0].min(initial=np.inf)
+    rounding = resolution**2 / 12.0 if np.isfinite(resolution) else 0.0
+    return max(float(np.median(powers)), rounding * float((taper**2).sum()))

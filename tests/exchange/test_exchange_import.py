@@ -420,3 +420,12 @@ def test_a_clock_coarser_than_the_samples_is_spread(tmp_path: Path) -> None:
 def test_time_that_stands_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ImportDataError, match=r"found 0\.005 s in every row"):
         made(tmp_path, "t,qm,u\n5,1,5\n5,2,6\n5,3,7\n", simple())
+
+
+def test_only_the_missing_rows_of_a_uniform_recording_are_resampled(tmp_path: Path) -> None:
+    kept = [k for k in range(100) if k not in {40, 41, 70}]
+    text = "t,qm,u\n" + "".join(f"{10 * k},{k},0\n" for k in kept)
+    block, _ = made(tmp_path, text, simple())
+    marks = block.channel("position").quality
+    assert np.flatnonzero(marks == quality.RESAMPLED).tolist() == [40, 41, 70]
+    assert set(marks[kept]) == {quality.GOOD}

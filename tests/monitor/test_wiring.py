@@ -7,6 +7,7 @@ import pytest
 
 from monitor.model.model_file import RigModel
 from monitor.pipeline.rig_monitor import RigMonitor
+from monitor.wiring.motion_ratio import motion_ratio
 from rigwatch.wire.messages.message_types import Alarm, EstimateBlock
 from rigwatch.wire.rig_config import AlarmSection
 from sim_plant.excitation import Chirp, Multisine, Shape, Sine, Square
@@ -17,6 +18,9 @@ Channels = dict[str, np.ndarray]
 JUDGED = {"departure", "dry_friction", "stiction", "other_fault"}
 # Volts, metres and m/s^2 of one code: a channel in another's place shows its codes.
 VOLT, METRE, ACCELERATION = 3.05e-4, 7.75e-7, 1.496e-2
+COARSE, ROUGH = 2.5e-5, 0.02
+"""Resolution of a position [m] and noise of an acceleration [m/s^2]."""
+SECOND = np.arange(round(RATE)) / RATE
 SCHEMES = {"transfer": monitor_rig.model, "equations": observed_rig.model}
 
 
@@ -134,3 +138,23 @@ def test_a_person_may_say_that_the_wiring_is_as_it_is_to_be() -> None:
     times, estimates = watched(channels, monitor_rig.model(), **off)
     assert not {name for name in times if name.startswith("wiring")}
     assert estimates[0].column("armed").values[-1] == 1.0
+
+
+@pytest.mark.parametrize("steps", [1, 3, 8])
+def test_a_position_that_steps_while_it_settles_is_no_motion(steps: int) -> None:
+    settling = COARSE * np.round(steps * (1.0 - np.exp(-4.0 * SECOND)))
+    noise = ROUGH * np.random.default_rng(1).standard_normal(SECOND.size)
+
+    assert motion_ratio(settling, noise, RATE) is None
+
+
+def test_coarse_channels_in_motion_show_it() -> None:
+    turns = 2.0 * np.pi * 8.0
+    position = COARSE * np.round(5e-3 * np.sin(turns * SECOND) / COARSE)
+    acceleration = ROUGH * np.round(-5e-3 * turns**2 * np.sin(turns * SECOND) / ROUGH)
+
+    found = motion_ratio(position, acceleration, RATE)
+
+    assert found is not None
+    assert found.gain == pytest.approx(1.0, abs=0.05)
+    assert found.phase == pytest.approx(0.0, abs=1.0)

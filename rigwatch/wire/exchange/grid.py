@@ -30,6 +30,8 @@ class Grid:
         times: shape (n,) [s].
         jittered: the recording's own time stamps are not uniform, its values must be interpolated.
         in_hole: shape (n,), points without a sample of the recording nearby.
+        own: shape (n,), points with a sample of their own, of a recording that is uniform but for
+            missing samples.
         steps_s: shortest and longest step of the time stamps [s].
     """
 
@@ -37,6 +39,7 @@ class Grid:
     times: FloatArray
     jittered: bool
     in_hole: NDArray[np.bool_]
+    own: NDArray[np.bool_]
     steps_s: tuple[float, float]
 
 
@@ -64,14 +67,31 @@ def fit_grid(times: FloatArray, rate: float | None, max_hole: float) -> Grid:
     extremes = float(steps.min()), float(steps.max())
     if _is_uniform(times, period):
         rate_hz = rate or _rounded((len(times) - 1) / span if span else 1 / period)
-        return Grid(rate_hz, times, False, np.zeros(len(times), bool), extremes)
+        return whole(rate_hz, times, extremes)
     rate_hz = rate or _rounded(1 / period)
     most = MOST_POINTS + MOST_PER_SAMPLE * len(times)
     if span * rate_hz > most:
         raise ImportDataError(_too_many(times, rate_hz))
     count = int(np.floor(span * rate_hz * (1 + 1e-12))) + 1
     grid = times[0] + np.arange(count) / rate_hz
-    return Grid(rate_hz, grid, True, _holes(times, grid, max_hole / rate_hz), extremes)
+    holes = _holes(times, grid, max_hole / rate_hz)
+    return Grid(rate_hz, grid, True, holes, _own(times, grid, rate_hz), extremes)
+
+
+def whole(rate_hz: float, times: FloatArray, steps_s: tuple[float, float]) -> Grid:
+    """The grid of a recording without jitter and holes."""
+    n = len(times)
+    return Grid(rate_hz, times, False, np.zeros(n, bool), np.ones(n, bool), steps_s)
+
+
+def _own(times: FloatArray, grid: FloatArray, rate_hz: float) -> NDArray[np.bool_]:
+    """Points with a sample of their own; none of a recording whose time stamps are jittered."""
+    own = np.zeros(len(grid), np.bool_)
+    at = (times - times[0]) * rate_hz
+    nearest = np.rint(at).astype(np.int64)
+    if np.abs(at - nearest).max() <= JITTER:
+        own[nearest[nearest < len(grid)]] = True
+    return own
 
 
 def _too_many(times: FloatArray, rate_hz: float) -> str:

@@ -10,7 +10,7 @@ from msgspec import structs
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ImportDataError
 from rigwatch.wire.exchange.column_units import conversion
-from rigwatch.wire.exchange.grid import Grid, fit_grid
+from rigwatch.wire.exchange.grid import Grid, fit_grid, whole
 from rigwatch.wire.exchange.mapping import ImportMapping, Source, parse_source
 from rigwatch.wire.exchange.repeated_stamps import Stamps, increasing
 from rigwatch.wire.exchange.session_columns import is_native, native_blocks
@@ -121,7 +121,7 @@ def _counted(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str
     first = _source(*next(iter(mapping.channels.items())), table, mapping)
     count = len(table.cells[first.column])
     times = np.arange(count) / mapping.rate
-    grid = Grid(mapping.rate, times, False, np.zeros(count, bool), (0.0, 0.0))
+    grid = whole(mapping.rate, times, (0.0, 0.0))
     return _TimeBase(grid, Stamps(times, np.ones(count, bool))), ()
 
 
@@ -164,7 +164,7 @@ def _resampled(column: Column, grid: Grid, times: FloatArray) -> Column:
     else:
         found = np.interp(grid.times, times[~missing], column.values[~missing])
     near_missing = np.interp(grid.times, times, missing.astype(np.float64)) > 0
-    marks = np.full(len(found), quality.RESAMPLED, np.uint8)
+    marks = np.where(grid.own, quality.GOOD, quality.RESAMPLED).astype(np.uint8)
     marks[near_missing] |= quality.NON_FINITE
     marks[grid.in_hole] |= quality.STALE
     return Column(column.name, column.unit, found, marks)

@@ -45,7 +45,14 @@ from rigwatch.wire.messages.message_types import (
     Severity,
 )
 from rigwatch.wire.messages.packed import decode_block
-from rigwatch.wire.messages.quality_flags import NON_FINITE, SATURATED, SPIKE, STALE, valid
+from rigwatch.wire.messages.quality_flags import (
+    NON_FINITE,
+    RESAMPLED,
+    SATURATED,
+    SPIKE,
+    STALE,
+    valid,
+)
 from rigwatch.wire.messages.topics import (
     ALARMS,
     ALIVE_KEY,
@@ -85,6 +92,7 @@ __all__ = [
     "PROBABLY_MISSING",
     "PROVED",
     "RECORDERS",
+    "RESAMPLED",
     "RING_KEY",
     "RUN",
     "SAMPLES",

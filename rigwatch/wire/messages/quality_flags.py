@@ -19,7 +19,7 @@ NON_FINITE = 1 << 3
 SPIKE = 1 << 4
 """A change faster than the sensor can follow."""
 RESAMPLED = 1 << 5
-"""A remark, not a defect: interpolated from samples with jittered time stamps."""
+"""A remark, not a defect: interpolated from samples with jittered or missing time stamps."""
 
 INVALID = STALE | SATURATED | STUCK | NON_FINITE | SPIKE
 
