@@ -10,7 +10,6 @@ regular.
 """
 
 import dataclasses
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from msgspec.structs import replace
 from monitor.model import EquationsPlant
 from monitor.observer.lagged_motion import EMPTY, FIRST
 from monitor.observer.missing_force import LATER, WEAKER
-from monitor.signals import Codes
+from monitor.signals import LARGEST, Codes
 from rigwatch.physics.engine.compile import CompiledSystem, Simulation, compile_system
 from rigwatch.physics.engine.equations import (
     Effect,
@@ -44,6 +43,10 @@ SETTLING = 8.0
 """Time for which the first sample is held, so that hidden states start in equilibrium [s]."""
 SUBSTEPS = 4
 """Runge-Kutta steps between samples."""
+PAUSE = 32
+"""Samples after a divergence before the states begin anew: what caused it, such as readings that no
+motion has, is then gone from the kernels, and a lasting cause costs no time.
+"""
 DRY, VISCOUS = "coulomb", "viscous"
 """Effects of the library that represent friction."""
 
@@ -125,7 +128,7 @@ class Predicted:
 
     `weak` and `weak_hidden` are output and hidden states with inputs weaker by `WEAKER`, `late` and
     `late_hidden` those with inputs late by `LATER`, `moved` and `moved_hidden` those with edges
-    between samples; `reset` marks samples at which the states diverged and were started anew.
+    between samples; `reset` marks samples at which the states diverged.
     """
 
     output: FloatArray
@@ -163,6 +166,7 @@ class AlongMotion:
         self._parameters = [self._compiled.vector(case) for case in (*cases, *[healthy] * 3)]
         self._states = [np.zeros(0)] * len(self._parameters)
         self._last = np.zeros((4, 0))
+        self._pause = -1
 
     def update(
         self,
@@ -178,10 +182,12 @@ class AlongMotion:
             rows: inputs, then motion.
             steps: changes of the inputs per sample, shape (n, inputs other than motion).
             moved: what their means gain by edges between samples, of the same shape.
-            state: of each row.
+            state: of each row; changed where the states diverge: the rows of a pause count as
+                without a kernel, and the one after it as the first.
             moves: whether that is known, shape (n,).
         """
         n = len(rows)
+        self._wait(state)
         weaker, later = rows.copy(), rows.copy()
         weaker[:, : steps.shape[1]] *= 1.0 - WEAKER
         later[:, : steps.shape[1]] -= LATER * steps
@@ -194,14 +200,31 @@ class AlongMotion:
             output, dry, viscous, weak, late, hidden, weak_hidden, late_hidden, edged, edged_hidden,
             reset,
         )  # fmt: skip
-        for begin, end in _stretches(state, moves):
+        begin = 0
+        while begin < n:
+            if state[begin] == EMPTY:
+                begin += 1
+                continue
             if state[begin] == FIRST:
                 self._begin(rows[begin])
-            done = begin
-            while done < end:
-                given = [each[done:end] for each in (rows, weaker, later, between)]
-                done += self._run(given, bool(moves[begin]), done, out)
+            end = _end(state, moves, begin)
+            given = [each[begin:end] for each in (rows, weaker, later, between)]
+            begin += self._run(given, bool(moves[begin]), begin, out)
+            if reset[begin - 1]:
+                self._pause = PAUSE
+                self._wait(state[begin - 1 :])
         return out
+
+    def _wait(self, state: Codes) -> None:
+        """Mark the rows of a pause, and the first after it."""
+        for k in range(state.size):
+            if self._pause < 0:
+                return
+            if self._pause > 0:
+                state[k] = EMPTY
+                self._pause -= 1
+            elif state[k] != EMPTY:
+                state[k], self._pause = FIRST, -1
 
     def _begin(self, row: FloatArray) -> None:
         """Hidden states in equilibrium with a row, with the motion at rest."""
@@ -212,7 +235,7 @@ class AlongMotion:
             self._states[case] = balanced(self._compiled, parameters, still, self._dt)
 
     def _run(self, rows: list[FloatArray], moves: bool, first: int, out: Predicted) -> int:
-        """Run along the rows until they end or a state diverges; returns the number done.
+        """Run along the rows until they end or diverge; returns the number done.
 
         Args:
             rows: as they are, weaker, late, and with edges between samples.
@@ -227,22 +250,23 @@ class AlongMotion:
         made = [self._simulated(case, own) for case, own in enumerate(given)]
         made.append(self._simulated(len(given), between) if moves else made[0])
         outputs = np.stack([one.outputs[0, 1:] for one in made])
-        finite = np.isfinite(outputs).all(axis=(0, 2))
-        if good := bool(finite.all()):
+        # Also false for NaN; the hidden states are among the outputs.
+        within = (np.abs(outputs) <= LARGEST).all(axis=(0, 2))
+        if good := bool(within.all()):
             self._states = [one.last[0] for one in made]
             self._last = np.stack([own[-1] for own in rows])
-        done = len(plain) - 1 if good else int(np.argmin(finite)) + 1
-        at, outputs = slice(first, first + done), np.nan_to_num(outputs[:, :done])
+        kept = len(plain) - 1 if good else int(np.argmin(within))
+        at, outputs = slice(first, first + kept), outputs[:, :kept]
         out.output[at], out.hidden[at] = outputs[0, :, 0], outputs[0, :, 1:]
         out.dry[at] = outputs[1, :, 0] - outputs[0, :, 0]
         out.viscous[at] = outputs[2, :, 0] - outputs[0, :, 0]
         out.weak[at], out.weak_hidden[at] = outputs[3, :, 0], outputs[3, :, 1:]
         out.late[at], out.late_hidden[at] = outputs[4, :, 0], outputs[4, :, 1:]
         out.moved[at], out.moved_hidden[at] = outputs[5, :, 0], outputs[5, :, 1:]
-        if not good:
-            out.reset[first + done - 1] = True
-            self._begin(plain[done])
-        return done
+        if good:
+            return kept
+        out.reset[first + kept] = True
+        return kept + 1
 
     def _simulated(self, case: int, inputs: FloatArray) -> Simulation:
         with np.errstate(over="ignore", invalid="ignore"):
@@ -253,18 +277,12 @@ class AlongMotion:
             )  # fmt: skip
 
 
-def _stretches(state: Codes, moves: BoolArray) -> Iterator[tuple[int, int]]:
-    """Runs of samples with a complete kernel; a start begins a new run, and so does a change."""
-    begin = -1
-    for k in range(state.size):
-        changes = k > 0 and moves[k] != moves[k - 1]
-        if begin >= 0 and (changes or state[k] in (EMPTY, FIRST)):
-            yield begin, k
-            begin = -1
-        if begin < 0 and state[k] != EMPTY:
-            begin = k
-    if begin >= 0:
-        yield begin, state.size
+def _end(state: Codes, moves: BoolArray, begin: int) -> int:
+    """Where a run of samples with a complete kernel ends; a change begins a new one."""
+    for k in range(begin + 1, state.size):
+        if moves[k] != moves[begin] or state[k] in (EMPTY, FIRST):
+            return k
+    return int(state.size)
 
 
 def _without_fit(system: System) -> System:
