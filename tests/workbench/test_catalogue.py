@@ -108,3 +108,28 @@ def test_a_model_is_begun_and_checked(tmp_path: Path, capsys: pytest.CaptureFixt
     assert set(json.loads(capsys.readouterr().out)) == set(shipped_models())
     assert main(["model", "show", "bearing"]) == 0
     assert 'name = "bearing"' in capsys.readouterr().out
+
+
+WARM = """
+name = "warm"
+summary = "A block whose temperature is shown in degC."
+inputs.u = { unit = "1" }
+states.T = { unit = "degC", derivative = "(k*u - (T - Ta))/tau", measured = "T", start = 20.0 }
+parameters.k = { value = 30.0, unit = "UNIT" }
+parameters.Ta = { value = 20.0, unit = "degC" }
+parameters.tau = { value = 5.0, unit = "s" }
+outputs.T = { unit = "degC", expression = "T" }
+"""
+
+
+@pytest.mark.parametrize(("unit", "told", "end"), [("K", (), 50.0), ("degC", ("k",), 323.15)])
+def test_a_run_is_drawn_in_the_units_shown_and_absolute_factors_are_told(
+    unit: str, told: tuple[str, ...], end: float
+) -> None:
+    report = model_report(parse(WARM.replace("UNIT", unit), Model, "warm"), {})
+    assert report.fine
+    assert report.absolute == told
+    (curve,) = report.run
+    assert curve.up == "T [degC]"
+    assert curve.y[0] == pytest.approx(20.0)
+    assert curve.y[-1] == pytest.approx(end, abs=0.5)

@@ -70,6 +70,10 @@ def _lines(name: str, report: "ModelReport") -> list[str]:
             report.start,
             "no channel measures it: a fit estimates its initial value from the outputs",
         ),
+        (
+            report.absolute,
+            "a temperature that multiplies something: 0 degC are 273.15 K; give a difference in K",
+        ),
     )
     lines += [f"  {one}: {what}" for names, what in said for one in names]
     return [*lines, *([f"  {report.trouble}"] if report.trouble else [])]

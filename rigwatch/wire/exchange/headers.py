@@ -1,13 +1,13 @@
 """Name and unit from a logger's column header.
 
-speed_rad_s    speed [rad/s]    Speed (rpm)    accel_m_s2    time_ms    t
+speed_rad_s    speed [rad/s]    Speed (rpm)    accel_m_s2    time_ms    Time (sec)    Heater 1
 """
 
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rigwatch.wire.units import UnitError, unit_of
+from rigwatch.wire.units import IN_OTHER_WORDS, UnitError, unit_of
 
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
 _SEPARATED = re.compile(r"[\s_.\-]+")
@@ -33,7 +33,7 @@ class Header:
 def read_header(column: str) -> Header:
     """Name and possible units from a header."""
     if found := _BRACKETED.match(column):
-        units = tuple(filter(_known, [found["unit"].strip()]))
+        units = tuple(filter(_known, [_usual(found["unit"].strip())]))
         return Header(column, _plain(found["name"]), units)
     words = [word for word in _SEPARATED.split(column.strip()) if word]
     for first in range(1, len(words)):
@@ -47,12 +47,22 @@ def _plain(name: str) -> str:
 
 
 def _units(words: list[str]) -> Iterator[str]:
-    """Units that words may mean: the first divided by the others, or their product."""
-    told = [_powered(word) for word in words if word.lower() != "per"]
+    """Units that words may mean: the first divided by the others, or their product.
+
+    A number counts columns, as in `Heater 1`.
+    """
+    if any(word.isdecimal() for word in words):
+        return
+    told = [_powered(_usual(word)) for word in words if word.lower() != "per"]
     if len(told) == 2:
         yield "/".join(told)
     if told:
         yield " ".join(told)
+
+
+def _usual(word: str) -> str:
+    """The symbol of a unit that is spelt out: s for `sec` or `Seconds`."""
+    return word if _known(word) else IN_OTHER_WORDS.get(word.lower(), word)
 
 
 def _powered(word: str) -> str:

@@ -10,10 +10,11 @@ from rigwatch.wire.units.unit import (
     times,
     unit_of,
 )
-from rigwatch.wire.units.unit_table import Dimension
+from rigwatch.wire.units.unit_table import IN_OTHER_WORDS, Dimension
 
 __all__ = [
     "GRAM",
+    "IN_OTHER_WORDS",
     "NONE",
     "Dimension",
     "Unit",

@@ -124,7 +124,9 @@ QUANTITIES: tuple[Quantity, ...] = (
 """All units that files may use, as well as their products, quotients and powers."""
 
 IN_OTHER_WORDS = {
-    "sec": "s", "second": "s", "seconds": "s", "hour": "h", "minute": "min", "meter": "m",
+    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "hour": "h", "hours": "h", "hr": "h",
+    "msec": "ms", "millis": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us",
+    "micros": "us", "minute": "min", "minutes": "min", "percent": "%", "meter": "m",
     "metre": "m", "inches": "inch", "feet": "ft", "grams": "gram", "newton": "N", "lbs": "lb",
     "pascal": "Pa", "volt": "V", "volts": "V", "amp": "A", "ampere": "A", "ohms": "ohm",
     "watt": "W", "degree": "deg", "degrees": "deg", "radian": "rad", "kelvin": "K",

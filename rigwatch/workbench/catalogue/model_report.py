@@ -10,10 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import sympy
 
 from rigwatch.physics.engine.compile import compile_system
 from rigwatch.physics.engine.equations import (
     Model,
+    Output,
     System,
     check_model,
     measured_states,
@@ -21,6 +23,7 @@ from rigwatch.physics.engine.equations import (
 )
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
+from rigwatch.wire.units import unit_of
 from rigwatch.workbench.catalogue.effect_curves import Curve
 
 STEPS = (1.0, 0.1, 0.01, 0.0)
@@ -42,6 +45,7 @@ class ModelReport:
         unseen: states that no output shows.
         tied: states that the outputs cannot distinguish.
         start: states that no channel measures, which start at the file's values.
+        absolute: parameters in degC or degF that multiply something, as only a difference would.
         step: step size of the inputs that are not given.
         run: the outputs from the file's initial state with these inputs; none without states.
         trouble: why the run failed.
@@ -51,6 +55,7 @@ class ModelReport:
     unseen: tuple[str, ...]
     tied: tuple[str, ...]
     start: tuple[str, ...]
+    absolute: tuple[str, ...]
     step: float
     run: tuple[Curve, ...]
     trouble: str = ""
@@ -78,9 +83,9 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
         raise ModelError(f"{where}: found input {min(unknown)!r}, expected one of {known}")
     shown = {state.name for state in measured_states(model)}
     start = tuple(name for name in model.states if name not in shown)
-    unused = _unused(model, system)
+    unused, absolute = _unused(model, system), _absolute_factors(model, system)
     if not model.states:
-        return ModelReport(unused, (), (), start, 0.0, ())
+        return ModelReport(unused, (), (), start, absolute, 0.0, ())
     for step in STEPS:
         given = dict.fromkeys(model.inputs, step) | dict(inputs)
         time, outputs, slopes = _run(system, given)
@@ -88,12 +93,22 @@ def model_report(model: Model, inputs: Mapping[str, float], where: str = "") -> 
             break
     else:
         trouble = "the run diverged (NaN or infinite), expected other starts, parameters or inputs"
-        return ModelReport(unused, (), (), start, 0.0, (), trouble)
+        return ModelReport(unused, (), (), start, absolute, 0.0, (), trouble)
     curves = tuple(
-        Curve("time [s]", f"{name} [{own.shown or own.unit}]", time, outputs[:, column])
+        Curve(
+            "time [s]", f"{name} [{own.shown or own.unit}]", time, _shown(own, outputs[:, column])
+        )
         for column, (name, own) in enumerate(model.outputs.items())
     )
-    return ModelReport(unused, *_observed(list(model.states), slopes), start, step, curves)
+    seen = _observed(list(model.states), slopes)
+    return ModelReport(unused, *seen, start, absolute, step, curves)
+
+
+def _shown(output: Output, values: FloatArray) -> FloatArray:
+    """An output's values in the unit in which it is shown."""
+    unit = unit_of(output.shown or output.unit)
+    start, one = unit.from_si(0.0), unit.from_si(1.0)
+    return values * (one - start) + start
 
 
 def _unused(model: Model, system: System) -> tuple[str, ...]:
@@ -112,6 +127,23 @@ def _unused(model: Model, system: System) -> tuple[str, ...]:
     symbols |= frozenset().union(*(names_in(text, "model") for text in spelt))
     leaves = [n for n in (*model.parameters, *model.inputs) if n not in symbols]
     return (*leaves, *(n for n in model.quantities if n not in named))
+
+
+def _absolute_factors(model: Model, system: System) -> tuple[str, ...]:
+    """Parameters given in a unit with an offset that are a factor of a product.
+
+    0.6 degC per unit of a drive are 273.75 K: what is meant is a difference, 0.6 K.
+    """
+    equations = (*system.derivatives.values(), *system.outputs.values())
+    factors = {
+        part.name
+        for equation in equations
+        for product in equation.atoms(sympy.Mul)
+        for part in product.args
+        if part.is_Symbol and any(o.free_symbols for o in product.args if o is not part)
+    }
+    given = {name: unit_of(p.shown or p.unit) for name, p in model.parameters.items()}
+    return tuple(n for n, unit in given.items() if n in factors and unit.from_si(0.0) != 0)
 
 
 def _run(system: System, inputs: Mapping[str, float]) -> tuple[FloatArray, FloatArray, FloatArray]:

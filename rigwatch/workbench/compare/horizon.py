@@ -8,6 +8,10 @@ its decay: as long as the initial state rings on, it stands in for what is missi
 resonance, and only what shifts the mean is left. A light damper rings for hundreds of periods, over
 which the smallest error of the frequency adds up; a dozen are enough. To find the modes, the model
 is fitted once over a horizon derived from the outputs.
+
+A drive that steps once a minute meets windows of a minute always at the same place. If that is a
+window's beginning or end, the window's own initial state takes up all that a lag does after a step.
+The horizon is then shortened until the steps fall inside the windows.
 """
 
 from dataclasses import replace
@@ -35,6 +39,13 @@ FEWEST = 20
 """Minimum number of samples in a window."""
 UNCORRELATED = float(np.exp(-1))
 """Autocorrelation that defines an output's correlation time."""
+BEGINNING, END = 0.1, 0.2
+"""Shares of a window at its ends where a change of an input hardly shows."""
+MOST_AT_ENDS = 0.6
+"""Largest share of the inputs' changes there; half of it if they are spread evenly."""
+SHORTENED = ", shortened as inputs would only change where windows begin or end"
+SHORTER = (1.0, 0.9, 0.8, 0.7, 0.6)
+"""Horizons that are tried, relative to the one chosen from the model."""
 
 
 def with_horizon(study: Study) -> Study:
@@ -52,7 +63,8 @@ def with_horizon(study: Study) -> Study:
     )
     longest, least = shortest / WINDOWS, FEWEST * data.train.dt
     begin = float(np.clip(_from_correlation(data.train), least, max(longest, least)))
-    study = _with_source(study, "how fast the outputs change", begin)
+    begin, shortened = _within_windows(begin, data)
+    study = _with_source(study, f"how fast the outputs change{shortened}", begin)
     try:
         fitted, data = _fitted_once(study)
     except ModelError:
@@ -63,7 +75,8 @@ def with_horizon(study: Study) -> Study:
     constant, name = slowest
     chosen = float(np.clip(constant, least, max(longest, least)))
     bound = ", limited to a tenth of the shortest recording" if chosen < constant else ""
-    return _with_source(study, f"{name}{bound}", chosen)
+    chosen, shortened = _within_windows(chosen, data)
+    return _with_source(study, f"{name}{bound}{shortened}", chosen)
 
 
 def with_horizon_of(study: Study, other: Study) -> Study:
@@ -72,6 +85,30 @@ def with_horizon_of(study: Study, other: Study) -> Study:
         return study
     file = structs.replace(study.file, horizon=other.file.horizon)
     return replace(study, file=file, horizon_from=other.horizon_from)
+
+
+def _within_windows(horizon: float, data: Data) -> tuple[float, str]:
+    """The horizon [s], shortened if inputs change only at the ends of its windows; words on it."""
+
+    def at_ends(share: float) -> float:
+        return max(_share_at_ends(r, share * horizon) for r in (data.train, data.held_out))
+
+    found = next((share for share in SHORTER if at_ends(share) <= MOST_AT_ENDS), None)
+    share = found or min(SHORTER, key=at_ends)
+    return share * horizon, SHORTENED if share < 1 else ""
+
+
+def _share_at_ends(recording: Recording, horizon: float) -> float:
+    """Share of the squared changes of the inputs near the ends of windows; 0 without changes."""
+    length = max(round(horizon / recording.dt), 2)
+    near, total = 0.0, 0.0
+    size = np.maximum(np.std(recording.inputs, axis=0), 1e-300)
+    for part in recording.slices:
+        changes = np.sum(np.square(np.diff(recording.inputs[part] / size, axis=0)), axis=1)
+        place = np.arange(1, len(changes) + 1) % length / length
+        near += float(changes[(place < BEGINNING) | (place >= 1 - END)].sum())
+        total += float(changes.sum())
+    return near / total if total > 0 else 0.0
 
 
 def _with_source(study: Study, source: str, horizon: float | None = None) -> Study:

@@ -95,7 +95,7 @@ def prepare(study: Study) -> Data:
     }
     tables = _on_one_rate(study, tables, remarks)
     dt = tables["train"][0].dt
-    horizon = max(round((file.horizon or USUAL) / dt), 2)
+    horizon = max(round(file.horizon / dt) if file.horizon else _usual(tables, dt), 2)
     groups: dict[str, list[Columns]] = _with_known(study, tables)
     groups["held_out"], groups["telling"], told = divided(study, groups["held_out"], horizon)
     remarks += told
@@ -112,6 +112,12 @@ def prepare(study: Study) -> Data:
         )
     uses = made["train"], made["held_out"], made["healthy"]
     return Data(*uses, horizon, tuple(remarks), telling=made["telling"])
+
+
+def _usual(tables: Mapping[str, Sequence[Columns]], dt: float) -> int:
+    """Samples of the default horizon; a tenth of the shortest recording if that is shorter."""
+    usual, shortest = round(USUAL / dt), min(len(t) for group in tables.values() for t in group)
+    return usual if usual <= shortest else shortest // 10
 
 
 def _with_known(study: Study, tables: Mapping[str, list[Columns]]) -> dict[str, list[Columns]]:
@@ -157,6 +163,7 @@ def _recording(
         if length == 0:
             raise ModelError(
                 f"{use}: found {len(table)} samples, expected at least one horizon of {horizon}"
+                f" ({horizon * table.dt:g} s); give a shorter `horizon` in the study's file"
             )
         if length < len(table):
             beyond.append((len(table) - length) * table.dt)

@@ -35,7 +35,7 @@ def judge_fit(base: Fitted, row: Ranked) -> None:
     assert row.fitted is not None
     found = difference(base.held_out, row.fitted.held_out)
     row.gain, row.reason = found.mean, _refused(found)
-    if not row.reason and row.fitted.train_error > (1 + MATERIAL) * base.train_error:
+    if row.fitted.train_error > (1 + MATERIAL) * base.train_error:
         row.reason = "its fit ended in a local minimum: the training error rises"
     if not row.reason and (vague := _undetermined_strength(row)) is not None:
         row.reason = vague

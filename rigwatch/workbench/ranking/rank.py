@@ -12,7 +12,7 @@ from typing import Any
 from rigwatch.workbench.data import Data, NoiseFloor
 from rigwatch.workbench.fit import Fitted, fit_model, fit_with_retry
 from rigwatch.workbench.ranking.candidates import candidates
-from rigwatch.workbench.ranking.fit_selection import select_for_fit
+from rigwatch.workbench.ranking.fit_selection import LEVEL, select_for_fit
 from rigwatch.workbench.ranking.ranked import SAME, Ranked, in_order
 from rigwatch.workbench.ranking.refitting import (
     Fitting,
@@ -34,6 +34,9 @@ MUCH_WORSE = 1.5
 
 Up to it another effect may be the right one, is fitted and may be named in place of the best.
 """
+
+MOST_MORE = 6
+"""Most rows that are fitted although others explain more, to first order."""
 
 
 def rank(
@@ -67,6 +70,9 @@ def rank(
     for other in _elsewhere(study, data, rows, floor):
         progress(f"fitting {other.label}, as the best may act there")
         refit(study, data, base, other, _from(in_order(rows)[0].fitted))
+    for other in _simpler_or_equal(study, data, rows, floor):
+        progress(f"fitting {other.label}, as the best at its port leaves more than noise")
+        refit(study, data, base, other, fit_model)
     return in_order(rows)
 
 
@@ -95,6 +101,25 @@ def _elsewhere(study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFlo
     if own_floor(study, data, floor, best).reached(accepted[0].fitted.held_out):
         return []
     return [r for r in rows if r.effect == best.effect and r.fitted is None and not r.failure]
+
+
+def _simpler_or_equal(
+    study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFloor
+) -> list[Ranked]:
+    """Unfitted significant rows at the best's port, no less simple, if it leaves more than noise.
+
+    A score is to first order in the strength: in a model that is far from linear, as a jet at a
+    nearly empty tank, what a sensor's zero does to it is underrated.
+    """
+    accepted = in_order([row for row in rows if row.accepted])
+    if not accepted or accepted[0].fitted is None:
+        return []
+    best = accepted[0]
+    if own_floor(study, data, floor, best).reached(accepted[0].fitted.held_out):
+        return []
+    waiting = [r for r in rows if r.fitted is None and not r.failure and not r.fitted_instead]
+    likely = [r for r in waiting if r.port == best.port and r.p_value < LEVEL]
+    return sorted((r for r in likely if r.free <= best.free), key=lambda r: r.p_value)[:MOST_MORE]
 
 
 def _substitute_of_failed(rows: Sequence[Ranked]) -> Ranked | None:

@@ -68,7 +68,10 @@ def matched(columns: Sequence[str], model: Model, given: Mapping[str, str]) -> M
             raise ModelError(_unknown(name, channel, signal, columns))
         rates[channel] = made
     if time is not None and not time.units:
-        remarks.append(f"{time.column}: no unit in its header, assumed s")
+        remarks.append(
+            f"{time.column}: no unit in its header, assumed s; for ms give --time"
+            f" '{time.column}[ms]'"
+        )
     told = f"{time.column}[{_time_unit(time)}]" if time else ""
     return Matched(found, told, rates, tuple(remarks))
 

@@ -108,3 +108,49 @@ def test_recordings_that_fill_no_number_of_horizons_do_not_end_it(
     parts = [{name: column[:samples] for name, column in fan(seed).items()} for seed in (0, 2)]
     study = studied(tmp_path, SLOW, parts, [fan(1)], UNITS)
     assert "time constant" in with_horizon(study).horizon_from
+
+
+BLOCK = """
+name = "block"
+summary = "A block that a heater warms."
+inputs.u = { unit = "%", hold = "zero" }
+states.T = { unit = "K", derivative = "(k*heater - T)/tau", measured = "T" }
+parameters.k = { value = 50.0, unit = "K", low = 0.0 }
+parameters.tau = { value = 100.0, unit = "s", low = 5.0 }
+outputs.T = { unit = "K", expression = "T" }
+[ports.heater]
+kind = "actuator"
+signal = "u"
+[ports.probe]
+kind = "sensor"
+signal = "T"
+"""
+
+
+def heated(seed: int, samples: int = 200) -> dict[str, np.ndarray]:
+    """A block whose heater steps once a minute, read every 3 s by a probe of 20 s."""
+    generator = np.random.default_rng(seed)
+    u = np.repeat(generator.uniform(0, 100, size=samples // 20), 20)
+    block, probe, read = 0.0, 0.0, np.zeros(samples)
+    for i in range(1, samples):
+        for _ in range(30):
+            block += 0.1 * (0.6 * u[i - 1] - block) / 170
+            probe += 0.1 * (block - probe) / 20
+        read[i] = probe
+    return {"u": u, "T": read + 0.03 * generator.normal(size=samples)}
+
+
+def test_a_drive_that_steps_at_equal_times_steps_inside_the_windows(tmp_path: Path) -> None:
+    tables, units = [heated(0, 400), heated(1)], {"u": "%", "T": "K"}
+    study = studied(tmp_path, BLOCK, tables[:1], tables[1:], units, rates=[1 / 3] * 2)
+    assert "shortened as inputs would only change" in with_horizon(study).horizon_from
+    found = explain(study)
+    assert found.verdict == "missing_effect"
+    late = {f"{name}@{port}" for name in ("lag", "delay") for port in ("heater", "probe")}
+    assert f"{found.ranking[0].effect}@{found.ranking[0].port}" in late
+
+
+def test_a_log_shorter_than_the_usual_horizon_can_be_studied(tmp_path: Path) -> None:
+    samples = {name: column[200:350] for name, column in fan(0, 900).items()}
+    study = studied(tmp_path, SLOW, [samples], [samples], UNITS, rates=[1000.0] * 2)
+    assert with_horizon(study).file.horizon < 0.15

@@ -212,7 +212,9 @@ class Model(Section, frozen=True, kw_only=True):
     rough: Annotated[
         bool, Meta(description="has a large residual even on a healthy rig; see the workbench")
     ] = False
-    inputs: dict[str, Input]
+    inputs: Annotated[
+        dict[str, Input], Meta(description="signals that drive it; none if it moves by itself")
+    ] = field(default_factory=dict)
     states: dict[str, State] = field(default_factory=dict)
     parameters: dict[str, Parameter]
     quantities: Annotated[
