@@ -4,7 +4,6 @@ Logs are imported as sessions in the study's folder and columns are matched to t
 The study file records the choices: training and held-out parts, sample rate, low-pass.
 """
 
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from pathlib import Path
 from msgspec import structs
 
 from rigwatch.physics.engine.equations import Input, Model, Output, model_named
-from rigwatch.wire.errors import ModelError, RigwatchError, nearest
+from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.wire.exchange import ImportMapping, import_file, read_table
 from rigwatch.workbench.data import (
     RATES_ALIKE,
@@ -24,8 +23,9 @@ from rigwatch.workbench.data import (
     read_columns,
 )
 from rigwatch.workbench.steps.log_columns import Matched, matched
+from rigwatch.workbench.steps.new_files import NewFiles
 from rigwatch.workbench.steps.stated_values import stated_values, unused_numbers
-from rigwatch.workbench.study import Span, Study, check_new, discard, start_study
+from rigwatch.workbench.study import FILE, LEDGER, Span, Study, check_new, start_study
 
 SAMPLES_PER_PERIOD = 2.5
 """Residual samples kept in a period of the low-pass's corner frequency."""
@@ -72,30 +72,24 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
         ModelError: the model is unknown, or columns cannot be matched to its signals.
     """
     check_new(folder)
-    model, made_folder, written = model_named(logs.model), not folder.exists(), list[Path]()
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        reading, remarks, stated = _imported(folder, logs, model, written)
+    model = model_named(logs.model)
+    with NewFiles(folder) as files:
+        reading, remarks, stated = _imported(files, logs, model)
         known = {log: values | dict(logs.known.get(log, {})) for log, values in stated.items()}
         logs = replace(logs, known={**logs.known, **known})
-        text, choices = _file(folder, logs, model, reading)
+        text, choices = _file(files, logs, model, reading)
+        for name in (FILE, LEDGER):
+            files.to_write(name)
         study = start_study(folder, text)
-        # A horizon is chosen when the study is fitted: what fills none is not known yet.
-        told = [remark for remark in prepare(study).remarks if UNFILLED not in remark]
-        return study, [*remarks, *choices, *told]
-    except RigwatchError:
-        discard(folder)
-        for path in written:
-            path.unlink(missing_ok=True)
-        if made_folder:
-            shutil.rmtree(folder)  # the model's own file is in it, too
-        raise
+        told = prepare(study).remarks
+    # A horizon is chosen when the study is fitted: what fills none is not known yet.
+    return study, [*remarks, *choices, *(remark for remark in told if UNFILLED not in remark)]
 
 
 def _imported(
-    folder: Path, logs: Logs, model: Model, written: list[Path]
+    files: NewFiles, logs: Logs, model: Model
 ) -> tuple[Matched, list[str], dict[str, dict[str, float]]]:
-    """Imports logs as sessions into the study's folder; `written` collects their paths.
+    """Imports logs as sessions into the study's folder.
 
     Returns the columns, remarks, and the parameters that each log states, by its name.
     """
@@ -108,10 +102,8 @@ def _imported(
         )
     reading, remarks, stated = None, list[tuple[str, str]](), dict[str, dict[str, float]]()
     for path in (*logs.data, *logs.healthy):
-        target = folder / f"{path.stem}.mcap"
         if path.suffix == ".mcap":
-            shutil.copyfile(path, target)
-            written.append(target)
+            files.copied(path)
             continue
         table = read_table(path, logs.mapping)
         try:
@@ -127,8 +119,7 @@ def _imported(
             flag_missing=True,
             any_unit=True,
         )
-        made = import_file(path, target, mapping)
-        written.append(target)
+        made = import_file(path, files.to_write(f"{path.stem}.mcap"), mapping)
         stated[path.stem] = stated_values(table, logs.stated, model)
         told = (*found.remarks, *made.remarks[1:], *unused_numbers(table, logs.stated))
         remarks += [(path.name, remark) for remark in told]
@@ -147,14 +138,14 @@ def _each_once(remarks: list[tuple[str, str]]) -> list[str]:
     ]
 
 
-def _file(folder: Path, logs: Logs, model: Model, reading: Matched) -> tuple[str, list[str]]:
+def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[str, list[str]]:
     """The text of the study's file, and remarks on its choices."""
     spans = [Span(session=f"{path.stem}.mcap") for path in logs.data]
-    tables = [read_columns(folder, span) for span in spans]
+    tables = [read_columns(files.folder, span) for span in spans]
     driving = [n for n in _channels(model.inputs) if n in tables[0].values]
     outputs = [n for n in _channels(model.outputs) if n in tables[0].values]
     train, held_out = proposed_split(tables, driving or outputs)
-    lines, choices = [f'model = "{_named(folder, logs.model)}"'], list[str]()
+    lines, choices = [f'model = "{_named(files, logs.model)}"'], list[str]()
     rates = [1 / table.dt for table in tables]
     if max(rates) / min(rates) > 1 + RATES_ALIKE:
         lines.append(f"rate = {min(rates):.6g}  # the slowest log's")
@@ -195,12 +186,13 @@ def _channels(signals: Mapping[str, Input] | Mapping[str, Output]) -> list[str]:
     return [signal.channel or name for name, signal in signals.items()]
 
 
-def _named(folder: Path, model: str) -> str:
+def _named(files: NewFiles, model: str) -> str:
     """The model's name, or its file name after copying it into the study."""
     if not model.endswith(".toml"):
         return model
-    shutil.copyfile(model, folder / Path(model).name)
-    return Path(model).name
+    if Path(model).name == FILE:
+        raise ModelError(f"{model}: found the name of the study's own file, expected another one")
+    return files.copied(Path(model)).name
 
 
 def _span(use: str, session: str, part: Part, logs: Logs) -> list[str]:

@@ -1,7 +1,7 @@
 """A study on disk: its TOML file, its recordings, and the hashed ledger of every step."""
 
 from rigwatch.workbench.study import ledger
-from rigwatch.workbench.study.creation import check_new, create, discard, start_study
+from rigwatch.workbench.study.creation import check_new, create, start_study
 from rigwatch.workbench.study.edits import (
     append_effect,
     drop_effect,
@@ -48,7 +48,6 @@ __all__ = [
     "commit",
     "create",
     "digest",
-    "discard",
     "drop_effect",
     "elements_of",
     "judged_alone",

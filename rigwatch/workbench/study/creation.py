@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from rigwatch.wire.errors import ConfigError, RigwatchError
+from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.typed_files import load
 from rigwatch.workbench.study.folder import FILE, LEDGER
 from rigwatch.workbench.study.ledger import append
@@ -12,13 +12,14 @@ from rigwatch.workbench.study.study_file import StudyFile
 
 
 def check_new(folder: Path) -> None:
-    """Check that a folder holds no study.
+    """Check that a folder holds no study, nor the ledger of one.
 
     Raises:
         ConfigError: it does.
     """
-    if (folder / FILE).exists():
-        raise ConfigError(folder / FILE, "", "a study", "a folder without one")
+    for name, what in ((FILE, "a study"), (LEDGER, "the ledger of a study")):
+        if (folder / name).exists():
+            raise ConfigError(folder / name, "", what, "a folder without one")
 
 
 def start_study(folder: Path, text: str) -> Study:
@@ -29,23 +30,20 @@ def start_study(folder: Path, text: str) -> Study:
         text: the study's file.
 
     Raises:
+        ConfigError: the folder holds a study already.
         RigwatchError: the text, the model, an effect or a recording is invalid.
     """
+    check_new(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / FILE).write_text(text, encoding="utf-8")
     try:
+        (folder / FILE).write_text(text, encoding="utf-8")
         study = open_study(folder)
         append(study, "new")
-    except RigwatchError:
-        discard(folder)
+    except BaseException:
+        for name in (FILE, LEDGER):
+            (folder / name).unlink(missing_ok=True)
         raise
     return study
-
-
-def discard(folder: Path) -> None:
-    """Remove the file and the ledger of a study that cannot be used."""
-    for name in (FILE, LEDGER):
-        (folder / name).unlink(missing_ok=True)
 
 
 def create(folder: Path | str, template: Path | str, sessions: Path | str | None = None) -> Study:
