@@ -24,12 +24,25 @@ class Notice:
     minutes: float
 
 
+AGAIN_S = 600.0
+"""Time after its end in which an alarm that comes again, seen by nobody, is the same one [s]: a
+monitor that is restarted again and again would send a notice each time."""
+
+
 @dataclass(slots=True)
 class _Unseen:
-    """An unacknowledged alarm: since when [s], and per recipient the last notice [s] and count."""
+    """An alarm that nobody has acknowledged.
+
+    Attributes:
+        alarm: as it was last.
+        since: when it came [s].
+        ended: when its condition ended [s]; None while it holds.
+        told: last notice [s] and number of notices by recipient.
+    """
 
     alarm: Alarm
     since: float
+    ended: float | None = None
     told: dict[str, tuple[float, int]] = field(default_factory=dict)
 
 
@@ -46,12 +59,22 @@ class Notices:
 
     def hear(self, alarm: Alarm, now: float) -> None:
         """Take note of a change of an alarm; `now` is monotonic time [s]."""
-        if alarm.state != "unacknowledged":
+        self._forget(now)
+        known = self._unseen.get(alarm.name)
+        if alarm.state == "cleared_unacknowledged" and known is not None:
+            known.ended = now
+        elif alarm.state != "unacknowledged":
             self._unseen.pop(alarm.name, None)
-        elif alarm.name in self._unseen:
-            self._unseen[alarm.name].alarm = alarm
+        elif known is not None:
+            known.alarm, known.ended = alarm, None
         else:
             self._unseen[alarm.name] = _Unseen(alarm, now)
+
+    def _forget(self, now: float) -> None:
+        """Forget the alarms that ended some time ago."""
+        for name, unseen in tuple(self._unseen.items()):
+            if unseen.ended is not None and now - unseen.ended > AGAIN_S:
+                del self._unseen[name]
 
     def due(self, now: float, wall: datetime) -> list[Notice]:
         """Notices to send now, each returned once.
@@ -62,7 +85,7 @@ class Notices:
         """
         windows = [one for one in self.people.maintenance if one.holds(wall)]
         found = []
-        for unseen in self._unseen.values():
+        for unseen in (one for one in self._unseen.values() if one.ended is None):
             severity = unseen.alarm.severity
             if all(window.lets_through(severity) for window in windows):
                 found += [

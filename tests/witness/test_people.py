@@ -78,6 +78,30 @@ def test_in_maintenance_nobody_is_told_until_it_is_over() -> None:
     assert told(who, 6, MONDAY + timedelta(hours=1)) == [("ann", "a")]
 
 
+def test_an_alarm_that_comes_and_goes_is_sent_as_one_that_stands() -> None:
+    often = RecipientSection(name="once", url="json://once")
+    who = notices(ANN, BOSS, often)
+    sent = []
+    for half_minute in range(60):
+        state = "cleared_unacknowledged" if half_minute % 2 else "unacknowledged"
+        who.hear(fault(state=state, severity="critical"), 30.0 * half_minute)
+        sent += told(who, half_minute / 2)
+    assert [name for name, _ in sent].count("once") == 1
+    assert [name for name, _ in sent].count("ann") == 3
+    assert [name for name, _ in sent].count("boss") == 1
+    who.hear(fault(severity="critical"), 60.0 * 41)
+    assert ("once", "stale") in told(who, 41)
+
+
+def test_what_was_seen_and_comes_again_is_sent_at_once() -> None:
+    who = notices(ANN)
+    for second, state in ((0, "unacknowledged"), (5, "acknowledged"), (6, "normal")):
+        who.hear(fault(state=state), second)
+        told(who, second / 60.0)
+    who.hear(fault(), 10.0)
+    assert told(who, 10 / 60.0) == [("ann", "stale")]
+
+
 def test_a_weekly_window_may_pass_midnight() -> None:
     late = datetime(2026, 1, 1, 23, 30).time()
     weekly = MaintenanceSection(name="wash", days=("sun",), at=late, minutes=60.0)

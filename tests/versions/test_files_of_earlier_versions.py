@@ -1,0 +1,78 @@
+"""Files that earlier versions have written are read by this one.
+
+A folder a version, named by its day: what `rigwatch demo` of that version left behind, its session
+cut to the moment in which friction was named, and its folder renamed to /var/lib/rig.
+"""
+
+import json
+from pathlib import Path
+from shutil import copy
+
+import pytest
+
+from monitor.alarms import AlarmManager, last_records, read_journal
+from monitor.process.cursor import Cursor
+from rigwatch.commands import main
+from rigwatch.recorder.positions import load_positions
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.session import open_session
+
+HERE = Path(__file__).parent
+VERSIONS = sorted(path for path in HERE.iterdir() if (path / "session.mcap").is_file())
+
+
+@pytest.fixture(params=VERSIONS, ids=lambda path: path.name)
+def version(request: pytest.FixtureRequest) -> Path:
+    return Path(request.param)
+
+
+def test_there_are_versions() -> None:
+    assert len(VERSIONS) >= 2
+
+
+def test_a_session_is_read_whole(version: Path) -> None:
+    session = open_session(version / "session.mcap")
+    assert sum(map(len, session.samples())) == 588
+    assert sum(map(len, session.estimates())) == 588
+    names = [item.message.name for item in session.messages(["alarms"])]
+    assert "dry_friction" in names
+    assert session.info.rig == "demo"
+
+
+def test_a_model_judges_a_session_of_its_time(
+    version: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [str(version / "session.mcap"), "--model", str(version / "model.toml"), "--json"]
+    assert main(["replay", *words]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["samples"] == 588
+    assert "dry_friction" in [alarm["name"] for alarm in found["alarms"]]
+
+
+def test_a_configuration_is_read_from_its_file_and_from_the_session(
+    version: Path, tmp_path: Path
+) -> None:
+    config = load_rig(version / "rig.toml")
+    recorded = tmp_path / "recorded.toml"
+    recorded.write_text(open_session(version / "session.mcap").info.configuration)
+    assert load_rig(recorded) == config
+    assert config.recorder is not None
+    assert config.recorder.folder == "/var/lib/rig/sessions"
+
+
+def test_a_monitor_goes_on_from_journal_and_position(version: Path, tmp_path: Path) -> None:
+    records, unread = read_journal(version / "alarms.jsonl")
+    assert unread == 0
+    alarms = AlarmManager()
+    alarms.restore(last_records(records))
+    states = {alarm.name: alarm.state for alarm in alarms.standing()}
+    assert states["dry_friction"] == "cleared_unacknowledged"
+    stored = copy(version / "alarms.jsonl.position", tmp_path)  # a monitor maps its own
+    position = Cursor(stored).read()
+    assert position is not None
+    assert position[1] > 10_000
+
+
+def test_a_recorder_goes_on_from_its_positions() -> None:
+    kept = load_positions(HERE / "2026-11-22")
+    assert kept["estimates"]["monitor"][1] > 10_000
