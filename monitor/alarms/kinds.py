@@ -377,6 +377,13 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
     ),
 )
 
+REPORTED = frozenset(
+    (
+        "link", "stale", "duplicate_source", "loss", "line_noise", "slow_device", "clock_drift",
+        "clock_wrong", "disk", "disk_almost_full", "recording_stopped", "estimates_missing",
+    )
+)  # fmt: skip
+"""Alarms whose conditions processes report without a sample."""
 REFINED = tuple(dict.fromkeys(kind.refines for kind in ALARM_KINDS if kind.refines))
 """Alarms that others refine."""
 

@@ -20,9 +20,17 @@ from dataclasses import replace
 
 from monitor.alarms.debounce import Debouncer
 from monitor.alarms.flood import MOST_IN_WINDOW, FloodWatch
-from monitor.alarms.kinds import ALARM_FLOOD, REFINED, check_settings, order_of, settings_of
+from monitor.alarms.kinds import (
+    ALARM_FLOOD,
+    REFINED,
+    REPORTED,
+    check_settings,
+    order_of,
+    settings_of,
+)
 from monitor.alarms.operator import NOBODY, Actor, addressed, refusal
 from monitor.alarms.record import AlarmRecord
+from monitor.alarms.restoring import let_go, restore_from
 from monitor.alarms.state import UNSEEN, AlarmInstance, Occasion
 from monitor.signals import Condition
 from rigwatch.wire.arrays import IntArray
@@ -59,6 +67,7 @@ class AlarmManager:
         self._settings = dict(settings or {})
         check_settings(self._settings, file)
         self._alarms: dict[str, AlarmInstance] = {}
+        self._inherited: set[str] = set()
         self._debouncers: dict[str, Debouncer] = {}
         self._flood = FloodWatch()
         self._first_out = ""
@@ -155,24 +164,44 @@ class AlarmManager:
         self._due_ns = 0
         for record in records:
             self._restore_one(record)
-        if now_ns is not None:
-            for alarm in self._alarms.values():
+        for alarm in list(self._alarms.values()):
+            if now_ns is not None:
                 alarm.shelved_until_ns = min(alarm.shelved_until_ns, now_ns + SHELF_LIFE_NS)
-        return self.standing()
+            t_ns = alarm.occasion.t_ns if now_ns is None else now_ns
+            if why := let_go(alarm):
+                self._publish(alarm, t_ns, Actor(text=why))
+                self._raise_unnamed(t_ns)
+        over = [said for said in self._take_announcements() if isinstance(said, Alarm)]
+        return [*(alarm for alarm in over if alarm.state == "normal"), *self.standing()]
 
     def _restore_one(self, record: AlarmRecord) -> None:
-        said = record.alarm
-        alarm = self._alarm(said.name)
-        alarm.state, alarm.active, alarm.latched = said.state, record.active, record.latched
-        alarm.shelved_until_ns, alarm.first_out = record.shelved_until_ns, said.first_out
-        alarm.superseded = record.active and said.state == "normal" and not record.shelved_until_ns
-        alarm.occasion = Occasion(
-            said.device, said.boot, said.seq, said.t_ns, said.value, said.low, said.high,
-            said.onset_seq, alarm.added_to(said.cause),
-        )  # fmt: skip
-        self._debouncer(said.name).level = record.active
-        if said.first_out and said.state != "normal":
-            self._first_out = said.name
+        alarm = self._alarm(record.alarm.name)
+        restore_from(alarm, record)
+        self._debouncer(alarm.name).level = alarm.active
+        if alarm.active:
+            self._inherited.add(alarm.name)
+        if alarm.first_out and alarm.state != "normal":
+            self._first_out = alarm.name
+
+    def retire(self, watched: Iterable[str], t_ns: int) -> list[Announcement]:
+        """Clear restored alarms whose condition nothing determines any more.
+
+        Args:
+            watched: names of the conditions that are determined.
+            t_ns: Unix time [ns].
+        """
+        inherited, self._inherited = self._inherited, set()
+        for name in sorted(inherited.difference(watched, REPORTED)):
+            if self.holds(name):
+                self._tell("alarm_not_watched", f"{name}: nothing watches for it any more", t_ns)
+                self._debouncer(name).level = False
+                self._set(name, Occasion(t_ns=t_ns), active=False)
+        return self._take_announcements()
+
+    @property
+    def has_inherited(self) -> bool:
+        """Whether alarms have been restored whose conditions have not been determined since."""
+        return bool(self._inherited)
 
     def _follow(self, boot: int, seq: int, count: int) -> None:
         """Interrupt the debouncers where the samples do not follow the last ones."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from monitor.alarms import AlarmManager, Occasion, last_records
 from monitor.decision.sample_kernel import watch_block
 from monitor.pipeline.rig_monitor import RigMonitor, compile_kernels
 from rigwatch.wire.messages.message_types import Alarm, Column, SampleBlock
@@ -37,6 +38,19 @@ def test_friction_that_has_gone_clears_on_a_line_that_loses_a_sample_every_secon
         said = (one for one in watched.announcements if isinstance(one, Alarm))
         states += [alarm.state for alarm in said if alarm.name == "dry_friction"]
     assert states == ["unacknowledged", "cleared_unacknowledged"]
+
+
+def test_alarms_of_a_detector_that_is_gone_clear_after_a_restart_and_others_do_not() -> None:
+    old, new = AlarmManager(), RigMonitor(model())
+    for name in ("parity_arma", "dry_friction", "link"):
+        old.report(name, Occasion("rig", 1, 9, 9), active=True)
+    new.alarms.restore(last_records(old.take_changes()))
+    watched = new.update(block(run(SINE, 1.0), 0, 64))
+    assert watched is not None
+    states = [(a.name, a.state) for a in watched.announcements if isinstance(a, Alarm)]
+    assert ("parity_arma", "cleared_unacknowledged") in states
+    assert new.alarms.holds("dry_friction")
+    assert new.alarms.holds("link")
 
 
 def test_estimates_are_made_with_and_without_the_friction_scheme() -> None:

@@ -101,6 +101,18 @@ def test_a_sensor_that_fails_later_is_a_fault_and_no_wiring(effect: str) -> None
     assert JUDGED & times.keys()
 
 
+def test_a_wiring_alarm_clears_once_the_wiring_is_right_after_a_restart_of_the_device() -> None:
+    wrong, right, monitor = run(SINE, 4.0), run(SINE, 4.0), RigMonitor(monitor_rig.model())
+    reversed_position(wrong)
+    said = []
+    for boot, channels in ((1, wrong), (2, right)):
+        found = monitor.update(block(channels, boot=boot))
+        assert found is not None
+        said += [one for one in found.announcements if isinstance(one, Alarm)]
+    states = [(one.boot, one.state) for one in said if one.name == "wiring_sign"]
+    assert states == [(1, "unacknowledged"), (2, "cleared_unacknowledged")]
+
+
 def test_the_cut_into_blocks_changes_no_alarm_and_no_estimate() -> None:
     channels = run(SINE, 6.0)
     in_g(channels)

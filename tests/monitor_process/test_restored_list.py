@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from monitor.alarms import AlarmJournal, AlarmRecord, Occasion
+from monitor.alarms.kinds import REPORTED
 from rigwatch.wire.bus import Bus, Close, ask_alarm_list
 from rigwatch.wire.bus.commands.alarm_list import KEY
 from rigwatch.wire.bus.transport import Answer
@@ -80,3 +81,9 @@ def test_a_return_to_normal_that_a_kill_kept_back_is_told_by_the_next_monitor(
     assert bench.alarm_states() == []
     bench.start()
     eventually(lambda: ("not_armed", "normal") in bench.alarm_states(), "the return is told")
+
+
+def test_conditions_that_no_sample_shows_are_all_in_the_table(bench: Bench) -> None:
+    """Else the first sample after a restart would clear such an alarm."""
+    reports = bench.monitor._reports(bench.monitor._seen())
+    assert {name for name, _, _ in reports} == REPORTED
