@@ -9,7 +9,7 @@ It is pure: no clock, bus or file, and the same samples give the same results fo
 blocks.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from monitor.detectors import Detector
 from monitor.model import EquationsPlant, RigModel
 from monitor.pipeline.observer_pipeline import ObserverMonitor
 from monitor.pipeline.pipeline import Monitor
-from monitor.signals import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition
+from monitor.signals import GAP, SENSOR_CLIPPED, SENSOR_INVALID, Condition, above
 from monitor.wiring import WIRING, WiringCheck
 from rigwatch.wire.arrays import BoolArray
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, cut
@@ -97,10 +97,18 @@ class RigMonitor:
         if self._wiring is None:
             return replace(at, columns=columns), (*own, *more, *quality)
         wrong, wiring = self._wiring.update(fresh)
+        wiring = (*wiring, *self._wiring_put_right(wiring, len(fresh)))
         if wrong is not None and wrong.any():
             columns = tuple(_disarmed(column, wrong) for column in columns)
             own, more = (tuple(_silenced(c, wrong) for c in part) for part in (own, more))
         return replace(at, columns=columns), (*own, *more, *wiring, *quality)
+
+    def _wiring_put_right(self, found: tuple[Condition, ...], n: int) -> Iterator[Condition]:
+        """That a wiring alarm of an earlier check does not hold any more, in n samples."""
+        named = {condition.name for condition in found}
+        for name in WIRING:
+            if name not in named and self.alarms.holds(name):
+                yield above(name, np.zeros(n, np.bool_), np.full(n, np.nan), np.inf)
 
     def announce(self, at: EstimateBlock, conditions: tuple[Condition, ...]) -> list[Announcement]:
         """Messages of the alarms for conditions, in order."""
