@@ -3,10 +3,12 @@
 import glob
 import os
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 from rigwatch.doctor.finding import Finding, judged
-from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.access import days_left, ending_soon, in_force, key_files, read_register
+from rigwatch.wire.errors import KeysError, RigwatchError
 from rigwatch.wire.host import endpoint_address, is_free
 from rigwatch.wire.rig_config import ModbusRtuSection, RigConfig, SerialSection, load_rig
 
@@ -23,8 +25,31 @@ def check_rig(path: Path) -> Iterator[Finding]:
         return
     yield Finding("configuration", "ok", f"{path}: rig {config.rig.id}")
     yield from check_files(config)
+    yield from check_keys(config)
     yield from check_ports(config)
     yield from check_device(config)
+
+
+def check_keys(config: RigConfig) -> Iterator[Finding]:
+    """The rig's certificates are in force for some time, and private keys are private."""
+    if not config.bus.security.keys:
+        return
+    folder, today = Path(config.bus.security.keys), datetime.now(UTC).date()
+    try:
+        register = read_register(folder)
+    except KeysError as error:
+        yield Finding("keys", "fail", str(error), "make them with rigwatch keys new")
+        return
+    known, soon = in_force(register), ending_soon(register, today)
+    ended = any(days_left(one, today) < 0 for one in soon)
+    dates = ", ".join(f"{one.name} ends {one.ends}" for one in soon)
+    text = dates or f"{folder}: {len(known)} certificates in force"
+    remedy = "issue them anew with rigwatch keys issue, and restart the processes"
+    yield judged("keys", not soon, text, remedy, "fail" if ended else "warn")
+    private = (key_files(folder, one.name)[1] for one in known)
+    open_ones = [one.name for one in private if one.is_file() and one.stat().st_mode & 0o077]
+    seen = f"others may read {', '.join(open_ones)}" if open_ones else "readable by you only"
+    yield judged("private keys", not open_ones, seen, f"chmod 600 {folder}/*.key")
 
 
 def check_files(config: RigConfig) -> Iterator[Finding]:

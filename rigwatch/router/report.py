@@ -1,11 +1,21 @@
-"""Reports of the router on its own bus: health once a second, an event when access is refused."""
+"""Reports of the router on its own bus: health once a second, events.
 
+ACCESS REFUSED      somebody was refused
+CERTIFICATES END    once a day, from a month before one of them ends
+"""
+
+import contextlib
+import math
 import threading
 import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
 
 from rigwatch.router.refusal_log import RefusalLog
+from rigwatch.wire.access import days_left, ending_soon, in_force, read_register, told
 from rigwatch.wire.bus import Bus, connect
-from rigwatch.wire.errors import RigwatchError
+from rigwatch.wire.errors import KeysError, RigwatchError
 from rigwatch.wire.messages import EVENTS, HEALTH, Event, Health
 from rigwatch.wire.rig_config import RigConfig
 
@@ -13,6 +23,8 @@ PROCESS = "router"
 BETWEEN_HEALTH = 1.0
 BETWEEN_EVENTS = 60.0
 """Shortest time between two events about refusals [s]."""
+BETWEEN_LOOKS, DAY = 60.0, 86_400.0
+"""Time between two looks at the certificates' ends, and between two events about them [s]."""
 
 
 class RouterReport:
@@ -28,6 +40,8 @@ class RouterReport:
         self._config, self._refusals, self._stop = config, refusals, stop
         self._said = (0, 0)
         self._said_at = -BETWEEN_EVENTS
+        self._looked_at = self._warned_at = -math.inf
+        self._days = math.inf
         self.reloads = 0
         self.trouble = ""
 
@@ -53,9 +67,28 @@ class RouterReport:
             "denied_messages": float(counted[1]),
             "register_reloads": float(self.reloads),
         }
+        for event in self._endings(now, t_ns):
+            bus.publish(EVENTS, event)
+        if math.isfinite(self._days):
+            counters["certificate_days"] = self._days
         bus.publish(HEALTH, Health(PROCESS, t_ns, "running", self.trouble, counters))
         if counted != self._said and now - self._said_at >= BETWEEN_EVENTS:
             connections, messages = counted[0] - self._said[0], counted[1] - self._said[1]
             self._said, self._said_at = counted, now
             text = f"{connections} connections and {messages} messages were refused"
             bus.publish(EVENTS, Event(PROCESS, t_ns, "warning", "ACCESS REFUSED", text))
+
+    def _endings(self, now: float, t_ns: int) -> Iterator[Event]:
+        """Look when the certificates end, and warn of those that end soon."""
+        if now - self._looked_at < BETWEEN_LOOKS:
+            return
+        self._looked_at = now
+        with contextlib.suppress(KeysError):  # whoever follows the register says so
+            register = read_register(Path(self._config.bus.security.keys))
+            today = datetime.fromtimestamp(t_ns / 1e9, UTC).date()
+            left = [days_left(one, today) for one in in_force(register)]
+            self._days = float(min(left, default=math.inf))
+            soon = ending_soon(register, today)
+            if soon and now - self._warned_at >= DAY:
+                self._warned_at = now
+                yield Event(PROCESS, t_ns, "error", "CERTIFICATES END", told(soon))

@@ -1,5 +1,7 @@
 """The router of a rig with keys follows the register, and counts what it refuses."""
 
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -7,7 +9,9 @@ import pytest
 
 from rigwatch.keys import Authority
 from rigwatch.router import RefusalLog
+from rigwatch.router.report import RouterReport
 from rigwatch.wire.bus import DENIED_MARK, REFUSED_MARK, Bus, connect
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, HEALTH, AlarmCommand, encode
 from rigwatch.wire.rig_config import load_rig
@@ -91,6 +95,23 @@ def test_refused_connections_and_denied_messages_are_counted_and_reported(
         connect(load_rig(tmp_path / "other.toml"), "monitor", 0.5)
     eventually(lambda: counted("refused_connections") > refused, "the refusal is counted")
     eventually(lambda: any(e.code == "ACCESS REFUSED" for e in events.drain()), "an event")
+
+
+def test_certificates_that_end_are_told_once_a_day_from_a_month_before(tmp_path: Path) -> None:
+    keys = make_keys(tmp_path / "keys")
+    config = SecuredRig(tmp_path, keys).config
+    report = RouterReport(config, RefusalLog(), threading.Event())
+    network = MemoryNetwork()
+    observer, router = network.bus("bench", "recorder"), network.bus("bench", "router")
+    healths, events = observer.subscribe(HEALTH), observer.subscribe(EVENTS)
+    two_years, day_ns = time.time_ns() + 730 * 86_400 * 10**9, 86_400 * 10**9
+    said = []
+    for day in range(-33, 2):
+        for second in (0.0, 61.0):
+            report.turn(router, 86_400.0 * day + second, two_years + day * day_ns)
+        said.append((len(events.drain()), healths.drain()[-1].counters["certificate_days"]))
+    assert said[:3] == [(0, 33.0), (0, 32.0), (0, 31.0)]
+    assert said[3:] == [(1, float(-day)) for day in range(-30, 2)]
 
 
 def test_the_log_of_refusals_passes_everything_else_on() -> None:

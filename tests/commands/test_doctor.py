@@ -3,6 +3,7 @@
 import json
 import socket
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from rigwatch.commands import main
 from rigwatch.doctor.machine import check_disk, check_kernels, check_machine
 from rigwatch.doctor.rig import check_rig, check_serial
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
+from tests.access.secured_rig import make_keys
 
 RIG = """
 [rig]
@@ -23,7 +25,7 @@ gain = 0.001
 adapter = "serial"
 port = "{port}"
 [bus]
-listen = "tcp/127.0.0.1:{bus}"
+listen = "{scheme}/127.0.0.1:{bus}"
 {more}
 """
 
@@ -34,9 +36,11 @@ def taken_port() -> Iterator[int]:
         yield int(server.getsockname()[1])
 
 
-def levels(tmp_path: Path, port: str = "/dev/null", bus: int = 0, more: str = "") -> dict[str, str]:
+def levels(
+    tmp_path: Path, port: str = "/dev/null", bus: int = 0, more: str = "", scheme: str = "tcp"
+) -> dict[str, str]:
     path = tmp_path / "rig.toml"
-    path.write_text(RIG.format(port=port, bus=bus or free_port(), more=more))
+    path.write_text(RIG.format(port=port, bus=bus or free_port(), more=more, scheme=scheme))
     return {finding.what: finding.level for finding in check_rig(path)}
 
 
@@ -50,7 +54,9 @@ def test_a_good_configuration_has_nothing_to_complain_about(tmp_path: Path) -> N
 
 def test_a_misspelt_key_is_named_and_nothing_else_is_guessed(tmp_path: Path) -> None:
     path = tmp_path / "rig.toml"
-    path.write_text(RIG.format(port="/dev/null", bus=7447, more="[monitr]\nmodel = 'm.toml'"))
+    path.write_text(
+        RIG.format(port="/dev/null", bus=7447, scheme="tcp", more="[monitr]\nmodel = 'm.toml'")
+    )
     (finding,) = check_rig(path)
     assert finding.level == "fail"
     assert "monitr" in finding.text
@@ -111,3 +117,25 @@ def test_free_and_taken_ports_are_distinguished(taken_port: int) -> None:
     assert not is_free("127.0.0.1", taken_port)
     assert is_free("127.0.0.1", free_port())
     assert len(set(free_ports(200))) == 200
+
+
+def test_certificates_that_end_and_keys_that_others_read_are_found(tmp_path: Path) -> None:
+    keys = make_keys(tmp_path / "keys")
+    more = f'router = "tls/127.0.0.1:1"\n[bus.security]\nkeys = "{keys}"\noperator = "ann"'
+    assert set(levels(tmp_path, more=more, scheme="tls").values()) == {"ok"}
+    for days, level in ((20, "warn"), (-1, "fail")):
+        _end_in(keys, days)
+        (keys / "daq.key").chmod(0o640)
+        found = levels(tmp_path, more=more, scheme="tls")
+        assert (found["keys"], found["private keys"]) == (level, "fail")
+    (keys / "register.json").unlink()
+    assert levels(tmp_path, more=more, scheme="tls")["keys"] == "fail"
+
+
+def _end_in(keys: Path, days: int) -> None:
+    """The certificate of daq ends in so many days."""
+    register = json.loads((keys / "register.json").read_text())
+    for one in register["issued"]:
+        if one["name"] == "daq":
+            one["ends"] = (datetime.now(UTC) + timedelta(days=days)).strftime("%Y-%m-%d")
+    (keys / "register.json").write_text(json.dumps(register))

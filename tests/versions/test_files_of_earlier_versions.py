@@ -1,7 +1,8 @@
 """Files that earlier versions have written are read by this one.
 
 A folder a version, named by its day: what `rigwatch demo` of that version left behind, its session
-cut to the moment in which friction was named, and its folder renamed to /var/lib/rig.
+cut to the moment in which friction was named, and its folder renamed to /var/lib/rig. One has
+a study of two logs, made and extended by that version, and its index of an archive.
 """
 
 import json
@@ -12,6 +13,7 @@ import pytest
 
 from monitor.alarms import AlarmManager, last_records, read_journal
 from monitor.process.cursor import Cursor
+from rigwatch.archive import Store, query
 from rigwatch.commands import main
 from rigwatch.recorder.positions import load_positions
 from rigwatch.wire.rig_config import load_rig
@@ -76,3 +78,20 @@ def test_a_monitor_goes_on_from_journal_and_position(version: Path, tmp_path: Pa
 def test_a_recorder_goes_on_from_its_positions() -> None:
     kept = load_positions(HERE / "2026-11-22")
     assert kept["estimates"]["monitor"][1] > 10_000
+
+
+def test_a_study_shows_its_effects_and_its_steps(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "show", str(HERE / "2026-11-23" / "study")]) == 0
+    shown = capsys.readouterr().out
+    assert "coulomb@shaft" in shown
+    steps = [line.split()[1] for line in shown.splitlines() if line.strip().startswith("2026-")]
+    assert steps == ["new", "add"]
+
+
+def test_an_index_of_an_archive_answers() -> None:
+    store = Store(str(HERE / "2026-11-23"))
+    assert query(store, "select rig, samples, raised from sessions").rows == [
+        ("demo", 588, ["dry_friction"])
+    ]
+    names = {name for (name,) in query(store, "select distinct name from seconds").rows}
+    assert {"theta1", "residual"} <= names

@@ -13,6 +13,7 @@ from rigwatch.wire.messages import decode as quick_decode
 from rigwatch.wire.messages import encode as quick_encode
 from rigwatch.wire.messages.message_types import Column, EstimateBlock, SampleBlock
 from rigwatch.wire.messages.packed import decode_block
+from rigwatch.wire.messages.packed_encoding import LENGTHS_KEPT, _around
 from rigwatch.wire.messages.protobuf import decode, encode
 
 Block = SampleBlock | EstimateBlock
@@ -161,3 +162,11 @@ def test_a_number_that_runs_on_for_ever_is_left_to_the_general_decoder() -> None
 def test_garbage_is_judged_alike(data: bytes) -> None:
     for kind in (SampleBlock, EstimateBlock):
         assert said(kind, data, fast=True) == said(kind, data, fast=False)
+
+
+def test_heads_of_blocks_of_any_length_fill_no_memory() -> None:
+    _around.cache_clear()
+    for n in range(1, 2000):
+        theta = Column("theta1", "N", np.zeros(n))
+        quick_encode(EstimateBlock("rig", 7, 0, np.arange(n), (theta,)))
+    assert _around.cache_info().currsize <= LENGTHS_KEPT < 1000

@@ -1,6 +1,7 @@
 """Who may speak on a rig's bus: certificates, roles, and signed commands.
 
 register        the certificates that a rig's authority has issued or revoked
+validity        which of them end soon
 certificates    mutual TLS of a process; the operator of a machine
 access_list     topics allowed for each role, enforced by the router
 signing         Signer: an operator signs a command ─▶ proof (`statement`)
@@ -33,6 +34,7 @@ from rigwatch.wire.access.register import (
 )
 from rigwatch.wire.access.signing import Signer
 from rigwatch.wire.access.statement import names_a_person
+from rigwatch.wire.access.validity import days_left, ending_soon, in_force, told
 from rigwatch.wire.access.verifying import Verifier
 
 __all__ = [
@@ -48,11 +50,15 @@ __all__ = [
     "authority_file",
     "certificate_name",
     "check_exposure",
+    "days_left",
+    "ending_soon",
+    "in_force",
     "key_files",
     "names_a_person",
     "operator_name",
     "read_register",
     "signer_of",
     "tls_settings",
+    "told",
     "verifier_of",
 ]
