@@ -1,4 +1,9 @@
-"""Decides who is notified of which alarm and when: at once, repeated, escalated, or not now."""
+"""Decides who is notified of which alarm and when: at once, repeated, escalated, or not now.
+
+An alarm that has cleared before anybody saw it is notified like one that lasts: short faults, and
+those of the night, are the ones that nobody sees. What came and went within a maintenance window is
+not, as the work causes it.
+"""
 
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -26,7 +31,13 @@ class Notice:
 
 @dataclass(slots=True)
 class _Unseen:
-    """An unacknowledged alarm: since when [s], and per recipient the last notice [s] and count."""
+    """An alarm that nobody has acknowledged, cleared or not.
+
+    Attributes:
+        alarm: its last change.
+        since: when it was raised [s].
+        told: per recipient the last notice [s] and count.
+    """
 
     alarm: Alarm
     since: float
@@ -34,7 +45,7 @@ class _Unseen:
 
 
 class Notices:
-    """Tracks unacknowledged alarms; receives the time and reads no clock.
+    """Tracks alarms that nobody has acknowledged; receives the time and reads no clock.
 
     Args:
         people: recipients and maintenance windows.
@@ -46,12 +57,13 @@ class Notices:
 
     def hear(self, alarm: Alarm, now: float) -> None:
         """Take note of a change of an alarm; `now` is monotonic time [s]."""
-        if alarm.state != "unacknowledged":
+        if alarm.state in ("acknowledged", "normal"):
             self._unseen.pop(alarm.name, None)
-        elif alarm.name in self._unseen:
-            self._unseen[alarm.name].alarm = alarm
-        else:
-            self._unseen[alarm.name] = _Unseen(alarm, now)
+            return
+        unseen = self._unseen.setdefault(alarm.name, _Unseen(alarm, now))
+        if alarm.state == "unacknowledged" and unseen.alarm.state == "cleared_unacknowledged":
+            unseen.told.clear()  # it has come again
+        unseen.alarm = alarm
 
     def due(self, now: float, wall: datetime) -> list[Notice]:
         """Notices to send now, each returned once.
@@ -62,7 +74,7 @@ class Notices:
         """
         windows = [one for one in self.people.maintenance if one.holds(wall)]
         found = []
-        for unseen in self._unseen.values():
+        for name, unseen in list(self._unseen.items()):
             severity = unseen.alarm.severity
             if all(window.lets_through(severity) for window in windows):
                 found += [
@@ -70,6 +82,8 @@ class Notices:
                     for recipient in self.people.recipients
                     if _is_due(unseen, recipient, now)
                 ]
+            elif unseen.alarm.state == "cleared_unacknowledged" and not unseen.told:
+                del self._unseen[name]
         return found
 
     def _notice(self, unseen: _Unseen, recipient: RecipientSection, now: float) -> Notice:
