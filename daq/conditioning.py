@@ -1,13 +1,19 @@
 """Turns raw codes into calibrated samples with quality flags, sample by sample.
 
     saturated    at a converter rail for three samples in a row, or outside the sensor's range
-    stuck        constant code for `stuck_after` samples while every other channel moves
+    stuck        constant code for `stuck_after` samples, as the channel's own do not repeat, while
+                 every other channel moves
     spike        further from the last good sample than the sensor can move
     non-finite   NaN or infinite; replaced by the last good value
 
 A decision about a sample depends on it and the samples before it, never on the cut into blocks. A
 channel "moves" when its code changes by at least a thousandth of the converter's range within the
-same time. All others must move, so that a mass held by friction is not mistaken for a dead sensor.
+same time. All others must move, so that a mass held by friction is not mistaken for a dead sensor;
+a single channel is never stuck.
+
+A controller's set value has no noise, and may be held for seconds. So a run of equal codes must
+also be improbable for a channel whose codes repeat as often as this one's have lately. As long as
+that is not known, the run must be three times as long.
 """
 
 from collections.abc import Sequence
@@ -26,6 +32,11 @@ from rigwatch.wire.rig_config import ChannelSection
 _MOVES = 1e-3
 _RAIL_RUN = 3
 _SPIKE_RUN = 5
+_IMPROBABLE = 1e-9
+_UNKNOWN = 3
+"""Factor on `stuck_after` for a channel whose codes are not known yet."""
+_REMEMBERED = 8192
+"""Samples after which older codes count half."""
 _STATE = np.dtype(
     [
         ("good", np.float64),
@@ -33,6 +44,8 @@ _STATE = np.dtype(
         ("since_good", np.int64),
         ("code", np.float64),
         ("equal", np.int64),
+        ("repeats", np.float64),
+        ("steps", np.float64),
         ("reference", np.float64),
         ("since_move", np.int64),
         ("rail", np.int64),
@@ -110,7 +123,14 @@ def _hold_last(values: FloatArray, flags: ByteArray, state: Any) -> None:
 @kernel()
 def _follow(code: float, moves: float, s: Any) -> None:
     """Track how long a channel's code has been constant, and how long it has not moved."""
-    s.equal = s.equal + 1 if code == s.code else 1
+    if code == s.code:
+        s.equal += 1
+    else:
+        s.repeats += max(s.equal - 1, 0)
+        s.steps += s.equal
+        if s.steps > _REMEMBERED:
+            s.repeats, s.steps = s.repeats / 2, s.steps / 2
+        s.equal = 1
     s.code = code
     s.since_move += 1
     if abs(code - s.reference) >= moves:
@@ -134,15 +154,26 @@ def _judge(  # noqa: PLR0917 -- a compiled kernel takes no keywords
                 _follow(codes[i, k], _MOVES * (limits[1, k] - limits[0, k]), state[k])
         for k in range(channels):
             flags[i, k] |= _flags_of(codes[i, k], values[i, k], limits[:, k], state[k])
-            same = stuck_after[k] > 0 and state[k].equal >= stuck_after[k]
-            if same and _others_move(state, k, stuck_after[k]):
+            if _is_constant(state[k], stuck_after[k]) and _others_move(state, k, stuck_after[k]):
                 flags[i, k] |= quality.STUCK
             if flags[i, k] & quality.NON_FINITE:
                 values[i, k] = state[k].good
 
 
 @kernel()
+def _is_constant(s: Any, stuck_after: int) -> bool:
+    """Whether the code has been constant for longer than this channel's usually is."""
+    if stuck_after == 0 or s.equal < stuck_after:
+        return False
+    if s.steps < stuck_after:
+        return bool(s.equal >= _UNKNOWN * stuck_after)
+    return bool(((s.repeats + 1.0) / (s.steps + 2.0)) ** s.equal < _IMPROBABLE)
+
+
+@kernel()
 def _others_move(state: Any, k: int, within: int) -> bool:
+    if len(state) == 1:
+        return False
     for j in range(len(state)):  # noqa: SIM110 (no generators in a compiled kernel)
         if j != k and state[j].since_move >= within:
             return False

@@ -67,6 +67,7 @@ class SequenceTracker:
         self._us = 0
         self._arrived = 0
         self._repeats = 0
+        self._repeat, self._rising = -2, 0
 
     def accept(self, raw: RawBlock) -> list[Step]:
         """The steps in `raw`, in order: runs, with gaps and restarts between them."""
@@ -93,6 +94,7 @@ class SequenceTracker:
         elapsed_us = (arrived - self._arrived) // 1000
         later_us = elapsed_us + _signed(us - self._us - elapsed_us)
         if ahead <= 0 and self._is_repeated(ahead, later_us):
+            self._count_repeat(seq)
             return _REPEATED
         if ahead <= 0 or (ahead > _LONG_HOLE and not self._plausible(ahead, later_us)):
             return self._begin(boot, seq, us, arrived, f"its counter jumped by {ahead}")
@@ -106,11 +108,13 @@ class SequenceTracker:
 
     def _is_repeated(self, ahead: int, later_us: int) -> bool:
         same_clock = abs(later_us - ahead * self._period_us) < self._period_us
-        if -ahead >= _REPEATS or not same_clock or self._repeats >= _REPEATS_IN_A_ROW:
-            return False
-        self._repeats += 1
+        return -ahead < _REPEATS and same_clock and self._repeats < _REPEATS_IN_A_ROW
+
+    def _count_repeat(self, seq: int) -> None:
         self.duplicates += 1
-        return True
+        self._repeats += 1
+        self._rising = self._rising + 1 if seq == self._repeat + 1 else 1
+        self._repeat = seq
 
     def _plausible(self, ahead: int, later_us: int) -> bool:
         expected = ahead * self._period_us
@@ -119,13 +123,23 @@ class SequenceTracker:
     def _begin(self, boot: int, seq: int, us: int, arrived: int, reason: str) -> list[Step]:
         """Start a new count; if the device kept its boot, derive a new one from it."""
         before, first, last = self._boot, self._seq + 1, self._seq
+        taken = self._taken_for_repeats(boot, seq)
         self._recounts = self._recounts + 1 if boot == self._device_boot else 0
         self._device_boot, self._seq, self._us, self._arrived = boot, seq, us, arrived
         self._boot = zlib.crc32(f"{boot}/{self._recounts}".encode()) if self._recounts else boot
         self._repeats = 0
         if not reason:
             return [Restart(self._boot, 0, "")]
-        return [Hole(before, first, last), Restart(self._boot, before, reason)]
+        mistaken = [Hole(self._boot, seq - taken, seq - 1)] if taken else []
+        return [Hole(before, first, last), Restart(self._boot, before, reason), *mistaken]
+
+    def _taken_for_repeats(self, boot: int, seq: int) -> int:
+        """Samples up to `seq` of a count that began anew, dropped as repeats: they are lost."""
+        goes_on = boot == self._device_boot and self._repeats > 0 and seq == self._repeat + 1
+        taken = self._rising if goes_on else 0
+        self.duplicates -= taken
+        self.lost += taken
+        return taken
 
 
 class _Run:

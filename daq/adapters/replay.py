@@ -1,7 +1,9 @@
 """Plays a recorded session in place of a device, at any speed.
 
-Samples arrive when they are due by the recording's clock, calibrated and flagged as recorded. They
-keep their recorded sequence numbers; each pass of a loop is a separate boot.
+Samples arrive when they are due by the device's clock in the recording, calibrated and flagged as
+recorded. Where the device started anew its clock did, too: the time of the host tells how much
+later that was. Samples keep their recorded sequence numbers; each pass of a loop is a separate
+boot.
 """
 
 import math
@@ -50,8 +52,10 @@ class ReplayAdapter:
         self._turn = 0
         self._blocks: Iterator[SampleBlock] = iter(())
         self._rest: RawBlock | None = None
+        self._boot: int | None = None
         self._start_ns = 0
         self._start_us = 0
+        self._recorded_ns = 0
         self._played = 0
 
     def open(self) -> None:
@@ -60,11 +64,9 @@ class ReplayAdapter:
         Raises:
             DeviceError: the session does not exist or has no samples.
         """
-        self._blocks = self._opened()
-        self._rest = self._next()
+        self._rest = self._first()
         if self._rest is None:
             raise DeviceError(f"{self._session}: no samples to replay")
-        self._start_ns, self._start_us = self._clock(), int(self._rest.device_us[0])
 
     def read(self, timeout: float) -> Sequence[RawBlock]:
         """The samples due now or within `timeout` [s].
@@ -110,17 +112,28 @@ class ReplayAdapter:
             block = next(self._blocks, None)
         except SessionError as error:
             raise DeviceError(str(error)) from error
-        return None if block is None else self._raw(block)
+        if block is None:
+            return None
+        raw = self._raw(block)
+        if block.boot != self._boot:
+            self._begin(block.boot, int(raw.device_us[0]), int(block.t_ns[0]))
+        return raw
+
+    def _begin(self, boot: int, us: int, t_ns: int) -> None:
+        """Play a boot from now on, or later if there was a break before it."""
+        later = 0 if self._boot is None else round((t_ns - self._recorded_ns) / self.clock_rate)
+        self._start_ns = max(self._start_ns + later, self._clock())
+        self._boot, self._start_us, self._recorded_ns = boot, us, t_ns
+
+    def _first(self) -> RawBlock | None:
+        self._blocks, self._boot = self._opened(), None
+        return self._next()
 
     def _again(self) -> RawBlock | None:
         if not self._loop:
             return None
         self._turn += 1
-        self._blocks = self._opened()
-        first = self._next()
-        if first is not None:
-            self._start_ns, self._start_us = self._clock(), int(first.device_us[0])
-        return first
+        return self._first()
 
     def _raw(self, block: SampleBlock) -> RawBlock:
         columns = [self._column(block, channel) for channel in self._channels]

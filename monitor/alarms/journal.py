@@ -51,9 +51,13 @@ class AlarmJournal:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-            self._end_torn_line()
-            _sync_folder(self.path.parent)
-            self._newest = _newest(self.path)
+            try:
+                self._end_torn_line()
+                _sync_folder(self.path.parent)
+                self._newest = _newest(self.path)
+            except OSError:
+                os.close(self._file)
+                raise
         except OSError as error:
             raise SessionError(
                 f"{path}: alarm journal cannot be opened: {reason_of(error)}"

@@ -238,7 +238,8 @@ ALARM_KINDS: tuple[AlarmKind, ...] = (
         "sensor_stuck",
         "error",
         "the {channel} reading has not changed for longer than a working sensor's noise allows",
-        "Check the sensor's wiring and supply; move the rig by hand and watch the channel.",
+        "Check the sensor's wiring and supply; move the rig by hand and watch the channel. If it "
+        "is a set value that may be held, set its stuck_after to 0.",
         _AT_ONCE,
     ),
     AlarmKind(

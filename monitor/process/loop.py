@@ -24,7 +24,7 @@ from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
 from rigwatch.wire.bus import Bus, CommandCheck, connect, serve_alarm_list
 from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
-from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.errors import ConfigError, SessionError
 from rigwatch.wire.host import (
     MONITOR,
     Heartbeat,
@@ -76,8 +76,7 @@ class MonitorProcess:
         friction = FRICTION in section.detectors
         self.rig = RigMonitor(model, section.alarms, detectors, str(path), friction)
         self.bus = bus
-        self._journal = AlarmJournal(section.journal) if section.journal else None
-        self._cursor = Cursor(f"{section.journal}.position") if section.journal else None
+        self._journal, self._cursor = _opened(section.journal)
         self._done = self._cursor.read() if self._cursor else None
         self._stale_after = config.daq.stale_after
         self._links = LinkWatch(self._stale_after)
@@ -297,6 +296,18 @@ class MonitorProcess:
         self.bus.publish(
             HEALTH, self._health.message(seen.t_ns, state, text, self.reader.counters, extra)
         )
+
+
+def _opened(journal: str) -> tuple[AlarmJournal | None, Cursor | None]:
+    """Journal and position at a path, both or neither: a rig that cannot start keeps no file."""
+    if not journal:
+        return None, None
+    opened = AlarmJournal(journal)
+    try:
+        return opened, Cursor(f"{journal}.position")
+    except SessionError:
+        opened.close()
+        raise
 
 
 def monitor_section(config: RigConfig, path: Path | str) -> MonitorSection:

@@ -1,10 +1,19 @@
-"""Decides who is notified of which alarm and when: at once, repeated, escalated, or not now."""
+"""Decides who is notified of which alarm and when: at once, repeated, escalated, or not now.
+
+An alarm that has cleared before anybody saw it is notified like one that lasts: short faults, and
+those of the night, are the ones that nobody sees. What came and went within a maintenance window is
+not, as the work causes it.
+"""
 
 from dataclasses import dataclass, field
 from datetime import datetime
 
 from rigwatch.wire.messages import Alarm
 from rigwatch.witness.people import SEVERITIES, PeopleFile, RecipientSection
+
+AGAIN_S = 600.0
+"""Time after its end in which an alarm that comes again, seen by nobody, is the same one [s]: a
+monitor that is restarted again and again would send a notice each time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,20 +33,15 @@ class Notice:
     minutes: float
 
 
-AGAIN_S = 600.0
-"""Time after its end in which an alarm that comes again, seen by nobody, is the same one [s]: a
-monitor that is restarted again and again would send a notice each time."""
-
-
 @dataclass(slots=True)
 class _Unseen:
-    """An alarm that nobody has acknowledged.
+    """An alarm that nobody has acknowledged, cleared or not.
 
     Attributes:
-        alarm: as it was last.
+        alarm: its last change.
         since: when it came [s].
         ended: when its condition ended [s]; None while it holds.
-        told: last notice [s] and number of notices by recipient.
+        told: per recipient the last notice [s] and count.
     """
 
     alarm: Alarm
@@ -47,7 +51,7 @@ class _Unseen:
 
 
 class Notices:
-    """Tracks unacknowledged alarms; receives the time and reads no clock.
+    """Tracks alarms that nobody has acknowledged; receives the time and reads no clock.
 
     Args:
         people: recipients and maintenance windows.
@@ -59,22 +63,17 @@ class Notices:
 
     def hear(self, alarm: Alarm, now: float) -> None:
         """Take note of a change of an alarm; `now` is monotonic time [s]."""
-        self._forget(now)
-        known = self._unseen.get(alarm.name)
-        if alarm.state == "cleared_unacknowledged" and known is not None:
-            known.ended = now
-        elif alarm.state != "unacknowledged":
+        if alarm.state in ("acknowledged", "normal"):
             self._unseen.pop(alarm.name, None)
-        elif known is not None:
-            known.alarm, known.ended = alarm, None
+            return
+        unseen = self._unseen.setdefault(alarm.name, _Unseen(alarm, now))
+        if alarm.state == "cleared_unacknowledged":
+            unseen.ended = now
+        elif unseen.ended is not None and now - unseen.ended > AGAIN_S:
+            unseen = self._unseen[alarm.name] = _Unseen(alarm, now)
         else:
-            self._unseen[alarm.name] = _Unseen(alarm, now)
-
-    def _forget(self, now: float) -> None:
-        """Forget the alarms that ended some time ago."""
-        for name, unseen in tuple(self._unseen.items()):
-            if unseen.ended is not None and now - unseen.ended > AGAIN_S:
-                del self._unseen[name]
+            unseen.ended = None
+        unseen.alarm = alarm
 
     def due(self, now: float, wall: datetime) -> list[Notice]:
         """Notices to send now, each returned once.
@@ -85,7 +84,7 @@ class Notices:
         """
         windows = [one for one in self.people.maintenance if one.holds(wall)]
         found = []
-        for unseen in (one for one in self._unseen.values() if one.ended is None):
+        for name, unseen in list(self._unseen.items()):
             severity = unseen.alarm.severity
             if all(window.lets_through(severity) for window in windows):
                 found += [
@@ -93,6 +92,8 @@ class Notices:
                     for recipient in self.people.recipients
                     if _is_due(unseen, recipient, now)
                 ]
+            elif unseen.alarm.state == "cleared_unacknowledged" and not unseen.told:
+                del self._unseen[name]
         return found
 
     def _notice(self, unseen: _Unseen, recipient: RecipientSection, now: float) -> Notice:

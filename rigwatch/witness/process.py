@@ -100,7 +100,7 @@ class Witness:
 
     def _report(self, now: float, t_ns: int) -> None:
         silent = max(0.0, now - self._heard_at)
-        stale = self._stale.standing is not None
+        stale = self._stale.holds
         counters = {
             "estimates_silent_s": silent,
             "lost_alarms": float(self._alarms.lost),

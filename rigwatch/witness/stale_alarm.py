@@ -24,7 +24,7 @@ class StaleAlarm:
         check: verifies the commands of operators.
 
     Attributes:
-        standing: the alarm while estimates are missing, otherwise None.
+        standing: the alarm until estimates come again and somebody has acknowledged it, or None.
     """
 
     def __init__(self, check: CommandCheck) -> None:
@@ -39,14 +39,21 @@ class StaleAlarm:
             silent: time since the last one [s].
             t_ns: Unix time [ns].
         """
-        if stale and self.standing is None:
-            self.standing = _alarm("unacknowledged", f"for {silent:.1f} s", t_ns)
-            yield self.standing
-        elif not stale and self.standing is not None:
+        if stale and not self.holds:
+            yield self._become(_alarm("unacknowledged", f"for {silent:.1f} s", t_ns))
+        elif not stale and self.standing is not None and self.holds:
             seen = self.standing.state == "acknowledged"
-            self.standing = None
             state: AlarmState = "normal" if seen else "cleared_unacknowledged"
-            yield _alarm(state, "estimates come again", t_ns)
+            yield self._become(_alarm(state, "estimates come again", t_ns))
+
+    @property
+    def holds(self) -> bool:
+        """Whether estimates are missing."""
+        return self.standing is not None and self.standing.state != "cleared_unacknowledged"
+
+    def _become(self, alarm: Alarm) -> Alarm:
+        self.standing = None if alarm.state == "normal" else alarm
+        return alarm
 
     def command(self, command: AlarmCommand, t_ns: int) -> Iterator[Alarm | Event]:
         """Execute an operator's command for this alarm, or say why not."""
@@ -65,13 +72,13 @@ class StaleAlarm:
             yield Event("witness", t_ns, "warning", "alarm_command_refused", text)
             return
         user = command.user[:LONGEST_NAME]
-        self.standing = _alarm("acknowledged", "seen", t_ns, user, verdict.identity)
-        yield self.standing
+        state: AlarmState = "acknowledged" if self.holds else "normal"
+        yield self._become(_alarm(state, "seen", t_ns, user, verdict.identity))
 
     def _obstacle(self, command: AlarmCommand) -> str:
         if command.action != "acknowledge":
             return "it can only be acknowledged"
-        if self.standing is None or self.standing.state != "unacknowledged":
+        if self.standing is None or self.standing.state == "acknowledged":
             return "it is not unacknowledged"
         return "" if command.user else "no user given"
 

@@ -49,14 +49,47 @@ def test_a_value_outside_the_range_counts_at_once() -> None:
     assert flags(block, "a", quality.SATURATED) == [1, 2]
 
 
+def stuck(*codes: np.ndarray, after: int = 20) -> list[list[int]]:
+    """Samples at which each channel counts as stuck."""
+    names = "abcdef"[: len(codes)]
+    block = judged(np.stack(codes, axis=1), *(channel(name, stuck_after=after) for name in names))
+    return [flags(block, name, quality.STUCK) for name in names]
+
+
 def test_a_dead_sensor_is_stuck_only_while_the_others_move() -> None:
-    still, moving = np.full(60, 7), np.arange(60) % 2 * 1000
-    keys = {"stuck_after": 20}
-    dead = judged(np.stack([still, moving, -moving], axis=1), *(channel(n, **keys) for n in "abc"))
-    assert flags(dead, "a", quality.STUCK) == list(range(19, 60))
-    assert not flags(dead, "b", quality.STUCK)
-    held = judged(np.stack([still, moving, still], axis=1), *(channel(n, **keys) for n in "abc"))
-    assert not flags(held, "a", quality.STUCK)
+    dies, moving = np.arange(120) % 3, np.arange(120) % 2 * 1000
+    dies[60:] = 7
+    assert stuck(dies, moving, -moving) == [list(range(79, 120)), [], []]
+    assert stuck(dies, moving, np.full(120, 7))[0] == []
+
+
+def test_a_sensor_that_is_dead_from_the_start_is_stuck_after_three_times_as_long() -> None:
+    still, moving = np.full(120, 7), np.arange(120) % 2 * 1000
+    assert stuck(still, moving) == [list(range(59, 120)), []]
+
+
+def test_a_sensor_that_dies_again_and_again_is_stuck_each_time() -> None:
+    dies, moving = np.arange(400) % 3, np.arange(400) % 2 * 1000
+    for first in range(60, 400, 100):
+        dies[first : first + 40] = 7
+    wanted = [at for first in range(60, 400, 100) for at in range(first + 19, first + 40)]
+    assert stuck(dies, moving)[0] == wanted
+
+
+@pytest.mark.parametrize("half_period", [25, 50])
+@pytest.mark.parametrize(("missed", "rest"), [(0, 0), (18, 0), (0, 400)])
+def test_a_set_value_that_is_held_is_not_stuck(half_period: int, missed: int, rest: int) -> None:
+    """A square wave without noise: from an edge, from within a half period, and after rest."""
+    square = np.where(np.arange(missed, 1000) // half_period % 2, 6000, -6000)
+    moving = np.arange(1000 - missed) % 2 * 1000
+    noise = np.arange(rest) % 2
+    assert stuck(np.append(np.zeros(rest), square), np.append(noise, moving)) == [[], []]
+
+
+def test_a_single_channel_is_never_stuck() -> None:
+    codes = np.arange(120) % 3
+    codes[60:] = 7
+    assert stuck(codes) == [[]]
 
 
 def test_zero_switches_stuck_off() -> None:

@@ -11,9 +11,9 @@ from daq.adapter import RawBlock
 from daq.adapters.replay import ReplayAdapter
 from rigwatch.simulated import sensor_channels, write_session
 from rigwatch.wire.errors import DeviceError
-from rigwatch.wire.messages.message_types import SampleBlock
+from rigwatch.wire.messages.message_types import Column, SampleBlock
 from rigwatch.wire.rig_config import ChannelSection
-from rigwatch.wire.session import open_session
+from rigwatch.wire.session import SessionWriter, open_session, run_info
 from sim_plant.parameters import RigParameters
 from tests.daq.rig import HostTime, config_of
 
@@ -74,6 +74,33 @@ def test_the_end_is_silence_or_the_start_again(session: Path) -> None:
     blocks = played(adapter, time, 5.0)
     assert len({block.boot for block in blocks}) == 3
     assert adapter.counters()["turns"] == 3
+
+
+@pytest.mark.parametrize("speed", [1.0, 10.0])
+@pytest.mark.parametrize("second_us", [0, 3_000_000_000])
+@pytest.mark.parametrize("pause_s", [3.0, -100.0])
+def test_a_device_that_started_anew_in_the_recording_goes_on_in_time(
+    tmp_path: Path, second_us: int, pause_s: float, speed: float
+) -> None:
+    """After a pause; a host whose clock was set back meanwhile does not tell how long it was."""
+    boots = ((1, 50_000_000, 0.0), (2, second_us, 2.0 + pause_s))
+    with SessionWriter(tmp_path / "000001.mcap", run_info("r", 256.0, t_ns=1)) as writer:
+        for boot, first_us, at_s in boots:
+            us = np.arange(512) * 1_000_000 // 256
+            t_ns = 10**18 + round(at_s * 1e9) + us * 1000
+            column = Column("x", "m", np.zeros(512), np.zeros(512, np.uint8))
+            writer.write(SampleBlock("rig", boot, 0, first_us + us, t_ns, (column,)))
+    time = HostTime()
+    channel = ChannelSection(name="x", unit="m", gain=1.0)
+    adapter = ReplayAdapter(tmp_path, [channel], speed, clock=time, sleep=time.pass_by)
+    start = time.ns
+    blocks = played(adapter, time, 8.0 / speed)
+    came = {raw.boot: [] for raw in blocks}
+    for raw in blocks:
+        came[raw.boot] += ((raw.arrived_ns - start) * 1e-9 * speed).tolist()
+    begins = 2.0 + max(pause_s, 0.0)
+    for boot, wanted in ((1, 0.0), (2, begins)):
+        np.testing.assert_allclose(came[boot], wanted + np.arange(512) / 256, atol=0.02 * speed)
 
 
 @pytest.mark.parametrize(

@@ -80,3 +80,26 @@ def test_a_count_that_begins_again_with_the_same_boot_gets_another() -> None:
     assert steps[-1].boot not in (1, 0)  # type: ignore[union-attr]
     again = tracker.accept(raw_of([2], us_offset=round(5002 * PERIOD_US)))
     assert [step.boot for step in again] == [steps[-1].boot]  # type: ignore[union-attr]
+
+
+def test_what_looks_repeated_at_the_start_of_a_new_count_is_told_as_lost() -> None:
+    """Within four seconds of its start a device without boot numbers sends what it sent before."""
+    tracker = SequenceTracker(256.0)
+    tracker.accept(raw_of(list(range(500))))
+    steps = [step for seq in range(100) for step in tracker.accept(raw_of([seq]))]
+    restart = next(step for step in steps if isinstance(step, Restart))
+    runs = [step for step in steps if isinstance(step, RawBlock)]
+    holes = [step for step in steps if isinstance(step, Hole)]
+    assert runs[0].boot == restart.boot != 1
+    first = int(runs[0].seq[0])
+    assert holes == [Hole(1, 500, 499), Hole(restart.boot, 0, first - 1)]
+    assert sum(map(len, runs)) + tracker.lost == 100
+    assert tracker.duplicates == 0
+
+
+def test_a_sample_that_is_sent_again_and_again_is_not_lost() -> None:
+    tracker = SequenceTracker(256.0)
+    tracker.accept(raw_of(list(range(100))))
+    for _ in range(70):
+        tracker.accept(raw_of([98]))
+    assert tracker.lost == 0

@@ -1,8 +1,16 @@
-"""At the start the monitor waits for the others, but not for ever."""
+"""At the start the monitor waits, but not for ever; one that fails leaves nothing open."""
+
+import contextlib
+from pathlib import Path
 
 import pytest
 
+from monitor.process.loop import MonitorProcess, suitable_model
 from monitor.process.startup_grace import Patience
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.errors import SessionError
+from tests.bus.rig import TestRig
+from tests.monitor_process.model import monitor_section
 
 NOW = 1000.0
 
@@ -39,3 +47,25 @@ def test_only_the_first_seconds_may_stutter(
     patience.counted(NOW + 2.0, 0.0, daq_alive=True, heard=True)
     now = NOW + 2.0 + running_s
     assert patience.counted(now, silent, daq_alive=True, heard=True) == counted
+
+
+def open_files() -> set[Path]:
+    """What this process has open."""
+    found = set()
+    for link in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(OSError):  # the listing's own
+            found.add(link.readlink())
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="open files are not listed here")
+def test_a_rig_that_cannot_start_keeps_no_file(tmp_path: Path) -> None:
+    rig = TestRig(tmp_path, monitor_section(tmp_path))
+    assert rig.config.monitor is not None
+    journal = Path(rig.config.monitor.journal)
+    Path(f"{journal}.position").mkdir(parents=True)
+    model = suitable_model(rig.config, rig.path)
+    with pytest.raises(SessionError, match="position"):
+        MonitorProcess(rig.config, rig.path, model, MemoryNetwork().bus("bench", "monitor"))
+    assert journal.exists()
+    assert journal.resolve() not in open_files()

@@ -64,6 +64,25 @@ def test_what_nobody_has_seen_goes_to_others() -> None:
     assert told(who, 16) == []
 
 
+def test_a_fault_of_a_moment_is_told_although_it_has_gone_by_then() -> None:
+    who = notices(ANN)
+    who.hear(fault(), 0.0)
+    who.hear(fault(state="cleared_unacknowledged"), 0.05)
+    assert told(who, 0.01) == [("ann", "stale")]
+    assert told(who, 0.02) == []
+
+
+def test_what_has_gone_unseen_is_repeated_and_goes_to_others_until_it_is_seen() -> None:
+    who = notices(ANN, BOSS)
+    who.hear(fault(severity="critical"), 0.0)
+    assert told(who, 0) == [("ann", "stale")]
+    who.hear(fault(state="cleared_unacknowledged", severity="critical"), 300.0)
+    assert told(who, 10) == [("ann", "stale")]
+    assert told(who, 15) == [("boss", "stale")]
+    who.hear(fault(state="normal", severity="critical"), 960.0)
+    assert told(who, 60) == []
+
+
 def test_in_maintenance_nobody_is_told_until_it_is_over() -> None:
     once = MaintenanceSection(
         name="bearing", begin=MONDAY, end=MONDAY + timedelta(hours=1), still="critical"

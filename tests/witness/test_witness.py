@@ -6,11 +6,21 @@ from pathlib import Path
 
 import numpy as np
 
-from rigwatch.wire.bus import ask_alarm_list
+from rigwatch.wire.access import signer_of
+from rigwatch.wire.bus import CommandCheck, ask_alarm_list
+from rigwatch.wire.bus.commands.command_check import signed
 from rigwatch.wire.bus.memory_transport import MemoryNetwork
-from rigwatch.wire.messages import ALARMS, ESTIMATES, Alarm, EstimateBlock
-from rigwatch.wire.rig_config import WitnessSection
+from rigwatch.wire.messages import (
+    ALARMS,
+    ESTIMATES,
+    MONITOR_STALE,
+    Alarm,
+    AlarmCommand,
+    EstimateBlock,
+)
+from rigwatch.wire.rig_config import SecuritySection, WitnessSection
 from rigwatch.witness.process import Witness
+from rigwatch.witness.stale_alarm import StaleAlarm
 from tests.bus.rig import TestRig, stopped
 from tests.monitor_process.model import monitor_section
 from tests.waiting import eventually
@@ -48,7 +58,21 @@ def test_a_silent_monitor_is_an_alarm_that_clears_and_stands_in_the_list(tmp_pat
         ("monitor_stale", "cleared_unacknowledged", 30),
     ]
     assert beat.read_text() != before
-    assert ask_alarm_list(screen) == []
+    assert [one.state for one in ask_alarm_list(screen)] == ["cleared_unacknowledged"]
+
+
+def test_a_silence_that_is_over_stands_until_somebody_has_seen_it(tmp_path: Path) -> None:
+    network, secret = MemoryNetwork(), SecuritySection(secret=str(tmp_path / "secret"))
+    stale = StaleAlarm(CommandCheck(network.bus("r", "monitor"), secret))
+    ann = network.bus("r", "ann", signer_of(secret, ""))
+    command = signed(ann, AlarmCommand(MONITOR_STALE, "acknowledge", "ann", 3))
+    said = [*stale.judge(True, 1.1, 1), *stale.judge(False, 0.0, 2), *stale.judge(False, 0.0, 3)]
+    assert [one.state for one in said] == ["unacknowledged", "cleared_unacknowledged"]
+    assert [one.state for one in stale.judge(True, 1.1, 4)] == ["unacknowledged"]
+    assert [one.state for one in stale.judge(False, 0.0, 5)] == ["cleared_unacknowledged"]
+    assert [getattr(one, "state", one) for one in stale.command(command, 6)] == ["normal"]
+    assert stale.standing is None
+    assert list(stale.judge(False, 0.0, 7)) == []
 
 
 def test_a_hung_monitor_is_reported_by_the_witness_and_the_command_is_run(tmp_path: Path) -> None:
