@@ -28,6 +28,31 @@ from rigwatch.wire.host import (
 from rigwatch.wire.rig_config import RigConfig, load_rig
 
 
+class Chain:
+    """One rig from its device to the bus; `step` takes what has come one link further.
+
+    Args:
+        config: the rig's configuration.
+        adapter: its device, not opened yet.
+        bus: destination of its samples.
+        pulse: told of each step.
+    """
+
+    def __init__(self, config: RigConfig, adapter: Adapter, bus: Bus, pulse: Pulse) -> None:
+        self.device = Supervisor(adapter)
+        self.acquisition = Acquisition(config, adapter.clock_rate)
+        self._publisher = Publisher(bus, SampleRing(bus, config.daq.ring))
+        self._adapter, self._pulse = adapter, pulse
+
+    def step(self, wait: float) -> None:
+        """Read for at most `wait` [s] and publish what comes of it."""
+        for raw in self.device.read(wait):
+            self._publisher.publish(self.acquisition.update(raw))
+        link, counters = self.device.link, self._adapter.counters()
+        self._publisher.publish(self.acquisition.tick(time.monotonic_ns(), link, counters))
+        self._pulse.advance(self.acquisition.samples)
+
+
 def acquire(
     config: RigConfig,
     adapter: Adapter,
@@ -40,46 +65,34 @@ def acquire(
     """Acquire until `stop` is set.
 
     Args:
-        config: the rig's configuration.
-        adapter: its device, not opened yet.
-        bus: destination of its samples.
+        config, adapter, bus, pulse: of the rig's `Chain`.
         stop: ends the loop.
-        pulse: told of each turn.
         turns: those of the process, if it serves several rigs: the device is read once a turn, and
             in their thread if it never waits; otherwise samples are passed on as they come.
 
     Raises:
         DeviceBusyError: another process holds the device.
     """
-    device = Supervisor(adapter)
-    acquisition = Acquisition(config, adapter.clock_rate)
-    publisher = Publisher(bus, SampleRing(bus, config.daq.ring))
+    chain = Chain(config, adapter, bus, pulse)
     at_once = turns is not None and getattr(adapter, "at_once", False)
 
-    def step(wait: float) -> None:
-        for raw in device.read(wait):
-            publisher.publish(acquisition.update(raw))
-        link, counters = device.link, adapter.counters()
-        publisher.publish(acquisition.tick(time.monotonic_ns(), link, counters))
-        pulse.advance(acquisition.samples)
-
     def in_turns() -> bool:
-        step(0.0)
-        return device.connected and not stop.is_set()
+        chain.step(0.0)
+        return chain.device.connected and not stop.is_set()
 
-    device.start()
+    chain.device.start()
     pulse.ready()
     try:
         while not stop.is_set():
-            if turns is not None and at_once and device.connected:
+            if turns is not None and at_once and chain.device.connected:
                 turns.serve(in_turns)
                 continue
-            step(acquisition.patience(time.monotonic_ns()))
+            chain.step(chain.acquisition.patience(time.monotonic_ns()))
             if turns is not None:
                 time.sleep(turns.turn - time.monotonic() % turns.turn)
         pulse.stopping()
     finally:
-        device.close()
+        chain.device.close()
 
 
 def run(path: Path | str, stop: threading.Event) -> None:

@@ -52,7 +52,6 @@ class Validation:
     time: Floats
     input: Floats
     acceleration_healthy: Floats
-    velocity_healthy: Floats
     acceleration_faulty: Floats
     velocity_faulty: Floats
     acceleration_measured: Floats
@@ -68,7 +67,6 @@ def validation(case: int, seed: int) -> Validation:
         time=time,
         input=_input(time),
         acceleration_healthy=healthy[:, 2],
-        velocity_healthy=healthy[:, 1],
         acceleration_faulty=faulty[:, 2],
         velocity_faulty=faulty[:, 1],
         acceleration_measured=_noisy(faulty[:, 2], time, random),

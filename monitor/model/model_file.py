@@ -22,7 +22,6 @@ from rigwatch.wire.rig_config import FASTEST, SLOWEST
 from rigwatch.wire.typed_files import Section, load, parse
 
 Floats = tuple[float, ...]
-Positive = Annotated[float, Meta(gt=0)]
 
 
 class FunctionSection(Section, frozen=True, kw_only=True):

@@ -13,8 +13,6 @@ from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.typed_files import Section, holder, load_layered, whole_text
 
 Text = Annotated[str, Meta(min_length=1)]
-Positive = Annotated[float, Meta(gt=0)]
-Count = Annotated[int, Meta(ge=1)]
 SLOWEST, FASTEST = 1e-3, 1e6
 """Sample rates that a rig may have [Hz]."""
 

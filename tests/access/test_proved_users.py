@@ -15,6 +15,8 @@ from tests.bus.rig import kill, rigwatch
 from tests.monitor_process.model import monitor_section
 from tests.waiting import PATIENCE, eventually
 
+pytestmark = pytest.mark.long
+
 
 def reset_by(bus: Bus) -> list[Alarm]:
     """Alarms that a reset by ann changes; the router or the monitor may be who refuses it."""

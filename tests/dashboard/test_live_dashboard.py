@@ -28,6 +28,8 @@ from tests.dashboard.rig_messages import RATE, Rig
 from tests.dashboard.screen import Screen
 from tests.waiting import eventually
 
+pytestmark = pytest.mark.long
+
 TOPIC_OF = {SampleBlock: SAMPLES, EstimateBlock: ESTIMATES, Alarm: ALARMS, Health: HEALTH}
 CONFIG = """
 [rig]

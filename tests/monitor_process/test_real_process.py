@@ -16,6 +16,8 @@ from tests.bus.rig import TestRig, kill, rigwatch, stopped
 from tests.monitor_process.model import monitor_section
 from tests.waiting import PATIENCE, eventually
 
+pytestmark = pytest.mark.long
+
 
 class Judged:
     """Which samples of which boot have estimates."""

@@ -20,6 +20,8 @@ from tests.monitor_process.model import MODEL, monitor_section
 from tests.monitor_process.test_real_process import Judged
 from tests.waiting import PATIENCE, wait_until
 
+pytestmark = pytest.mark.long
+
 
 class Bench:
     """Rigs on a bus in memory, and one seat for each; the router of r0 answers when it is let."""

@@ -15,6 +15,8 @@ from sim_plant.family.kernel import ISENTROPIC, flow, hidden_effects, simulate
 from sim_plant.family.laws import Flow
 from sim_plant.family.scenarios import SINE8, tuned_force
 
+pytestmark = pytest.mark.long
+
 RATE = 256
 Floats = NDArray[np.float64]
 

@@ -12,6 +12,8 @@ from rigwatch.structures.report.identification_report import Findings, report_ht
 from rigwatch.wire.errors import ImportDataError
 from tests.structures.antenna import FILE, FOLDER, TRUTH, antenna, record
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def csv(tmp_path_factory):

@@ -17,6 +17,8 @@ from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from sim_plant.structure import Damage, simulate, with_noise
 
+pytestmark = pytest.mark.long
+
 KABE = Path(__file__).parents[2] / "configs" / "structures" / "kabe_antenna.toml"
 SIGNALS = [f"x{node}" for node in range(1, 9)]
 K4 = Damage(5.0, {"springs.k4_46.stiffness": 50.0})

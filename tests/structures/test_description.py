@@ -8,7 +8,7 @@ from rigwatch.structures.model.checks import check, load_structure
 from rigwatch.structures.model.description import Structure
 from rigwatch.structures.model.edit import Change, changed, with_unknowns, with_values
 from rigwatch.structures.model.matrices import modes, stiffness_matrix
-from rigwatch.structures.model.structure_model import port_of, to_model, to_system
+from rigwatch.structures.model.structure_model import port_of, to_model
 from rigwatch.wire.errors import ConfigError, ModelError
 from rigwatch.wire.typed_files.loading import parse
 from sim_plant.structure import simulate
@@ -82,7 +82,7 @@ def test_model_and_simulated_structure_move_alike_under_every_law(law, tmp_path)
     file = tmp_path / "two.toml"
     file.write_text(text)
     made = simulate(file, 0.01, 4.0)
-    compiled = compile_system(to_system(structure))
+    compiled = compile_system(compose(to_model(structure)))
     run = compiled.simulate(
         np.zeros((401, 0)), 0.01, np.array([0]), 401, initial=np.zeros((1, 4)),
         parameters=compiled.parameters, substeps=20,
@@ -93,7 +93,7 @@ def test_model_and_simulated_structure_move_alike_under_every_law(law, tmp_path)
 
 
 def test_every_spring_is_a_port_with_the_springs_own_signs():
-    system = to_system(antenna())
+    system = compose(to_model(antenna()))
     compiled = compile_system(system)
     inputs, initial = np.zeros((2, 0)), np.linspace(-0.3, 0.4, 16)[None]
     there = compiled.linearise(
@@ -148,7 +148,9 @@ def test_edits_change_what_they_name_and_nothing_else():
     structure = antenna()
     assert with_values(structure, {"k3_4": 850.0}).springs["k3_4"].stiffness.value == 850.0
     assert with_values(structure, {"k3_4": 850.0}).springs["k3_5"] == structure.springs["k3_5"]
-    free = to_system(with_unknowns(structure, ["m4", "k2_23_cubic"], {"m4": 1.3}), ports=False)
+    free = compose(
+        to_model(with_unknowns(structure, ["m4", "k2_23_cubic"], {"m4": 1.3}), ports=False)
+    )
     assert free.free == ("m4", "k2_23_cubic")
     assert free.parameters["m4"].value == 1.3
     with pytest.raises(ModelError, match="found the unknown 'k9_9'"):

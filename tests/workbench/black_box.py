@@ -1,6 +1,8 @@
 """The simulated rig under a multisine, and the black box beside a healthy recording of it."""
 
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from rigwatch.simulated import write_session
 from rigwatch.workbench.study.creation import create
@@ -15,11 +17,22 @@ def record(
     folder: Path, name: str, noise: int, phases: int = 1, *, period: int = 1024, **effects: float
 ) -> None:
     """Writes a session: noise and phases are seeds, the period is in samples."""
+    whole = _recorded(name, noise, phases, period, tuple(effects.items()))
+    (folder / f"{name}.mcap").write_bytes(whole)
+
+
+@cache
+def _recorded(
+    name: str, noise: int, phases: int, period: int, effects: tuple[tuple[str, float], ...]
+) -> bytes:
     shape = Multisine(amplitude=2.5, start=0.5, stop=12.0, period=period, seed=phases)
     scenario = Scenario(
-        name=name, duration_s=24.0, lead_in_s=8.0, excitation=shape, effects=effects
+        name=name, duration_s=24.0, lead_in_s=8.0, excitation=shape, effects=dict(effects)
     )
-    write_session(folder / f"{name}.mcap", scenario, seed=noise)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"{name}.mcap"
+        write_session(path, scenario, seed=noise)
+        return path.read_bytes()
 
 
 def study(folder: Path, text: str = "") -> Study:

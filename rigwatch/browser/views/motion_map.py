@@ -7,7 +7,7 @@ from typing import Any
 from rigwatch.browser.views.study_state import State
 
 SIZE = 260
-LEFT, BOTTOM = 54, 34
+LEFT = 54
 _NAME = re.compile(r"x (\S+) to (\S+), v (\S+) to (\S+)")
 
 

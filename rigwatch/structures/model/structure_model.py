@@ -19,9 +19,7 @@ from rigwatch.physics.engine.equations import (
     Parameter,
     Port,
     State,
-    System,
     Variable,
-    compose,
 )
 from rigwatch.structures.model.description import (
     Coefficient,
@@ -54,11 +52,6 @@ SMALLEST_MASS = 1e-9
 def port_of(spring: str) -> str:
     """Name of the port between the nodes of a spring."""
     return f"at_{spring}"
-
-
-def to_system(structure: Structure, *, ports: bool = True) -> System:
-    """The composed equations of a structure."""
-    return compose(to_model(structure, ports=ports))
 
 
 def to_model(structure: Structure, *, ports: bool = True) -> Model:

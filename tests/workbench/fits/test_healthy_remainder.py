@@ -17,6 +17,8 @@ from rigwatch.workbench.fit.learned_terms import LEARNED, with_friction, with_pr
 from tests.workbench.black_box import TEMPLATE, study
 from tests.workbench.black_box import record as multisine
 
+pytestmark = pytest.mark.long
+
 SIZES = {
     "load": {"x": 0.01, "v": 0.3},
     "remainder": {"push": 3.0, "flow": 0.3, "speed": 0.3, "place": 0.01},

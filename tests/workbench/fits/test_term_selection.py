@@ -21,6 +21,8 @@ from rigwatch.workbench.fit.whole_fit import SHARE, fit_whole, search_scales
 from rigwatch.workbench.study.study import Study
 from tests.workbench.black_box import record, study
 
+pytestmark = pytest.mark.long
+
 HORIZON = 512
 Case = tuple[Study, Recording]
 Taught = Callable[[int], Learned]

@@ -20,6 +20,8 @@ from rigwatch.workbench.study.study import Study
 from rigwatch.workbench.study.study_file import Span, StudyFile
 from tests.workbench.conftest import measured
 
+pytestmark = pytest.mark.long
+
 RATE = 256
 SETTLED, HALF = 8 * RATE, 24 * RATE
 

@@ -11,12 +11,15 @@ from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.fit.recording import Recording
 from rigwatch.workbench.compare.preparation import Bench, bench_of, determined_by_healthy
-from rigwatch.workbench.data.noise_floor import from_residual
+from rigwatch.workbench.data.motion import along_motion
+from rigwatch.workbench.data.noise_floor import from_residual, quiet_scale
 from rigwatch.workbench.data.signals import Data
 from rigwatch.workbench.explain.explain import ranking
 from rigwatch.workbench.study.study import Study
 from rigwatch.workbench.study.study_file import Span, StudyFile
 from tests.workbench.conftest import measured
+
+pytestmark = pytest.mark.long
 
 RATE = 256
 SETTLED, HALF = 8 * RATE, 24 * RATE
@@ -35,14 +38,25 @@ def part(whole: Recording, begin: int, end: int | None = None) -> Recording:
     return Recording(whole.dt, whole.inputs[begin:end], whole.outputs[begin:end])
 
 
-def bench(case: str, healthy: Recording | None = None) -> Bench:
-    """The analytic model told by a healthy recording, beside a recording with something hidden."""
+def opened(case: str, healthy: Recording | None = None) -> tuple[Study, Data]:
+    """The analytic model, and a healthy recording beside one with something hidden."""
     span = (Span(session="recorded"),)
     file = StudyFile(model="servo-pneumatic", train=span, held_out=span)
     study = Study(Path(), file, shipped_models()["servo-pneumatic"], library(), frozenset())
     whole, known = recorded(case), healthy or part(recorded("healthy"), SETTLED)
-    data = Data(part(whole, SETTLED, HALF), part(whole, HALF), known, RATE // 2, ())
-    return bench_of(*determined_by_healthy(study, data))
+    return study, Data(part(whole, SETTLED, HALF), part(whole, HALF), known, RATE // 2, ())
+
+
+@cache
+def told() -> Study:
+    """What the healthy recording tells of the model, which is the same beside every other one."""
+    return determined_by_healthy(*opened("none"))[0]
+
+
+def bench(case: str) -> Bench:
+    """The analytic model told by the healthy recording, beside one with something hidden."""
+    _, data = along_motion(*opened(case))
+    return bench_of(told(), data, quiet_scale(data.train))
 
 
 def test_healthy_fit_comes_near_to_what_repeated_periods_allow() -> None:
@@ -83,7 +97,7 @@ def test_model_that_does_not_describe_the_healthy_rig_names_nothing() -> None:
     healthy = part(recorded("healthy"), SETTLED)
     other = replace(healthy, outputs=healthy.outputs * [1.0, -1.0])
 
-    rows, verdict = ranking(bench("coulomb_strong", other))
+    rows, verdict = ranking(bench_of(*determined_by_healthy(*opened("coulomb_strong", other))))
 
     assert verdict.word == "model_inadequate"
     assert verdict.best is None

@@ -12,6 +12,8 @@ from rigwatch.workbench.study.creation import create
 from rigwatch.workbench.study.study import open_study
 from tests.workbench.conftest import CONFIGS
 
+pytestmark = pytest.mark.long
+
 
 def test_silverbox_has_a_cubic_spring_and_no_quadratic_one(silverbox: Path, tmp_path: Path) -> None:
     study = create(tmp_path / "s", CONFIGS / "studies" / "silverbox.toml", silverbox)

@@ -12,6 +12,8 @@ from rigwatch.workbench.study.study import Study
 from sim_plant.oscillator import UNKNOWN, Hidden, strength_for
 from tests.workbench.simulated import HORIZON, multisine, recorded, size_of, study
 
+pytestmark = pytest.mark.long
+
 SEED = 77
 NOISE = 2e-3
 LINES = np.arange(0.25, 8, 0.25)

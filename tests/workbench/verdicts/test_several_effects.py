@@ -18,6 +18,8 @@ from sim_plant.oscillator import Hidden, strength_for
 from tests.workbench.machine import studied
 from tests.workbench.simulated import fitted, multisine
 
+pytestmark = pytest.mark.long
+
 FORCE = multisine(np.arange(0.25, 8.0, 0.25), 4.0)
 HIDDEN = ("quadratic_drag", "dead_band", "acceleration_lag")
 LABELS = {"quadratic_drag@load", "dead_band@drive", "lag@acceleration_sensor"}
