@@ -10,6 +10,7 @@ whether they describe the rig. No recording of a fault is needed.
 from collections.abc import Sequence
 
 import numpy as np
+from msgspec.structs import replace
 from scipy.signal import savgol_coeffs
 
 from monitor.commissioning.described import STARTED, TRAINED, Left, described, rms
@@ -17,10 +18,12 @@ from monitor.commissioning.healthy_fit import fit_healthy
 from monitor.commissioning.healthy_limits import HealthyPart, healthy_limits
 from monitor.commissioning.sensor_chain import fit_sensor
 from monitor.commissioning.unhealthy import check_healthy, check_moves, white_noise
+from monitor.commissioning.unseen_motion import largest_unseen
 from monitor.model import (
     EquationsPlant,
     FrictionSection,
     NoiseSection,
+    RangeSection,
     RecordingSection,
     RemainderSection,
     RigModel,
@@ -88,8 +91,8 @@ def commission_equations(
     rate = rates.pop()
     check_moves(used, [state.channel for state in measured_states(base_model(name))])
     plant = _fitted(used, name, corner, rate)
-    parts, remainder, scheme = _remainder(used, plant, rate)
-    return _model(used, plant, remainder, scheme, parts, rate)
+    parts, roles, remainder, scheme = _remainder(used, plant, rate)
+    return _model(used, plant, remainder, scheme, parts, roles, rate)
 
 
 def _fitted(used: Sequence[Recording], name: str, corner: float, rate: float) -> EquationsPlant:
@@ -165,8 +168,8 @@ def _observed(
 
 def _remainder(
     used: Sequence[Recording], plant: EquationsPlant, rate: float
-) -> tuple[list[Observed], RemainderSection, SchemeSection]:
-    """The remainder, and the residual on the held-out part of each recording.
+) -> tuple[list[Observed], list[str], RemainderSection, SchemeSection]:
+    """What is kept of each recording, its role, and the remainder.
 
     Raises:
         ModelError: the residual is too large, or a recording is not healthy.
@@ -198,12 +201,12 @@ def _remainder(
     ]
     remainder = fit_remainder(kept, filters, skip)
     every = _observed(used, plant, remainder, rate)
-    parts = [
-        o.part(begin, end)
-        for o, (begin, end) in zip(every, found.parts, strict=True)
+    cuts = [
+        (o.part(begin, end), one.role)
+        for one, o, (begin, end) in zip(used, every, found.parts, strict=True)
         if end > begin
     ]
-    return parts, remainder, scheme
+    return [part for part, _ in cuts], [role for _, role in cuts], remainder, scheme
 
 
 def _split(rows: FloatArray) -> int:
@@ -228,6 +231,7 @@ def _model(  # noqa: PLR0917 -- all that was found
     remainder: RemainderSection,
     scheme: SchemeSection,
     parts: Sequence[Observed],
+    roles: Sequence[str],
     rate: float,
 ) -> RigModel:
     layout = layout_of(base_model(plant.model), plant.port)
@@ -252,7 +256,7 @@ def _model(  # noqa: PLR0917 -- all that was found
     ]
     skip = round(SKIPPED * rate)
     limits = healthy_limits(healthy, slow, skip, rate)
-    return RigModel(
+    model = RigModel(
         sample_rate=rate,
         channels=layout.channels,
         plant=plant,
@@ -266,3 +270,13 @@ def _model(  # noqa: PLR0917 -- all that was found
             RecordingSection(role=one.role, name=one.name, sha256=one.sha256) for one in used
         ),
     )
+
+    def range_of_others(place: int) -> RangeSection:
+        kept = [k for k in range(len(parts)) if k != place]
+        return range_of(
+            layout.signals, [signals[k] for k in kept], [motions[k] for k in kept],
+            [drives[k] for k in kept], bends,
+        )  # fmt: skip
+
+    unseen = largest_unseen(model, parts, roles, range_of_others)
+    return replace(model, healthy=replace(limits, unseen=unseen))

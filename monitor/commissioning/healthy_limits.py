@@ -54,7 +54,7 @@ class HealthyPart:
 
     def grown(self, skip: int) -> FloatArray:
         """Mean levels over medium windows, shape (windows, levels)."""
-        return np.column_stack([_means(level[skip:], MEDIUM) for level in self.levels.T])
+        return np.column_stack([mean_over(level[skip:], MEDIUM) for level in self.levels.T])
 
 
 def healthy_limits(
@@ -109,7 +109,7 @@ def _extremes(part: HealthyPart, rules: DecisionRules, skip: int) -> Extremes:
     error = part.judged[:, E]
     relative = error[skip:] ** 2 / allowed[skip:]
     return Extremes(
-        lasting=float(_means(relative, min(LASTING, relative.size)).max()),
+        lasting=float(mean_over(relative, min(LASTING, relative.size)).max()),
         short=_largest(error, SHORT, allowed, skip),
         medium=_largest(error, MEDIUM, allowed, skip),
         friction=float(np.abs(out[DEVIATIONS][skip:]).max()),
@@ -140,15 +140,15 @@ def spread(errors: FloatArray, levels: FloatArray) -> tuple[float, float]:
     return float(np.sqrt(noise)), float(np.sqrt(growth))
 
 
-def _means(signal: FloatArray, length: int) -> FloatArray:
-    """Means over all windows of one length."""
+def mean_over(signal: FloatArray, length: int) -> FloatArray:
+    """Means over all windows of one length, shape (n - length + 1,)."""
     total = np.cumsum(np.concatenate([[0.0], signal]))
     return np.asarray((total[length:] - total[:-length]) / length)
 
 
 def _energies(signal: FloatArray, length: int) -> FloatArray:
     """Mean squares over all windows of one length."""
-    return _means(signal**2, length)
+    return mean_over(signal**2, length)
 
 
 def _largest(signal: FloatArray, length: int, allowed: FloatArray, skip: int) -> float:

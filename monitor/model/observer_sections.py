@@ -100,6 +100,10 @@ class HealthyLimits(Section, frozen=True, kw_only=True):
     speed_noise: Annotated[
         float, Meta(gt=0, description="speed that cannot be distinguished from rest")
     ]
+    unseen: Annotated[
+        float,
+        Meta(ge=0, description="largest residual of a recording relative to that of all others"),
+    ] = 0.0
     steady_paces: Annotated[
         Floats, Meta(description="mean frequency of each steady healthy motion [Hz]")
     ] = ()

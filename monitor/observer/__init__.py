@@ -31,6 +31,7 @@ from monitor.observer.missing_force import (
     E,
     high_pass,
     levels,
+    terms,
 )
 from monitor.observer.model_signals import (
     LaggedSignals,
@@ -103,4 +104,5 @@ __all__ = [
     "rate_columns",
     "remainder_signals",
     "steady_motion",
+    "terms",
 ]

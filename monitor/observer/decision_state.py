@@ -96,7 +96,10 @@ def new_state(levels: int) -> DecisionState:
 
 
 class DecisionRules(NamedTuple):
-    """Decision thresholds; energies are relative to the healthy variance, see `HealthyLimits`."""
+    """Decision thresholds; energies are relative to the healthy variance, see `HealthyLimits`.
+
+    `unseen` is what the limits' energies grow by where a healthy rig's are not known.
+    """
 
     noise: float
     growth: FloatArray
@@ -110,6 +113,7 @@ class DecisionRules(NamedTuple):
     settle: int
     patience: int
     lasting: float
+    unseen: float = 1.0
 
 
 MARGIN = 1.6
@@ -132,6 +136,7 @@ def rules_of(limits: HealthyLimits, rate: float) -> DecisionRules:
         round(SETTLE * rate),
         round(PATIENCE * rate),
         energy,
+        max(limits.unseen**2 / energy, 1.0),
     )
 
 

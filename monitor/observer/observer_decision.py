@@ -237,10 +237,23 @@ def friction_limit(usual: FloatArray, rules: DecisionRules) -> FloatArray:
         usual: the largest of the healthy rig at the present motion, one or several.
         rules: of the decision.
     """
-    return np.minimum(rules.friction, usual * np.sqrt(rules.lasting))
+    known = np.minimum(rules.friction, usual * np.sqrt(rules.lasting))
+    return np.where(np.isinf(usual), rules.friction * np.sqrt(rules.unseen), known)
 
 
-_friction_limit = njit()(friction_limit)
+@njit()
+def _energy_limit(largest: float, usual: float, rules: DecisionRules) -> float:
+    """Energy at which the rig has departed, from the largest ever and at the present motion."""
+    if np.isinf(usual):
+        return largest * rules.unseen
+    return min(largest, usual * rules.lasting)
+
+
+@njit()
+def _friction_limit(usual: float, rules: DecisionRules) -> float:
+    if np.isinf(usual):
+        return rules.friction * np.sqrt(rules.unseen)
+    return min(rules.friction, usual * np.sqrt(rules.lasting))
 
 
 @njit()
@@ -266,8 +279,8 @@ def _one(  # noqa: PLR0917 -- a kernel
     )
     out[SENSORS, k] = mean_square(kept, DISAGREE, MEDIUM) / sensor_variance / rules.sensor
     margin = rules.lasting
-    short_limit = min(rules.short, usual[USUAL_SHORT] * margin)
-    medium_limit = min(rules.medium, usual[USUAL_MEDIUM] * margin)
+    short_limit = _energy_limit(rules.short, usual[USUAL_SHORT], rules)
+    medium_limit = _energy_limit(rules.medium, usual[USUAL_MEDIUM], rules)
     short = mean_square(kept, ERROR, SHORT) / spread**2 / short_limit
     medium = mean_square(kept, ERROR, MEDIUM) / spread**2 / medium_limit
     allowed = _friction_limit(usual[USUAL_FRICTION], rules)

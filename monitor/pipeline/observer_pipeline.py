@@ -115,7 +115,9 @@ class ObserverMonitor:
         """Whether missing samples have hidden an edge of an input, shape (n,)."""
         found = np.zeros(admitted.code.size, np.bool_)
         for place, edges in enumerate(self._edges):
-            found |= edges.update(admitted.signals[:, place], admitted.bridged, admitted.code)
+            found |= edges.update(
+                admitted.signals[:, place], admitted.bridged[:, place], admitted.code
+            )
         return found
 
     def _jump_conditions(

@@ -55,7 +55,7 @@ class Admitted:
         missing: samples known to be missing before the block, -1 for an unknown number.
         invalid_run: samples without a good reading up to and with this one, shape (n,).
         good: whether each reading is one, shape (n, c).
-        bridged: whether a needed reading is held or interpolated, shape (n,).
+        bridged: whether each reading is held or interpolated, shape (n, c).
     """
 
     signals: FloatArray
@@ -124,7 +124,7 @@ class Admission:
         position_valid = good[:, min(1, good.shape[1] - 1)]
         seq = np.arange(first, first + len(values), dtype=np.int64)
         valid_position = position_valid.astype(np.uint8)
-        bridged = (code == HELD) | made[:, self._needed].any(axis=1)
+        bridged = ~good | made
         return Admitted(values, code, valid_position, seq, padding, missing, run, good, bridged)
 
     def _mark_new_boot(self, code: Codes) -> None:
