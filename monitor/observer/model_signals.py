@@ -171,7 +171,12 @@ class ObserverSignals:
         self._along = AlongMotion(plant, rate)
         self._drives = [DriveChanges() for _ in range(self.layout.motions[0])]
         self.remainder_size = len(self.layout.motions) + self._along.hidden
-        self._high_passed = HighPassed(plant.corner, rate, remainder)
+        self._corner, self._rate = plant.corner, rate
+        self.follow(remainder)
+
+    def follow(self, remainder: RemainderSection) -> None:
+        """Use another remainder from the next sample, which must be the first after a start."""
+        self._high_passed = HighPassed(self._corner, self._rate, remainder)
 
     def update(self, signals: FloatArray, code: Codes) -> Observed:
         """The next samples, shape (n, channels) in the layout's order."""

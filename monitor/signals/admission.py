@@ -123,6 +123,10 @@ class Admission:
         valid_position = position_valid.astype(np.uint8)
         return Admitted(values, code, valid_position, seq, padding, missing, run, good)
 
+    def begin_again(self) -> None:
+        """Restart every filter with the next good sample."""
+        self._run[0] = self._hold + 1
+
     def _mark_new_boot(self, code: Codes) -> None:
         """The first good sample of a boot restarts more than the filters."""
         if not self._fresh:
