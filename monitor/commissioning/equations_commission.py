@@ -7,7 +7,8 @@ The equations are fitted to the first part of each recording; their residual on 
 whether they describe the rig. No recording of a fault is needed.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 import numpy as np
 from msgspec.structs import replace
@@ -90,19 +91,79 @@ def commission_equations(
         raise ModelError(f"commissioning: found sample rates {sorted(rates)} Hz, expected one")
     rate = rates.pop()
     check_moves(used, [state.channel for state in measured_states(base_model(name))])
-    plant = _fitted(used, name, corner, rate)
-    parts, roles, remainder, scheme = _remainder(used, plant, rate)
+    readings, seem = [False] * len(used), _seem_to_jitter(used, name, rate)
+    if seem == readings:
+        return _commissioned(used, name, corner, rate, readings)
+    return _quieter(
+        partial(_commissioned, used, name, corner, rate, jitters) for jitters in (readings, seem)
+    )
+
+
+def _seem_to_jitter(used: Sequence[Recording], name: str, rate: float) -> list[bool]:
+    """Of which recordings the inputs' steps seem to jitter, which the motion must confirm."""
+    layout = layout_of(base_model(name), force_port(base_model(name)))
+    lag = _lag(name)
+    seem = []
+    for one in used:
+        readings, in_force = (_motion(one, layout, lag, rate, 0.0, each) for each in (False, True))
+        seem.append(not np.array_equal(readings, in_force))
+    return seem
+
+
+def _quieter(attempts: Iterable[Callable[[], RigModel]]) -> RigModel:
+    """The model with the smaller healthy residual.
+
+    Raises:
+        ModelError: of the first attempt, if all fail.
+    """
+    made: list[RigModel] = []
+    failed: list[ModelError] = []
+    for attempt in attempts:
+        try:
+            made.append(attempt())
+        except ModelError as error:
+            failed.append(error)
+    if not made:
+        raise failed[0]
+    return min(made, key=lambda model: model.noise.residual)
+
+
+def _commissioned(
+    used: Sequence[Recording], name: str, corner: float, rate: float, jitters: Sequence[bool]
+) -> RigModel:
+    """The model.
+
+    Args:
+        used: recordings.
+        name: of the equations.
+        corner: of the high-pass [Hz].
+        rate: sample rate [Hz].
+        jitters: of which recordings the inputs' steps jitter.
+
+    Raises:
+        ModelError: the equations do not describe the rig, or a recording is not healthy.
+    """
+    plant = _fitted(used, name, corner, rate, jitters)
+    parts, roles, remainder, scheme = _remainder(used, plant, rate, jitters)
     return _model(used, plant, remainder, scheme, parts, roles, rate)
 
 
-def _fitted(used: Sequence[Recording], name: str, corner: float, rate: float) -> EquationsPlant:
+def _lag(name: str) -> int:
+    return EquationsPlant(model=name, names=(), values=(), port="").half_width
+
+
+def _fitted(
+    used: Sequence[Recording], name: str, corner: float, rate: float, jitters: Sequence[bool]
+) -> EquationsPlant:
     """The equations with parameters from the first part of each recording."""
     model = base_model(name)
     port = force_port(model)
     layout = layout_of(model, port)
-    lag = EquationsPlant(model=name, names=(), values=(), port=port).half_width
+    lag = _lag(name)
     late = _lateness(used, layout, rate)
-    moved = [_motion(one, layout, lag, rate, late) for one in used]
+    moved = [
+        _motion(one, layout, lag, rate, late, each) for one, each in zip(used, jitters, strict=True)
+    ]
     n = layout.inputs
     known = fit_sensor(model, [(m[:, :n], m[:, n], m[:, n + 1]) for m in moved], rate)
     stretches = [
@@ -131,8 +192,11 @@ def _lateness(used: Sequence[Recording], layout: Layout, rate: float) -> float:
     return lateness(pairs, 1.0 / rate, column.order)
 
 
-def _motion(one: Recording, layout: Layout, lag: int, rate: float, late: float) -> FloatArray:
-    columns, state, _ = LaggedSignals(layout, lag, rate, late).update(*_admitted(one, layout))
+def _motion(  # noqa: PLR0917
+    one: Recording, layout: Layout, lag: int, rate: float, late: float, jitters: bool
+) -> FloatArray:
+    signals = LaggedSignals(layout, lag, rate, late, jitters)
+    columns, state, _ = signals.update(*_admitted(one, layout))
     return np.ascontiguousarray(columns[state != EMPTY])
 
 
@@ -157,17 +221,21 @@ def _speed_noise(used: Sequence[Recording], layout: Layout, lag: int, rate: floa
 
 
 def _observed(
-    used: Sequence[Recording], plant: EquationsPlant, remainder: RemainderSection, rate: float
+    used: Sequence[Recording],
+    plant: EquationsPlant,
+    remainder: RemainderSection,
+    rate: float,
+    jitters: Sequence[bool],
 ) -> list[Observed]:
     found = []
-    for one in used:
-        signals = ObserverSignals(plant, remainder, rate)
+    for one, each in zip(used, jitters, strict=True):
+        signals = ObserverSignals(plant, remainder, rate, each)
         found.append(signals.update(*_admitted(one, signals.layout)))
     return found
 
 
 def _remainder(
-    used: Sequence[Recording], plant: EquationsPlant, rate: float
+    used: Sequence[Recording], plant: EquationsPlant, rate: float, jitters: Sequence[bool]
 ) -> tuple[list[Observed], list[str], RemainderSection, SchemeSection]:
     """What is kept of each recording, its role, and the remainder.
 
@@ -176,11 +244,11 @@ def _remainder(
     """
     layout = layout_of(base_model(plant.model), plant.port)
     size = ObserverSignals(plant, no_remainder(0), rate).remainder_size
-    bare = _observed(used, plant, no_remainder(size), rate)
+    bare = _observed(used, plant, no_remainder(size), rate, jitters)
     filters, skip = high_pass(plant.corner, rate), round(SKIPPED * rate)
     pairs = [(remainder_signals(o.rows, o.predicted.hidden, layout), o.judged[:, E]) for o in bare]
     earlier = [(z[: _split(z)], e[: _split(z)]) for z, e in pairs]
-    later = _observed(used, plant, fit_remainder(earlier, filters, skip), rate)
+    later = _observed(used, plant, fit_remainder(earlier, filters, skip), rate, jitters)
     steady = [
         (one.name, o.judged) for one, o in zip(used, later, strict=True) if one.role == "healthy"
     ]
@@ -200,7 +268,7 @@ def _remainder(
         if end > begin
     ]
     remainder = fit_remainder(kept, filters, skip)
-    every = _observed(used, plant, remainder, rate)
+    every = _observed(used, plant, remainder, rate, jitters)
     cuts = [
         (o.part(begin, end), one.role)
         for one, o, (begin, end) in zip(used, every, found.parts, strict=True)

@@ -1,9 +1,10 @@
-"""Whether the edges of an input lie between samples, as the motion shows.
+"""Whether the edges of an input lie between samples, or its steps jitter, as the motion shows.
 
 Intervals between edges that differ by a sample come from a generator with a clock of its own, or
 from one that updates at the instants of sampling at a frequency that does not divide the rate. The
 residual tells them apart: taken for each other they leave a response to every edge, which comes and
-goes with its place between samples, as no fault does.
+goes with its place between samples, as no fault does. In the same way it tells readings that repeat
+because the steps of a smooth drive jitter from those of a voltage that is held.
 """
 
 # Compiled functions are untyped to mypy.

@@ -1,4 +1,9 @@
-"""An input between samples, as far as it is known: means where its steps slide or jitter."""
+"""An input between samples, as far as it is known: means where its steps slide or jitter.
+
+That steps jitter, or that edges lie between samples, is an assumption: a generator that holds each
+voltage for several samples repeats readings too. Both are given beside the readings, and the motion
+tells what is true (see `edge_choice`).
+"""
 
 from typing import NamedTuple
 
@@ -24,7 +29,8 @@ class Steps(NamedTuple):
         mean: its mean until the next sample; 0 with too few samples.
         known: False while its steps slide and their clock is not yet known.
         unsure: uncertainty of the instants of its steps [samples].
-        moved: what the mean gains if edges lie between samples, see `sliding_edges`.
+        moved: what the mean gains if edges lie between samples, see `sliding_edges`, or if steps
+            jitter, see `jittered_steps`.
         moves: whether that is known.
     """
 
@@ -40,9 +46,11 @@ class InputSteps:
 
     Args:
         half_width: lag of the results [samples].
+        jitters: whether steps that seem to jitter are known to do so.
     """
 
-    def __init__(self, half_width: int) -> None:
+    def __init__(self, half_width: int, jitters: bool = False) -> None:
+        self._jitters = jitters
         self._sliding = SlidingSteps(half_width)
         self._jittered = JitteredSteps(half_width)
         self._edges = JitteredEdges()
@@ -55,10 +63,13 @@ class InputSteps:
         edges = self._edges.update(signal, code)
         regular = self._regular.update(signal, code)
         # Steps that slide and jitter do the latter only where they meet the samples.
-        jitters = np.where(slides.followed, found.shows, found.jitters)
-        mean = np.where(jitters, found.value, slides.mean)
+        jitters = np.where(slides.followed, found.shows, found.jitters) & ~regular.shows
+        mean = np.where(regular.shows, regular.held, slides.mean)
+        known = slides.known | jitters | regular.shows
         unsure = np.where(edges, EDGES, np.where(jitters, JITTER, 0.0))
         unsure = np.where(regular.shows, regular.unsure, unsure)
-        mean = np.where(regular.shows, regular.held, mean)
-        known = slides.known | jitters | regular.shows
-        return Steps(mean, known, unsure, regular.gained, regular.shows)
+        if self._jitters:
+            mean = np.where(jitters, found.value, mean)
+            return Steps(mean, known, unsure, regular.gained, regular.shows)
+        moved = np.where(jitters, found.value - mean, regular.gained)
+        return Steps(mean, known, unsure, moved, regular.shows | jitters)

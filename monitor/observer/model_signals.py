@@ -128,11 +128,14 @@ class LaggedSignals:
         half_width: lag [samples].
         rate: sample rate [Hz].
         late: lateness of the motion behind the predicted output's sensor [s].
+        jitters: whether inputs whose steps seem to jitter are known to do so.
     """
 
-    def __init__(self, layout: Layout, half_width: int, rate: float, late: float) -> None:
+    def __init__(
+        self, layout: Layout, half_width: int, rate: float, late: float, jitters: bool = False
+    ) -> None:
         self._motion = FixedLag(layout.columns, half_width, rate, late)
-        self._inputs = [InputSteps(half_width) for _ in range(layout.motions[0])]
+        self._inputs = [InputSteps(half_width, jitters) for _ in range(layout.motions[0])]
 
     def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes, Steps]:
         """Columns, states, and what is known of the inputs' steps, for the next samples.
@@ -160,18 +163,30 @@ class ObserverSignals:
         plant: the equations with their parameters.
         remainder: their residual on a healthy rig.
         rate: sample rate [Hz].
+        jitters: whether inputs whose steps seem to jitter are known to do so.
 
     Raises:
         ModelError: the plant does not match its model.
     """
 
-    def __init__(self, plant: EquationsPlant, remainder: RemainderSection, rate: float) -> None:
+    def __init__(
+        self,
+        plant: EquationsPlant,
+        remainder: RemainderSection,
+        rate: float,
+        jitters: bool = False,
+    ) -> None:
         self.layout = layout_of(base_model(plant.model), plant.port)
-        self._motion = LaggedSignals(self.layout, plant.half_width, rate, plant.late)
+        self._motion = LaggedSignals(self.layout, plant.half_width, rate, plant.late, jitters)
         self._along = AlongMotion(plant, rate)
         self._drives = [DriveChanges() for _ in range(self.layout.motions[0])]
         self.remainder_size = len(self.layout.motions) + self._along.hidden
-        self._high_passed = HighPassed(plant.corner, rate, remainder)
+        self._corner, self._rate = plant.corner, rate
+        self.follow(remainder)
+
+    def follow(self, remainder: RemainderSection) -> None:
+        """Use another remainder from the next sample, which must be the first after a start."""
+        self._high_passed = HighPassed(self._corner, self._rate, remainder)
 
     def update(self, signals: FloatArray, code: Codes) -> Observed:
         """The next samples, shape (n, channels) in the layout's order."""

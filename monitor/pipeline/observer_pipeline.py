@@ -57,27 +57,31 @@ class ObserverMonitor:
             model.channels, model.channels, model.decision.longest_hold, model.sample_rate
         )
         self._signals = ObserverSignals(plant, remainder, model.sample_rate)
-        self._range = RangeSeen(model, self._signals.layout.speed)
-        assert model.motion_range is not None
-        equations, channels = base_model(plant.model), self._signals.layout.channels
-        self._jumps = ChannelJumps(model.motion_range, equations, channels)
-        self._edges = [BridgedEdges() for _ in range(self._signals.layout.motions[0])]
-        self._state = d.new_state(1 + 2 * len(self._signals.layout.motions))
-        self._since = 0
+        self._equations = base_model(plant.model)
         self._follow(model)
 
     def adopt(self, model: RigModel) -> None:
-        """Use another model from the next sample; filters keep their state.
+        """Use another model from the next sample, with which every stage begins as at a start.
 
         Raises:
             ModelError: the new model has other equations.
         """
         check_can_follow(self.model, model)
+        assert model.remainder is not None
+        self._admission.begin_again()
+        self._signals.follow(model.remainder)
         self._follow(model)
 
     def _follow(self, model: RigModel) -> None:
         assert model.healthy is not None
+        assert model.motion_range is not None
+        layout = self._signals.layout
         self.model = model
+        self._range = RangeSeen(model, layout.speed)
+        self._jumps = ChannelJumps(model.motion_range, self._equations, layout.channels)
+        self._edges = [BridgedEdges() for _ in range(layout.motions[0])]
+        self._state = d.new_state(1 + 2 * len(layout.motions))
+        self._since = 0
         self._usual = UsualError(model.healthy, model.sample_rate)
         self.rules = d.rules_of(model.healthy, model.sample_rate)
         self._clipping = Clipping(model)

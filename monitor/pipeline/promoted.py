@@ -100,4 +100,12 @@ def _frozen(model: RigModel) -> Frozen:
     inertia = isinstance(model.plant, InertiaPlant)
     plant = model.plant.half_width if isinstance(model.plant, InertiaPlant) else model.plant
     filters = None if inertia else (model.velocity, model.friction)
-    return Frozen(model.sample_rate, model.channels, plant, (filters, model.decision.longest_hold))
+    fixed = (filters, model.decision.longest_hold, _signals(model))
+    return Frozen(model.sample_rate, model.channels, plant, fixed)
+
+
+def _signals(model: RigModel) -> object:
+    """The signals on which limits of the observer scheme are; None in the friction scheme."""
+    if model.motion_range is None or model.remainder is None or model.healthy is None:
+        return None
+    return model.motion_range.names, len(model.remainder.centre), len(model.healthy.growth)

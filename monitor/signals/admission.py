@@ -127,6 +127,10 @@ class Admission:
         bridged = ~good | made
         return Admitted(values, code, valid_position, seq, padding, missing, run, good, bridged)
 
+    def begin_again(self) -> None:
+        """Restart every filter with the next good sample."""
+        self._run[0] = self._hold + 1
+
     def _mark_new_boot(self, code: Codes) -> None:
         """The first good sample of a boot restarts more than the filters."""
         if not self._fresh:
