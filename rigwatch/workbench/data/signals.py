@@ -26,6 +26,8 @@ USUAL = 0.5
 """Default horizon [s]."""
 UNFILLED = "since they fill no horizon"
 """Words of the remark on ends that are not counted."""
+ONE_STEP = ": a further log, or one in which they change more than once"
+"""What to do about held-out data without a change, as of a log of one step."""
 MOST_MISSING = 0.2
 """Largest share of samples that may be missing from an input."""
 
@@ -237,7 +239,7 @@ def _check_excitation(model: Model, u: FloatArray, use: str) -> None:
     if u.size and not np.any(np.ptp(u, axis=0) > 1e-12 * np.maximum(np.abs(u).max(axis=0), 1e-300)):
         raise ModelError(
             f"{use}: found inputs {', '.join(driving)} that never change, expected a recording"
-            " with excitation"
+            f" with excitation{ONE_STEP if use == 'held_out' else ''}"
         )
 
 

@@ -19,6 +19,7 @@ from rigwatch.workbench.compare import Bench
 from rigwatch.workbench.data import Data, prepare
 from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.fit import Value, fit_base, fit_model, shown, values
+from rigwatch.workbench.ranking import Ranked
 from rigwatch.workbench.study import Span, Study
 
 UNDETERMINED, DETERMINED = 1.0, 0.25
@@ -52,6 +53,24 @@ def unexcited(bench: Bench) -> Verdict | None:
             )
             return Verdict("model_inadequate", None, (), (), text)
     return None
+
+
+def cannot_tell(bench: Bench, rows: Sequence[Ranked], verdict: Verdict) -> Verdict:
+    """`model_inadequate` if no effect was accepted on a fit that determines no parameter at all.
+
+    A fit that leaves all of them open follows what is missing, and so hides it: in windows of a
+    minute a block that warms for ten minutes is any ramp. That no effect helps there says nothing.
+    """
+    ended, free = bench.base.convergence, bench.base.compiled.system.free
+    open_ = set(ended.undetermined) if ended else set()
+    accepted = any(row.accepted for row in rows)
+    if verdict.word != "unknown_effect" or accepted or not free or set(free) - open_:
+        return verdict
+    text = (
+        f"the training determines none of {', '.join(free)}, so that what is missing cannot be"
+        " told; record longer, or more changes of the inputs, or give what is known with --set"
+    )
+    return Verdict("model_inadequate", None, (), (), text)
 
 
 def _own(bench: Bench) -> dict[str, Value]:

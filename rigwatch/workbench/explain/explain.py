@@ -21,7 +21,7 @@ from rigwatch.workbench.explain.adequacy import (
 )
 from rigwatch.workbench.explain.credibility import credible_verdict
 from rigwatch.workbench.explain.exchange import Exchange, exchange
-from rigwatch.workbench.explain.excitation import unexcited
+from rigwatch.workbench.explain.excitation import cannot_tell, unexcited
 from rigwatch.workbench.explain.lower_floor import with_lower_floor
 from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.pairs import two_effects
@@ -195,6 +195,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
     elif along:
         verdict = undetermined_if_much_left(bench.base, bench.floor, verdict)
         verdict = undetermined_if_little_and_unexplained(bench.base, bench.floor, verdict)
+    verdict = cannot_tell(bench, rows, verdict)
     verdict = with_base_offered(bench, unchecked(bench, verdict))
     verdict = with_change_told(bench.study, verdict)
     if verdict.best is not None:

@@ -103,6 +103,12 @@ def test_a_recording_without_excitation_is_refused(made: Made) -> None:
         compare(made(still, good()))
 
 
+def test_a_held_out_part_after_the_only_step_says_what_to_record(made: Made) -> None:
+    still = good() | {"position": np.ones(400)}
+    with pytest.raises(ModelError, match=r"held_out: .* a further log, or one in which"):
+        compare(made(good(), still))
+
+
 def test_rates_that_differ_are_refused(made: Made) -> None:
     with pytest.raises(ModelError, match=r"b.mcap: found 50 Hz, expected 100 Hz"):
         compare(made(good(), good(), (100.0, 50.0)))

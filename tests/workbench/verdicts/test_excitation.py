@@ -98,3 +98,43 @@ def test_an_inductance_too_small_to_show_is_no_reason_to_refuse(tmp_path: Path) 
     units, rates = {"voltage": "V", "speed": "rad/s"}, [200.0] * 3
     study = studied(tmp_path, text, train, held_out, units, rates=rates)
     assert unexcited(open_bench(study)) is None
+
+
+BLOCK = """
+name = "block"
+summary = "A block that a heater warms."
+inputs.u = { unit = "%" }
+states.T = { unit = "K", derivative = "(k*heater - (T - Ta))/tau", measured = "T" }
+parameters.k = { value = 60.0, unit = "K", low = 0.0 }
+parameters.tau = { value = 120.0, unit = "s", low = 5.0 }
+parameters.Ta = { value = 21.0, unit = "K" }
+outputs.T = { unit = "K", expression = "T" }
+[ports.heater]
+kind = "actuator"
+signal = "u"
+[ports.probe]
+kind = "sensor"
+signal = "T"
+"""
+
+
+def warmed(levels: list[int], counts: list[int], seed: int, begin: float) -> dict[str, np.ndarray]:
+    """A block and its slow probe, read every 2 s to half a kelvin; `counts` rows of each level."""
+    u = np.repeat(np.array(levels, float), counts)
+    block, probe, read = begin, begin, np.zeros(len(u))
+    noise = 0.1 * np.random.default_rng(seed).normal(size=len(u))
+    for i in range(len(u)):
+        read[i] = np.round((probe + noise[i]) / 0.49) * 0.49
+        for _ in range(20):
+            block += 0.1 * (0.6 * u[i] + 21 - block) / 170
+            probe += 0.1 * (block - probe) / 20
+    return {"u": u, "T": read}
+
+
+def test_a_training_too_short_for_every_parameter_says_that_it_cannot_tell(tmp_path: Path) -> None:
+    train = warmed([0, 100, 20], [5, 44, 41], seed=0, begin=21.0)
+    held_out = warmed([20, 80], [9, 50], seed=1, begin=44.0)
+    units = {"u": "%", "T": "K"}
+    found = explain(studied(tmp_path, BLOCK, [train], [held_out], units, rates=[0.5, 0.5]))
+    assert found.verdict == "model_inadequate"
+    assert "determines none of k, tau, Ta" in found.text
