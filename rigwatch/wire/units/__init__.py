@@ -11,6 +11,7 @@ from rigwatch.wire.units.unit import (
     unit_of,
 )
 from rigwatch.wire.units.unit_table import Dimension
+from rigwatch.wire.units.written import in_table_words, may_count_turns
 
 __all__ = [
     "GRAM",
@@ -19,6 +20,8 @@ __all__ = [
     "Unit",
     "UnitError",
     "describe",
+    "in_table_words",
+    "may_count_turns",
     "names_gram",
     "times",
     "unit_of",

@@ -124,11 +124,14 @@ QUANTITIES: tuple[Quantity, ...] = (
 """All units that files may use, as well as their products, quotients and powers."""
 
 IN_OTHER_WORDS = {
-    "sec": "s", "second": "s", "seconds": "s", "hour": "h", "minute": "min", "meter": "m",
-    "metre": "m", "inches": "inch", "feet": "ft", "grams": "gram", "newton": "N", "lbs": "lb",
-    "pascal": "Pa", "volt": "V", "volts": "V", "amp": "A", "ampere": "A", "ohms": "ohm",
-    "watt": "W", "degree": "deg", "degrees": "deg", "radian": "rad", "kelvin": "K",
-    "celsius": "degC", "fahrenheit": "degF", "rps": "rev/s", "lpm": "l/min", "kph": "km/h",
+    "sec": "s", "second": "s", "seconds": "s", "sek": "s", "msec": "ms", "usec": "us",
+    "hour": "h", "hours": "h", "minute": "min", "minutes": "min", "meter": "m", "meters": "m",
+    "metre": "m", "metres": "m", "inches": "inch", "feet": "ft", "grams": "gram",
+    "newton": "N", "newtons": "N", "lbs": "lb", "pascal": "Pa", "volt": "V", "volts": "V",
+    "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "ohms": "ohm", "watt": "W",
+    "watts": "W", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad",
+    "kelvin": "K", "celsius": "degC", "fahrenheit": "degF", "rps": "rev/s", "lpm": "l/min",
+    "kph": "km/h",
 }  # fmt: skip
 """Other names of units, for which errors suggest the right one."""
 
