@@ -25,7 +25,10 @@ Equations compute in SI. The errors of an output are in its SI unit.
 * A temperature that stands alone is absolute: 20 degC are 293.15 K. Within a product it is a
   difference: W/degC is W/K. A difference by itself is written in K.
 * Angles are pure numbers (rad). Hz counts turns and rad/s angles: a channel in one is refused where
-  the model has the other.
+  the model has the other, as is one in 1/s or 1/min where the model has rad/s.
+* Headers of logs may use other words: RPM, U/min, r/min, Volt, rad/sec, N-m, min-1. In a header,
+  1/min of an angular speed is rpm. Brackets that hold no unit are refused, with the option that
+  states it.
 * A channel of a recording whose unit measures something else than the model's signal is refused;
   one without a unit is taken in SI.
 

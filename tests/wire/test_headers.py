@@ -23,6 +23,23 @@ from rigwatch.wire.units import unit_of
         ("flow l/min", "flow", "l/min"),
         ("level1_m", "level1", "m"),
         ("time_ms", "time", "ms"),
+        ("Speed [RPM]", "speed", "rpm"),
+        ("Speed [U/min]", "speed", "rpm"),
+        ("Speed [r/min]", "speed", "rpm"),
+        ("Speed_RPM", "speed", "rpm"),
+        ("Speed [min-1]", "speed", "min^-1"),
+        ("Speed [rpm] filtered", "speed_filtered", "rpm"),
+        ("Speed [rpm] (avg)", "speed", "rpm"),
+        ("Speed (avg) [rpm]", "speed", "rpm"),
+        ("speed_rpm (filtered)", "speed", "rpm"),
+        ("rate (rad/sec)", "rate", "rad/s"),
+        ("Pos [mm] filtered", "pos_filtered", "mm"),
+        ("u [Volt]", "u", "V"),
+        ("t [sec]", "t", "s"),
+        ("torque [N-m]", "torque", "N m"),
+        ("drag [N/(m/s)]", "drag", "N/(m/s)"),
+        ("pressure [mBar]", "pressure", "mbar"),
+        ("share [-]", "share", "1"),
     ],
 )
 def test_a_header_tells_name_and_unit(header, name, unit):
@@ -34,6 +51,12 @@ def test_a_header_tells_name_and_unit(header, name, unit):
 @pytest.mark.parametrize("header", ["omega", "t", "channel 3", "speed [furlongs]"])
 def test_a_header_without_a_unit_tells_none(header):
     assert read_header(header).units == ()
+
+
+@pytest.mark.parametrize("text", ["furlongs", "mw", "NM", "m?"])
+def test_what_stands_in_brackets_and_is_no_unit_is_kept_to_be_told(text):
+    found = read_header(f"speed [{text}]")
+    assert (found.units, found.unknown) == ((), text)
 
 
 def test_a_torque_and_a_stiffness_are_both_meant_until_the_model_says():

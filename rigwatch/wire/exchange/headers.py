@@ -1,15 +1,15 @@
 """Name and unit from a logger's column header.
 
-speed_rad_s    speed [rad/s]    Speed (rpm)    accel_m_s2    time_ms    Time (sec)    Heater 1
+speed_rad_s    speed [rad/s]    Speed (rpm)    Speed [RPM] (avg)    time_ms    t    Heater 1
 """
 
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from rigwatch.wire.units import IN_OTHER_WORDS, UnitError, unit_of
+from rigwatch.wire.units import UnitError, in_table_words, unit_of
 
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")
+_BRACKETED = re.compile(r"\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()\[\]]*)\)")
 _SEPARATED = re.compile(r"[\s_.\-]+")
 _POWER = re.compile(r"^(?P<unit>[A-Za-zµΩ°%]+)(?P<power>\d)$")
 
@@ -23,23 +23,33 @@ class Header:
         name: the quantity, in lower case with `_` between words.
         units: possible units in rigwatch's notation, the likeliest first; empty without a unit.
             `N_m` may be N/m or N m.
+        unknown: what stands in brackets, if nothing in the header is a unit.
     """
 
     column: str
     name: str
     units: tuple[str, ...]
+    unknown: str = ""
 
 
 def read_header(column: str) -> Header:
     """Name and possible units from a header."""
-    if found := _BRACKETED.match(column):
-        units = tuple(filter(_known, [_usual(found["unit"].strip())]))
-        return Header(column, _plain(found["name"]), units)
-    words = [word for word in _SEPARATED.split(column.strip()) if word]
+    bracketed = [in_table_words(text) for text in _bracketed(column)]
+    plain = _BRACKETED.sub(" ", column).strip()
+    if known := next(filter(_known, bracketed), None):
+        return Header(column, _plain(plain), (known,))
+    words = [word for word in _SEPARATED.split(plain) if word]
     for first in range(1, len(words)):
         if units := tuple(filter(_known, _units(words[first:]))):
             return Header(column, _plain("_".join(words[:first])), units)
-    return Header(column, _plain(column), ())
+    return Header(column, _plain(plain), (), next(filter(None, _bracketed(column)), ""))
+
+
+def _bracketed(column: str) -> list[str]:
+    """What stands in brackets, in square ones first."""
+    found = list(_BRACKETED.finditer(column))
+    texts = [match["square"] for match in found] + [match["round"] for match in found]
+    return [text.strip() for text in texts if text is not None]
 
 
 def _plain(name: str) -> str:
@@ -53,16 +63,11 @@ def _units(words: list[str]) -> Iterator[str]:
     """
     if any(word.isdecimal() for word in words):
         return
-    told = [_powered(_usual(word)) for word in words if word.lower() != "per"]
+    told = [_powered(in_table_words(word)) for word in words if word.lower() != "per"]
     if len(told) == 2:
         yield "/".join(told)
     if told:
         yield " ".join(told)
-
-
-def _usual(word: str) -> str:
-    """The symbol of a unit that is spelt out: s for `sec` or `Seconds`."""
-    return word if _known(word) else IN_OTHER_WORDS.get(word.lower(), word)
 
 
 def _powered(word: str) -> str:

@@ -10,16 +10,18 @@ from rigwatch.wire.units.unit import (
     times,
     unit_of,
 )
-from rigwatch.wire.units.unit_table import IN_OTHER_WORDS, Dimension
+from rigwatch.wire.units.unit_table import Dimension
+from rigwatch.wire.units.written import in_table_words, may_count_turns
 
 __all__ = [
     "GRAM",
-    "IN_OTHER_WORDS",
     "NONE",
     "Dimension",
     "Unit",
     "UnitError",
     "describe",
+    "in_table_words",
+    "may_count_turns",
     "names_gram",
     "times",
     "unit_of",

@@ -126,11 +126,12 @@ QUANTITIES: tuple[Quantity, ...] = (
 IN_OTHER_WORDS = {
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "hour": "h", "hours": "h", "hr": "h",
     "msec": "ms", "millis": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us",
-    "micros": "us", "minute": "min", "minutes": "min", "percent": "%", "meter": "m",
-    "metre": "m", "inches": "inch", "feet": "ft", "grams": "gram", "newton": "N", "lbs": "lb",
-    "pascal": "Pa", "volt": "V", "volts": "V", "amp": "A", "ampere": "A", "ohms": "ohm",
-    "watt": "W", "degree": "deg", "degrees": "deg", "radian": "rad", "kelvin": "K",
-    "celsius": "degC", "fahrenheit": "degF", "rps": "rev/s", "lpm": "l/min", "kph": "km/h",
+    "micros": "us", "minute": "min", "minutes": "min", "percent": "%", "meter": "m", "metre": "m",
+    "inches": "inch", "feet": "ft", "grams": "gram", "newton": "N", "lbs": "lb", "pascal": "Pa",
+    "volt": "V", "volts": "V", "amp": "A", "ampere": "A", "ohms": "ohm", "watt": "W",
+    "degree": "deg", "degrees": "deg", "radian": "rad", "kelvin": "K", "celsius": "degC",
+    "fahrenheit": "degF", "rps": "rev/s", "lpm": "l/min", "kph": "km/h", "sek": "s", "meters": "m",
+    "metres": "m", "newtons": "N", "amps": "A", "amperes": "A", "watts": "W", "radians": "rad",
 }  # fmt: skip
 """Other names of units, for which errors suggest the right one."""
 

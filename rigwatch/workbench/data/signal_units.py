@@ -4,12 +4,10 @@ A channel recorded in mm is converted; one of another dimension is refused. A ch
 is assumed to be in the model's SI unit.
 """
 
-import re
-
 from rigwatch.physics.engine.equations import Input, Output
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
-from rigwatch.wire.units import GRAM, UnitError, names_gram, unit_of
+from rigwatch.wire.units import GRAM, UnitError, may_count_turns, names_gram, unit_of
 
 
 def in_si(values: FloatArray, unit: str) -> FloatArray:
@@ -47,7 +45,8 @@ def check_unit(recorded: str, signal: Input | Output, channel: str, where: str) 
         )
 
 
-def _turns_for_angle(one: str, other: str) -> bool:
-    """Whether one unit counts turns and the other angles: 1 Hz is 2π rad/s, equal in dimension."""
-    angle = re.compile("rad|deg|rpm|rev|°")
-    return any("Hz" in a and angle.search(b) is not None for a, b in ((one, other), (other, one)))
+def _turns_for_angle(recorded: str, wanted: str) -> bool:
+    """Whether one unit may count turns and the other angles: 1 Hz may be 2π rad/s."""
+    return may_count_turns(recorded, wanted) or (
+        "Hz" in wanted and may_count_turns(wanted, recorded)
+    )

@@ -107,7 +107,7 @@ def _imported(
             continue
         table = read_table(path, logs.mapping)
         try:
-            found = matched(table.names, model, logs.mapping.channels)
+            found = matched(table.names, model, logs.mapping.channels, logs.mapping.time)
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None
         # A log of a real machine has gaps: missing values are invalid samples, not errors.
@@ -115,7 +115,7 @@ def _imported(
         mapping = structs.replace(
             logs.mapping,
             channels=found.channels,
-            time=logs.mapping.time or found.time,
+            time=found.time,
             flag_missing=True,
             any_unit=True,
         )

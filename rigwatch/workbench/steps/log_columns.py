@@ -1,15 +1,19 @@
 """Matches columns of a log to a model's signals: by name, otherwise by the only matching unit."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 from rigwatch.physics.engine.equations import Input, Model, Output
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.exchange import Header, read_header
-from rigwatch.wire.units import unit_of
+from rigwatch.wire.units import UnitError, may_count_turns, unit_of
 
 TIMES = ("time", "t", "timestamp", "time_stamp", "seconds", "sec")
 """Names of a time column."""
+PER_MINUTE = Fraction(1, 60)
+_GIVEN_UNIT = re.compile(r"\[\s*([^\[\]]*?)\s*\]\s*$")
 
 
 @dataclass(frozen=True)
@@ -29,36 +33,41 @@ class Matched:
     remarks: tuple[str, ...]
 
 
-def matched(columns: Sequence[str], model: Model, given: Mapping[str, str]) -> Matched:
+def matched(
+    columns: Sequence[str], model: Model, given: Mapping[str, str], when: str = ""
+) -> Matched:
     """The columns of a model's signals.
 
     Args:
         columns: of the log.
         model: the model whose signals are matched.
         given: mapping given by the user, channel = "column[unit]".
+        when: the time's column given by the user.
 
     Raises:
         ModelError: no column, or more than one, matches a signal; the text names the option.
     """
     headers = [read_header(column) for column in columns]
-    time = next((header for header in headers if header.name in TIMES), None)
-    free = [header for header in headers if header is not time]
+    times = [header for header in headers if header.name in TIMES and _is_time(header)]
+    time = times[0] if times and not when else None
+    free = [h for h in headers if h is not time and not when.startswith(h.column)]
     signals: dict[str, Input | Output] = {**model.inputs, **model.outputs}
     found, remarks = dict(given), list[str]()
     missing = dict[str, Input | Output]()
     for name, signal in signals.items():
         channel = signal.channel or name
         if channel in found:
+            found[channel], told = _given(found[channel], signal)
+            remarks += told
             continue
         column = _column(name, channel, signal, free)
         if column is None:
             missing[name] = signal
             continue
-        unit = _unit(column, signal)
+        unit, told = _unit(column, channel, signal)
         found[channel] = f"{column.column}[{unit}]"
         free.remove(column)
-        if not column.units:
-            remarks.append(f"{column.column}: no unit in its header, assumed {unit}")
+        remarks += told
     measured = {s.channel or name: s for name, s in signals.items() if name not in missing}
     rates = dict[str, tuple[str, int]]()
     for name, signal in missing.items():
@@ -72,11 +81,17 @@ def matched(columns: Sequence[str], model: Model, given: Mapping[str, str]) -> M
             f"{time.column}: no unit in its header, assumed s; for ms give --time"
             f" '{time.column}[ms]'"
         )
-    told = f"{time.column}[{_time_unit(time)}]" if time else ""
-    return Matched(found, told, rates, tuple(remarks))
+    when = f"{time.column}[{_time_unit(time)}]" if time else when
+    return Matched(found, when, rates, tuple(remarks))
+
+
+def _is_time(header: Header) -> bool:
+    return not header.units or unit_of(header.units[0]).dimension == unit_of("s").dimension
 
 
 def _time_unit(time: Header) -> str:
+    if time.unknown:
+        raise ModelError(_no_unit(time, f"--time '{time.column}[s]'"))
     return time.units[0] if time.units else "s"
 
 
@@ -104,11 +119,61 @@ def _fits(header: Header, signal: Input | Output) -> bool:
     return any(unit_of(unit).dimension == wanted for unit in header.units)
 
 
-def _unit(header: Header, signal: Input | Output) -> str:
-    """The unit of a header: of its possible readings, the one that matches the signal."""
-    wanted = unit_of(signal.shown or signal.unit).dimension
-    fitting = (unit for unit in header.units if unit_of(unit).dimension == wanted)
-    return next(fitting, signal.shown or signal.unit)
+def _unit(header: Header, channel: str, signal: Input | Output) -> tuple[str, list[str]]:
+    """The unit of a header: of its possible readings, the one that matches the signal.
+
+    Also a remark if it is assumed.
+
+    Raises:
+        ModelError: the header has brackets with something else, or a rate where an angle matters.
+    """
+    wanted = signal.shown or signal.unit
+    dimension = unit_of(wanted).dimension
+    unit = next((u for u in header.units if unit_of(u).dimension == dimension), "")
+    if not unit and header.unknown and wanted not in ("", "1"):
+        raise ModelError(_no_unit(header, f"--map '{channel}={header.column}[{wanted}]'"))
+    if not unit:
+        return wanted, [f"{header.column}: no unit in its header, assumed {wanted}"]
+    if turns := _as_turns(unit, wanted):
+        return turns, [f"{header.column}: {unit} is read as {turns}"]
+    if may_count_turns(unit, wanted):
+        raise ModelError(
+            f"{header.column}: found the unit {unit} for {channel} [{wanted}], which may count"
+            f" turns or angles; expected --map '{channel}={header.column}[rev/s]' or '…[rad/s]'"
+        )
+    return unit, []
+
+
+def _as_turns(unit: str, wanted: str) -> str:
+    """`rpm` for 1/min where the model has an angle in a time; otherwise empty."""
+    per_minute = may_count_turns(unit, wanted) and unit_of(unit).factor == PER_MINUTE
+    return "rpm" if per_minute else ""
+
+
+def _given(text: str, signal: Input | Output) -> tuple[str, list[str]]:
+    """A column as the user maps it, with 1/min read as rpm where the model has an angle."""
+    unit = _GIVEN_UNIT.search(text)
+    if unit is None or not _known(unit[1]):
+        return text, []
+    turns = _as_turns(unit[1], signal.shown or signal.unit)
+    if not turns:
+        return text, []
+    return f"{text[: unit.start()]}[{turns}]", [f"{text}: {unit[1]} is read as {turns}"]
+
+
+def _known(unit: str) -> bool:
+    try:
+        unit_of(unit)
+    except UnitError:
+        return False
+    return True
+
+
+def _no_unit(header: Header, option: str) -> str:
+    return (
+        f"{header.column}: found {header.unknown!r} in the header's brackets, which is no unit that"
+        f" is known; expected {option} with the column's unit"
+    )
 
 
 def _rate(signal: Input | Output, measured: Mapping[str, Input | Output]) -> tuple[str, int] | None:

@@ -1,0 +1,84 @@
+"""A unit that is not understood is asked for; a speed is never taken in another unit."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.workbench.data.signals import prepare
+from rigwatch.workbench.study.study import open_study
+from sim_plant.machines import MACHINES, log
+
+MOTOR = ["--model", "motor", "--set", "R=2.0", "--set", "K=0.06"]
+RPM = 30 / np.pi
+
+
+@pytest.fixture(scope="module")
+def run() -> dict[str, np.ndarray]:
+    return log(MACHINES["motor"], {}, 0.003, seed=1)
+
+
+def made(folder: Path, run: dict[str, np.ndarray], header: str, *more: str) -> int:
+    """A study of the motor's log, with the speed in turns a minute under the given header."""
+    time, voltage, speed = run.values()
+    rows = zip(time, voltage, RPM * speed, strict=True)
+    lines = [f"time_s,voltage_V,{header}", *(",".join(f"{v:.12g}" for v in row) for row in rows)]
+    path = folder / "run.csv"
+    path.write_text("\n".join(lines) + "\n")
+    return main(["study", "new", str(folder / "study"), "--data", str(path), *MOTOR, *more])
+
+
+def speed(folder: Path) -> np.ndarray:
+    return prepare(open_study(folder / "study")).train.outputs[:100, 0]
+
+
+@pytest.mark.parametrize(
+    "header", ["Speed [U/min]", "Speed [RPM]", "Speed [rpm] filtered", "Speed [rpm] (avg)"]
+)
+def test_usual_spellings_of_a_unit_are_read(tmp_path, run, header):
+    assert made(tmp_path, run, header) == 0
+    np.testing.assert_allclose(speed(tmp_path), run["speed_rad_s"][:100], rtol=1e-9, atol=1e-9)
+
+
+def test_a_unit_that_is_not_known_is_asked_for(tmp_path, run, capsys):
+    assert made(tmp_path, run, "Speed [turns/min]") == 2
+    said = capsys.readouterr().err
+    assert "Speed [turns/min]: found 'turns/min' in the header's brackets" in said
+    assert "--map 'speed=Speed [turns/min][rad/s]'" in said
+    assert made(tmp_path, run, "Speed [turns/min]", "--map", "speed=Speed [turns/min][rpm]") == 0
+    np.testing.assert_allclose(speed(tmp_path), run["speed_rad_s"][:100], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("header", "more"),
+    [
+        pytest.param("Speed [1/min]", (), id="of the header"),
+        pytest.param("Speed [min-1]", (), id="with a negative power"),
+        pytest.param("n", ("--map", "speed=n[1/min]"), id="of the option"),
+    ],
+)
+def test_turns_a_minute_are_no_angles_a_minute(tmp_path, run, capsys, header, more):
+    assert made(tmp_path, run, header, *more) == 0
+    assert "is read as rpm" in capsys.readouterr().err
+    np.testing.assert_allclose(speed(tmp_path), run["speed_rad_s"][:100], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", ["1/s", "Hz"])
+def test_a_rate_that_may_count_turns_or_angles_is_asked_for(tmp_path, run, capsys, unit):
+    assert made(tmp_path, run, f"Speed [{unit}]") == 2
+    said = capsys.readouterr().err
+    assert f"found the unit {unit} for speed [rad/s], which may count turns or angles" in said
+    assert made(tmp_path, run, "n", "--map", f"speed=n[{unit}]") == 2
+    assert "expected a unit of 'rad/s'" in capsys.readouterr().err
+
+
+def test_a_time_in_something_that_is_no_unit_is_asked_for(tmp_path, run, capsys):
+    path = tmp_path / "run.csv"
+    rows = zip(*run.values(), strict=True)
+    lines = ["time [ticks],voltage_V,speed_rad_s", *(",".join(map(str, row)) for row in rows)]
+    path.write_text("\n".join(lines))
+    new = ["study", "new", str(tmp_path / "study"), "--data", str(path), *MOTOR]
+    assert main(new) == 2
+    assert "expected --time 'time [ticks][s]'" in capsys.readouterr().err
+    assert main([*new, "--time", "time [ticks][s]"]) == 0
