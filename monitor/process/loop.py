@@ -78,7 +78,7 @@ class MonitorProcess:
         self.bus = bus
         self._journal, self._cursor = _opened(section.journal)
         self._done = self._cursor.read() if self._cursor else None
-        self._stale_after = config.daq.stale_after
+        self._stale_after = config.stale_after
         self._links = LinkWatch(self._stale_after)
         self._health = HealthBook("monitor")
         self._device = config.daq.name
@@ -281,7 +281,7 @@ class MonitorProcess:
         )
 
     def _tell_health(self, seen: Seen) -> None:
-        stale = seen.silent_s > 1.0
+        stale = seen.silent_s > max(1.0, self._stale_after)
         state = "unsuitable" if self._unsuitable else "stale" if stale else "running"
         text = self._unsuitable or ("no samples arrive" if stale else "")
         if self._journal and self._journal.failure:
