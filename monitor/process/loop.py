@@ -94,7 +94,8 @@ class MonitorProcess:
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
         bus.announce()
-        self._healths = bus.subscribe(HEALTH)
+        self._of_daq = bus.subscribe_own(HEALTH, "daq")
+        self._of_recorder = bus.subscribe_own(HEALTH, "recorder")
         self._follow("daq", self._daq_presence)
         self._follow("recorder", self._recorder_presence)
         self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
@@ -253,13 +254,12 @@ class MonitorProcess:
         return self._daq_presence.holds(now)
 
     def _hear_of_others(self) -> None:
-        for health in self._healths.drain():
-            if health.source.startswith("daq"):
-                self._daq = health
-                self._daq_trouble = health.text if health.state == "reconnecting" else ""
-            elif health.source.startswith("recorder"):
-                self._recorder = None if health.state == "stopped" else health
-                self._recorder_presence.heard(time.monotonic())
+        for health in self._of_daq.drain():
+            self._daq = health
+            self._daq_trouble = health.text if health.state == "reconnecting" else ""
+        for health in self._of_recorder.drain():
+            self._recorder = None if health.state == "stopped" else health
+            self._recorder_presence.heard(time.monotonic())
 
     def _seen(self) -> Seen:
         self._hear_of_others()
