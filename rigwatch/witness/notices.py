@@ -29,6 +29,11 @@ class Notice:
     minutes: float
 
 
+AGAIN_S = 600.0
+"""Time after its end in which an alarm that comes again, seen by nobody, is the same one [s]: a
+monitor that is restarted again and again would send a notice each time."""
+
+
 @dataclass(slots=True)
 class _Unseen:
     """An alarm that nobody has acknowledged, cleared or not.
@@ -36,11 +41,13 @@ class _Unseen:
     Attributes:
         alarm: its last change.
         since: when it was raised [s].
+        ended: when its condition ended [s]; None while it holds.
         told: per recipient the last notice [s] and count.
     """
 
     alarm: Alarm
     since: float
+    ended: float | None = None
     told: dict[str, tuple[float, int]] = field(default_factory=dict)
 
 
@@ -60,10 +67,11 @@ class Notices:
         if alarm.state in ("acknowledged", "normal"):
             self._unseen.pop(alarm.name, None)
             return
-        unseen = self._unseen.setdefault(alarm.name, _Unseen(alarm, now))
-        if alarm.state == "unacknowledged" and unseen.alarm.state == "cleared_unacknowledged":
-            unseen.told.clear()  # it has come again
+        unseen = self._unseen.get(alarm.name)
+        if unseen is None or (unseen.ended is not None and now - unseen.ended > AGAIN_S):
+            unseen = self._unseen[alarm.name] = _Unseen(alarm, now)
         unseen.alarm = alarm
+        unseen.ended = now if alarm.state == "cleared_unacknowledged" else None
 
     def due(self, now: float, wall: datetime) -> list[Notice]:
         """Notices to send now, each returned once.
@@ -82,7 +90,7 @@ class Notices:
                     for recipient in self.people.recipients
                     if _is_due(unseen, recipient, now)
                 ]
-            elif unseen.alarm.state == "cleared_unacknowledged" and not unseen.told:
+            elif unseen.ended is not None and not unseen.told:
                 del self._unseen[name]
         return found
 
