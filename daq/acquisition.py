@@ -53,7 +53,7 @@ class Acquisition:
         self.clock = DeviceClock(rate, clock_rate, host_offset_ns())
         self.tracker = SequenceTracker(rate)
         self.conditioner = Conditioner(config.channels, config.daq.name)
-        self.watch = Watch(self.source, rate, config.daq.stale_after, clock_rate)
+        self.watch = Watch(self.source, rate, config.stale_after, clock_rate)
 
     def update(self, raw: RawBlock) -> list[Message]:
         """The messages for `raw`, in order: samples, with gaps and events between them."""

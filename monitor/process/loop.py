@@ -78,7 +78,7 @@ class MonitorProcess:
         self.bus = bus
         self._journal, self._cursor = _opened(section.journal)
         self._done = self._cursor.read() if self._cursor else None
-        self._stale_after = config.daq.stale_after
+        self._stale_after = config.stale_after
         self._links = LinkWatch(self._stale_after)
         self._health = HealthBook("monitor")
         self._device = config.daq.name
@@ -94,7 +94,8 @@ class MonitorProcess:
         check = CommandCheck(bus, config.bus.security)
         self._operators = OperatorDesk(bus, check)
         bus.announce()
-        self._healths = bus.subscribe(HEALTH)
+        self._of_daq = bus.subscribe_own(HEALTH, "daq")
+        self._of_recorder = bus.subscribe_own(HEALTH, "recorder")
         self._follow("daq", self._daq_presence)
         self._follow("recorder", self._recorder_presence)
         self._explainer = Explainer(lambda: self.rig.model, section.effect_files)
@@ -253,13 +254,12 @@ class MonitorProcess:
         return self._daq_presence.holds(now)
 
     def _hear_of_others(self) -> None:
-        for health in self._healths.drain():
-            if health.source.startswith("daq"):
-                self._daq = health
-                self._daq_trouble = health.text if health.state == "reconnecting" else ""
-            elif health.source.startswith("recorder"):
-                self._recorder = None if health.state == "stopped" else health
-                self._recorder_presence.heard(time.monotonic())
+        for health in self._of_daq.drain():
+            self._daq = health
+            self._daq_trouble = health.text if health.state == "reconnecting" else ""
+        for health in self._of_recorder.drain():
+            self._recorder = None if health.state == "stopped" else health
+            self._recorder_presence.heard(time.monotonic())
 
     def _seen(self) -> Seen:
         self._hear_of_others()
@@ -281,7 +281,7 @@ class MonitorProcess:
         )
 
     def _tell_health(self, seen: Seen) -> None:
-        stale = seen.silent_s > 1.0
+        stale = seen.silent_s > max(1.0, self._stale_after)
         state = "unsuitable" if self._unsuitable else "stale" if stale else "running"
         text = self._unsuitable or ("no samples arrive" if stale else "")
         if self._journal and self._journal.failure:

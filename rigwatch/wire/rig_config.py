@@ -167,7 +167,13 @@ class DaqSection(Section, frozen=True):
     ring: Annotated[
         int, Meta(ge=256, description="samples stored for readers that missed some")
     ] = 65536
-    stale_after: Annotated[float, Meta(gt=0, description="silence that means stale [s]")] = 0.1
+    stale_after: Annotated[
+        Annotated[float, Meta(gt=0)] | None,
+        Meta(
+            description="silence that means stale [s], at least two periods or polls; without it "
+            "three of them, and no less than 0.1"
+        ),
+    ] = None
 
 
 class PlantSection(Section, frozen=True):
@@ -248,8 +254,12 @@ class WitnessSection(Section, frozen=True):
     """[witness] — a separate process that supervises the monitor and sends notifications."""
 
     stale_after: Annotated[
-        float, Meta(gt=0, description="time without estimates that is an alarm [s]")
-    ] = 1.0
+        Annotated[float, Meta(gt=0)] | None,
+        Meta(
+            description="time without estimates that is an alarm [s], at least two periods or "
+            "polls of the device; without it three of them, and no less than 1"
+        ),
+    ] = None
     heartbeat_file: Annotated[
         str,
         Meta(description="file renewed every second while estimates come, empty for none"),
@@ -322,6 +332,27 @@ class RigConfig(Section, frozen=True):
     witness: Annotated[WitnessSection | None, Meta(description="the witness")] = None
     dashboard: Annotated[DashboardSection | None, Meta(description="the dashboard")] = None
 
+    @property
+    def interval(self) -> float:
+        """Time from one arrival of samples to the next, with a healthy device [s]."""
+        device = self.daq.device
+        speed = device.speed if isinstance(device, ReplaySection) else 1.0
+        period = 1.0 / (self.rig.sample_rate * speed)
+        if isinstance(device, ModbusSection | ModbusRtuSection):
+            return max(period, 1.0 / device.polls)
+        return period
+
+    @property
+    def stale_after(self) -> float:
+        """Silence after which the device counts as stale [s]."""
+        return self.daq.stale_after or max(0.1, 3.0 * self.interval)
+
+    @property
+    def unwatched_after(self) -> float:
+        """Time without estimates after which the witness raises its alarm [s]."""
+        chosen = self.witness.stale_after if self.witness else None
+        return chosen or max(1.0, 3.0 * self.interval)
+
 
 _KIND = "adapter"
 """Key of the sections that replace one another as a whole: devices."""
@@ -331,13 +362,20 @@ def load_rig(path: Path | str) -> RigConfig:
     """The configuration at `path`; relative paths in it stay relative to the working folder.
 
     Raises:
-        ConfigError: the file is invalid, or two channels have the same name.
+        ConfigError: the file is invalid, two channels have the same name, or silence would count
+            as stale between two samples.
     """
     config = load_layered(path, RigConfig, _KIND)
     names = [channel.name for channel in config.channels]
     if len(set(names)) < len(names):
         file = holder(path, "channels")
         raise ConfigError(file, "channels", f"the names {', '.join(names)}", "different names")
+    chosen = {"daq": config.stale_after, "witness": config.unwatched_after}
+    for section, silence in chosen.items():
+        if silence < 2.0 * config.interval:
+            least = f"at least {2.0 * config.interval:.3g} s, two periods or polls of the device"
+            key, found = f"{section}.stale_after", f"{silence:g} s"
+            raise ConfigError(holder(path, section), key, found, least)
     return config
 
 

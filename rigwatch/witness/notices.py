@@ -33,6 +33,11 @@ class Notice:
     minutes: float
 
 
+AGAIN_S = 600.0
+"""Time after its end in which an alarm that comes again, seen by nobody, is the same one [s]: a
+monitor that is restarted again and again would send a notice each time."""
+
+
 @dataclass(slots=True)
 class _Unseen:
     """An alarm that nobody has acknowledged, cleared or not.
@@ -92,7 +97,7 @@ class Notices:
                     for recipient in self.people.recipients
                     if _is_due(unseen, recipient, now)
                 ]
-            elif unseen.alarm.state == "cleared_unacknowledged" and not unseen.told:
+            elif unseen.ended is not None and not unseen.told:
                 del self._unseen[name]
         return found
 

@@ -6,6 +6,8 @@ python -m rigwatch witness CONFIG
 import threading
 import time
 
+import msgspec
+
 from rigwatch.wire.bus import (
     MOST_COMMANDS,
     Bus,
@@ -33,6 +35,8 @@ from rigwatch.witness.stale_alarm import StaleAlarm
 
 PROCESS = "witness"
 TURN = 0.1
+LEAST_SILENCE = 1.0
+"""Time without estimates that is an alarm, for a rig of usual rate [s]."""
 FOR_MONITOR = 30.0
 """Time allowed until a monitor's first estimate [s]."""
 
@@ -65,7 +69,8 @@ class Witness:
         self._outputs = Outputs(settings, bus, security)
         self._estimates = bus.subscribe_lossy(ESTIMATES)
         self._alarms = bus.listen(ALARMS)
-        self._heard_at = now + max(0.0, FOR_MONITOR - settings.stale_after)
+        self._stale_after = settings.stale_after or LEAST_SILENCE
+        self._heard_at = now + max(0.0, FOR_MONITOR - self._stale_after)
         self._stale = StaleAlarm(CommandCheck(bus, security))
         self._commands = bus.subscribe(COMMANDS)
         self._told_at = now - 1.0
@@ -78,7 +83,7 @@ class Witness:
         if self._estimates.drain():
             self._heard_at = now
         silent = now - self._heard_at
-        for alarm in self._stale.judge(silent > self.settings.stale_after, silent, t_ns):
+        for alarm in self._stale.judge(silent > self._stale_after, silent, t_ns):
             self._bus.publish(ALARMS, alarm)
         self._obey(t_ns)
         for alarm in self._alarms.drain():
@@ -127,6 +132,12 @@ def _standing(bus: Bus) -> list[Alarm]:
         return []
 
 
+def patient(config: RigConfig) -> WitnessSection:
+    """The section [witness] with the time that suits the rig's rate."""
+    section = config.witness or WitnessSection()
+    return msgspec.structs.replace(section, stale_after=config.unwatched_after)
+
+
 def run(config: RigConfig, stop: threading.Event) -> None:
     """Supervise the rig until `stop` is set.
 
@@ -136,7 +147,7 @@ def run(config: RigConfig, stop: threading.Event) -> None:
     bus = connect(config, PROCESS)
     try:
         witness = Witness(
-            config.witness or WitnessSection(),
+            patient(config),
             bus,
             time.monotonic(),
             config.bus.security,

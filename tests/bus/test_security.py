@@ -11,7 +11,16 @@ from rigwatch.keys import Authority
 from rigwatch.wire.access import ROLES
 from rigwatch.wire.bus import Bus, connect, open_router
 from rigwatch.wire.errors import BusError, ConfigError, KeysError
-from rigwatch.wire.messages import ALARMS, COMMANDS, EVENTS, AlarmCommand, Event, encode
+from rigwatch.wire.messages import (
+    ALARMS,
+    COMMANDS,
+    EVENTS,
+    HEALTH,
+    AlarmCommand,
+    Event,
+    Health,
+    encode,
+)
 from rigwatch.wire.rig_config import RigConfig, load_rig
 from tests.bus.rig import TestRig
 from tests.bus.test_complete_subscription import alarm, heard, say
@@ -86,6 +95,38 @@ def test_each_role_says_what_is_its_own_and_nothing_else(secured: RigConfig) -> 
         assert commands.drain() == []
     finally:
         for bus in (monitor, operator, recorder, dashboard, daq):
+            bus.close()
+
+
+def test_only_daq_and_recorder_say_how_they_are(secured: RigConfig) -> None:
+    names = ("monitor", "daq", "recorder", "dashboard")
+    monitor, daq, recorder, dashboard = (connect(secured, name, PATIENCE) for name in names)
+    try:
+        own = {name: monitor.subscribe_own(HEALTH, name) for name in HEALTH.owned_by}
+        for bus in (daq, recorder, dashboard):
+            until_reached(bus, monitor)
+        forged = encode(Health("recorder", 1, "stopped", "", {}))
+        for stranger, victim in ((dashboard, "recorder"), (daq, "recorder"), (recorder, "daq")):
+            stranger.transport.put(stranger.key(HEALTH.key_of(victim)), forged)
+            until_reached(stranger, monitor)
+        for bus in (daq, recorder):
+            bus.publish(HEALTH, Health(bus.process, 1, "running", "", {}))
+            assert own[bus.process].get(timeout=PATIENCE).source == bus.process
+            assert own[bus.process].drain() == []
+    finally:
+        for bus in (monitor, daq, recorder, dashboard):
+            bus.close()
+
+
+def test_nobody_feigns_the_presence_of_daq_or_recorder(secured: RigConfig) -> None:
+    monitor, dashboard = (connect(secured, name, PATIENCE) for name in ("monitor", "dashboard"))
+    try:
+        for name in (*HEALTH.owned_by, "second-screen"):
+            dashboard.declare_token(f"alive/{name}")
+        eventually(lambda: "alive/second-screen" in monitor.tokens("alive/*"), "its own token")
+        assert not {"alive/daq", "alive/recorder"} & set(monitor.tokens("alive/*"))
+    finally:
+        for bus in (monitor, dashboard):
             bus.close()
 
 

@@ -317,10 +317,11 @@ def test_a_clock_that_was_set_is_noticed_and_one_that_runs_is_not() -> None:
 
 def test_the_recorders_troubles_are_alarms_and_clear(bench: Bench) -> None:
     names = ("disk", "disk_almost_full", "recording_stopped")
+    recorder = bench.network.bus("bench", "recorder")
 
     def told(state: str, free: float, trouble: float) -> set[tuple[str, str]]:
         counters = {"disk_trouble": trouble, "free_share": free}
-        bench.daq.publish(HEALTH, Health("recorder", 1, state, "", counters))
+        recorder.publish(HEALTH, Health("recorder", 1, state, "", counters))
         bench.turn()
         return {(name, state) for name, state in bench.alarm_states() if name in names}
 
@@ -358,6 +359,23 @@ def test_a_drift_that_is_not_certain_is_no_alarm(bench: Bench) -> None:
     bench.daq.publish(HEALTH, Health("daq/rig", 1, "running", "", figures))
     bench.turn()
     assert not {name for name, _ in bench.alarm_states()} & {"clock_drift", "clock_wrong"}
+
+
+def test_what_another_process_says_of_daq_and_recorder_changes_no_alarm(bench: Bench) -> None:
+    recorder, dashboard = (bench.network.bus("bench", name) for name in ("recorder", "dashboard"))
+    recorder.publish(HEALTH, Health("recorder", 1, "not recording", "", {}))
+    bench.turn()
+    assert ("recording_stopped", "unacknowledged") in bench.alarm_states()
+    for source, state, figures in (
+        ("recorder", "stopped", {}),
+        ("recorder", "recording", {}),
+        ("daq/rig", "running", {"drift_ppm": 9e3}),
+        ("daq/rig", "garbage", {}),
+    ):
+        dashboard.publish(HEALTH, Health(source, 1, state, "", figures))
+        bench.turn()
+    assert bench.alarm_states() == []
+    assert len(bench.got(HEALTH)) >= 5, "who displays them gets them all"
 
 
 def test_samples_without_estimates_are_an_alarm(bench: Bench) -> None:

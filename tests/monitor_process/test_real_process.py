@@ -97,11 +97,13 @@ def test_a_kill_between_journal_and_delivery_leaves_no_change_untold(
         heard.extend(map(change_of, alarms.drain()))
         return heard
 
+    recorder = rig.bus("recorder")
+
     def disk(trouble: float, until: str) -> None:
         """A recorder's word about its disk, until the change that it causes is in the journal."""
 
         def written() -> bool:
-            observer.publish(
+            recorder.publish(
                 HEALTH, Health("recorder", 1, "recording", "", {"disk_trouble": trouble})
             )
             return changes(rig, "disk")[-1:] == [until] or killed.poll() is not None

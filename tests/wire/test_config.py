@@ -69,6 +69,43 @@ def test_two_channels_of_one_name_are_refused(tmp_path):
         load_rig(path)
 
 
+def silence(tmp_path, rate, device='adapter = "serial"\nport = "p"', daq="", witness=""):
+    """The times without samples and without estimates that are alarms."""
+    path = tmp_path / "rig.toml"
+    channel = '[[channels]]\nname = "x"\nunit = "m"\ngain = 1.0\n'
+    path.write_text(
+        f'[rig]\nid = "r"\nsample_rate = {rate}\n{channel}[daq]\n{daq}\n[daq.device]\n{device}\n'
+        f"[witness]\n{witness}\n"
+    )
+    config = load_rig(path)
+    return config.stale_after, config.unwatched_after
+
+
+@pytest.mark.parametrize(
+    ("rate", "device", "least"),
+    [
+        (256.0, 'adapter = "serial"\nport = "p"', (0.1, 1.0)),
+        (8.0, 'adapter = "serial"\nport = "p"', (0.375, 1.0)),
+        (1.0, 'adapter = "serial"\nport = "p"', (3.0, 3.0)),
+        (256.0, 'adapter = "modbus-tcp"\nhost = "h"\npolls = 4.0', (0.75, 1.0)),
+        (256.0, 'adapter = "replay"\nsession = "s"\nspeed = 0.01', (1.171875, 1.171875)),
+    ],
+)
+def test_silence_is_stale_after_three_periods_or_polls(tmp_path, rate, device, least):
+    assert silence(tmp_path, rate, device) == pytest.approx(least)
+
+
+def test_a_chosen_time_of_silence_holds_unless_it_is_less_than_two_periods(tmp_path):
+    assert silence(tmp_path, 8.0, daq="stale_after = 0.25", witness="stale_after = 2.5") == (
+        0.25,
+        2.5,
+    )
+    with pytest.raises(ConfigError, match=r"daq\.stale_after: found 0\.2 s, expected at least 0"):
+        silence(tmp_path, 8.0, daq="stale_after = 0.2")
+    with pytest.raises(ConfigError, match=r"witness\.stale_after: found 0\.2 s"):
+        silence(tmp_path, 8.0, witness="stale_after = 0.2")
+
+
 def test_a_section_that_a_process_needs_is_asked_for():
     config = parse(GOOD, RigConfig, "rig.toml")
     with pytest.raises(ConfigError, match=r"a section \[recorder\]"):

@@ -83,6 +83,16 @@ def test_what_has_gone_unseen_is_repeated_and_goes_to_others_until_it_is_seen() 
     assert told(who, 60) == []
 
 
+@pytest.mark.parametrize(("pause", "sent"), [(9.0, 1), (11.0, 2)])
+def test_what_comes_again_within_ten_minutes_is_the_same_alarm(pause: float, sent: int) -> None:
+    who, got = notices(RecipientSection(name="once", url="json://once")), []
+    states = ("unacknowledged", "cleared_unacknowledged", "unacknowledged")
+    for minute, state in zip((0.0, 1.0, 1.0 + pause), states, strict=True):
+        who.hear(fault(state=state), minute * 60.0)
+        got += told(who, minute)
+    assert len(got) == sent
+
+
 def test_in_maintenance_nobody_is_told_until_it_is_over() -> None:
     once = MaintenanceSection(
         name="bearing", begin=MONDAY, end=MONDAY + timedelta(hours=1), still="critical"

@@ -28,9 +28,9 @@ _EVERYBODY = (EVENTS.key, GAPS.key, HEALTH.key)
 _SAYS: dict[str, tuple[str, ...]] = {
     "router": (),
     "device": (),
-    "daq": (SAMPLES.key,),
+    "daq": (SAMPLES.key, HEALTH.key_of("daq")),
     "monitor": (ALARMS.key, ESTIMATES.key, MODELS.key),
-    "recorder": (RUN.key,),
+    "recorder": (RUN.key, HEALTH.key_of("recorder")),
     "witness": (ALARMS.key,),
     "dashboard": (),
     "operator": (COMMANDS.key,),
@@ -104,6 +104,9 @@ def _role_rules(role: str, rig: str) -> list[dict[str, Any]]:
             ("**",),
         ),
     ]
+    others = tuple(f"{ALIVE_KEY}/{process}" for process in HEALTH.owned_by if process != role)
+    feigned = _rule(f"{role} is no other", ["liveliness_token"], rig, others)
+    rules.append(feigned | {"permission": "deny"})
     if answered := (*_ANSWERS.get(role, ()), *named):
         rules.append(_rule(f"{role} answers", ["declare_queryable", "reply"], rig, answered))
     return rules

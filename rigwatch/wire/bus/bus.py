@@ -9,7 +9,7 @@ receiving callback only puts bytes into a bounded queue; they are decoded in the
 an invalid message is counted there without further effect.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from rigwatch.wire.bus.complete_subscription import CompleteSubscription, Place
 from rigwatch.wire.bus.member import Member
@@ -49,6 +49,19 @@ class Bus(Member):
 
     def subscribe_lossy(self, topic: Topic, capacity: int = QUEUE_CAPACITY) -> Subscription:
         """The topic's messages as received; some may be lost, which suits e.g. a display."""
-        subscription = Subscription(topic, capacity)
-        subscription._close = self.transport.listen(self.key(topic.key), subscription.receive)
-        return subscription
+        return self._subscribed(topic, topic.keys, capacity)
+
+    def subscribe_own(self, topic: Topic, process: str) -> Subscription:
+        """The messages that only `process` may send: its role, if the bus has keys."""
+        return self._subscribed(topic, (topic.key_of(process),), QUEUE_CAPACITY)
+
+    def _subscribed(self, topic: Topic, keys: Iterable[str], capacity: int) -> Subscription:
+        found = Subscription(topic, capacity)
+        ends = [self.transport.listen(self.key(key), found.receive) for key in keys]
+
+        def close() -> None:
+            for end in ends:
+                end()
+
+        found._close = close
+        return found

@@ -60,7 +60,7 @@ class Member:
         if topic.numbered:
             self._numbered().put(topic, payload)
         else:
-            self.transport.put(self.key(topic.key), payload)
+            self.transport.put(self.key(topic.key_of(self.process)), payload)
 
     def announce(self) -> None:
         """Show subscribers who sends numbered messages here, before the first one.

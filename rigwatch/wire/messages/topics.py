@@ -22,13 +22,15 @@ class Topic:
 
     Attributes:
         name: its name in code and session files.
-        key: key on the bus below `rig/<id>/`, the same for every publisher of the topic.
+        key: key on the bus below `rig/<id>/`.
         message: class of its messages.
         publisher: the process that publishes it.
         rate_hz: messages a second at most in normal running [Hz]; 0 for now and then.
         recorded: whether the recorder keeps it.
         numbered: whether its publisher numbers and stores its messages, so that a listener gets
             each message once or a report of the missing ones.
+        owned_by: processes whose messages decide alarms: each has a key of its own, at which no
+            other role may send.
     """
 
     name: str
@@ -38,6 +40,16 @@ class Topic:
     rate_hz: float
     recorded: bool
     numbered: bool = False
+    owned_by: tuple[str, ...] = ()
+
+    def key_of(self, process: str) -> str:
+        """Key at which a process sends."""
+        return f"{self.key}/{process}" if process in self.owned_by else self.key
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys at which its messages arrive."""
+        return (self.key, *map(self.key_of, self.owned_by))
 
 
 SAMPLES = Topic("samples", "daq/samples", SampleBlock, "daq", 256.0, recorded=True)
@@ -47,7 +59,7 @@ ESTIMATES = Topic(
 ALARMS = Topic("alarms", "monitor/alarms", Alarm, "monitor", 0.0, recorded=True, numbered=True)
 COMMANDS = Topic("commands", "monitor/commands", AlarmCommand, "operator", 0.0, recorded=True)
 GAPS = Topic("gaps", "gaps", Gap, "any", 0.0, recorded=True)
-HEALTH = Topic("health", "health", Health, "any", 1.0, recorded=True)
+HEALTH = Topic("health", "health", Health, "any", 1.0, recorded=True, owned_by=("daq", "recorder"))
 EVENTS = Topic("events", "events", Event, "any", 0.0, recorded=True)
 RUN = Topic("run", "run", RunInfo, "recorder", 0.0, recorded=True)
 MODELS = Topic(
