@@ -92,7 +92,7 @@ def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int
         if count >= FEWEST_PERIODS:
             return NoiseFloor(_between(series, samples // factor, count), "periods")
     rate = 1 / (recording.dt * factor)
-    top = 0.38 if factor > 1 else 0.5
+    top = 0.38 if factor > 1 else recording.passed
     quiet, chances = zip(*(quietest_band([c], rate, top) for c in series.T), strict=True)
     return NoiseFloor(np.array(quiet), "quiet band", max(chances))
 
@@ -149,7 +149,9 @@ def quiet_scale(recording: Recording) -> FloatArray:
     sizes = np.nanstd(recording.outputs, axis=0)
     quiet = np.array(
         [
-            quietest_band([channel[part] for part in recording.slices], 1 / recording.dt)[0]
+            quietest_band(
+                [channel[part] for part in recording.slices], 1 / recording.dt, recording.passed
+            )[0]
             for channel in recording.outputs.T
         ]
     )

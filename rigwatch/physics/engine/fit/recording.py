@@ -24,6 +24,7 @@ class Recording:
         parts: lengths of the concatenated recordings; a single one if empty.
         driving: leading inputs that drive the rig, before those of its measured motion; None if
             all do.
+        passed: frequency up to which the outputs are not low-passed, over the rate.
     """
 
     dt: float
@@ -32,6 +33,7 @@ class Recording:
     thinning: Thinning | None = None
     parts: tuple[int, ...] = ()
     driving: int | None = None
+    passed: float = 0.5
 
     def __len__(self) -> int:
         return len(self.inputs)
