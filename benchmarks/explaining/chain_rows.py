@@ -10,16 +10,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from benchmarks.explaining.hidden import share_row
-from rigwatch.workbench.explain.verdict_calibration import (
-    PRIOR_CASES,
-    Evidence,
-    cell_of,
-    probability_wrong,
-)
+from rigwatch.workbench.explain.verdict_calibration import Evidence, cell_of, probability_wrong
 from tools.benchmark_table import Row
 
 CONFIDENT = 0.05
 """Largest probability of being wrong at which a verdict counts as confident."""
+PRIOR_CASES = 2.0
+"""Number of cases that a word's rate over all cells weighs in each cell."""
 
 
 @dataclass(frozen=True)

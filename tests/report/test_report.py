@@ -135,18 +135,26 @@ def test_the_doubt_of_a_later_step_is_that_of_later_steps(study: Study) -> None:
 
 
 @pytest.mark.parametrize(
-    ("probability", "cases", "said"),
+    ("most", "cases", "unlike", "said"),
     [
-        (1e-5, (8, 0), "wrong below 0.1%: of 8 similar simulated cases 0 were wrong"),
-        (0.059, (15, 1), "wrong 5.9%: of 15 similar simulated cases 1 was wrong"),
-        (0.5, (0, 0), "no simulated case is similar"),
+        (
+            None,
+            (8, 0),
+            "",
+            "is unknown: of 8 similar simulated cases 0 were wrong, which are too few",
+        ),
+        (0.0894, (32, 0), "", "wrong at most 8.9%: of 32 similar simulated cases 0 were wrong"),
+        (0.0145, (325, 1), "", "wrong at most 1.5%: of 325 similar simulated cases 1 was wrong"),
+        (None, (200, 0), "inputs are missing", "is unknown: inputs are missing, unlike simulated"),
+        (None, (0, 0), "", "no simulated case is similar"),
     ],
 )
 def test_a_doubt_is_stated_no_finer_than_simulated_cases_support(
-    study: Study, probability: float, cases: tuple[int, int], said: str
+    study: Study, most: float | None, cases: tuple[int, int], unlike: str, said: str
 ) -> None:
     found = gather(study).explanation
-    assert said in doubt_of(replace(found, wrong_probability=probability, like_this=cases))
+    told = replace(found, wrong_at_most=most, like_this=cases, unlike=unlike)
+    assert said in doubt_of(told)
 
 
 def test_an_output_that_cannot_be_written(

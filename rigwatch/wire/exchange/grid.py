@@ -49,7 +49,7 @@ def fit_grid(times: FloatArray, rate: float | None, max_hole: float) -> Grid:
     Args:
         times: shape (n,), increasing [s].
         rate: nominal rate [Hz], None to take the median step.
-        max_hole: sample periods without data that are bridged.
+        max_hole: longest step between samples that is bridged [sample periods].
 
     Raises:
         ImportDataError: the rate is not that of the time stamps, or they jump too far.

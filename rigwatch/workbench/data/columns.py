@@ -17,11 +17,15 @@ class Columns:
         dt: time between samples [s].
         values: by channel, each of shape (n,), in SI; NaN for invalid samples.
         units: of the channels as recorded.
+        altered: how the samples differ from what was measured, in words.
+        passed: frequency up to which signals are not low-passed, over the rate.
     """
 
     dt: float
     values: Mapping[str, FloatArray]
     units: Mapping[str, str] = field(default_factory=dict)
+    altered: tuple[str, ...] = ()
+    passed: float = 0.5
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))

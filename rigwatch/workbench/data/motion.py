@@ -94,7 +94,7 @@ def along_motion(study: Study, data: Data) -> tuple[Study, Data]:
     remarks = (*data.remarks, form, *told, *motion_range_remarks(study, train, held_out, healthy))
     along = Data(
         train, held_out, healthy, longest, remarks, along_motion=True, motion=_sensors(study),
-        telling=telling,
+        telling=telling, altered=data.altered,
     )  # fmt: skip
     return replace(study, model=model), along
 

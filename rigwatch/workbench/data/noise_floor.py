@@ -6,15 +6,14 @@ be white noise, gives a lower limit.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import welch
 
 from rigwatch.physics.engine.fit import Fit, Recording
-from rigwatch.physics.transfer import period_by_correlation
+from rigwatch.physics.transfer import period_by_correlation, shortest_period
 from rigwatch.wire.arrays import BoolArray, FloatArray
+from rigwatch.workbench.data.quietest_band import quietest_band
 
 METHODS = {
     "periods": "differences between repeated periods of the excitation",
@@ -24,9 +23,6 @@ METHODS = {
 }
 ALLOWED = {"periods": 1.1, "healthy": 1.1, "healthy motion": 1.05, "quiet band": 1.25}
 """Largest ratio of error to noise floor at which nothing remains to be explained, by method."""
-BANDS = 8
-SHORTEST = 64
-"""Valid samples of a recording from which its spectrum counts beside those of longer ones."""
 FEWEST_PERIODS = 3
 REPEATED = 2e-4
 """Mean square difference of an input one period later, relative to its own; rms 1 % of each."""
@@ -39,10 +35,17 @@ class NoiseFloor:
     Attributes:
         rms: in the channels' units, shape (outputs,).
         method: key of `METHODS`.
+        chance: largest ratio of error to floor that a short recording reaches with noise alone.
     """
 
     rms: FloatArray
     method: str
+    chance: float = 1.0
+
+    @property
+    def allowed(self) -> float:
+        """Largest ratio of error to floor at which nothing remains to be explained."""
+        return max(ALLOWED[self.method], self.chance)
 
     def ratio(self, fitted: Fit, at: BoolArray | None = None) -> float:
         """Error over the floor, over all channels; `at`: samples used, shape (windows, length)."""
@@ -55,7 +58,7 @@ class NoiseFloor:
 
     def reached(self, fitted: Fit) -> bool:
         """Whether the error is at the noise floor."""
-        return self.ratio(fitted) <= ALLOWED[self.method]
+        return self.ratio(fitted) <= self.allowed
 
     def left_over(
         self, before: Fit, after: Fit, at: BoolArray | None = None, *, tolerant: bool = False
@@ -67,7 +70,7 @@ class NoiseFloor:
             at: samples to use, shape (windows, length); all if None.
             tolerant: count an error at the noise floor as zero.
         """
-        least = ALLOWED[self.method] ** 2 if tolerant else 1.0
+        least = self.allowed**2 if tolerant else 1.0
         above = self.ratio(before, at) ** 2 - 1
         return max(self.ratio(after, at) ** 2 - least, 0.0) / max(above, 1e-12)
 
@@ -89,8 +92,9 @@ def from_residual(fitted: Fit, recording: Recording, period: float, horizon: int
         if count >= FEWEST_PERIODS:
             return NoiseFloor(_between(series, samples // factor, count), "periods")
     rate = 1 / (recording.dt * factor)
-    top = 0.38 if factor > 1 else 0.5
-    return NoiseFloor(np.array([_quiet([c], rate, top) for c in series.T]), "quiet band")
+    top = 0.38 if factor > 1 else recording.passed
+    quiet, chances = zip(*(quietest_band([c], rate, top) for c in series.T), strict=True)
+    return NoiseFloor(np.array(quiet), "quiet band", max(chances))
 
 
 def lowered(
@@ -112,11 +116,21 @@ def lowered(
 
 
 def find_period(recording: Recording) -> int:
-    """Period in samples after which the first input repeats to 1 %; 0 if it does not."""
-    if recording.inputs.shape[1] == 0:
+    """Period in samples after which all inputs that drive the rig repeat to 1 %; 0 if they do not.
+
+    Inputs of different periods repeat together after their least common multiple.
+    """
+    drive = recording.excitation.T
+    periods = [period_by_correlation(signal, _allowed) for signal in drive]
+    if not periods or not all(periods):
         return 0
-    signal = recording.inputs[:, 0] - recording.inputs[:, 0].mean()
-    return period_by_correlation(signal, lambda part: REPEATED * float(np.mean(part**2)))
+    common = math.lcm(*periods)
+    together = common <= len(recording) // 2
+    return common if together and all(shortest_period(u, [common], _allowed) for u in drive) else 0
+
+
+def _allowed(later: FloatArray) -> float:
+    return REPEATED * float(np.mean(later**2))
 
 
 def _between(series: FloatArray, samples: int, count: int) -> FloatArray:
@@ -130,25 +144,14 @@ def _between(series: FloatArray, samples: int, count: int) -> FloatArray:
     return np.array([float(np.sqrt(v[k].mean())) for v, k in zip(variance.T, known.T, strict=True)])
 
 
-def _quiet(parts: Sequence[FloatArray], rate: float, top: float) -> float:
-    """Noise of a channel by its quietest band, of each recording: where they join, it steps."""
-    clean = [part[np.isfinite(part)] for part in parts]
-    clean = [part for part in clean if len(part) >= SHORTEST] or clean
-    length = min(256, max(min(map(len, clean)) // 4, 8))
-    found = [welch(part, rate, nperseg=length) for part in clean]
-    density = np.average([one for _, one in found], axis=0, weights=[len(part) for part in clean])
-    frequencies = found[0][0]
-    inside = density[(frequencies > 0) & (frequencies <= top * rate)]
-    levels = [float(np.mean(band)) for band in np.array_split(inside, BANDS) if band.size]
-    return math.sqrt(min(levels) * rate / 2)
-
-
 def quiet_scale(recording: Recording) -> FloatArray:
     """Noise of each channel from its own quietest band, used as weight of the channel."""
     sizes = np.nanstd(recording.outputs, axis=0)
     quiet = np.array(
         [
-            _quiet([channel[part] for part in recording.slices], 1 / recording.dt, 0.5)
+            quietest_band(
+                [channel[part] for part in recording.slices], 1 / recording.dt, recording.passed
+            )[0]
             for channel in recording.outputs.T
         ]
     )

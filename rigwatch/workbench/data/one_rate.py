@@ -27,6 +27,12 @@ MENTIONED = 3
 """Most recordings that are named one by one."""
 PASSED = 0.4
 """Corner of the low-pass over the new rate; a zero-phase Butterworth of order 8."""
+FLAT = 0.32
+"""Highest frequency over the new rate that the low-pass leaves as it is."""
+TOUCHED = 1e-6
+"""Share of an interval without a valid sample that is no rounding error."""
+RESAMPLED = "samples are at another rate than recorded"
+"""How a recording is altered that is resampled."""
 
 
 def on_one_rate(
@@ -41,7 +47,7 @@ def on_one_rate(
         tables: the recordings.
         names: of their sessions.
         rate: requested by the study [Hz]; None to take the slowest if they are nearly equal.
-        kept: channels with a zero-order hold, whose steps must not be smoothed.
+        kept: channels with a zero-order hold: their mean over each new interval acts there.
 
     Raises:
         ModelError: rates differ by more than clock tolerances, or the study requests a faster one.
@@ -75,16 +81,31 @@ def resampled(table: Columns, rate: float, kept: frozenset[str] = frozenset()) -
     """The channels resampled to an equal or lower rate [Hz]; NaN next to gaps."""
     count = int(np.floor((len(table) - 1) * table.dt * rate + 1e-9)) + 1
     at = np.arange(count) / (rate * table.dt)
+    ratio = 1 / (rate * table.dt)
     values = {
-        name: _held(signal, at) if name in kept else _smooth(signal, at, 1 / (rate * table.dt))
+        name: _held(signal, at, ratio) if name in kept else _smooth(signal, at, ratio)
         for name, signal in table.values.items()
     }
-    return replace(table, dt=1 / rate, values=values)
+    altered = (*table.altered, RESAMPLED)
+    passed = FLAT if _is_low_passed(ratio, len(table)) else table.passed
+    return replace(table, dt=1 / rate, values=values, altered=altered, passed=passed)
 
 
-def _held(signal: FloatArray, at: FloatArray) -> FloatArray:
-    """The last sample before each point."""
-    return signal[np.minimum(np.floor(at + 1e-9).astype(np.int64), len(signal) - 1)]
+def _held(signal: FloatArray, at: FloatArray, ratio: float) -> FloatArray:
+    """The mean of a held signal over the interval of `ratio` samples from each point on."""
+    sums = np.concatenate([[0.0], np.cumsum(signal)])
+    if not np.isfinite(sums[-1]):
+        missing = ~np.isfinite(signal)
+        part = _held(missing.astype(np.float64), at, ratio)
+        return np.where(part > TOUCHED, np.nan, _held(np.where(missing, 0.0, signal), at, ratio))
+    ends = np.minimum(at + ratio, len(signal))
+    samples = np.arange(len(sums))
+    whole = np.interp(ends, samples, sums) - np.interp(at, samples, sums)
+    return np.asarray(whole / (ends - at), np.float64)
+
+
+def _is_low_passed(ratio: float, samples: int) -> bool:
+    return ratio > THINNED and samples > 60
 
 
 def _smooth(signal: FloatArray, at: FloatArray, ratio: float) -> FloatArray:
@@ -93,7 +114,7 @@ def _smooth(signal: FloatArray, at: FloatArray, ratio: float) -> FloatArray:
     if not good.any():
         return np.full(len(at), np.nan)
     whole = bridged(signal)
-    if ratio > THINNED and len(whole) > 60:
+    if _is_low_passed(ratio, len(whole)):
         whole = sosfiltfilt(butter(8, 2 * PASSED / ratio, output="sos"), whole)
     found = CubicSpline(np.arange(len(whole)), whole)(at)
     missing = np.interp(at, np.arange(len(signal)), ~good) > 0

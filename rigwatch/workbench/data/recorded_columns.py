@@ -1,15 +1,21 @@
 """Columns of a recorded session, and signals derived from them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from rigwatch.wire.errors import ModelError, nearest
+from rigwatch.wire.messages import Column
+from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.session import open_session
 from rigwatch.workbench.data.columns import Columns, bridged
 from rigwatch.workbench.data.signal_units import in_si
 from rigwatch.workbench.study import Derive, Span
+
+INTERPOLATED = "samples are interpolated, as their times are uneven"
+"""How a recording is altered that an import has put on a uniform grid."""
 
 
 def read_columns(folder: Path, span: Span) -> Columns:
@@ -40,7 +46,12 @@ def read_columns(folder: Path, span: Span) -> Columns:
         )
     units = {column.name: column.unit for block in blocks for column in block.channels}
     cut = {name: in_si(column[begin:end], units[name]) for name, column in values.items()}
-    return Columns(dt, cut, units)
+    moved = any(_is_resampled(column) for block in blocks for column in block.channels)
+    return Columns(dt, cut, units, (INTERPOLATED,) if moved else ())
+
+
+def _is_resampled(column: Column) -> bool:
+    return bool(np.any(column.quality & quality.RESAMPLED))
 
 
 def with_derived(columns: Columns, derive: Derive | None) -> Columns:
@@ -68,7 +79,8 @@ def with_derived(columns: Columns, derive: Derive | None) -> Columns:
         for _ in range(signal.order):
             smooth = np.gradient(smooth, columns.dt)
         found[name] = np.where(np.isfinite(raw), smooth, np.nan)
-    return Columns(columns.dt, found, {**columns.units, **_derived_units(columns, derive)})
+    units = {**columns.units, **_derived_units(columns, derive)}
+    return replace(columns, values=found, units=units)
 
 
 def _derived_units(columns: Columns, derive: Derive) -> dict[str, str]:

@@ -17,14 +17,16 @@ LONGEST = 0.75
 
 
 def repeat_of(recording: Recording) -> int:
-    """Smallest delay in samples after which the first input repeats or inverts; 0 if it does not.
+    """Smallest delay in samples after which all that drives the rig repeats or inverts; 0 if none.
 
     Args:
         recording: the recording.
     """
-    if recording.inputs.shape[1] == 0:
+    drive = recording.excitation
+    if drive.shape[1] == 0:
         return 0
-    size = np.abs(_correlation(recording.inputs[:, 0]))
+    each = np.array([_correlation(signal) for signal in drive.T])
+    size = np.maximum(each.min(axis=0), (-each).min(axis=0))
     falls = np.flatnonzero(size < 0.5)
     if not falls.size:
         return 0

@@ -1,7 +1,8 @@
 """Prepares recordings for a model: reads sessions, matches channels, derives velocities.
 
 Invalid and lost samples are NaN. Inputs are interpolated linearly there, since a simulation needs
-them everywhere; the outputs at those samples do not count.
+them everywhere; outputs that are simulated from such an input, up to the end of the window, do not
+count.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +12,7 @@ import numpy as np
 
 from rigwatch.physics.engine.equations import Input, Model, Output
 from rigwatch.physics.engine.fit import Recording, Thinning
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.workbench.data.columns import Columns, bridged
 from rigwatch.workbench.data.derived_ends import without_ends
@@ -28,6 +29,8 @@ UNFILLED = "since they fill no horizon"
 """Words of the remark on ends that are not counted."""
 ONE_STEP = ": a further log, or one in which they change more than once"
 """What to do about held-out data without a change, as of a log of one step."""
+INVENTED = "without a valid input"
+"""Words of the remark on samples at which an input is interpolated."""
 MOST_MISSING = 0.2
 """Largest share of samples that may be missing from an input."""
 
@@ -59,6 +62,7 @@ class Data:
         motion: sensors whose position and rate are inputs of that model.
         telling: first samples of held-out recordings that tell what moves between recordings; None
             if nothing has to be told.
+        altered: how the recordings differ from those on which verdicts are calibrated, in words.
     """
 
     train: Recording
@@ -69,6 +73,7 @@ class Data:
     along_motion: bool = False
     motion: tuple[MotionSensor, ...] = ()
     telling: Recording | None = None
+    altered: tuple[str, ...] = ()
 
     @property
     def of_healthy(self) -> "Data | None":
@@ -96,6 +101,7 @@ def prepare(study: Study) -> Data:
         )
     }
     tables = _on_one_rate(study, tables, remarks)
+    altered = [word for group in tables.values() for table in group for word in table.altered]
     dt = tables["train"][0].dt
     horizon = max(round(file.horizon / dt) if file.horizon else _usual(tables, dt), 2)
     groups: dict[str, list[Columns]] = _with_known(study, tables)
@@ -113,7 +119,10 @@ def prepare(study: Study) -> Data:
             " study to override"
         )
     uses = made["train"], made["held_out"], made["healthy"]
-    return Data(*uses, horizon, tuple(remarks), telling=made["telling"])
+    if any(INVENTED in remark for remark in remarks):
+        altered.append("inputs are missing")
+    unlike = tuple(dict.fromkeys(altered))
+    return Data(*uses, horizon, tuple(remarks), telling=made["telling"], altered=unlike)
 
 
 def _usual(tables: Mapping[str, Sequence[Columns]], dt: float) -> int:
@@ -178,11 +187,13 @@ def _recording(
     parts = tuple(len(u) for u in inputs)
     thinning = Thinning(thin.factor, thin.edge, parts) if thin else None
     u, y = np.concatenate(inputs), np.concatenate(outputs)
-    u, y = _without_holes(study.model, u, y, use, remarks)
+    u, y = _without_holes(study.model, u, y, horizon, use=use, remarks=remarks)
     if use != "telling":
         _check_excitation(study.model, u, use)
     ends = [name for name, held in study.holds.items() if held.ends]
-    return with_next_rows(study.model, Recording(tables[0].dt, u, y, thinning, parts), ends)
+    passed = min(table.passed for table in tables)
+    made = Recording(tables[0].dt, u, y, thinning, parts, passed=passed)
+    return with_next_rows(study.model, made, ends)
 
 
 def _beyond(use: str, spans: Sequence[float], horizon: float) -> str:
@@ -214,8 +225,9 @@ def _matched(study: Study, table: Columns) -> tuple[FloatArray, FloatArray]:
 
 
 def _without_holes(
-    model: Model, u: FloatArray, y: FloatArray, use: str, remarks: list[str]
+    model: Model, u: FloatArray, y: FloatArray, horizon: int, *, use: str, remarks: list[str]
 ) -> tuple[FloatArray, FloatArray]:
+    """Inputs without gaps, and outputs without those that are simulated from an invented input."""
     missing = np.asarray(~np.isfinite(u).all(axis=1))
     for index, name in enumerate(model.inputs):
         share = float(np.mean(~np.isfinite(u[:, index])))
@@ -227,10 +239,26 @@ def _without_holes(
     for index, name in enumerate(model.outputs):
         if not np.isfinite(y[:, index]).any():
             raise ModelError(f"{use}: found no valid sample of output {name!r}")
-    if missing.any():
-        remarks.append(f"{use}: {int(missing.sum())} samples without a valid input are not counted")
-    filled = np.stack([bridged(column) for column in u.T], axis=1) if u.size else u
-    return filled, np.where(missing[:, None], np.nan, y)
+    if not missing.any():
+        return u, y
+    lost = _to_the_windows_end(missing, horizon) if model.states else missing
+    remark = f"{use}: {int(missing.sum())} samples {INVENTED} are not counted"
+    if after := int(lost.sum() - missing.sum()):
+        remark += f", nor {after} that the model runs through before its next initialisation"
+    remarks.append(remark)
+    if not np.isfinite(y[~lost]).any(axis=0).all():
+        raise ModelError(
+            f"{use}: found {int(missing.sum())} samples {INVENTED}, so that no horizon of"
+            f" {horizon} samples counts; expected a recording with fewer gaps or a shorter horizon"
+        )
+    filled = np.stack([bridged(column) for column in u.T], axis=1)
+    return filled, np.where(lost[:, None], np.nan, y)
+
+
+def _to_the_windows_end(missing: BoolArray, horizon: int) -> BoolArray:
+    """Samples from the first missing one of each window on."""
+    rows = missing.reshape(-1, horizon)
+    return np.asarray(np.maximum.accumulate(rows, axis=1).reshape(-1))
 
 
 def _check_excitation(model: Model, u: FloatArray, use: str) -> None:

@@ -6,12 +6,14 @@ confidence. Another base is then searched for, with the healthy recordings alone
 the fault are looked at; the study's file is not changed, and the verdict says what it is judged on.
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
 from msgspec import structs
 
 from rigwatch.physics.engine.equations import Model
+from rigwatch.physics.engine.fit import Fit
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.compare import Bench, find_base, open_bench
@@ -26,6 +28,13 @@ ENOUGH = 2.0
 """The same at which a search for a base ends: what is left is hardly a law that the base lacks."""
 ADVICE = "try another model or other starting values, or record a healthy run that excites it more"
 VARIED = "`rigwatch study base {study} --take enough` searches for better variants of the model"
+
+FEW = 0.005
+"""Share of the samples that are few; of white noise they hold 5 % of the energy."""
+HALF = 0.5
+"""Share of the error's energy in so few samples at which the others do not count."""
+SHORT = 1000
+"""Held-out samples below which no simulated case is similar: those have 5120."""
 
 UNCHECKED = (
     "the model could not be checked on a healthy recording: record one with nothing wrong and list"
@@ -56,6 +65,46 @@ def inadequate(bench: Bench) -> Verdict | None:
         f" {METHODS[noise.method]}), expected at most {MOST:g}: {ADVICE}"
     )
     return Verdict("model_inadequate", None, (), (), text)
+
+
+def stopped_by_outliers(bench: Bench, found: Verdict) -> Verdict:
+    """`model_inadequate` if nothing seems missing only because outliers raise the noise floor."""
+    if found.word != "nothing_missing":
+        return found
+    judged = {"held-out": bench.base.held_out}
+    if bench.bare is not None:
+        judged["healthy"] = bench.bare.held_out
+    for use, fitted in judged.items():
+        for channel, residual in zip(bench.study.model.outputs, _by_channel(fitted), strict=True):
+            count, share = _in_few(residual)
+            if share > HALF:
+                text = (
+                    f"{count} of {len(residual)} samples hold {share:.0%} of the {use} error of"
+                    f" {channel}: what is missing cannot be seen beside them; find them with"
+                    " `rigwatch locate` and flag or remove them"
+                )
+                return Verdict("model_inadequate", None, (), (), text)
+    return found
+
+
+def _by_channel(fitted: Fit) -> list[FloatArray]:
+    """The valid residuals of each output."""
+    series = fitted.residuals.reshape(-1, fitted.residuals.shape[-1])
+    return [channel[np.isfinite(channel)] for channel in series.T]
+
+
+def _in_few(residual: FloatArray) -> tuple[int, float]:
+    """The number of samples that are few, and the share of the energy in the largest ones."""
+    energy = np.sort(residual**2)[::-1]
+    count = math.ceil(FEW * len(energy))
+    return count, float(energy[:count].sum() / max(energy.sum(), 1e-300))
+
+
+def uncalibrated(bench: Bench) -> list[str]:
+    """How the recordings differ from those on which verdicts are calibrated, in words."""
+    count = int(np.isfinite(bench.data.held_out.outputs).any(axis=1).sum())
+    short = [f"only {count} held-out samples count"] if count < SHORT else []
+    return [*bench.data.altered, *short]
 
 
 def with_base_offered(bench: Bench, found: Verdict) -> Verdict:

@@ -14,6 +14,8 @@ from rigwatch.workbench.compare import (
 from rigwatch.workbench.experiment import Experiment, propose
 from rigwatch.workbench.explain.adequacy import (
     inadequate,
+    stopped_by_outliers,
+    uncalibrated,
     unchecked,
     with_adequate_base,
     with_base_offered,
@@ -39,6 +41,7 @@ from rigwatch.workbench.explain.verdict_calibration import (
     cases_seen,
     cases_seen_along,
     later_probability_wrong,
+    most_probably_wrong,
     probability_wrong_along,
 )
 from rigwatch.workbench.fit import Value, as_written, values
@@ -95,11 +98,14 @@ class Explanation:
         next_experiment: an excitation that separates the rivals; None if there are none, or if
             none is found.
         wrong_probability: probability that the verdict is wrong, calibrated on simulated cases;
-            None if a later step is judged along the measured motion, or if no case was like it.
+            None if a later step is judged along the measured motion, or if too few cases were like
+            it.
         like_this: number of simulated cases with a similar verdict, and how many were wrong.
         beside: the other effects of the set that the named effect was judged in; with them `add`
             accepts it if it is refused alone.
         error_unit: unit of the errors in `text` and `ranking`.
+        wrong_at_most: upper bound of that probability, 95 %; None as above.
+        unlike: why no simulated case is like this one, in words; empty if some are.
         exchange: an effect that describes the last accepted one better, if nothing beside it
             explains the error; None if none does, or if that was not asked.
     """
@@ -116,6 +122,8 @@ class Explanation:
     beside: list[str] = field(default_factory=list)
     error_unit: str = ""
     exchange: Exchange | None = None
+    wrong_at_most: float | None = None
+    unlike: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +204,7 @@ def ranking(bench: Bench, progress: Progress = no_progress) -> tuple[list[Ranked
         verdict = undetermined_if_much_left(bench.base, bench.floor, verdict)
         verdict = undetermined_if_little_and_unexplained(bench.base, bench.floor, verdict)
     verdict = cannot_tell(bench, rows, verdict)
+    verdict = stopped_by_outliers(bench, verdict)
     verdict = with_base_offered(bench, unchecked(bench, verdict))
     verdict = with_change_told(bench.study, verdict)
     if verdict.best is not None:
@@ -268,7 +277,9 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
     listed = [
         _row(row, members, more) if row is verdict.best else _row(row, row.alike) for row in rows
     ]
+    unlike = "; ".join(uncalibrated(bench))
     probability, similar = _reliability(bench, verdict)
+    most = None if unlike else most_probably_wrong(*similar)
     return Explanation(
         verdict.word,
         verdict.text,
@@ -277,10 +288,12 @@ def explanation(bench: Bench, rows: list[Ranked], verdict: Verdict) -> Explanati
         rivals,
         list(verdict.second),
         experiment,
-        probability,
+        None if unlike or (similar[0] and most is None) else probability,
         similar,
         list(verdict.beside),
         compared.unit,
+        wrong_at_most=most,
+        unlike=unlike,
     )
 
 

@@ -4,11 +4,11 @@ A verdict falls into a cell by its word, the share of the error above the floor 
 effect leaves, and the margin by which it beats effects outside its class. `calibration.toml` counts
 the verdicts of each cell on simulated plants and how many were wrong. With k of n wrong,
 
-    probability of being wrong = (k + s·r)/(n + s),   r = (K + 1)/(N + 2)
+    probability of being wrong = (k + 1)/(n + 2)                 rule of succession, P. S. Laplace
+    upper bound p, 95 %:  P(at most k of n wrong | p) = 0.05     C. J. Clopper and E. S. Pearson
 
-where K of N verdicts with the same word were wrong over all cells (P. S. Laplace's rule of
-succession, 1774). The rate r weighs as much as s = 2 cases, so a cell with few cases relies on the
-others. `benchmarks/explaining/hidden_effects` writes the file and evaluates it on held-out seeds.
+Other cells say nothing of a cell with few cases, and below `FEWEST` no probability is stated.
+`benchmarks/explaining/hidden_effects` writes the file and evaluates it on held-out seeds.
 
 Verdicts along the measured motion are counted apart, in `calibration_along.toml`, by word and by
 whether the model is rough: there the share that is left holds the model's own error.
@@ -23,6 +23,7 @@ from typing import Annotated
 
 import numpy as np
 from msgspec import Meta
+from scipy.stats import beta
 
 from rigwatch.wire.typed_files import Section, parse
 
@@ -30,8 +31,9 @@ LEFT_EDGES = (0.02, 0.1)
 """Cell edges: share of the energy above the floor that the named effect leaves."""
 MARGIN_EDGES = (3.0, 6.0)
 """Cell edges: standard deviations by which it beats the best of the others."""
-PRIOR_CASES = 2.0
-"""Number of cases that a word's rate over all cells weighs in each cell."""
+FEWEST = 30
+"""Simulated cases from which a probability is stated."""
+CONFIDENCE = 0.95
 FILE = "calibration.toml"
 ALONG_FILE = "calibration_along.toml"
 LATER_COUNTS = (78, 4)
@@ -102,8 +104,7 @@ def cases_seen(word: str, evidence: Evidence) -> tuple[int, int]:
 
 def later_probability_wrong() -> float:
     """Probability that the verdict on a later step is wrong."""
-    cases, wrong = LATER_COUNTS
-    return (wrong + 1) / (cases + 2)
+    return _rate(*LATER_COUNTS)
 
 
 def cases_seen_along(word: str, *, rough: bool) -> tuple[int, int]:
@@ -114,17 +115,23 @@ def cases_seen_along(word: str, *, rough: bool) -> tuple[int, int]:
 def probability_wrong_along(word: str, *, rough: bool) -> float | None:
     """Probability that a verdict along the measured motion is wrong; None without such a case."""
     cases, wrong = cases_seen_along(word, rough=rough)
-    return (wrong + 1) / (cases + 2) if cases else None
+    return _rate(cases, wrong) if cases else None
 
 
 def probability_wrong(word: str, evidence: Evidence) -> float:
     """Probability that the verdict is wrong; 0.5 if its cell has no simulated case."""
-    cases, wrong = cases_seen(word, evidence)
-    if not cases:
-        return 0.5
-    same = [count for cell, count in _counts().items() if cell[0] == word]
-    rate = (sum(k for _, k in same) + 1) / (sum(n for n, _ in same) + 2)
-    return (wrong + PRIOR_CASES * rate) / (cases + PRIOR_CASES)
+    return _rate(*cases_seen(word, evidence))
+
+
+def most_probably_wrong(cases: int, wrong: int) -> float | None:
+    """Upper bound of the probability of being wrong, 95 %; None if there are too few cases."""
+    if cases < FEWEST:
+        return None
+    return float(beta.ppf(CONFIDENCE, wrong + 1, cases - wrong)) if wrong < cases else 1.0
+
+
+def _rate(cases: int, wrong: int) -> float:
+    return (wrong + 1) / (cases + 2)
 
 
 @cache

@@ -147,6 +147,7 @@ def _with_reference(recording: Recording, reference: FloatArray) -> Recording:
     return replace(
         recording,
         inputs=np.column_stack([recording.inputs, np.nan_to_num(shown)]),
+        driving=recording.inputs.shape[1],
         outputs=np.where(np.isfinite(shown), recording.outputs, np.nan),
     )
 

@@ -16,9 +16,6 @@ VERDICTS = {
     "model_inadequate": "the model is inadequate for this recording: no effect is named",
 }
 
-LEAST_DOUBT = 1e-3
-"""Smallest probability of being wrong that is stated: simulated cases support no smaller one."""
-
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of aligned columns; numbers are right-aligned."""
@@ -131,17 +128,19 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
 def doubt_of(found: Explanation) -> str:
     """How often similar verdicts were wrong on simulated cases, in a sentence."""
     cases, wrong = found.like_this
-    if found.wrong_probability is None:
+    if found.unlike:
+        return f"the probability of being wrong is unknown: {found.unlike}, unlike simulated cases"
+    if found.wrong_probability is None and not cases:
         return (
             "the probability of being wrong is not calibrated for this verdict of a model along the"
             " measured motion"
         )
     if not cases:
         return "the probability of being wrong is unknown: no simulated case is similar to this one"
-    doubt = found.wrong_probability
-    stated = "below 0.1%" if doubt < LEAST_DOUBT else f"{doubt:.1%}"
-    were = f"{wrong} {'was' if wrong == 1 else 'were'} wrong"
-    return f"probability of being wrong {stated}: of {cases} similar simulated cases {were}"
+    were = f"of {cases} similar simulated cases {wrong} {'was' if wrong == 1 else 'were'} wrong"
+    if found.wrong_at_most is None:
+        return f"the probability of being wrong is unknown: {were}, which are too few"
+    return f"probability of being wrong at most {found.wrong_at_most:.1%}: {were}"
 
 
 def _ranked(row: Row) -> list[str]:

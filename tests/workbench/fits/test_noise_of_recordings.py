@@ -1,10 +1,18 @@
-"""The noise of a channel over several recordings: where they join, the channel steps."""
+"""The noise of a channel over several recordings, which step where they join, and short ones."""
+
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
+from scipy.signal import welch
 
+from rigwatch.physics.engine.fit import Fit
 from rigwatch.physics.engine.fit.recording import Recording, joined
-from rigwatch.workbench.data.noise_floor import quiet_scale
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.data.noise_floor import NoiseFloor, find_period, quiet_scale
+from rigwatch.workbench.data.quietest_band import quietest_band
+from rigwatch.workbench.data.repeats import repeat_of
 
 NOISE, RATE = 1e-3, 200.0
 
@@ -25,3 +33,49 @@ def test_it_is_that_of_each_recording() -> None:
 def test_a_short_recording_does_not_hide_the_others() -> None:
     runs = [run_at(0.0, 4000, 1), run_at(1.0, 20, 2)]
     assert quiet_scale(joined(runs)) == pytest.approx([NOISE], rel=0.15)
+
+
+@pytest.mark.parametrize("samples", [120, 240, 600, 5120])
+def test_noise_alone_is_within_the_limit_however_short_the_recording(samples: int) -> None:
+    draws = np.random.default_rng(samples).normal(0.0, NOISE, (100, samples))
+    assert sum(not reached(noise) for noise in draws) <= 3
+
+
+@pytest.mark.parametrize("samples", [240, 600])
+def test_a_motion_of_the_size_of_the_noise_is_above_it(samples: int) -> None:
+    motion = 1.5 * NOISE * np.sin(2 * np.pi * 3 * np.arange(samples) / RATE)
+    draws = np.random.default_rng(samples).normal(0.0, NOISE, (100, samples))
+    assert sum(reached(motion + noise) for noise in draws) <= 20
+
+
+def test_a_long_recording_has_the_level_of_its_quietest_band() -> None:
+    noise = np.random.default_rng(3).normal(0.0, NOISE, 6000)
+    frequencies, density = welch(noise, RATE, nperseg=256)
+    lowest = min(band.mean() for band in np.array_split(density[frequencies > 0], 8))
+    assert quietest_band([noise], RATE) == (pytest.approx(np.sqrt(lowest * RATE / 2)), 1.0)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_period_is_that_of_all_inputs_in_any_order(*, swapped: bool) -> None:
+    sample = np.arange(3000)
+    fast, slow = (np.sin(2 * np.pi * sample / period) for period in (250, 375))
+    free = np.random.default_rng(1).normal(size=len(sample))
+    constant, motion = np.full(len(sample), 2.0), free
+
+    def driven_by(*inputs: FloatArray, driving: int | None = None) -> Recording:
+        columns = np.stack(inputs[::-1] if swapped and driving is None else inputs, axis=1)
+        return Recording(1 / RATE, columns, np.zeros((len(sample), 1)), driving=driving)
+
+    assert find_period(driven_by(fast, constant)) == 250
+    assert find_period(driven_by(fast, slow)) == 750
+    assert find_period(driven_by(fast, free)) == 0
+    assert find_period(driven_by(fast, motion, driving=1)) == 250
+    assert repeat_of(driven_by(fast, slow)) == 750
+    assert repeat_of(driven_by(fast, free)) == 0
+
+
+def reached(residual: FloatArray) -> bool:
+    """Whether an error of this residual is at the noise floor that follows from it."""
+    rms, chance = quietest_band([residual], RATE)
+    floor = NoiseFloor(np.array([rms]), "quiet band", chance)
+    return floor.reached(cast("Fit", SimpleNamespace(rms=np.array([residual.std()]))))

@@ -19,6 +19,7 @@ from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.fit.intervals import identifiability
 from rigwatch.workbench.study.creation import create
 from rigwatch.workbench.study.study import Study
+from tests.workbench.machine import studied
 
 MODEL = """
 name = "line"
@@ -27,6 +28,17 @@ inputs.position = { unit = "m" }
 parameters.k = { value = 1.0, unit = "N/m" }
 outputs.force = { unit = "N", expression = "k*position + load" }
 ports.load = { kind = "force", unit = "N", variables.x = { expression = "position", unit = "m" } }
+"""
+LAG = """
+name = "lagging"
+summary = "A first-order lag."
+hold = "zero"
+inputs.u = { unit = "V" }
+states.x = { unit = "m", derivative = "a*(k*drive - x)", measured = "y" }
+parameters.a = { value = 8.0, unit = "1/s" }
+parameters.k = { value = 0.8, unit = "m/V" }
+outputs.y = { unit = "m", expression = "x" }
+ports.drive = { kind = "actuator", signal = "u" }
 """
 Table = dict[str, np.ndarray]
 Made = Callable[..., Study]
@@ -88,6 +100,37 @@ def test_samples_that_are_missing_are_reported_and_left_out(made: Made) -> None:
     found = compare(made(broken, good()))
     assert "train: 10 samples without a valid input are not counted" in found.remarks
     assert found.parameters["k"].value == pytest.approx(3.0, rel=0.01)
+
+
+def test_what_is_simulated_from_an_invented_input_does_not_count(tmp_path: Path) -> None:
+    whole = [lagging(seed) for seed in (1, 2)]
+    broken = [dict(table, u=np.where(lost(table["u"]), np.nan, table["u"])) for table in whole]
+    found = compare(studied(tmp_path, LAG, broken[:1], broken[1:], {"u": "V", "y": "m"}))
+    assert found.held_out_error == pytest.approx(1e-3, rel=0.1)
+    assert any("nor" in remark and "next initialisation" in remark for remark in found.remarks)
+
+
+def test_a_recording_of_which_no_window_counts_is_refused(tmp_path: Path) -> None:
+    broken = lagging(1)
+    broken["u"][::25] = np.nan
+    given = (LAG, [broken], [lagging(2)], {"u": "V", "y": "m"})
+    with pytest.raises(ModelError, match="train: found 80 samples without a valid input"):
+        compare(studied(tmp_path, *given))
+
+
+def lagging(seed: int, samples: int = 2000) -> Table:
+    """A first-order lag of 0.1 s behind a voltage that changes at random, at 100 Hz."""
+    generator = np.random.default_rng(seed)
+    u = np.repeat(generator.uniform(-1, 1, samples // 10), 10)
+    x = np.zeros(samples)
+    for k in range(samples - 1):
+        x[k + 1] = u[k] + (x[k] - u[k]) * np.exp(-0.1)
+    return {"u": u, "y": x + 1e-3 * generator.normal(size=samples)}
+
+
+def lost(signal: np.ndarray) -> np.ndarray:
+    """Three samples of every 200, around a step of the signal."""
+    return np.abs(np.arange(len(signal)) % 200 - 110) <= 1
 
 
 def test_an_input_that_is_mostly_missing_is_refused(made: Made) -> None:

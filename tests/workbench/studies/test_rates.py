@@ -11,6 +11,7 @@ from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.compare.compare import compare
 from rigwatch.workbench.data.columns import Columns
 from rigwatch.workbench.data.one_rate import resampled
+from rigwatch.workbench.data.quietest_band import quietest_band
 from tests.workbench.machine import studied
 
 LINE = """
@@ -50,6 +51,14 @@ def test_others_are_put_on_the_rate_that_the_study_says(tmp_path: Path) -> None:
         compare(studied(tmp_path / "c", *given, "rate = 300", rates=(500.0, 200.0)))
 
 
+def test_the_floor_of_a_low_passed_recording_is_that_of_the_band_that_passes() -> None:
+    noise = np.random.default_rng(2).normal(size=20000)
+    made = resampled(Columns(1e-3, {"y": noise}), 500.0)
+    density = np.sqrt(1e-3)
+    rms, _ = quietest_band([made.values["y"]], 500.0, made.passed)
+    assert rms == pytest.approx(density * np.sqrt(500.0), rel=0.08)
+
+
 def test_what_the_new_rate_cannot_show_is_filtered_away() -> None:
     time = np.arange(4000) / 1000
     low, high = np.sin(2 * np.pi * 5 * time), np.sin(2 * np.pi * 97 * time)
@@ -61,11 +70,18 @@ def test_what_the_new_rate_cannot_show_is_filtered_away() -> None:
     assert np.sqrt(np.mean(error**2)) < 0.01
 
 
-def test_a_signal_that_is_kept_stays_a_staircase_and_holes_stay_holes() -> None:
+def test_a_held_signal_becomes_its_mean_over_each_new_interval_and_holes_stay_holes() -> None:
     stairs = np.repeat([0.0, 1.0, -2.0], 50)
     holed = np.where((np.arange(150) > 70) & (np.arange(150) < 80), np.nan, 1.0)
-    made = resampled(Columns(0.01, {"u": stairs, "y": holed}), 60.0, frozenset({"u"}))
-    assert set(made.values["u"]) == {0.0, 1.0, -2.0}
+    columns = Columns(0.01, {"u": stairs, "v": holed, "y": holed})
+    made = resampled(columns, 60.0, frozenset({"u", "v"}))
+    u = made.values["u"]
+    assert np.isin(u, [0.0, 1.0, -2.0]).sum() == len(u) - 1, "one step falls inside an interval"
+    np.testing.assert_allclose(u.sum() / 60, stairs.sum() / 100, atol=0.01)
+    assert np.isnan(made.values["v"][43:47]).all()
+    np.testing.assert_allclose(made.values["v"][:42], 1.0)
+    halved = resampled(Columns(0.01, {"u": np.array([0.0, 2.0, 4.0, 5.0])}), 50.0, frozenset({"u"}))
+    assert halved.values["u"].tolist() == [1.0, 4.5]
     assert np.isnan(made.values["y"][44:47]).all()
     assert np.isfinite(made.values["y"][:42]).all()
 

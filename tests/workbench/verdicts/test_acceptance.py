@@ -116,5 +116,5 @@ def test_a_strength_that_may_as_well_be_neutral_is_not_accepted(tmp_path: Path) 
 def test_what_helps_a_little_is_not_called_the_answer(tmp_path: Path) -> None:
     found = explain(damper(tmp_path, wavy))
     assert found.verdict == "unknown_effect"
-    assert "% of the error's energy remains, 14 times the noise floor" in found.text
+    assert "% of the error's energy remains, 13 times the noise floor" in found.text
     assert "also accepted: stribeck@load" in found.text

@@ -1,12 +1,21 @@
 """The probability of being wrong: counts of simulated verdicts, by cell."""
 
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
 import pytest
 
+from rigwatch.wire.arrays import FloatArray
+from rigwatch.workbench.compare import Bench
+from rigwatch.workbench.explain.adequacy import stopped_by_outliers, uncalibrated
+from rigwatch.workbench.explain.verdict import Verdict
 from rigwatch.workbench.explain.verdict_calibration import (
     Evidence,
     cases_seen,
     cases_seen_along,
     cell_of,
+    most_probably_wrong,
     probability_wrong,
     probability_wrong_along,
 )
@@ -43,3 +52,47 @@ def test_a_verdict_along_the_motion_is_doubted_by_its_own_word(word: str, rough:
 
 def test_along_the_motion_nothing_is_promised_for_a_word_that_was_not_counted() -> None:
     assert probability_wrong_along("model_inadequate", rough=False) is None
+
+
+def test_a_bound_is_what_the_counts_support_and_few_support_none() -> None:
+    assert most_probably_wrong(29, 0) is None
+    bound = most_probably_wrong(32, 0)
+    assert bound is not None
+    assert (1 - bound) ** 32 == pytest.approx(0.05)
+    assert most_probably_wrong(32, 1) > bound  # type: ignore[operator]
+    assert most_probably_wrong(32, 32) == 1.0
+
+
+def test_nothing_is_missing_is_not_said_where_outliers_hold_the_error() -> None:
+    clean = np.random.default_rng(0).normal(size=(10, 100, 1))
+    struck = clean.copy()
+    struck[3, 50], struck[8, 20] = 900.0, -900.0
+    nothing = Verdict("nothing_missing", None, (), (), "at the floor")
+    assert stopped_by_outliers(left(clean), nothing) is nothing
+    found = stopped_by_outliers(left(struck), nothing)
+    assert found.word == "model_inadequate"
+    assert "5 of 1000 samples hold 100% of the held-out error of speed" in found.text
+    assert stopped_by_outliers(left(clean, struck), nothing).word == "model_inadequate"
+
+
+def test_recordings_unlike_the_simulated_ones_are_told() -> None:
+    def told(samples: int, *altered: str) -> list[str]:
+        held_out = SimpleNamespace(outputs=np.zeros((samples, 1)))
+        data: Any = SimpleNamespace(held_out=held_out, altered=altered)
+        return uncalibrated(cast("Bench", SimpleNamespace(data=data)))
+
+    assert told(5120) == []
+    assert told(240, "inputs are missing") == [
+        "inputs are missing",
+        "only 240 held-out samples count",
+    ]
+
+
+def left(residuals: FloatArray, healthy: FloatArray | None = None) -> Bench:
+    """A study whose model leaves these residuals."""
+    base = SimpleNamespace(held_out=SimpleNamespace(residuals=residuals))
+    bare = (
+        healthy if healthy is None else SimpleNamespace(held_out=SimpleNamespace(residuals=healthy))
+    )
+    model = SimpleNamespace(outputs={"speed": None})
+    return cast("Bench", SimpleNamespace(study=SimpleNamespace(model=model), base=base, bare=bare))

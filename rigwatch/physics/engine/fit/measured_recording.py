@@ -68,7 +68,8 @@ def motion_recording(
     shown = np.where(counted[:, None], outputs, np.nan)
     lengths = tuple(np.diff([0, *cut, len(recording)]).tolist())
     thinning = _thinning(model, recording, chosen, lengths)
-    return Recording(recording.dt, inputs, shown, thinning, lengths)
+    drives = len(model.inputs)
+    return Recording(recording.dt, inputs, shown, thinning, lengths, drives, recording.passed)
 
 
 def motion_widths(model: Model, recording: Recording, parts: Sequence[int] = ()) -> dict[str, int]:

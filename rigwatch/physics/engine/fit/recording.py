@@ -1,7 +1,7 @@
 """Recordings, their division into windows, and initial states from the channels."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -22,6 +22,9 @@ class Recording:
         outputs: in the order of its outputs, shape (n, n_y); NaN without a valid sample.
         thinning: filter and decimation of residuals and sensitivities, None without.
         parts: lengths of the concatenated recordings; a single one if empty.
+        driving: leading inputs that drive the rig, before those of its measured motion; None if
+            all do.
+        passed: frequency up to which the outputs are not low-passed, over the rate.
     """
 
     dt: float
@@ -29,9 +32,18 @@ class Recording:
     outputs: FloatArray
     thinning: Thinning | None = None
     parts: tuple[int, ...] = ()
+    driving: int | None = None
+    passed: float = 0.5
 
     def __len__(self) -> int:
         return len(self.inputs)
+
+    @property
+    def excitation(self) -> FloatArray:
+        """Inputs that drive the rig and change, without their means, shape (n, up to n_u)."""
+        drive = self.inputs[:, : self.driving]
+        changing = drive[:, np.ptp(drive, axis=0) > 0.0]
+        return np.asarray(changing - changing.mean(axis=0), np.float64)
 
     @property
     def slices(self) -> list[slice]:
@@ -88,14 +100,14 @@ def joined(recordings: Sequence[Recording]) -> Recording:
         np.concatenate([getattr(each, signals) for each in recordings])
         for signals in ("inputs", "outputs")
     )
-    return Recording(first.dt, inputs, outputs, first.thinning, tuple(map(len, recordings)))
+    return replace(first, inputs=inputs, outputs=outputs, parts=tuple(map(len, recordings)))
 
 
 def beginning(recording: Recording, samples: int) -> Recording:
     """The first samples of a recording, as one part."""
     inputs, outputs = recording.inputs[:samples], recording.outputs[:samples]
     thinning = recording.thinning and recording.thinning.of_part(len(inputs))
-    return Recording(recording.dt, inputs, outputs, thinning)
+    return replace(recording, inputs=inputs, outputs=outputs, thinning=thinning, parts=())
 
 
 def cut_for(system: System, recording: Recording, horizon: int, *, apart: bool = False) -> Windows:
