@@ -5,11 +5,15 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.wire.session import open_session
 from rigwatch.workbench.data.columns import Columns, bridged
 from rigwatch.workbench.data.signal_units import in_si
 from rigwatch.workbench.study import Derive, Span
+
+LARGEST = 1e70
+"""Largest value that counts as measured [SI]: the fourth power is summed over a recording."""
 
 
 def read_columns(folder: Path, span: Span) -> Columns:
@@ -26,6 +30,11 @@ def read_columns(folder: Path, span: Span) -> Columns:
     first, last = blocks[0], blocks[-1]
     count = last.seq + len(last) - first.seq
     dt = float(last.t_ns[-1] - first.t_ns[0]) * 1e-9 / max(count - 1, 1)
+    if not dt > 0:
+        raise ModelError(
+            f"{span.session}: found {count} samples in {dt * (count - 1):g} s, expected at least"
+            " two, one after the other"
+        )
     values = {c.name: np.full(count, np.nan) for c in first.channels}
     for block in blocks:
         at = block.seq - first.seq
@@ -40,7 +49,12 @@ def read_columns(folder: Path, span: Span) -> Columns:
         )
     units = {column.name: column.unit for block in blocks for column in block.channels}
     cut = {name: in_si(column[begin:end], units[name]) for name, column in values.items()}
-    return Columns(dt, cut, units)
+    return Columns(dt, {name: _measurable(column) for name, column in cut.items()}, units)
+
+
+def _measurable(column: FloatArray) -> FloatArray:
+    """The column without values that no sensor gives and no sum can hold."""
+    return np.where(np.abs(column) < LARGEST, column, np.nan)
 
 
 def with_derived(columns: Columns, derive: Derive | None) -> Columns:
