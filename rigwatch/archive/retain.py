@@ -1,7 +1,8 @@
 """Removes old sessions of an archive, by the rules that the recorder has for its own.
 
 Only what the catalogue knows as it is goes: a session that is new, has changed, is still being
-recorded or could not be read stays.
+recorded or could not be read stays. So does one whose age is not known, such as a log that was
+imported without the time of its start.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,6 +20,8 @@ from rigwatch.wire.errors import ArchiveError, SessionError
 from rigwatch.wire.rig_config import RecorderSection
 
 _STAYS = (UNFINISHED, UNREADABLE, FAILED)
+_DATED = datetime(2000, 1, 1, tzinfo=UTC).timestamp()
+"""Earliest end of a session that is a date [s]: imported logs may begin at zero, in 1970."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +44,7 @@ class Retained:
         expired: sessions that the rules remove, oldest first.
         removed: number of them that are removed.
         unknown: sessions that stay because they are new or have changed since the last index.
+        undated: sessions that stay because they do not tell when they were recorded.
         failures: a sentence on each that cannot be removed.
     """
 
@@ -48,6 +52,7 @@ class Retained:
     expired: list[Old] = field(default_factory=list)
     removed: int = 0
     unknown: list[str] = field(default_factory=list)
+    undated: list[str] = field(default_factory=list)
     failures: list[str] = field(default_factory=list)
 
 
@@ -84,6 +89,8 @@ def retain(
     done = Retained(len(kept.sessions), unknown=sorted(set(found) - {r["session"] for r in known}))
     now_s = (now or datetime.now(UTC)).timestamp()
     old = sorted((o for o in map(_old, known) if o and rig in (None, o.rig)), key=lambda o: o.rig)
+    done.undated = sorted(one.session for one in old if one.ended < _DATED)
+    old = [one for one in old if one.ended >= _DATED]
     for _, of_rig in groupby(old, key=lambda one: one.rig):
         done.expired += expired(of_rig, rules, now_s)
     if remove and done.expired:

@@ -92,6 +92,20 @@ def test_the_command_shows_and_then_removes(archive, capsys):
     assert _left(archive) == {"alarmed.mcap", "open.mcap", "broken.mcap"}
 
 
+def test_a_log_that_was_imported_without_a_date_stays_and_is_told(archive, capsys):
+    source = archive.parent / "log.csv"
+    source.write_text("t,u\n0,1\n1,2\n2,1\n")
+    mapping = ["--time", "t[s]", "--map", "voltage=u[V]"]
+    assert main(["import", str(source), str(archive / "log.mcap"), *mapping]) == 0
+    index(Store(str(archive)))
+    rules = RecorderSection(keep_days=1, keep_gigabytes=1e-9)
+    found = retain(Store(str(archive)), rules, now=NOW, remove=True)
+    assert found.undated == ["log.mcap"]
+    assert "log.mcap" in _left(archive)
+    assert main(["archive", "retain", str(archive), "--keep-days", "1"]) == 0
+    assert "1 sessions stay that do not tell when they were recorded" in capsys.readouterr().out
+
+
 def test_without_a_limit_or_an_index_nothing_begins(tmp_path, capsys):
     assert main(["archive", "retain", str(tmp_path)]) == 2
     assert "expected --keep-days" in capsys.readouterr().err

@@ -47,6 +47,12 @@ def test_dimensions_are_bounded_in_the_same_way() -> None:
         dimension_of("-" * 50_000 + "x", {}, "boom")
 
 
+@pytest.mark.parametrize("text", ["x*sqrt(-1 - x**2/x**2)", "x + (-2)**0.5", "log(-1)*x"])
+def test_an_expression_without_a_real_value_is_refused(text: str) -> None:
+    with pytest.raises(ModelError, match="which has no real value"):
+        parse(text, X, "force of effect imaginary")
+
+
 def test_usual_powers_and_sums_stay() -> None:
     assert parse("x**3 + 2**10*x - 1e-3*x**0.5", X, "good").has(X["x"])
     assert parse(" + ".join(f"{k}*x" for k in range(1, 300)), X, "good").has(X["x"])

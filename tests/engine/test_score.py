@@ -10,7 +10,7 @@ from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
 from rigwatch.physics.engine.fit.recording import Recording, windows
 from rigwatch.physics.engine.fit.windowed_fit import fit
-from rigwatch.physics.engine.score.candidates import Candidate, shaped
+from rigwatch.physics.engine.score.candidates import Candidate, root_mean_square, shaped
 from rigwatch.physics.engine.score.compatibility import suits
 from rigwatch.physics.engine.score.effect_sensitivities import directions, trajectory
 from rigwatch.physics.engine.score.score_test import Projector, score
@@ -114,3 +114,9 @@ def ranked(base, u, found, candidates, noise):
     fitted = Projector(slopes[..., :3], slopes[..., 3:])
     scaled = (moved / noise[:, None]).reshape(*flat, len(candidates))
     return score((found.residuals / noise).reshape(flat), scaled, fitted, variance=1.0)
+
+
+def test_a_signal_without_samples_has_no_size_and_gives_no_warning(recwarn):
+    assert root_mean_square(np.full(5, np.nan)) == 1.0
+    assert root_mean_square(np.array([3.0, np.nan, -3.0])) == 3.0
+    assert not recwarn.list

@@ -17,6 +17,7 @@ from rigwatch.wire.exchange.column_units import conversion
 from rigwatch.wire.exchange.importing import Imported, import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_source
 from rigwatch.wire.exchange.mat5 import read_mat5
+from rigwatch.wire.exchange.table_files import read_table
 from rigwatch.wire.messages import encode
 from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.messages.message_types import SampleBlock
@@ -204,6 +205,41 @@ def test_nearly_uniform_times_stay_as_they_are(
     assert not grid.jittered
     assert grid.times is times
     assert grid.rate_hz == pytest.approx(rate, rel=0.01)
+
+
+@pytest.mark.parametrize("unit", ["ns", "us", "ms"])
+@pytest.mark.parametrize("since", [np.timedelta64(5, "s"), np.datetime64("2026-11-23T10:00:00")])
+def test_dates_and_durations_are_seconds_by_their_own_resolution(
+    tmp_path: Path, unit: str, since: np.timedelta64 | np.datetime64
+) -> None:
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    kind = f"{'timedelta64' if isinstance(since, np.timedelta64) else 'datetime64'}[{unit}]"
+    steps = (np.arange(50) * 4).astype("timedelta64[ms]")
+    table = pyarrow.table({"time": (since + steps).astype(kind), "x": np.arange(50.0)})
+    parquet.write_table(table, tmp_path / "run.parquet")
+    source, channels = tmp_path / "run.parquet", {"x": "x[m]"}
+    mapping = ImportMapping(time="time[s]", channels=channels)
+    assert import_file(source, tmp_path / "a.mcap", mapping).rate_hz == pytest.approx(250.0)
+    wrong = ImportMapping(time=f"time[{unit}]", channels=channels)
+    with pytest.raises(ImportDataError, match="dates or durations, which state their own"):
+        import_file(source, tmp_path / "b.mcap", wrong)
+
+
+@pytest.mark.parametrize(
+    ("variables", "said"),
+    [
+        ({"data": np.zeros((9, 3))}, "found data of 9 x 3, expected a variable for each column"),
+        ({"log": {"t": np.zeros(9)}}, "found no array of numbers.* structures are not read"),
+    ],
+)
+def test_a_mat_file_without_columns_says_what_it_has(
+    tmp_path: Path, variables: dict[str, object], said: str
+) -> None:
+    savemat(tmp_path / "a.mat", variables)
+    with pytest.raises(ImportDataError, match=said):
+        read_table(tmp_path / "a.mat", ImportMapping())
 
 
 def test_matlab_files_of_hdf5_are_refused_with_the_way_out(tmp_path: Path) -> None:

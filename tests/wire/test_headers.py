@@ -78,6 +78,12 @@ def test_numbers_are_the_same_however_a_country_writes_them(tmp_path: Path, text
     np.testing.assert_array_equal(table.numbers("u"), [1.5, -2.25])
 
 
+def test_a_decimal_comma_is_found_however_late_it_comes(tmp_path: Path):
+    path = tmp_path / "log.csv"
+    path.write_text("t;u\n" + "".join(f"{row};0\n" for row in range(300)) + "300;1,5\n")
+    assert read_table(path, ImportMapping()).numbers("u")[-1] == 1.5
+
+
 def test_a_log_without_header_asks_for_names(tmp_path: Path):
     path = tmp_path / "log.csv"
     path.write_text("0.0,1.5\n0.1,2\n")

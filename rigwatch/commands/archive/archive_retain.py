@@ -86,7 +86,9 @@ def _lines(found: "Retained", *, removed: bool) -> list[str]:
     shown = table(("rig", "session", "end", "size", "alarms"), rows) if rows else []
     unknown = len(found.unknown)
     new = [f"{unknown} new or changed sessions stay: rigwatch archive index"] if unknown else []
-    return [*shown, *new, total]
+    undated = len(found.undated)
+    timeless = [f"{undated} sessions stay that do not tell when they were recorded: import --start"]
+    return [*shown, *new, *(timeless if undated else []), total]
 
 
 def _day(ended: float) -> str:

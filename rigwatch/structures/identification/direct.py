@@ -50,6 +50,7 @@ def solve(problem: Problem, *, iterations: int = 25) -> Outcome:
         found.append(found[-1] + step.change)
         covariance = step.covariance
         if settled(found[-2], found[-1]):
+            require_determined(problem.names, step.blind, system.model.name)
             return Outcome(found[1:], covariance, True)
     return Outcome(found[1:], covariance, False)
 

@@ -35,8 +35,10 @@ def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outc
         ModelError: the record does not determine the unknowns.
     """
     found, covariance = [problem.guess], None
-    scale = np.nanstd(problem.observed, axis=0)
+    seen = np.isfinite(problem.observed).any(axis=0)
+    scale = np.nanstd(np.where(seen, problem.observed, 0.0), axis=0)
     scale = np.where(scale > 0, scale, 1.0)
+    name = problem.sweeper.compiled.system.model.name
     for turn in range(iterations):
         outputs, slopes = problem.simulate(found[-1], problem.substeps)
         if not np.isfinite(slopes).all():
@@ -46,11 +48,11 @@ def solve(problem: Problem, *, iterations: int = 25, trust: float = 0.0) -> Outc
         )
         step = least_squares(errors, slopes, weight, scale)
         if not turn:
-            name = problem.sweeper.compiled.system.model.name
             require_determined(problem.names, step.blind, name)
         found.append(found[-1] + step.change)
         covariance = step.covariance
         if turn and settled(found[-2], found[-1]):
+            require_determined(problem.names, step.blind, name)
             remarks = _doubts(problem.observed - outputs, scale)
             return Outcome(found[1:], covariance, not remarks, remarks)
     remark = "the model's trajectory parted from the record"

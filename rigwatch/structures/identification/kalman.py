@@ -17,6 +17,7 @@ import numpy as np
 from rigwatch.structures.identification.identify import Outcome, settled
 from rigwatch.structures.identification.problem import Problem
 from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.errors import ModelError
 
 REMARK = "the noise was given to the filter; its intervals rest on that figure"
 
@@ -40,8 +41,14 @@ def solve(
         spread: standard deviation of the guess, as a share of it.
         weight: factor on the parameters' covariance from one pass to the next.
         drift: standard deviation of the system noise per sample, as a share of each state's rms.
+
+    Raises:
+        ModelError: every signal is at rest, so that its noise, a share of it, is none.
     """
     run = _Filter(problem, noise, drift)
+    if not np.nanmax(run.variance, initial=0.0) > 0:
+        name = problem.sweeper.compiled.system.model.name
+        raise ModelError(f"{name}: found signals that never change, expected a record of motion")
     found, covariance = [problem.guess], run.prior(problem.guess, spread)
     for turn in range(iterations):
         unknowns, after = run.through(found[-1], covariance)
@@ -64,7 +71,8 @@ class _Filter:
 
     def __post_init__(self) -> None:
         problem = self.problem
-        size = np.sqrt(np.nanmean(problem.observed**2, axis=0))
+        seen = np.isfinite(problem.observed).any(axis=0)
+        size = np.sqrt(np.nanmean(np.where(seen, problem.observed, 0.0) ** 2, axis=0))
         self.variance = (
             self.noise * np.ones_like(size) * (size if np.isscalar(self.noise) else 1)
         ) ** 2

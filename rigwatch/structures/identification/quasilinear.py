@@ -57,18 +57,20 @@ def solve(
     follower = _Nominal(problem, integrator_of(integrator))
     wanted = np.ones(problem.observed.shape[1]) if scale is None else scale
     found, step = [problem.guess], None
+    name = problem.sweeper.compiled.system.model.name
     for turn in range(iterations):
         swept = follower.sweep(found[-1])
         if not np.abs(swept.slopes).max() < BLOWN_UP:
             return Outcome(found[1:] or found, None, False, ("the linear solution blew up",))
         step = least_squares(problem.observed - swept.outputs, swept.slopes, problem.weight, wanted)
         if not turn:
-            name = problem.sweeper.compiled.system.model.name
             require_determined(problem.names, step.blind, name)
         found.append(found[-1] + step.change)
         follower.learn(swept, step.change)
         if not np.isfinite(found[-1]).all() or (turn and settled(found[-2], found[-1])):
             break
+    if step is not None and settled(found[-2], found[-1]):
+        require_determined(problem.names, step.blind, name)
     return _outcome(found, step, follower.remarks)
 
 

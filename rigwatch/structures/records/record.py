@@ -2,10 +2,11 @@
 
 A file is CSV with a header, or NPZ; the column `t` [s] is the time, equally spaced from 0 on, and
 the others are called after the signals they hold: x6, v6, a6 and the channels of recorded loads. An
-empty cell or NaN is a sample that is missing.
+empty cell, NaN or infinity is a sample that is missing.
 """
 
 import csv
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.errors import ImportDataError, ModelError, reason_of
+from rigwatch.wire.errors import ImportDataError, ModelError, one_line, reason_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +67,12 @@ def record_of(time: FloatArray, columns: Mapping[str, FloatArray], where: str = 
     """A record of arrays.
 
     Raises:
-        ImportDataError: the time is not equally spaced from 0 on, or a column has another length.
+        ImportDataError: the time is not equally spaced from 0 on, or a column has another shape.
     """
+    for name, column in {"t": time, **columns}.items():
+        if np.ndim(column) != 1:
+            shape = " x ".join(map(str, np.shape(column))) or "a single number"
+            raise ImportDataError(f"{where}: {name}: found {shape}, expected a single column")
     steps = np.diff(time)
     if len(time) < 2 or not np.all(np.isfinite(time)) or not steps.min() > 0:
         raise ImportDataError(f"{where}: t: found no rising time, expected at least two samples")
@@ -81,7 +86,7 @@ def record_of(time: FloatArray, columns: Mapping[str, FloatArray], where: str = 
                 f"{where}: {name}: found {len(column)} samples, expected {len(time)} as in t"
             )
     arrays = {name: np.asarray(column, np.float64) for name, column in columns.items()}
-    return Record(dt, arrays)
+    return Record(dt, {name: np.where(np.isfinite(x), x, np.nan) for name, x in arrays.items()})
 
 
 def read_record(path: Path | str) -> Record:
@@ -93,8 +98,9 @@ def read_record(path: Path | str) -> Record:
     file = Path(path)
     try:
         table = _from_npz(file) if file.suffix == ".npz" else _from_csv(file)
-    except (OSError, ValueError, csv.Error) as error:
-        raise ImportDataError(f"{file}: found {error}, expected columns of numbers") from error
+    except (OSError, EOFError, ValueError, csv.Error, zipfile.BadZipFile) as error:
+        why = one_line(error)
+        raise ImportDataError(f"{file}: found {why}, expected columns of numbers") from error
     if "t" not in table:
         raise ImportDataError(f"{file}: found columns {', '.join(table)}, expected one called t")
     time = table.pop("t")
@@ -125,7 +131,10 @@ def write_record(record: Record, path: Path | str) -> None:
 
 
 def _from_npz(file: Path) -> dict[str, FloatArray]:
-    with np.load(file) as archive:
+    with file.open("rb") as stream:
+        archive = np.load(stream)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise ValueError("one array without a name")
         return {name: np.asarray(archive[name], np.float64) for name in archive.files}
 
 

@@ -112,12 +112,20 @@ def _source(channel: str, text: str, table: Table, mapping: ImportMapping) -> So
         conversion(source.unit, channel, any_unit=mapping.any_unit)
     except ImportDataError as error:
         raise ImportDataError(f"{table.path}: {error}") from None
+    if table.states_time(source.column) and source.unit != "s":
+        raise ImportDataError(
+            f"{table.path}: {channel}: found the unit {source.unit!r} for dates or durations, which"
+            f" state their own: expected {source.column}[s]"
+        )
     return source
 
 
 def _counted(table: Table, mapping: ImportMapping) -> tuple[_TimeBase, tuple[str, ...]]:
     if mapping.rate is None:
-        raise ImportDataError(f"{table.path}: found neither time nor rate, expected one of them")
+        raise ImportDataError(
+            f"{table.path}: found neither time nor rate, expected --time 'COLUMN[s]' or --rate HZ;"
+            f" its columns are {', '.join(table.names)}"
+        )
     first = _source(*next(iter(mapping.channels.items())), table, mapping)
     count = len(table.cells[first.column])
     times = np.arange(count) / mapping.rate

@@ -87,6 +87,8 @@ def parse_source(channel: str, text: str, columns: tuple[str, ...]) -> Source:
     if match is None:
         raise ImportDataError(f"{channel}: found {text!r}, expected column[unit], such as x[mm]")
     source, unit = match["source"], match["unit"].strip()
+    if source not in columns and text.strip() in columns:
+        source = text.strip()  # the header itself has its unit in brackets
     if source in columns:
         return Source(source, 1.0, 0.0, unit)
     parts = _SCALED.match(source)

@@ -94,13 +94,11 @@ def _all_numbers(cells: list[str]) -> bool:
 
 def _with_points(rows: list[list[str]]) -> list[list[str]]:
     """Rows with decimal commas replaced by decimal points."""
-    if not any(_DECIMAL_COMMA.match(cell) for row in rows[:100] for cell in row):
-        return rows
-    return [[_pointed(cell) for cell in row] for row in rows]
+    return [[_pointed(cell) for cell in row] if any("," in c for c in row) else row for row in rows]
 
 
 def _pointed(cell: str) -> str:
-    return cell.replace(",", ".") if _DECIMAL_COMMA.match(cell) else cell
+    return cell.replace(",", ".") if "," in cell and _DECIMAL_COMMA.match(cell) else cell
 
 
 def _rows(lines: list[str], delimiter: str) -> list[list[str]]:
@@ -133,7 +131,18 @@ def _read_mat(path: Path, _: ImportMapping) -> Table:
             table.scalars[name] = float(value.item())
         elif value.ndim == 2 and min(value.shape) == 1:
             table.cells[name] = value.ravel()
+    if not table.cells:
+        raise ImportDataError(
+            f"{path}: found {_shapes(arrays)}, expected a variable for each column, such as t, u"
+            " and y; structures are not read"
+        )
     return table
+
+
+def _shapes(arrays: dict[str, Any]) -> str:
+    """Variables that are no columns, with their shapes."""
+    shapes = (f"{name} of {' x '.join(map(str, value.shape))}" for name, value in arrays.items())
+    return ", ".join(shapes) or "no array of numbers"
 
 
 def _titles(found: Value | None, arrays: dict[str, Any]) -> dict[str, str]:

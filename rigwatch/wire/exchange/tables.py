@@ -41,8 +41,13 @@ class Table:
             return f"{self.path}, row {row + 1}, column {column}"
         return f"{self.path}:{self.first_line + row}, column {column}"
 
+    def states_time(self, column: str) -> bool:
+        """Whether a column has dates or durations, which are numbers in seconds."""
+        cells = self.cells[column]
+        return isinstance(cells, np.ndarray) and cells.dtype.kind in "mM"
+
     def numbers(self, column: str, allow_missing: bool = False) -> FloatArray:
-        """A column as numbers.
+        """A column as numbers; dates since 1970 and durations in seconds.
 
         Args:
             column: its name.
@@ -53,7 +58,7 @@ class Table:
         """
         cells = self.cells[column]
         try:
-            values = np.asarray(cells).astype(np.float64)
+            values = _in_seconds(np.asarray(cells)).astype(np.float64)
         except (ValueError, TypeError):
             values = self._numbers_one_by_one(column, cells, allow_missing)
         bad = np.flatnonzero(~np.isfinite(values))
@@ -99,3 +104,12 @@ class Table:
         cells = {name: column[rows:] for name, column in self.cells.items()}
         line = None if self.first_line is None else self.first_line + rows
         return Table(self.path, cells, self.scalars, line)
+
+
+def _in_seconds(cells: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Dates and durations in seconds by their own resolution; other cells as they are."""
+    if cells.dtype.kind == "M":
+        cells = cells - np.datetime64(0, "s")
+    if cells.dtype.kind == "m":
+        return np.asarray(cells / np.timedelta64(1, "s"))
+    return cells

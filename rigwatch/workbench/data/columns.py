@@ -1,12 +1,16 @@
 """Channels of a session over equally spaced samples."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
 from rigwatch.physics.engine.fit import filled
 from rigwatch.wire.arrays import FloatArray
+
+SAME_RATE = 1e-6
+"""Relative difference of the time between samples up to which it is the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,3 +38,30 @@ class Columns:
 def bridged(signal: FloatArray) -> FloatArray:
     """The signal with gaps (NaN) interpolated linearly; unchanged if it has no valid sample."""
     return filled(signal) if np.isfinite(signal).any() else signal
+
+
+def copies(tables: Mapping[str, Columns]) -> tuple[str, str] | None:
+    """Names of the first two recordings that are equal sample by sample; None if all differ.
+
+    Args:
+        tables: the recordings by name.
+    """
+    pairs = combinations(tables, 2)
+    return next((pair for pair in pairs if same(tables[pair[0]], tables[pair[1]])), None)
+
+
+def any_same(some: Sequence[Columns], others: Sequence[Columns]) -> bool:
+    """Whether one of the recordings is also among the others."""
+    return any(same(one, other) for one in some for other in others)
+
+
+def same(one: Columns, other: Columns) -> bool:
+    """Whether two recordings have the same rate, channels and samples."""
+    if len(one) != len(other) or set(one.values) != set(other.values):
+        return False
+    if abs(one.dt - other.dt) > SAME_RATE * one.dt:
+        return False
+    return all(
+        np.array_equal(values, other.values[name], equal_nan=True)
+        for name, values in one.values.items()
+    )

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.wire.messages import Column
 from rigwatch.wire.messages import quality_flags as quality
@@ -16,6 +17,8 @@ from rigwatch.workbench.study import Derive, Span
 
 INTERPOLATED = "samples are interpolated, as their times are uneven"
 """How a recording is altered that an import has put on a uniform grid."""
+LARGEST = 1e70
+"""Largest value that counts as measured [SI]: the fourth power is summed over a recording."""
 
 
 def read_columns(folder: Path, span: Span) -> Columns:
@@ -32,6 +35,11 @@ def read_columns(folder: Path, span: Span) -> Columns:
     first, last = blocks[0], blocks[-1]
     count = last.seq + len(last) - first.seq
     dt = float(last.t_ns[-1] - first.t_ns[0]) * 1e-9 / max(count - 1, 1)
+    if not dt > 0:
+        raise ModelError(
+            f"{span.session}: found {count} samples in {dt * (count - 1):g} s, expected at least"
+            " two, one after the other"
+        )
     values = {c.name: np.full(count, np.nan) for c in first.channels}
     for block in blocks:
         at = block.seq - first.seq
@@ -47,11 +55,17 @@ def read_columns(folder: Path, span: Span) -> Columns:
     units = {column.name: column.unit for block in blocks for column in block.channels}
     cut = {name: in_si(column[begin:end], units[name]) for name, column in values.items()}
     moved = any(_is_resampled(column) for block in blocks for column in block.channels)
-    return Columns(dt, cut, units, (INTERPOLATED,) if moved else ())
+    measured = {name: _measurable(column) for name, column in cut.items()}
+    return Columns(dt, measured, units, (INTERPOLATED,) if moved else ())
 
 
 def _is_resampled(column: Column) -> bool:
     return bool(np.any(column.quality & quality.RESAMPLED))
+
+
+def _measurable(column: FloatArray) -> FloatArray:
+    """The column without values that no sensor gives and no sum can hold."""
+    return np.where(np.abs(column) < LARGEST, column, np.nan)
 
 
 def with_derived(columns: Columns, derive: Derive | None) -> Columns:

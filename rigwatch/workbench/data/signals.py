@@ -14,7 +14,7 @@ from rigwatch.physics.engine.equations import Input, Model, Output
 from rigwatch.physics.engine.fit import Recording, Thinning
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.errors import ModelError, nearest
-from rigwatch.workbench.data.columns import Columns, bridged
+from rigwatch.workbench.data.columns import Columns, any_same, bridged
 from rigwatch.workbench.data.derived_ends import without_ends
 from rigwatch.workbench.data.next_rows import with_next_rows
 from rigwatch.workbench.data.one_rate import on_one_rate
@@ -100,6 +100,11 @@ def prepare(study: Study) -> Data:
             ("healthy", file.healthy),
         )
     }
+    if any_same(tables["held_out"], tables["train"]):
+        remarks.append(
+            "held_out: a recording has the same samples as one in training: its error is no"
+            " evidence for a model"
+        )
     tables = _on_one_rate(study, tables, remarks)
     altered = [word for group in tables.values() for table in group for word in table.altered]
     dt = tables["train"][0].dt

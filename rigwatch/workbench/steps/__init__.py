@@ -3,7 +3,8 @@
 from rigwatch.workbench.steps import change
 from rigwatch.workbench.steps.base import take_base
 from rigwatch.workbench.steps.change import add, check_effect, learn, learn_text, remodel, undo
-from rigwatch.workbench.steps.from_logs import Logs, study_from_logs
+from rigwatch.workbench.steps.from_logs import study_from_logs
+from rigwatch.workbench.steps.imported_logs import Logs
 from rigwatch.workbench.steps.ledger_replay import replay
 from rigwatch.workbench.steps.model_handover import (
     ModelHandover,

@@ -5,14 +5,11 @@ The study file records the choices: training and held-out parts, sample rate, lo
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
-from msgspec import structs
-
 from rigwatch.physics.engine.equations import Input, Model, Output, model_named
-from rigwatch.wire.errors import ModelError, nearest
-from rigwatch.wire.exchange import ImportMapping, import_file, read_table
+from rigwatch.wire.errors import ModelError
 from rigwatch.workbench.data import (
     RATES_ALIKE,
     UNFILLED,
@@ -22,9 +19,9 @@ from rigwatch.workbench.data import (
     proposed_split,
     read_columns,
 )
-from rigwatch.workbench.steps.log_columns import Matched, matched
+from rigwatch.workbench.steps.imported_logs import Logs, check_different, check_names, imported
+from rigwatch.workbench.steps.log_columns import Matched
 from rigwatch.workbench.steps.new_files import NewFiles
-from rigwatch.workbench.steps.stated_values import stated_values, unused_numbers
 from rigwatch.workbench.study import FILE, LEDGER, Span, Study, check_new, start_study
 
 SAMPLES_PER_PERIOD = 2.5
@@ -33,30 +30,6 @@ FEWEST = 200
 """Residual samples that each recording keeps at least."""
 EDGE = 15
 """Residual samples left out at both ends, where filters have not settled."""
-
-
-@dataclass(frozen=True)
-class Logs:
-    """Input of a new study.
-
-    Attributes:
-        data: log files: CSV, MAT, Parquet, JSON; or sessions.
-        model: a shipped model's name, or a model file.
-        healthy: logs of the healthy machine.
-        mapping: columns, time and rate, if headers are not sufficient.
-        start: known values of the model's parameters, in their units.
-        known: values that hold for one log alone, by its file name without suffix.
-        stated: parameters whose value each log states, as a single number beside its columns:
-            "mass" or "mass[g]".
-    """
-
-    data: tuple[Path, ...]
-    model: str
-    healthy: tuple[Path, ...] = ()
-    mapping: ImportMapping = field(default_factory=ImportMapping)
-    start: Mapping[str, float] = field(default_factory=dict)
-    known: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    stated: Mapping[str, str] = field(default_factory=dict)
 
 
 def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
@@ -73,8 +46,10 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
     """
     check_new(folder)
     model = model_named(logs.model)
+    check_names(logs, model)
     with NewFiles(folder) as files:
-        reading, remarks, stated = _imported(files, logs, model)
+        reading, remarks, stated = imported(files, logs, model)
+        check_different(folder, logs)
         known = {log: values | dict(logs.known.get(log, {})) for log, values in stated.items()}
         logs = replace(logs, known={**logs.known, **known})
         text, choices = _file(files, logs, model, reading)
@@ -84,58 +59,6 @@ def study_from_logs(folder: Path, logs: Logs) -> tuple[Study, list[str]]:
         told = prepare(study).remarks
     # A horizon is chosen when the study is fitted: what fills none is not known yet.
     return study, [*remarks, *choices, *(remark for remark in told if UNFILLED not in remark)]
-
-
-def _imported(
-    files: NewFiles, logs: Logs, model: Model
-) -> tuple[Matched, list[str], dict[str, dict[str, float]]]:
-    """Imports logs as sessions into the study's folder.
-
-    Returns the columns, remarks, and the parameters that each log states, by its name.
-    """
-    names = [path.stem for path in (*logs.data, *logs.healthy)]
-    if twice := {name for name in names if names.count(name) > 1}:
-        raise ModelError(f"--data: found {min(twice)} twice, expected files of different names")
-    if other := [name for name in logs.known if name not in names]:
-        raise ModelError(
-            f"--set: found log {min(other)!r}{nearest(min(other), dict.fromkeys(names))}"
-        )
-    reading, remarks, stated = None, list[tuple[str, str]](), dict[str, dict[str, float]]()
-    for path in (*logs.data, *logs.healthy):
-        if path.suffix == ".mcap":
-            files.copied(path)
-            continue
-        table = read_table(path, logs.mapping)
-        try:
-            found = matched(table.names, model, logs.mapping.channels, logs.mapping.time)
-        except ModelError as error:
-            raise ModelError(f"{path}: {error}") from None
-        # A log of a real machine has gaps: missing values are invalid samples, not errors.
-        # The model states the unit of a signal, whatever its name stands for elsewhere.
-        mapping = structs.replace(
-            logs.mapping,
-            channels=found.channels,
-            time=found.time,
-            flag_missing=True,
-            any_unit=True,
-        )
-        made = import_file(path, files.to_write(f"{path.stem}.mcap"), mapping)
-        stated[path.stem] = stated_values(table, logs.stated, model)
-        told = (*found.remarks, *made.remarks[1:], *unused_numbers(table, logs.stated))
-        remarks += [(path.name, remark) for remark in told]
-        reading = reading or found
-    return reading or Matched({}, "", {}, ()), _each_once(remarks), stated
-
-
-def _each_once(remarks: list[tuple[str, str]]) -> list[str]:
-    """Remarks on logs, each once: those of one machine are mostly alike."""
-    logs = dict[str, list[str]]()
-    for log, remark in remarks:
-        logs.setdefault(remark, []).append(log)
-    return [
-        f"{names[0] if len(names) == 1 else f'{names[0]} and {len(names) - 1} more'}: {remark}"
-        for remark, names in logs.items()
-    ]
 
 
 def _file(files: NewFiles, logs: Logs, model: Model, reading: Matched) -> tuple[str, list[str]]:

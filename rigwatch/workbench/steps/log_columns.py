@@ -57,7 +57,7 @@ def matched(
     for name, signal in signals.items():
         channel = signal.channel or name
         if channel in found:
-            found[channel], told = _given(found[channel], signal)
+            found[channel], told = _given(found[channel], channel, signal, headers)
             remarks += told
             continue
         column = _column(name, channel, signal, free)
@@ -150,8 +150,14 @@ def _as_turns(unit: str, wanted: str) -> str:
     return "rpm" if per_minute else ""
 
 
-def _given(text: str, signal: Input | Output) -> tuple[str, list[str]]:
+def _given(
+    text: str, channel: str, signal: Input | Output, headers: Sequence[Header]
+) -> tuple[str, list[str]]:
     """A column as the user maps it, with 1/min read as rpm where the model has an angle."""
+    header = next((header for header in headers if header.column == text.strip()), None)
+    if header is not None and header.units:
+        own, told = _unit(header, channel, signal)
+        return f"{header.column}[{own}]", told
     unit = _GIVEN_UNIT.search(text)
     if unit is None or not _known(unit[1]):
         return text, []

@@ -56,6 +56,7 @@ def test_a_unit_that_is_not_known_is_asked_for(tmp_path, run, capsys):
         pytest.param("Speed [1/min]", (), id="of the header"),
         pytest.param("Speed [min-1]", (), id="with a negative power"),
         pytest.param("n", ("--map", "speed=n[1/min]"), id="of the option"),
+        pytest.param("n [1/min]", ("--map", "speed=n [1/min]"), id="of a header that is named"),
     ],
 )
 def test_turns_a_minute_are_no_angles_a_minute(tmp_path, run, capsys, header, more):

@@ -151,7 +151,8 @@ def test_the_model_states_what_a_position_is_measured_in(tmp_path, header, facto
     (tmp_path / "servo.toml").write_text(SERVO)
     time = np.arange(400) / 100
     table = {"time_s": time, "goal_rad": np.sin(time), header: np.sin(time - 0.5) / factor}
-    paths = [written(tmp_path / f"{name}.csv", table) for name in ("one", "two")]
+    longer = {name: np.append(values, values[-1] + 0.01) for name, values in table.items()}
+    paths = [written(tmp_path / f"{n}.csv", t) for n, t in (("one", table), ("two", longer))]
     assert made(tmp_path, *paths, more=["--model", str(tmp_path / "servo.toml")]) == 0
     data = prepare(open_study(tmp_path / "study"))
     np.testing.assert_allclose(data.train.outputs[:300, 0], np.sin(time - 0.5)[:300], atol=1e-6)

@@ -78,6 +78,8 @@ def _parsed(text: str, names: tuple[tuple[str, sympy.Expr], ...], where: str) ->
         raise ModelError(f"{where}: found {quoted(text)}, which cannot be computed") from None
     if value.has(sympy.nan, sympy.zoo, sympy.oo, -sympy.oo):
         raise ModelError(f"{where}: found {quoted(text)}, which has no finite value")
+    if value.has(sympy.I):
+        raise ModelError(f"{where}: found {quoted(text)}, which has no real value")
     return value
 
 

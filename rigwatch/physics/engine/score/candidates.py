@@ -90,6 +90,7 @@ def sizes_at_port(
 
 
 def root_mean_square(signal: FloatArray) -> float:
-    """Root mean square without NaN; 1 for a signal that is always 0, so that it can divide."""
-    size = float(np.sqrt(np.nanmean(np.square(signal))))
+    """Root mean square without NaN; 1 for a signal without size, so that it can divide."""
+    known = signal[np.isfinite(signal)]
+    size = float(np.sqrt(np.mean(np.square(known)))) if len(known) else 0.0
     return size if size > 0 else 1.0

@@ -1,0 +1,66 @@
+"""Records that are damaged, or tell nothing: one plain line, and no value is made up."""
+
+import contextlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.structures.identification.gauss_newton import solve
+from rigwatch.structures.identification.identify import METHODS, identify
+from rigwatch.structures.identification.problem import problem_of
+from rigwatch.structures.records.record import Record, read_record
+from rigwatch.wire.errors import ImportDataError, ModelError
+from tests.structures.antenna import NAMES, antenna
+
+TIME = np.arange(100) * 0.01
+
+
+def test_a_truncated_archive_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "whole.npz"
+    np.savez(path, t=TIME, x6=TIME)
+    for size in (0, 2, 100, path.stat().st_size - 30):
+        broken = tmp_path / "broken.npz"
+        broken.write_bytes(path.read_bytes()[:size])
+        with pytest.raises(ImportDataError, match=r"broken\.npz: found .*expected columns"):
+            read_record(broken)
+
+
+def test_an_archive_that_is_a_single_array_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "one.npz"
+    with path.open("wb") as stream:
+        np.save(stream, TIME)
+    with pytest.raises(ImportDataError, match="found one array without a name"):
+        read_record(path)
+
+
+def test_a_column_of_two_dimensions_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "wide.npz"
+    np.savez(path, t=TIME, x6=np.zeros((100, 2)))
+    with pytest.raises(ImportDataError, match=r"x6: found 100 x 2, expected a single column"):
+        read_record(path)
+
+
+def test_an_infinite_cell_is_a_missing_sample(tmp_path: Path) -> None:
+    path = tmp_path / "record.npz"
+    values = np.sin(TIME)
+    values[7] = np.inf
+    np.savez(path, t=TIME, x6=values)
+    found = read_record(path).columns["x6"]
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(found)), [7])
+
+
+@pytest.mark.parametrize("names", [("x6",), tuple(f"x{node}" for node in range(1, 9))])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_record_at_rest_tells_nothing(method: str, names: tuple[str, ...]) -> None:
+    still = Record(0.01, {name: np.zeros(100) for name in names})
+    found = None
+    with contextlib.suppress(ModelError):
+        found = identify(method, antenna(), still, NAMES)
+    assert found is None or not found.converged
+
+
+def test_an_unknown_that_is_lost_on_the_way_is_refused_at_the_end() -> None:
+    problem = problem_of(antenna(), Record(0.01, {"x6": np.zeros(100)}), NAMES)
+    with pytest.raises(ModelError, match="does not determine k1_6_cubic"):
+        solve(problem)

@@ -1,0 +1,82 @@
+"""Logs and options from which no honest study can be made: one plain line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigwatch.commands import main
+from rigwatch.workbench.data.signals import prepare
+from rigwatch.workbench.study.study import open_study
+from sim_plant.machines import MACHINES, log
+from tests.workbench.machine import studied
+from tests.workbench.new_studies.test_kept_files import SERVO, TIME, UNITS
+
+MOTOR = ["--model", "motor", "--set", "R=2.0", "--set", "K=0.06"]
+Table = dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def run() -> Table:
+    return log(MACHINES["motor"], {}, 0.003, seed=1)
+
+
+def written(path: Path, table: Table) -> Path:
+    rows = (",".join(f"{v:.12g}" for v in row) for row in zip(*table.values(), strict=True))
+    path.write_text("\n".join([",".join(table), *rows]) + "\n")
+    return path
+
+
+def new(folder: Path, *words: object) -> int:
+    return main(["study", "new", str(folder / "study"), "--data", *map(str, words), *MOTOR])
+
+
+def test_a_copy_of_a_log_does_not_decide_about_it(tmp_path, run, capsys):
+    one, copy = (written(tmp_path / f"{name}.csv", run) for name in ("one", "copy"))
+    assert new(tmp_path, one, copy) == 2
+    assert "found the same samples in one.csv and copy.csv" in capsys.readouterr().err
+    assert new(tmp_path, one, "--healthy", copy) == 2
+    assert "found the same samples in one.csv and copy.csv" in capsys.readouterr().err
+    assert not (tmp_path / "study").exists()
+
+
+def test_a_study_file_whose_held_out_recording_is_a_copy_is_told_so(tmp_path):
+    table = {"goal": np.sin(TIME), "angle": np.sin(TIME - 0.5)}
+    other = {name: 2 * values for name, values in table.items()}
+    copied = prepare(studied(tmp_path / "a", SERVO, [table, other], [table], UNITS)).remarks
+    apart = prepare(studied(tmp_path / "b", SERVO, [table], [other], UNITS)).remarks
+    assert any("no evidence" in remark for remark in copied)
+    assert not any("no evidence" in remark for remark in apart)
+
+
+def test_a_log_of_one_row_is_refused(tmp_path, run, capsys):
+    single = {name: values[:1] for name, values in run.items()}
+    assert new(tmp_path, written(tmp_path / "one.csv", single)) == 2
+    assert "found 1 samples in 0 s, expected at least two" in capsys.readouterr().err
+
+
+def test_a_value_that_no_sensor_gives_is_an_invalid_sample(tmp_path, run):
+    broken = run["speed_rad_s"].copy()
+    broken[77] = 1e308
+    assert new(tmp_path, written(tmp_path / "run.csv", run | {"speed_rad_s": broken})) == 0
+    outputs = prepare(open_study(tmp_path / "study")).train.outputs[:, 0]
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(outputs)), [77])
+
+
+@pytest.mark.parametrize("option", ["nosuch=1", "run:nosuch=1"])
+def test_a_value_of_an_unknown_parameter_is_refused_at_once(tmp_path, run, capsys, option):
+    assert new(tmp_path, written(tmp_path / "run.csv", run), "--set", option) == 2
+    assert "--set: found 'nosuch'" in capsys.readouterr().err
+
+
+def test_a_time_under_another_name_is_asked_for_and_may_be_named_as_it_stands(
+    tmp_path, run, capsys
+):
+    time, voltage, speed = run.values()
+    path = written(tmp_path / "run.csv", {"Zeit [s]": time, "u [V]": voltage, "n [rad/s]": speed})
+    assert new(tmp_path, path) == 2
+    said = capsys.readouterr().err
+    assert "expected --time 'COLUMN[s]' or --rate HZ; its columns are Zeit [s], u [V]" in said
+    assert new(tmp_path, path, "--time", "Zeit [s]") == 0
+    dt = prepare(open_study(tmp_path / "study")).train.dt
+    assert dt == pytest.approx(time[1] - time[0], rel=1e-6)
