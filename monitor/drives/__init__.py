@@ -1,10 +1,11 @@
-"""What the generator of an input does, from the input: new frequencies, steps that slide or jitter,
-and edges between samples, where the motion has to tell.
+"""What the generator of an input does, from the input: new frequencies, steps that slide, jitter
+or are held, and edges between samples, where the motion has to tell.
 """
 
 from monitor.drives.bridged_edges import BridgedEdges
 from monitor.drives.drive_changes import Drive, DriveChanges
 from monitor.drives.edge_choice import corrected, edges_unsure, follow_edges, no_edges
+from monitor.drives.held_readings import HeldReadings
 from monitor.drives.input_steps import InputSteps, Steps
 from monitor.drives.jittered_edges import JitteredEdges
 from monitor.drives.jittered_steps import Jittered, JitteredSteps
@@ -15,6 +16,7 @@ __all__ = [
     "BridgedEdges",
     "Drive",
     "DriveChanges",
+    "HeldReadings",
     "InputSteps",
     "Jittered",
     "JitteredEdges",

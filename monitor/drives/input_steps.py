@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from monitor.drives.held_readings import HeldReadings
 from monitor.drives.jittered_edges import JitteredEdges
 from monitor.drives.jittered_steps import JitteredSteps
 from monitor.drives.sliding_edges import SlidingEdges
@@ -18,7 +19,7 @@ from rigwatch.wire.arrays import BoolArray, FloatArray
 
 JITTER, EDGES = 0.1, 0.5
 """Uncertainty of the instants of steps that jitter [samples]: of those that are told apart, that of
-each interval's share; of edges, that of one read early or late.
+each interval's share; of edges and of held voltages, that of one read early or late.
 """
 
 
@@ -54,13 +55,14 @@ class InputSteps:
         self._sliding = SlidingSteps(half_width)
         self._jittered = JitteredSteps(half_width)
         self._edges = JitteredEdges()
+        self._held = HeldReadings()
         self._regular = SlidingEdges(half_width)
 
     def update(self, signal: FloatArray, code: Codes) -> Steps:
         """The next samples of the input, shape (n,), with states of the admission."""
         slides = self._sliding.update(signal, code)
         found = self._jittered.update(signal, code)
-        edges = self._edges.update(signal, code)
+        edges = self._edges.update(signal, code) | self._held.update(signal, code)
         regular = self._regular.update(signal, code)
         # Steps that slide and jitter do the latter only where they meet the samples.
         jitters = np.where(slides.followed, found.shows, found.jitters) & ~regular.shows
