@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from monitor.commissioning.commission import CommissionSettings, commission
-from monitor.commissioning.equations_commission import EQUATIONS, commission_equations
+from monitor.commissioning.equations import EQUATIONS, commission_equations
 from monitor.model import RigModel, SchemeSection
 from monitor.pipeline import Monitor
 from monitor.signals import DEPARTURE, DRY_FRICTION, OTHER_FAULT, STICTION, Recording

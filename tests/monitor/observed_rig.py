@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from monitor.commissioning.equations_commission import commission_equations
+from monitor.commissioning.equations import commission_equations
 from monitor.model.model_file import RigModel
 from monitor.pipeline.rig_monitor import RigMonitor, Watched
 from monitor.signals.recordings import Recording, Role, recording_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from monitor.commissioning.described import Left, described
+from monitor.commissioning.equations.described import Left, described
 from monitor.observer import MEASURED, E
 from rigwatch.wire.errors import ModelError
 

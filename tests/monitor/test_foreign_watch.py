@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from monitor.commissioning.equations_commission import commission_equations
+from monitor.commissioning.equations import commission_equations
 from monitor.model.model_file import RigModel
 from monitor.signals.recordings import recording_of
 from tests.monitor.observed_rig import FAULTS, RATE, raised, watched

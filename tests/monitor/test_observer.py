@@ -163,7 +163,7 @@ def test_model_file_without_limits_is_refused() -> None:
 
 
 def test_rig_that_the_equations_do_not_describe_is_refused() -> None:
-    from monitor.commissioning.equations_commission import commission_equations
+    from monitor.commissioning.equations import commission_equations
 
     rng = np.random.default_rng(1)
     channels = run(SINE, 10.0, seed=9)
@@ -174,7 +174,7 @@ def test_rig_that_the_equations_do_not_describe_is_refused() -> None:
 
 
 def test_no_healthy_recording_is_refused() -> None:
-    from monitor.commissioning.equations_commission import commission_equations
+    from monitor.commissioning.equations import commission_equations
 
     with pytest.raises(ModelError, match="no healthy recording"):
         commission_equations([])

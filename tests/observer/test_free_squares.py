@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from monitor.commissioning.equations_commission import commission_equations
+from monitor.commissioning.equations import commission_equations
 from monitor.model import RigModel
 from monitor.signals.recordings import recording_of
 from sim_plant.excitation import Periodic, Square

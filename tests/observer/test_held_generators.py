@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from monitor.commissioning.equations_commission import commission_equations
+from monitor.commissioning.equations import commission_equations
 from monitor.signals.recordings import recording_of
 from sim_plant.excitation import Recorded
 from tests.monitor.observed_rig import FAULTS, RATE, coulomb, raised, run, watched

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from monitor.commissioning.unseen_motion import MOST, unseen_ratio
+from monitor.commissioning.equations.unseen_motion import MOST, unseen_ratio
 from monitor.model import EquationsPlant
 from monitor.observer import E, Observed, ObserverSignals, decide, friction_limit, new_state
 from monitor.observer import decision_state as d

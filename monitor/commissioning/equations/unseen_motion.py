@@ -11,7 +11,7 @@ import numpy as np
 from msgspec.structs import replace
 from scipy.signal import lfilter
 
-from monitor.commissioning.healthy_limits import mean_over, variance
+from monitor.commissioning.equations.healthy_limits import mean_over, variance
 from monitor.model import EquationsPlant, RangeSection, RemainderSection, RigModel
 from monitor.observer import (
     MEDIUM,
