@@ -8,12 +8,10 @@ judged until then: a reference learned with wrong wiring would count as healthy.
 window on nothing is judged either, until a good one; it takes the second to be told.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
 from monitor.model import RigModel
-from monitor.signals import Condition, above, level, usable
+from monitor.signals import Condition, above, usable
 from monitor.wiring.motion_ratio import MotionRatio, motion_ratio
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.messages import SampleBlock
@@ -64,19 +62,17 @@ class WiringCheck:
             self._window = []
         self._boot, self._next = block.boot, block.seq + len(block)
         if self._passed:
-            return None, _right(len(block))
+            return None, ()
         doubted, wrong = np.zeros((2, len(block)), np.bool_)
         wrong[self._first_failed(block, doubted) :] = True
-        return doubted | wrong, self._conditions(wrong) if self._failed else _right(len(block))
-
-    def _conditions(self, wrong: BoolArray) -> tuple[Condition, ...]:
-        return tuple(
-            above(name, wrong & (name == self._failed), np.full(len(wrong), value), limit)
+        return doubted | wrong, tuple(
+            above(name, wrong & (name == self._failed), np.full(len(block), value), limit)
             for name, value, limit in (
                 (SIGN, abs(self._phase), 180 - REVERSED),
                 (SCALE, self._gain, GAIN),
                 (SWAPPED, abs(self._phase), PHASE),
             )
+            if self._failed == name
         )
 
     def _first_failed(self, block: SampleBlock, doubted: BoolArray) -> int:
@@ -124,14 +120,6 @@ class WiringCheck:
         self._passed, self._fails = not reason, self._fails + 1 if reason else 0
         if self._fails == FAILURES:
             self._failed, self._gain, self._phase = reason, found.gain, found.phase
-
-
-@lru_cache(maxsize=1024)
-def _right(n: int) -> tuple[Condition, ...]:
-    """That nothing is known to be wrong in n samples, so that alarms of an earlier check clear."""
-    none = np.zeros(n, np.bool_)
-    none.setflags(write=False)
-    return tuple(above(name, none, level(n, np.nan), np.inf) for name in WIRING)
 
 
 def _wrong(found: MotionRatio) -> str:

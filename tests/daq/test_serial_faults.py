@@ -39,6 +39,7 @@ class Fault:
     boots: int = 1
     first_seq: int = 0
     channel: str = ""
+    before: int = 20
 
 
 def line_fault(name: str, frames: int = BURST) -> Inject:
@@ -107,7 +108,7 @@ FAULTS = [
     ),
     Fault(10, "clock jumps ahead", lambda b: b.device.jump_clock(0.5), events=("clock_jump",)),
     Fault(10, "clock jumps back", lambda b: b.device.jump_clock(-0.5), events=("clock_jump",)),
-    Fault(11, "stuck sensor", sensor(stuck, 150), flags={quality.STUCK: 51}),
+    Fault(11, "stuck sensor", sensor(stuck, 150), flags={quality.STUCK: 51}, before=120),
     Fault(13, "saturation", sensor(rail, 5), flags={quality.SATURATED: 3}),
     Fault(
         15,
@@ -147,7 +148,7 @@ def opened(tmp_path: Path) -> Iterator[Callable[[Fault], SerialBench]]:
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: f"{fault.number}-{fault.name}")
 def test_fault(fault: Fault, opened: Callable[[Fault], SerialBench]) -> None:
     bench = opened(fault)
-    bench.settle(20)
+    bench.settle(fault.before)
     fault.inject(bench)
     bench.settle(120)
     bench.time.pass_by(1.0)

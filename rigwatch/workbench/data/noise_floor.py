@@ -45,7 +45,12 @@ class NoiseFloor:
     @property
     def allowed(self) -> float:
         """Largest ratio of error to floor at which nothing remains to be explained."""
-        return max(ALLOWED[self.method], self.chance)
+        return max(self.usual, self.chance)
+
+    @property
+    def usual(self) -> float:
+        """The same for recordings so long that chance does not matter."""
+        return ALLOWED[self.method]
 
     def ratio(self, fitted: Fit, at: BoolArray | None = None) -> float:
         """Error over the floor, over all channels; `at`: samples used, shape (windows, length)."""

@@ -115,7 +115,9 @@ def _simpler_or_equal(
     if not accepted or accepted[0].fitted is None:
         return []
     best = accepted[0]
-    if own_floor(study, data, floor, best).reached(accepted[0].fitted.held_out):
+    own = own_floor(study, data, floor, best)
+    # A short recording excuses what is left, but a rival that leaves less must be tried.
+    if own.ratio(accepted[0].fitted.held_out) <= own.usual:
         return []
     waiting = [r for r in rows if r.fitted is None and not r.failure and not r.fitted_instead]
     likely = [r for r in waiting if r.port == best.port and r.p_value < LEVEL]
