@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.effect_files import library
@@ -59,3 +60,15 @@ def test_what_the_equations_hold_already_is_no_candidate_there():
     ac_coupled = library()["ac_coupling"]
     assert not suits(ac_coupled, model.ports["acceleration_sensor"], model)
     assert suits(ac_coupled, model.ports["position_sensor"], model)
+
+
+@pytest.mark.parametrize(
+    ("unit", "slides"),
+    [("rad/s", True), ("rpm", True), ("mm/s", True), ("V", False), ("K", False), ("m", False)],
+)
+def test_a_path_follows_from_a_speed_and_from_no_other_variable(unit, slides):
+    model = shipped_models()["motor"]
+    shaft = model.ports["shaft"]
+    port = replace(shaft, variables={"v": replace(shaft.variables["v"], unit=unit)})
+    assert suits(library()["bliman_sorine_2"], port, model) == slides
+    assert suits(library()["viscous"], port, model)

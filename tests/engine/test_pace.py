@@ -5,8 +5,14 @@ import pytest
 from msgspec.structs import replace
 
 from rigwatch.physics.engine.compile.compiled_system import compile_system
-from rigwatch.physics.engine.compile.resolved_rates import FASTEST, resolved
-from rigwatch.physics.engine.compile.step_size import FINEST, constant_rates, pace, steps_for
+from rigwatch.physics.engine.compile.resolved_rates import resolved
+from rigwatch.physics.engine.compile.step_size import (
+    FINEST,
+    INSTANT,
+    constant_rates,
+    pace,
+    steps_for,
+)
 from rigwatch.physics.engine.equations.effect_files import library
 from rigwatch.physics.engine.equations.model import shipped_models
 from rigwatch.physics.engine.equations.system import Placement, compose
@@ -118,6 +124,15 @@ def test_a_slow_model_takes_the_steps_asked_for():
     assert steps_for(system, constant_rates(system), at, INTERVAL) == FINEST
 
 
+def test_a_mode_that_is_instantaneous_takes_only_the_steps_in_which_it_decays():
+    system, rate = motor().system, 5 * INSTANT
+    at = motor().vector({"L": INTERVAL / rate, "J": 1e-3, "K": 0.1, "R": 1.0, "b": 1e-4})
+    steps = steps_for(system, constant_rates(system), at, INTERVAL)
+    assert rate / 2 < steps < rate
+    fine = discharged(INTERVAL / rate, 512)
+    assert discharged(INTERVAL / rate, 1) == pytest.approx(fine, rel=1e-2)
+
+
 def test_rates_that_depend_on_the_motion_are_left_to_the_steps_asked_for():
     assert constant_rates(compose(shipped_models()["tanks"])) == ()
 
@@ -133,7 +148,7 @@ def bounds(model=MOTOR, dt=COARSE, **values):
 
 
 def test_an_inductance_is_bounded_where_its_time_constant_is_a_sixteenth_of_a_sample():
-    assert bounds(R=1.8)["L"].low == pytest.approx(1.8 * COARSE / FASTEST, rel=1e-6)
+    assert bounds(R=1.8)["L"].low == pytest.approx(1.8 * COARSE / INSTANT, rel=1e-6)
     assert bounds(R=1.8)["L"].high == MOTOR.parameters["L"].high
 
 
@@ -158,7 +173,7 @@ def test_a_rate_that_grows_with_its_parameter_bounds_it_above():
     loose = {"R": replace(MOTOR.parameters["R"], fixed=False, low=0.1, high=1e6)}
     fixed = {"L": replace(MOTOR.parameters["L"], fixed=True)}
     model = replace(MOTOR, parameters=MOTOR.parameters | loose | fixed)
-    assert bounds(model)["R"].high == pytest.approx(FASTEST * 5e-3 / COARSE, rel=1e-6)
+    assert bounds(model)["R"].high == pytest.approx(INSTANT * 5e-3 / COARSE, rel=1e-6)
 
 
 def test_a_mode_at_the_bound_is_followed_by_stable_steps():

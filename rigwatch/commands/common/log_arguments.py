@@ -10,7 +10,10 @@ def add_log_columns(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="CHANNEL=COLUMN[UNIT]",
-        help="a channel, its column and the column's unit; also COLUMN*FACTOR+OFFSET[UNIT]",
+        help=(
+            "a channel, its column and the column's unit, [1] if it has none; also"
+            " COLUMN*FACTOR+OFFSET[UNIT], with the unit of the result"
+        ),
     )
     parser.add_argument("--time", metavar="COLUMN[UNIT]", help="time column")
     parser.add_argument("--rate", type=float, metavar="HZ", help="sample rate, without a time")

@@ -85,7 +85,10 @@ def parse_source(channel: str, text: str, columns: tuple[str, ...]) -> Source:
     """
     match = _WITH_UNIT.match(text.strip())
     if match is None:
-        raise ImportDataError(f"{channel}: found {text!r}, expected column[unit], such as x[mm]")
+        raise ImportDataError(
+            f"{channel}: found {text!r}, expected column[unit], such as x[mm] or u*35.15[N], and"
+            " [1] for what has no unit"
+        )
     source, unit = match["source"], match["unit"].strip()
     if source not in columns and text.strip() in columns:
         source = text.strip()  # the header itself has its unit in brackets

@@ -29,7 +29,7 @@ class Comparison:
 
     Attributes:
         train_error, held_out_error, noise_floor: over all channels, in `unit`.
-        unit: that of the channel if there is only one, otherwise "noise floors".
+        unit: that of the channel if there is only one, otherwise "× channel noise".
         noise_from: method of the noise floor, in words.
         channels: by output.
         parameters: by name, in the units of the model's and effects' files.

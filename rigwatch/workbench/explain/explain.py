@@ -29,6 +29,7 @@ from rigwatch.workbench.explain.motion_sensor import with_motion_sensor
 from rigwatch.workbench.explain.pairs import two_effects
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
+    leaves_some,
     limited_verdict,
     much_left,
     undetermined_if_little_and_unexplained,
@@ -239,14 +240,20 @@ def _explains_the_rest(bench: Bench, row: Ranked) -> bool:
 
 
 def _by_pairs(bench: Bench, rows: list[Ranked], verdict: Verdict, progress: Progress) -> Verdict:
-    """The verdict after trying pairs, if one effect alone leaves a large residual."""
+    """The verdict after trying pairs, if one effect alone leaves a large residual or a part of it.
+
+    If only a part is left, the verdict changes only if a pair leaves nothing.
+    """
+    along = bench.data.along_motion
     much = verdict.word == "unknown_effect" or (
-        bench.data.along_motion and leaves_much(bench.base, bench.floor, verdict)
+        along and leaves_much(bench.base, bench.floor, verdict)
     )
-    if not much or verdict.best is None:
+    some = along and not bench.study.model.rough and leaves_some(bench.base, bench.floor, verdict)
+    if verdict.best is None or not (much or some):
         return verdict
-    progress(f"{verdict.best.label} leaves a large residual: trying two effects at once")
-    return two_effects(bench, rows, verdict, progress)
+    size = "a large residual" if much else "a part of the residual"
+    progress(f"{verdict.best.label} leaves {size}: trying two effects at once")
+    return two_effects(bench, rows, verdict, progress, tolerant=much)
 
 
 def _stopped(bench: Bench) -> Verdict | None:

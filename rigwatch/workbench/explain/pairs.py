@@ -57,7 +57,12 @@ class Pair:
 
 
 def two_effects(
-    bench: Bench, rows: Sequence[Ranked], verdict: Verdict, progress: Progress
+    bench: Bench,
+    rows: Sequence[Ranked],
+    verdict: Verdict,
+    progress: Progress,
+    *,
+    tolerant: bool = True,
 ) -> Verdict:
     """The verdict after trying pairs; unchanged if no pair explains the error.
 
@@ -66,9 +71,10 @@ def two_effects(
         rows: the ranking of single effects.
         verdict: the verdict on single effects, none of which explains the error alone.
         progress: called with the pair about to be fitted.
+        tolerant: whether a pair along the measured motion may leave more than the noise floor.
     """
     fits = _fitted(bench, likely_pairs(bench, rows), progress)
-    good = _explaining(bench, fits)
+    good = _explaining(bench, fits, tolerant=tolerant)
     if not good:
         return verdict
     best, together = min(good, key=lambda found: found[1].held_out_error)
@@ -140,14 +146,17 @@ def _fitted_pair(bench: Bench, pair: Pair) -> Fitted | None:
         return None
 
 
-def _explaining(bench: Bench, fits: Sequence[tuple[Pair, Fitted]]) -> list[tuple[Pair, Fitted]]:
+def _explaining(
+    bench: Bench, fits: Sequence[tuple[Pair, Fitted]], *, tolerant: bool
+) -> list[tuple[Pair, Fitted]]:
     """Pairs whose residual is small enough for them to be named.
 
     The residual must be at the noise floor, since two wrong effects together explain much. A rough
     model, and any model along the measured motion, is allowed more, since a fault changes the
     model's own residual.
     """
-    floor, tolerant = bench.floor, bench.data.along_motion or bench.study.model.rough
+    floor = bench.floor
+    tolerant = tolerant and (bench.data.along_motion or bench.study.model.rough)
     return [
         (pair, fitted)
         for pair, fitted in fits

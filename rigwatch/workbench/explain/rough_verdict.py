@@ -57,6 +57,19 @@ def leaves_much(base: Fitted, floor: NoiseFloor, found: Verdict) -> bool:
     return found.best.fitted is not None and much_left(base, floor, found.best.fitted)
 
 
+def leaves_some(base: Fitted, floor: NoiseFloor, found: Verdict) -> bool:
+    """Whether the single effect named leaves a share above the floor that another may explain.
+
+    Where noise is most of the floor, as mains hum, the ratio of the error to it hides that share.
+    """
+    if found.word != "missing_effect" or found.second or found.best is None:
+        return False
+    fitted = found.best.fitted
+    if fitted is None or floor.ratio(fitted.held_out, fitted.calm) <= floor.allowed:
+        return False
+    return floor.left_over(base.held_out, fitted.held_out, fitted.calm) > SHARE
+
+
 def undetermined_if_little_and_unexplained(
     base: Fitted, floor: NoiseFloor, found: Verdict
 ) -> Verdict:

@@ -1,7 +1,7 @@
 """Fits a study's model to its recordings: intervals, healthy parameters, holds, free run."""
 
 from rigwatch.workbench.fit.continued_error import continued_train_error
-from rigwatch.workbench.fit.fitted import Fitted, block_differences
+from rigwatch.workbench.fit.fitted import Fitted, block_differences, error_text
 from rigwatch.workbench.fit.fitted_model import (
     eigenvalues,
     fit_base,
@@ -43,6 +43,7 @@ __all__ = [
     "continued_train_error",
     "covariance",
     "eigenvalues",
+    "error_text",
     "fit_base",
     "fit_model",
     "fit_with_retry",

@@ -14,6 +14,8 @@ from rigwatch.physics.engine.search import (
 )
 from rigwatch.wire.arrays import BoolArray, FloatArray
 
+DIVERGED = 1e6
+"""Ratio of an error to that without the effect beyond which the simulation has diverged."""
 BLOCKS = 40
 """Number of blocks for statistics on a recording of a model without states."""
 
@@ -63,14 +65,26 @@ class Fitted:
     def error_unit(self) -> str:
         """Unit of the overall errors: that of the channel if there is only one."""
         outputs = list(self.compiled.system.model.outputs.values())
-        return outputs[0].unit if len(outputs) == 1 else "noise floors"
+        return outputs[0].unit if len(outputs) == 1 else "× channel noise"
 
 
 def overall(fitted: Fit) -> float:
-    """Error over all channels: in the channel's unit if there is only one, else in noise floors."""
+    """Error over all channels: in the channel's unit if there is only one, else over its noise."""
     if len(fitted.scale) == 1:
         return float(fitted.rms[0])
     return float(np.sqrt(np.mean((fitted.rms / fitted.scale) ** 2)))
+
+
+def error_text(value: float | None, before: float) -> str:
+    """An error with four significant digits; "diverges" if it is far beyond the one before.
+
+    Args:
+        value: the error with an effect, None if it was not fitted.
+        before: the error without it, in the same unit.
+    """
+    if value is None:
+        return "-"
+    return "diverges" if value > DIVERGED * before else f"{value:.4g}"
 
 
 def block_errors(fitted: Fit) -> FloatArray:

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from rigwatch.physics.engine.compile import (
+    INSTANT,
     CompiledSystem,
     compile_system,
     even_substeps,
@@ -318,7 +319,10 @@ def nodes(fitted: Fitted, recording: Recording) -> int:
         return 1
     even = max(fitted.substeps, _even(system, recording, fitted.train.parameters))
     fastest = _fastest(fitted, recording) * recording.dt
-    return even if fastest <= FAST * even else math.ceil(fastest / SLOWED)
+    if fastest <= FAST * even:
+        return even
+    # Of a mode that is instantaneous for the recording only the decay matters.
+    return math.ceil(max(min(fastest, INSTANT) / SLOWED, fastest / FAST))
 
 
 def _fastest(fitted: Fitted, recording: Recording) -> float:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from rigwatch.workbench.compare import Bases, Comparison, Region
 from rigwatch.workbench.explain import Explanation, Row
-from rigwatch.workbench.fit import Value
+from rigwatch.workbench.fit import Value, error_text
 from rigwatch.workbench.steps import Change
 from rigwatch.workbench.study import GIVEN, Held
 
@@ -119,7 +119,7 @@ def explanation_lines(found: Explanation, most: int = 12) -> list[str]:
         f"ranking ({len(found.ranking)} effects at ports)",
     ]
     errors = [f"training [{found.error_unit}]", "held out", "p", "", "cannot be told from"]
-    lines += table(["effect@port", *errors], [_ranked(row) for row in found.ranking[:most]])
+    lines += table(["effect@port", *errors], [_ranked(row, base) for row in found.ranking[:most]])
     if found.next_experiment:
         lines += ["", f"next experiment: {found.next_experiment.text}"]
     return lines + [f"note: {remark}" for remark in base.remarks]
@@ -143,10 +143,13 @@ def doubt_of(found: Explanation) -> str:
     return f"probability of being wrong at most {found.wrong_at_most:.1%}: {were}"
 
 
-def _ranked(row: Row) -> list[str]:
+def _ranked(row: Row, base: Comparison) -> list[str]:
     mark = "accepted" if row.accepted else row.reason
     p = "< 1e-6" if row.p_value < 1e-6 else f"{row.p_value:.1g}"
-    errors = [number(row.train_error), number(row.held_out_error)]
+    errors = [
+        error_text(row.train_error, base.train_error),
+        error_text(row.held_out_error, base.held_out_error),
+    ]
     return [f"{row.effect}@{row.port}", *errors, p, mark, ", ".join(row.class_[:3])]
 
 
@@ -154,7 +157,9 @@ def change_lines(found: Change) -> list[str]:
     """What `rigwatch add` and `undo` print."""
     rows = [["before", number(found.before.train_error), number(found.before.held_out_error)]]
     if found.tried and found.step == "refused":
-        rows.append([f"with {found.effect}", *map(number, found.tried)])
+        known = (found.before.train_error, found.before.held_out_error)
+        tried = [error_text(*each) for each in zip(found.tried, known, strict=True)]
+        rows.append([f"with {found.effect}", *tried])
     else:
         after = found.after
         rows.append(["after", number(after.train_error), number(after.held_out_error)])

@@ -18,7 +18,7 @@ from rigwatch.physics.engine.score import suits
 from rigwatch.wire.errors import ModelError, nearest
 from rigwatch.workbench.compare import Bench, Comparison, Warm, with_horizon_of
 from rigwatch.workbench.explain import SetGain, set_gain
-from rigwatch.workbench.fit import held_as
+from rigwatch.workbench.fit import error_text, held_as
 from rigwatch.workbench.ranking import (
     Progress,
     Ranked,
@@ -178,7 +178,8 @@ def _evidence(found: SetGain | None) -> dict[str, Any]:
 
 
 def _falls(row: Ranked, before: Comparison, after: float) -> str:
-    return f"{row.label}: held-out error {before.held_out_error:.4g} → {after:.4g} {before.unit}"
+    error = error_text(after, before.held_out_error)
+    return f"{row.label}: held-out error {before.held_out_error:.4g} → {error} {before.unit}"
 
 
 def keeps_gain(before: float, accepted: float, again: float, floor: float) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigwatch.physics.engine.compile import all_cores, turns
-from rigwatch.workbench.explain.explain import ranking
+from rigwatch.workbench.explain.explain import _by_pairs, ranking
 from rigwatch.workbench.explain.pairs import Pair, _pair, likely_pairs, two_effects
 from rigwatch.workbench.explain.verdict import judge
 from rigwatch.workbench.ranking import refitting
@@ -109,3 +109,28 @@ def test_a_pair_that_leaves_more_than_noise_is_not_named(bench, rows):
     alone = judge(bench.base, rows, bench.floor)
     others = [row for row in rows if row.label not in PAIR]
     assert two_effects(bench, others, alone, no_progress) is alone
+
+
+def along_motion(bench, times):
+    """The study as along a measured motion, with a noise floor so many times as high."""
+    floor = dataclasses.replace(bench.floor, rms=times * bench.floor.rms, method="healthy motion")
+    data = dataclasses.replace(bench.data, along_motion=True)
+    return dataclasses.replace(bench, floor=floor, data=data)
+
+
+def named_alone(bench, rows):
+    found = judge(bench.base, rows, bench.floor)
+    return dataclasses.replace(found, word="missing_effect")
+
+
+def test_a_second_effect_is_named_where_noise_hides_most_of_what_the_first_leaves(bench, rows):
+    alone = named_alone(bench, rows)
+    noisy = along_motion(bench, bench.floor.ratio(alone.best.fitted.held_out) / 1.2)
+    found = _by_pairs(noisy, rows, alone, no_progress)
+    assert {found.members[0], found.second[0]} == set(PAIR)
+
+
+def test_a_part_of_the_residual_speaks_for_a_pair_only_if_it_leaves_nothing(bench, rows):
+    alone, quiet = named_alone(bench, rows), along_motion(bench, 1 / 1.2)
+    assert two_effects(quiet, rows, alone, no_progress, tolerant=False) is alone
+    assert two_effects(quiet, rows, alone, no_progress).second

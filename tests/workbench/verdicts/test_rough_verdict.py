@@ -10,6 +10,7 @@ from rigwatch.workbench.data.noise_floor import NoiseFloor
 from rigwatch.workbench.explain.adequacy import unchecked
 from rigwatch.workbench.explain.rough_verdict import (
     leaves_much,
+    leaves_some,
     limited_verdict,
     undetermined_if_little_and_unexplained,
     undetermined_if_much_left,
@@ -57,6 +58,21 @@ def test_a_strong_effect_may_leave_more_as_it_changes_the_motion() -> None:
 def test_what_leaves_little_and_a_pair_stay_named(found: Verdict) -> None:
     assert not leaves_much(left(4.0), FLOOR, found)
     assert limited_verdict(left(4.0), [], FLOOR, found).word == "missing_effect"
+
+
+@pytest.mark.parametrize(
+    ("base", "best", "some"),
+    [
+        pytest.param(3.0, 1.17, True, id="a share that noise hides"),
+        pytest.param(3.0, 1.04, False, id="at the floor"),
+        pytest.param(28.0, 1.17, False, id="next to nothing of a strong effect"),
+    ],
+)
+def test_a_share_above_the_floor_may_be_another_effect(
+    base: float, best: float, some: bool
+) -> None:
+    assert leaves_some(left(base), FLOOR, naming(best)) == some
+    assert not leaves_some(left(base), FLOOR, naming(best, ("cubic_stiffness@load",)))
 
 
 @pytest.mark.parametrize(

@@ -18,9 +18,11 @@ from rigwatch.physics.engine.compile.integrator import across, call, lateness, p
 from rigwatch.physics.engine.compile.resolved_rates import resolved
 from rigwatch.physics.engine.compile.stability import even_substeps
 from rigwatch.physics.engine.compile.static_kernel import evaluated, numpy_function
+from rigwatch.physics.engine.compile.step_size import INSTANT
 from rigwatch.physics.engine.compile.turns import side_by_side, together
 
 __all__ = [
+    "INSTANT",
     "CompiledSystem",
     "Linearisation",
     "Simulation",

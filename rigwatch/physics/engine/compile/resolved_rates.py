@@ -14,12 +14,10 @@ import sympy
 from msgspec import structs
 
 from rigwatch.physics.engine.compile.static_kernel import numpy_function
-from rigwatch.physics.engine.compile.step_size import constant_rates
+from rigwatch.physics.engine.compile.step_size import INSTANT, constant_rates
 from rigwatch.physics.engine.equations import Parameter, System
 from rigwatch.wire.arrays import FloatArray
 
-FASTEST = 16.0
-"""Largest rate of a mode times the time between samples."""
 HALVINGS = 60
 """Steps of the search for a bound."""
 
@@ -58,7 +56,7 @@ def _bounded(  # noqa: PLR0917 -- they belong together
 
     def too_fast(value: float) -> bool:
         found = function(*np.concatenate([parameters[:index], [value], parameters[index + 1 :]]))[0]
-        return not abs(float(found)) * spacing <= FASTEST
+        return not abs(float(found)) * spacing <= INSTANT
 
     start = float(np.clip(parameters[index], parameter.low, parameter.high))
     if too_fast(start):

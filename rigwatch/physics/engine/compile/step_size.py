@@ -34,6 +34,11 @@ PASSIVE = 2.0
 SMOOTH = 0.5
 """The same for a model's own constant rates: the error, a thousandth of a mode that has decayed in
 two steps, is too small to be seen as a jump of a fit's error where the number of steps changes."""
+INSTANT = 16.0
+"""Rate times the time between samples from which a mode is instantaneous for any recording."""
+DECAYING = 1.25
+"""The same as `SMOOTH` beyond that, where it is enough that a mode decays: states that are coupled
+as strongly as they decay have modes of twice the rate, and those decay, too."""
 FINEST = 256
 """Most steps between two samples."""
 FILLED = 1
@@ -86,7 +91,8 @@ def steps_for(
     if not rates:
         return 1
     found = np.abs(numpy_function(tuple(system.parameters), rates)(*parameters))
-    return math.ceil(min(float(np.nanmax(found)) * spacing / SMOOTH, FINEST))
+    fastest = float(np.nanmax(found)) * spacing
+    return math.ceil(min(max(min(fastest, INSTANT) / SMOOTH, fastest / DECAYING), FINEST))
 
 
 def _steep(system: System) -> dict[str, sympy.Expr]:

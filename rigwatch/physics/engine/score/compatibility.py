@@ -5,6 +5,9 @@ from string import Formatter
 
 from rigwatch.physics.engine.equations import LEFT, RATE, Effect, Model, Port, hold_at, names_in
 from rigwatch.physics.engine.score.candidates import Candidate
+from rigwatch.wire.units import unit_of
+
+_SPEEDS = tuple(unit_of(unit).dimension for unit in ("m/s", "rad/s"))
 
 
 def suits(effect: Effect, port: Port, model: Model) -> bool:
@@ -36,7 +39,13 @@ def has_variables(effect: Effect, port: Port) -> bool:
 def _variables_with_scale(port: Port) -> set[str]:
     """Variables whose unit and size follow from a port's: a distance follows from a speed."""
     names = {*port.variables, "F" if port.kind == "force" else "u"}
-    return names | ({"x"} if "v" in names else set())
+    return names | ({"x"} if _has_speed(port) else set())
+
+
+def _has_speed(port: Port) -> bool:
+    """Whether `v` is a speed or an angular rate; a voltage is the rate of no distance."""
+    found = port.variables.get("v")
+    return found is not None and unit_of(found.unit).dimension in _SPEEDS
 
 
 def _units_named(effect: Effect) -> set[str]:
