@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from monitor.decision.departure import departed
-from monitor.decision.episode import follow
+from monitor.decision.episode import PLAINLY_HEALTHY, follow
 from monitor.decision.estimates import estimate
 from monitor.decision.isolation import HISTORY, store_sample
 from monitor.decision.kernel_state import (  # fmt: skip
@@ -43,8 +43,11 @@ from monitor.reference import (
     Reference,
     ReferenceRules,
     follow_level,
+    get_to_know,
+    is_known,
     learnt_here,
     observe,
+    pass_over,
     place_in_period,
     restart,
 )
@@ -96,6 +99,8 @@ def watch_block(  # noqa: PLR0917
             _judge(data[k], seq, position_valid[k], rules, ref, state)
         elif code[k] == HELD and ref.counts.mode == ARMED:
             _skip(state)
+        elif code[k] == HELD:
+            pass_over(ref)
         _write(data[k], code[k], ref, state, out[:, k])
 
 
@@ -134,6 +139,11 @@ def _judge(  # noqa: PLR0917
 ) -> None:
     """Process one good sample."""
     place = place_in_period(ref, seq)
+    if not is_known(ref, place):
+        if state.counts.episode == 0 and state.held[DEVIATION] < PLAINLY_HEALTHY * rules.factor:
+            get_to_know(ref, place, data)
+        _skip(state)
+        return
     _take(data, place, position_valid, ref, state)
     # Sums are updated by every sample, the least squares are solved every `hop` samples.
     state.counts.hop += 1

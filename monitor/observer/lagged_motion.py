@@ -38,16 +38,23 @@ class FixedLag:
         half_width: lag [samples].
         rate: sample rate [Hz].
         late: lateness of the smoothed channels behind the delayed ones [s].
+        fills: whether held readings are replaced by the line between both ends of their gap.
     """
 
     def __init__(
-        self, columns: Sequence[MotionColumn], half_width: int, rate: float, late: float = 0.0
+        self,
+        columns: Sequence[MotionColumn],
+        half_width: int,
+        rate: float,
+        late: float = 0.0,
+        fills: bool = True,
     ) -> None:
+        self._fills = fills
         kernels = [_kernel(column.order, half_width, rate, late) for column in columns]
         self._kernels = np.array(kernels)
         self._channels = np.array([column.channel for column in columns])
         self._ring = np.zeros((2 * half_width + 1, int(self._channels.max()) + 1))
-        self._count = np.zeros(3, np.int64)
+        self._count = np.zeros(4, np.int64)
 
     def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes]:
         """Convert the next samples, shape (n, channels), to columns, (n, columns), with states.
@@ -57,7 +64,10 @@ class FixedLag:
         """
         out = np.zeros((code.size, self._channels.size))
         state = np.zeros(code.size, np.int64)
-        _advance(signals, code, self._kernels, self._channels, self._ring, self._count, out, state)
+        _advance(
+            signals, code, self._kernels, self._channels, self._fills, self._ring, self._count,
+            out, state,
+        )  # fmt: skip
         return out, state
 
 
@@ -82,17 +92,30 @@ def _kernel(order: int, half_width: int, rate: float, late: float) -> FloatArray
 
 
 @kernel()
+def _interpolate(ring: FloatArray, count: Codes) -> None:
+    """Replace the held samples before the newest by the line between both ends of the gap."""
+    width, held, newest = ring.shape[0], count[3], count[0] - 1
+    for c in range(ring.shape[1]):
+        first, last = ring[(newest - held - 1) % width, c], ring[newest % width, c]
+        for k in range(1, held + 1):
+            ring[(newest - k) % width, c] = last + (first - last) * k / (held + 1.0)
+
+
+@kernel()
 def _advance(  # noqa: PLR0917 -- a kernel
     signals: FloatArray,
     code: Codes,
     kernels: FloatArray,
     channels: NDArray[np.int64],
+    fills: bool,
     ring: FloatArray,
     count: Codes,
     out: FloatArray,
     state: Codes,
 ) -> None:
-    """`count` holds the ring's head, samples since the start, and samples since a held one."""
+    """`count` holds the ring's head, samples since the start, samples since a held one, and the
+    number of those that are held now.
+    """
     width = ring.shape[0]
     for k in range(code.size):
         if code[k] == RESTART or code[k] == NEW_BOOT:
@@ -105,6 +128,9 @@ def _advance(  # noqa: PLR0917 -- a kernel
         count[0] = (count[0] + 1) % width
         count[1] += 1
         good = code[k] == GOOD or code[k] == RESTART or code[k] == NEW_BOOT
+        if fills and code[k] == GOOD and 0 < count[3] < width - 1:
+            _interpolate(ring, count)
+        count[3] = 0 if good else count[3] + 1
         count[2] = min(count[2] + 1, width) if good else 0
         if count[1] < width:
             continue

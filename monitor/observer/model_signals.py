@@ -135,7 +135,10 @@ class LaggedSignals:
         self, layout: Layout, half_width: int, rate: float, late: float, jitters: bool = False
     ) -> None:
         self._motion = FixedLag(layout.columns, half_width, rate, late)
-        self._inputs = [InputSteps(half_width, jitters) for _ in range(layout.motions[0])]
+        places = range(layout.motions[0])
+        self._inputs = [InputSteps(half_width, jitters) for _ in places]
+        delayed = [MotionColumn(place, DELAY) for place in places]
+        self._held = FixedLag(delayed, half_width, rate, fills=False) if delayed else None
 
     def update(self, signals: FloatArray, code: Codes) -> tuple[FloatArray, Codes, Steps]:
         """Columns, states, and what is known of the inputs' steps, for the next samples.
@@ -143,11 +146,14 @@ class LaggedSignals:
         The steps are of all inputs: `mean` and `moved` have a column for each.
         """
         columns, state = self._motion.update(signals, code)
+        filled = np.zeros((code.size, len(self._inputs)))
+        if self._held is not None:
+            filled = columns[:, : len(self._inputs)] - self._held.update(signals, code)[0]
         known, unsure = np.ones(code.size, np.bool_), np.zeros(code.size)
         moved, moves = np.zeros((code.size, len(self._inputs))), np.zeros(code.size, np.bool_)
         for place, steps in enumerate(self._inputs):
             found = steps.update(signals[:, place], code)
-            columns[:, place] = np.where(state == EMPTY, 0.0, found.mean)
+            columns[:, place] = np.where(state == EMPTY, 0.0, found.mean + filled[:, place])
             known &= found.known
             unsure = np.maximum(unsure, found.unsure)
             moved[:, place] = np.where(found.moves, found.moved, 0.0)

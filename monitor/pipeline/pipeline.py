@@ -7,6 +7,8 @@ It uses no clock, bus or file, and every stage works sample by sample with carri
 samples give the same numbers to the last bit, live or in replay, for any division into blocks.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,10 +18,14 @@ from monitor.decision import rules_for, watch_block
 from monitor.model import InertiaPlant, RigModel
 from monitor.pipeline.promoted import PromotedFriction, check_can_follow
 from monitor.pipeline.result import Result
-from monitor.reference import ReferenceRules, new_reference
+from monitor.reference import ReferenceRules, new_reference, usual
 from monitor.signals import (
+    GOOD,
+    HELD,
+    NOTHING,
     Admission,
     Admitted,
+    Codes,
     Condition,
     InertiaResidual,
     TransferResidual,
@@ -27,7 +33,7 @@ from monitor.signals import (
     level,
 )
 from monitor.signals import conditions as kinds
-from rigwatch.wire.arrays import FloatArray
+from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock
 
@@ -72,6 +78,7 @@ class Monitor:
         self._admission = Admission(
             model.channels, needed, model.decision.longest_hold, model.sample_rate
         )
+        self._missing = 0
         self._residual = InertiaResidual(model) if inertia else TransferResidual(model)
         self._follow(model)
 
@@ -101,25 +108,54 @@ class Monitor:
         admitted = self._admission.admit(block)
         if admitted is None:
             return None
-        data = self._residual.update(admitted.signals, admitted.code)
         clipping = self._clipping.update(admitted)
-        self._promoted.add(data, admitted.code)
-        out = np.zeros((w.OUTPUTS, len(data)))
+        out = np.zeros((w.OUTPUTS, len(admitted.code)))
+        reset = np.zeros(len(admitted.code), np.bool_)
+        # What is usual in a gap is known from all samples before it, whatever the blocks.
+        for begin, end in pairwise(_ends_of_gaps(admitted.code)):
+            self._judge(admitted, begin, end, out, reset)
+        result = self._result(block, admitted, out)
+        reset = reset[admitted.padding :]
+        resets = above(kinds.MONITOR_RESET, reset, reset.astype(np.float64), 0.0)
+        return Result(result.estimates, (*result.conditions, resets, *clipping))
+
+    def _judge(
+        self, admitted: Admitted, begin: int, end: int, out: FloatArray, reset: BoolArray
+    ) -> None:
+        """Residual and decision of samples `begin` to before `end`, of which the first may be the
+        one after a gap.
+        """
+        code, seq = admitted.code[begin:end], admitted.seq[begin:end]
+        data = self._columns(admitted.signals[begin:end], code, seq)
+        reset[begin:end] = self._residual.reset
+        self._promoted.add(data, code)
+        part = np.zeros((w.OUTPUTS, end - begin))
         watch_block(
             data,
-            admitted.code,
-            admitted.position_valid,
-            int(admitted.seq[0]),
+            code,
+            admitted.position_valid[begin:end],
+            int(seq[0]),
             self.rules,
             self._arming,
             self._reference,
             self._state,
-            out,
+            part,
         )
-        result = self._result(block, admitted, out)
-        reset = self._residual.reset[admitted.padding :]
-        resets = above(kinds.MONITOR_RESET, reset, reset.astype(np.float64), 0.0)
-        return Result(result.estimates, (*result.conditions, resets, *clipping))
+        out[:, begin:end] = part
+
+    def _columns(self, signals: FloatArray, code: Codes, seq: Codes) -> FloatArray:
+        if isinstance(self._residual, InertiaResidual):
+            return self._residual.update(signals, code)
+        return self._residual.update(signals, code, self._usual(code, seq))
+
+    def _usual(self, code: Codes, seq: Codes) -> FloatArray:
+        """What is usual for the signals over a gap that ends at the first sample; empty if none
+        does.
+        """
+        missing, self._missing = self._missing, _held_at_end(code, self._missing)
+        if code[0] != GOOD or missing == 0:
+            return NOTHING
+        return usual(self._reference, int(seq[0]) - missing - 1, missing + 2)
 
     def _result(self, block: SampleBlock, admitted: Admitted, out: FloatArray) -> Result:
         kept = out[:, admitted.padding :]
@@ -223,6 +259,18 @@ def _judged_by(model: RigModel) -> tuple[tuple[str, int, float, float], ...]:
         (name, k, float(low.get(row, -np.inf)), float(high.get(row, 0.0)))
         for row, (name, k) in enumerate(_JUDGED)
     )
+
+
+def _ends_of_gaps(code: Codes) -> list[int]:
+    """Where to divide samples: their begin, the first good ones after bridged ones, their end."""
+    ends = 1 + np.flatnonzero((code[:-1] == HELD) & (code[1:] == GOOD))
+    return [0, *ends.tolist(), len(code)]
+
+
+def _held_at_end(code: Codes, before: int) -> int:
+    """Number of bridged samples with which the samples end, `before` of them before the first."""
+    others = np.flatnonzero(code != HELD)
+    return len(code) - 1 - int(others[-1]) if others.size else before + len(code)
 
 
 def _arming_rules(model: RigModel) -> ReferenceRules:

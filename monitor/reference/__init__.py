@@ -1,7 +1,15 @@
 """The healthy residual: averaged for periodic drives, bounded for aperiodic ones."""
 
 from monitor.reference.aperiodic import follow_level
-from monitor.reference.learning import learnt_here, observe, place_in_period, refine, restart
+from monitor.reference.averages import get_to_know, is_known
+from monitor.reference.learning import (
+    learnt_here,
+    observe,
+    pass_over,
+    place_in_period,
+    refine,
+    restart,
+)
 from monitor.reference.reference_state import (
     APERIODIC,
     ARMED,
@@ -11,6 +19,7 @@ from monitor.reference.reference_state import (
     new_record,
     new_reference,
 )
+from monitor.reference.usual import usual
 
 __all__ = [
     "APERIODIC",
@@ -19,11 +28,15 @@ __all__ = [
     "Reference",
     "ReferenceRules",
     "follow_level",
+    "get_to_know",
+    "is_known",
     "learnt_here",
     "new_record",
     "new_reference",
     "observe",
+    "pass_over",
     "place_in_period",
     "refine",
     "restart",
+    "usual",
 ]

@@ -24,6 +24,7 @@ import numpy as np
 from numba import njit
 
 from monitor.reference.aperiodic import learn_aperiodic
+from monitor.reference.averages import FEWEST_OF_A_PLACE, average, enough_known
 from monitor.reference.reference_state import (
     APERIODIC,
     ARMED,
@@ -87,9 +88,18 @@ def observe(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) ->
 
 
 @njit()
+def pass_over(ref: Reference) -> None:
+    """Process one missing sample before the reference is armed, so that places keep their time."""
+    _remember(ref, np.nan)
+    if ref.counts.mode == LEARNING and ref.counts.source == FROM_RUN:
+        ref.counts.learnt += 1
+
+
+@njit()
 def _arm_fixed(ref: Reference, rules: ReferenceRules) -> None:
     """Arm without a healthy average: the residual is friction, with limits from the model file."""
     ref.template[:, :] = 0.0
+    ref.seen[:] = FEWEST_OF_A_PLACE
     ref.counts.period, ref.counts.anchor, ref.counts.depth = 1, 0, LONGEST_AVERAGE
     ref.counts.source, ref.counts.mode = FIXED, ARMED
     ref.levels.scale, ref.levels.noise = 1.0, rules.residual_noise
@@ -111,14 +121,17 @@ def _past(ref: Reference, ago: int) -> float:
 
 @njit()
 def _swing(ref: Reference, count: int) -> float:
-    mean = 0.0
+    mean, known = 0.0, 0
     for n in range(count):
-        mean += _past(ref, n)
-    mean /= count
+        if not np.isnan(_past(ref, n)):
+            mean += _past(ref, n)
+            known += 1
+    mean /= max(known, 1)
     square = 0.0
     for n in range(count):
-        square += (_past(ref, n) - mean) ** 2
-    return np.sqrt(square / count)
+        if not np.isnan(_past(ref, n)):
+            square += (_past(ref, n) - mean) ** 2
+    return np.sqrt(square / max(known, 1))
 
 
 @njit()
@@ -142,7 +155,9 @@ def _repeats(ref: Reference, period: int, count: int, tolerance: float) -> bool:
     """Whether the voltage repeats after `period`; stops at the first contradiction."""
     total = 0.0
     for n in range(count):
-        total += (_past(ref, n) - _past(ref, n + period)) ** 2
+        moved = _past(ref, n) - _past(ref, n + period)
+        if not np.isnan(moved):
+            total += moved**2
         if total > tolerance * count:
             return False
     return True
@@ -158,6 +173,7 @@ def _found(ref: Reference, rules: ReferenceRules, seq: int, period: int, swing: 
     levels.position_noise = rules.position_noise
     levels.voltage_noise = rules.voltage_noise
     ref.sums[:, :] = 0.0
+    ref.seen[:] = 0
     ref.products[:] = 0.0
     counts.mode = LEARNING
     counts.source = FROM_RUN
@@ -176,7 +192,9 @@ def _turn(ref: Reference, index: int, period: int, swing: float) -> int:
     for turn in range(period):
         total = 0.0
         for n in range(period):
-            total += (_past(ref, n) - ref.known[index, 0, (turn - n) % period]) ** 2
+            moved = _past(ref, n) - ref.known[index, 0, (turn - n) % period]
+            if not np.isnan(moved):
+                total += moved**2
             if total >= best:
                 break
         if total < best:
@@ -192,6 +210,7 @@ def _take_known(ref: Reference, index: int, period: int, turn: int, seq: int) ->
             ref.template[row, place] = ref.known[index, row, place]
     ref.counts.anchor = seq - turn
     ref.counts.depth = ref.known_depth[index]
+    ref.seen[:] = FEWEST_OF_A_PLACE
     ref.levels.scale = ref.known_scale[index]
     ref.counts.source = FROM_MODEL
     _measure_swings(ref)
@@ -203,10 +222,12 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
     counts, period = ref.counts, ref.counts.period
     if period == 1:
         learn_aperiodic(ref, rules, row)
+        ref.seen[0] = FEWEST_OF_A_PLACE
         return
     place = place_in_period(ref, seq)
     for i in range(4):
         ref.sums[i, place] += row[i]
+    ref.seen[place] += 1
     ref.products[0] += row[2] * row[2]
     ref.products[1] += row[2] * row[3]
     ref.products[2] += row[3] * row[3]
@@ -214,7 +235,7 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
     ref.products[4] += row[0] * row[0]
     counts.learnt += 1
     wanted = max(4, (rules.learn + period - 1) // period) * period
-    if counts.learnt >= wanted:
+    if counts.learnt >= wanted and enough_known(ref):
         _finish_learning(ref, rules, wanted // period)
 
 
@@ -222,20 +243,28 @@ def _learn(ref: Reference, rules: ReferenceRules, seq: int, row: FloatArray) -> 
 def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     """Compute averages, amplitude scale and scatter; restart if the rig has not settled."""
     counts, levels, period = ref.counts, ref.levels, ref.counts.period
-    for i in range(4):
-        for place in range(period):
-            ref.template[i, place] = ref.sums[i, place] / depth
+    average(ref)
     counts.depth = depth
     aa = am = mm = xx = vv = 0.0
+    # Energies of the averages over whole periods, and over the samples beyond or short of them.
+    more, moreover = np.zeros(5), 0
     for place in range(period):
+        count = ref.seen[place] - depth
+        moreover += count + (1 if ref.seen[place] == 0 else 0)
+        signals = ref.template[:, place]
+        more[0] += count * signals[2] ** 2
+        more[1] += count * signals[2] * signals[3]
+        more[2] += count * signals[3] ** 2
+        more[3] += count * signals[1] ** 2
+        more[4] += count * signals[0] ** 2
         aa += ref.template[2, place] ** 2
         am += ref.template[2, place] * ref.template[3, place]
         mm += ref.template[3, place] ** 2
         xx += ref.template[1, place] ** 2
         vv += ref.template[0, place] ** 2
     scale = am / mm if mm > 0.0 else 0.0
-    freedom = period * (depth - 1)
-    p = ref.products
+    freedom = period * (depth - 1) + moreover
+    p = ref.products[:5] - more
     scatter = (p[0] - depth * aa) - 2.0 * scale * (p[1] - depth * am)
     scatter += scale**2 * (p[2] - depth * mm)
     noise = np.sqrt(max(scatter, 0.0) / freedom)
@@ -252,6 +281,7 @@ def _finish_learning(ref: Reference, rules: ReferenceRules, depth: int) -> None:
     else:
         counts.learnt = 0
         ref.sums[:, :] = 0.0
+        ref.seen[:] = 0
         ref.products[:] = 0.0
 
 

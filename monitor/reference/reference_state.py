@@ -52,13 +52,15 @@ def new_record(layout: np.dtype[Any]) -> Any:
 class Reference(NamedTuple):
     """State; `counts` and `levels` are records of named numbers.
 
-    Templates and sums have one row per signal (V, x, a, am) and one column per place in the period.
+    Templates and sums have one row per signal (V, x, a, am) and one column per place in the period;
+    `seen` counts the samples of each place. The ring of voltages has NaN where one is missing.
     """
 
     counts: Any
     levels: Any
     template: FloatArray
     sums: FloatArray
+    seen: NDArray[np.int64]
     products: FloatArray
     ring: FloatArray
     known: FloatArray
@@ -92,6 +94,7 @@ def new_reference(rules: ReferenceRules, known: list[tuple[FloatArray, float, in
         levels,
         np.zeros((4, longest)),
         np.zeros((4, longest)),
+        np.zeros(longest, np.int64),
         np.zeros(6),
         np.zeros(2 * rules.longest_period),
         stored,

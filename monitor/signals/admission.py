@@ -1,10 +1,10 @@
 """Admission of samples: gaps, restarts and invalid readings become one code per sample.
 
-A short run of missing or invalid samples is bridged: the last good value is held for the filters,
-and the sample is excluded from the estimates. After a longer run nothing is fed until a good sample
-arrives, which restarts every filter. Missing samples are inserted as held ones, so that sample
-counts and periods stay aligned. Numbers that follow one another do not show a device that has
-paused, or whose clock has jumped: its clock does, and restarts the filters as well.
+A short run of missing or invalid samples is bridged: the last good value is held until the filters
+know the next one, and the sample is excluded from the estimates. After a longer run nothing is fed
+until a good sample arrives, which restarts every filter. Missing samples are inserted as held ones,
+so that sample counts and periods stay aligned. Numbers that follow one another do not show a device
+that has paused, or whose clock has jumped: its clock does, and restarts the filters as well.
 """
 
 from dataclasses import dataclass

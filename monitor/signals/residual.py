@@ -11,6 +11,10 @@ instead.
 A recursive filter keeps a number that is not finite for ever, and an unstable one grows without
 limit. Each sample's results are therefore checked: beyond `LARGEST` every filter is reset, the
 sample counts as dead, and the next good one restarts the estimates.
+
+A rig rings for a second or more, and so does the modelled acceleration after one wrong voltage. A
+sample that is missing is therefore held only until the next good one. The filters then go back to
+the last good sample and pass the gap again, with the readings that both ends make likely.
 """
 
 from typing import NamedTuple
@@ -18,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from monitor.model import RigModel, TransferPlant
-from monitor.signals.admission import DEAD, GOOD, LARGEST, NEW_BOOT, RESTART, Codes
+from monitor.signals.admission import DEAD, GOOD, HELD, LARGEST, NEW_BOOT, RESTART, Codes
 from rigwatch.physics.transfer import TransferFunction, filter_sample, velocity_filter
 from rigwatch.wire.arrays import BoolArray, FloatArray
 from rigwatch.wire.kernel import kernel
@@ -27,22 +31,37 @@ from rigwatch.wire.messages import ByteArray
 COLUMNS = ("voltage", "position", "acceleration", "modelled", "velocity", "g1", "g2")
 """Columns of the stage's output."""
 VOLTAGE, POSITION, ACCELERATION, MODELLED, VELOCITY, G1, G2 = range(7)
+NOTHING = np.zeros((0, 3))
+"""No usual readings are known."""
+
+
+class _States(NamedTuple):
+    """States of the four filters, and the measured signals' delay line, whose last column marks
+    samples that are missing.
+    """
+
+    plant: FloatArray
+    velocity: FloatArray
+    sign: FloatArray
+    speed: FloatArray
+    late: FloatArray
 
 
 class _Filters(NamedTuple):
-    """Coefficients and states of the four filters, and the measured signals' delay line."""
+    """Coefficients and states of the four filters, and what a gap needs: the states and the
+    readings of the last good sample, and the number of missing ones since.
+    """
 
     plant_b: FloatArray
     plant_a: FloatArray
-    plant_state: FloatArray
     velocity_b: FloatArray
     velocity_a: FloatArray
-    velocity_state: FloatArray
     friction_b: FloatArray
     friction_a: FloatArray
-    sign_state: FloatArray
-    speed_state: FloatArray
-    late: FloatArray
+    now: _States
+    before: _States
+    last: FloatArray
+    missing: Codes
     was_reset: ByteArray
 
 
@@ -67,42 +86,63 @@ class TransferResidual:
         velocity = velocity_filter(
             model.velocity.corner, model.sample_rate, model.velocity.sensor_corner
         )
-        friction = model.friction.function().padded()
+        functions = (acceleration, velocity, model.friction.function())
         self._filters = _Filters(
-            *_with_state(acceleration),
-            *_with_state(velocity),
-            *friction,
-            np.zeros(max(friction[0].size - 1, 1)),
-            np.zeros(max(friction[0].size - 1, 1)),
-            np.zeros((delay + 1, 3)),
+            *acceleration.padded(),
+            *velocity.padded(),
+            *functions[2].padded(),
+            _states_of(functions, delay),
+            _states_of(functions, delay),
+            np.zeros(3),
+            np.zeros(1, np.int64),
             np.zeros(1, np.uint8),
         )
         self.delay = delay
         self.reset = np.zeros(0, np.bool_)
 
-    def update(self, signals: FloatArray, code: Codes) -> FloatArray:
+    def update(self, signals: FloatArray, code: Codes, usual: FloatArray = NOTHING) -> FloatArray:
         """The next samples, shape (n, 3) of V, x, a, to the stage's columns, shape (n, 7).
 
-        `code` is changed where the filters are reset, which `reset`, shape (n,), marks.
+        `code` is changed where the filters are reset, which `reset`, shape (n,), marks, and where a
+        missing sample leaves the delay line. `usual` has what is usual there for the signals from
+        the last good sample to the first one after a gap, shape (m, 3): the readings between are
+        the usual ones and the interpolated deviation of both ends from them. Without it, they are
+        interpolated.
         """
         out = np.zeros((code.size, len(COLUMNS)))
         self.reset = np.zeros(code.size, np.bool_)
-        _advance(signals, code, self._filters, out, self.reset)
+        _advance(signals, code, usual, self._filters, out, self.reset)
         return out
 
 
-def _with_state(function: TransferFunction) -> tuple[FloatArray, FloatArray, FloatArray]:
-    b, a = function.padded()
-    return b, a, np.zeros(max(b.size - 1, 1))
+def _states_of(functions: tuple[TransferFunction, ...], delay: int) -> _States:
+    plant, velocity, friction = (max(each.padded()[0].size - 1, 1) for each in functions)
+    return _States(
+        np.zeros(plant),
+        np.zeros(velocity),
+        np.zeros(friction),
+        np.zeros(friction),
+        np.zeros((delay + 1, 4)),
+    )
 
 
 @kernel()
 def _clear(f: _Filters) -> None:
-    f.plant_state[:] = 0.0
-    f.velocity_state[:] = 0.0
-    f.sign_state[:] = 0.0
-    f.speed_state[:] = 0.0
-    f.late[:] = 0.0
+    f.now.plant[:] = 0.0
+    f.now.velocity[:] = 0.0
+    f.now.sign[:] = 0.0
+    f.now.speed[:] = 0.0
+    f.now.late[:] = 0.0
+    f.missing[0] = 0
+
+
+@kernel()
+def _copy(source: _States, to: _States) -> None:
+    to.plant[:] = source.plant
+    to.velocity[:] = source.velocity
+    to.sign[:] = source.sign
+    to.speed[:] = source.speed
+    to.late[:] = source.late
 
 
 @kernel()
@@ -114,10 +154,66 @@ def _within_limits(row: FloatArray) -> bool:
 
 
 @kernel()
-def _advance(
-    signals: FloatArray, code: Codes, f: _Filters, out: FloatArray, reset: BoolArray
+def _filter(readings: FloatArray, missing: bool, f: _Filters, out: FloatArray) -> None:
+    """One sample through all filters, to the stage's columns, shape (7,)."""
+    state, late = f.now, f.now.late
+    oldest = late.shape[0] - 1
+    for i in range(oldest, 0, -1):
+        for c in range(4):
+            late[i, c] = late[i - 1, c]
+    for c in range(3):
+        late[0, c] = readings[c]
+    late[0, 3] = 1.0 if missing else 0.0
+    out[0], out[1], out[2] = readings[0], late[oldest, 1], late[oldest, 2]
+    speed = filter_sample(f.velocity_b, f.velocity_a, state.velocity, out[2])
+    sign = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
+    out[3] = filter_sample(f.plant_b, f.plant_a, state.plant, readings[0])
+    out[4] = speed
+    out[5] = filter_sample(f.friction_b, f.friction_a, state.sign, sign)
+    out[6] = filter_sample(f.friction_b, f.friction_a, state.speed, speed)
+
+
+@kernel()
+def _pass_gap(readings: FloatArray, usual: FloatArray, f: _Filters) -> None:
+    """Pass the missing samples again, now that `readings` after them are known."""
+    count, unused, between = f.missing[0], np.zeros(7), np.zeros(3)
+    known = usual.shape[0] == count + 2
+    _copy(f.before, f.now)
+    for k in range(1, count + 1):
+        share = k / (count + 1.0)
+        for c in range(3):
+            first, here, last = f.last[c], 0.0, readings[c]
+            if known:
+                first, here, last = first - usual[0, c], usual[k, c], last - usual[count + 1, c]
+            between[c] = here + (1.0 - share) * first + share * last
+        _filter(between, True, f, unused)
+    f.missing[0] = 0
+
+
+@kernel()
+def _follow_gap(readings: FloatArray, held: bool, usual: FloatArray, f: _Filters) -> None:
+    """Keep what a gap needs, before its first sample and after its last one."""
+    if held:
+        if f.missing[0] == 0:
+            _copy(f.now, f.before)
+        f.missing[0] += 1
+        return
+    if f.missing[0] > 0:
+        _pass_gap(readings, usual, f)
+    for c in range(3):
+        f.last[c] = readings[c]
+
+
+@kernel()
+def _advance(  # noqa: PLR0917 -- a kernel
+    signals: FloatArray,
+    code: Codes,
+    usual: FloatArray,
+    f: _Filters,
+    out: FloatArray,
+    reset: BoolArray,
 ) -> None:
-    longest = f.late.shape[0]
+    oldest = f.now.late.shape[0] - 1
     for k in range(code.size):
         if f.was_reset[0] and code[k] == GOOD:
             code[k] = RESTART
@@ -126,19 +222,11 @@ def _advance(
             _clear(f)
         if code[k] == DEAD:
             continue
-        for i in range(longest - 1, 0, -1):
-            for c in range(3):
-                f.late[i, c] = f.late[i - 1, c]
-        for c in range(3):
-            f.late[0, c] = signals[k, c]
-            out[k, c] = f.late[longest - 1, c]
-        out[k, 0] = signals[k, 0]
-        speed = filter_sample(f.velocity_b, f.velocity_a, f.velocity_state, out[k, 2])
-        sign = 1.0 if speed > 0.0 else (-1.0 if speed < 0.0 else 0.0)
-        out[k, 3] = filter_sample(f.plant_b, f.plant_a, f.plant_state, signals[k, 0])
-        out[k, 4] = speed
-        out[k, 5] = filter_sample(f.friction_b, f.friction_a, f.sign_state, sign)
-        out[k, 6] = filter_sample(f.friction_b, f.friction_a, f.speed_state, speed)
+        held = code[k] == HELD
+        _follow_gap(signals[k], held, usual, f)
+        _filter(signals[k], held, f, out[k])
+        if f.now.late[oldest, 3] > 0.0:
+            code[k] = HELD
         if not _within_limits(out[k]):
             _clear(f)
             out[k] = 0.0
