@@ -115,7 +115,7 @@ class Acquisition:
 
     def _counted(self, block: SampleBlock, arrived_ns: int) -> SampleBlock:
         self.samples += len(block)
-        self.watch.saw(block, arrived_ns)
+        self.watch.saw(block, arrived_ns, self.clock.unix_ns(0))
         return block
 
     def _restarted(self, restart: Restart, now_ns: int) -> list[Message]:

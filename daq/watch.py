@@ -79,8 +79,8 @@ class Watch:
         self._drift_severity: Severity = "info"
         self._outside: dict[str, int] = {}
 
-    def saw(self, block: SampleBlock, arrived_ns: int) -> None:
-        """Count published samples."""
+    def saw(self, block: SampleBlock, arrived_ns: int, unix_minus_monotonic_ns: int) -> None:
+        """Count published samples, whose Unix time has this difference to the monotonic clock."""
         if self._first_ns is None:
             self._first_ns, self._first_samples = arrived_ns, len(block)
         self._last_ns = arrived_ns
@@ -88,7 +88,8 @@ class Watch:
             self._boot = block.boot
             self._recent.clear()
         last = block.seq + len(block) - 1
-        self._recent.append((last, int(block.t_ns[-1])))
+        # By the monotonic clock: Unix time that is set forward would look like a pause.
+        self._recent.append((last, int(block.t_ns[-1]) - unix_minus_monotonic_ns))
         for column in block.channels:
             self._count_flags(column.name, column.quality)
         self._samples += len(block)

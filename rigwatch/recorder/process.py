@@ -19,7 +19,7 @@ from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
 from rigwatch.wire.bus import Bus, connect
-from rigwatch.wire.host import Heartbeat, Pulse, free_share
+from rigwatch.wire.host import Heartbeat, Pulse, free_share, use_few_pools
 from rigwatch.wire.messages import (
     ALARMS,
     ESTIMATES,
@@ -165,6 +165,7 @@ def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path:
         ConfigError: the configuration is invalid.
         BusError: the router's endpoint is invalid.
     """
+    use_few_pools()
     config = load_rig(path)
     bus = connect(config, process_name(config))
     try:

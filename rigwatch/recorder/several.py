@@ -9,7 +9,15 @@ from pathlib import Path
 
 from rigwatch.recorder.process import PROCESS, describe_run, process_name, record
 from rigwatch.wire.bus import SharedLinks, joined
-from rigwatch.wire.host import Heartbeat, Part, RigPulse, Work, run_side_by_side, set_at_hangup
+from rigwatch.wire.host import (
+    Heartbeat,
+    Part,
+    RigPulse,
+    Work,
+    run_side_by_side,
+    set_at_hangup,
+    use_few_pools,
+)
 from rigwatch.wire.rig_config import load_rig, rig_text
 from rigwatch.wire.several_rigs import valid_rigs
 
@@ -39,6 +47,7 @@ def run_several(paths: list[Path], stop: threading.Event, notes: str = "") -> li
     Raises:
         ConfigError: no configuration is valid, or two are of one rig.
     """
+    use_few_pools()
     folders: dict[Path, Path] = {}
     valid_rigs(paths)  # a wrong file is named by its rig's thread
     links = SharedLinks(len(paths))

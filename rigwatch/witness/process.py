@@ -17,7 +17,7 @@ from rigwatch.wire.bus import (
     serve_alarm_list,
 )
 from rigwatch.wire.errors import BusError
-from rigwatch.wire.host import Heartbeat
+from rigwatch.wire.host import Heartbeat, use_few_pools
 from rigwatch.wire.messages import (
     ALARMS,
     COMMANDS,
@@ -144,6 +144,7 @@ def run(config: RigConfig, stop: threading.Event) -> None:
     Raises:
         BusError: the bus cannot be reached.
     """
+    use_few_pools()
     bus = connect(config, PROCESS)
     try:
         witness = Witness(

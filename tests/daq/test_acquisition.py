@@ -71,6 +71,16 @@ def test_a_step_of_the_host_clock_is_reported_and_time_goes_on() -> None:
     assert after.t_ns[0] - before.t_ns[0] == pytest.approx(SECOND / 256, abs=1e4)
 
 
+def test_a_host_clock_that_is_set_forward_makes_no_slow_device() -> None:
+    acquiring, offset = acquisition()
+    for k in range(8):
+        offset[0] += 4704 * SECOND * (k == 5)
+        acquiring.tick(k * SECOND // 4, UP, {})
+        acquiring.update(raw_of(64 * k, 64))
+        acquiring.tick(k * SECOND // 4 + 1, UP, {})
+        assert acquiring.watch.state == "running"
+
+
 @pytest.mark.parametrize(("ppm", "severity"), [(1000.0, "warning"), (-6000.0, "error")])
 def test_drift_is_reported_once_with_its_severity(ppm: float, severity: str) -> None:
     acquiring, _ = acquisition()

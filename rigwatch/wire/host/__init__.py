@@ -1,8 +1,9 @@
-"""The host: notifications, priority, threads of rigs, ports, signals, files, disks, clocks."""
+"""The host: notifications, priority, threads of rigs, ports, signals, files, memory, clocks."""
 
 from rigwatch.wire.host.both_clocks import both_clocks
 from rigwatch.wire.host.disk_space import free_share
 from rigwatch.wire.host.ending import set_at_hangup, set_at_signal
+from rigwatch.wire.host.few_pools import use_few_pools
 from rigwatch.wire.host.heartbeat import Heartbeat
 from rigwatch.wire.host.ports import endpoint_address, free_port, free_ports, is_free
 from rigwatch.wire.host.realtime import DAQ, MONITOR, ROUTER, prepare_for_real_time, raise_priority
@@ -30,5 +31,6 @@ __all__ = [
     "run_side_by_side",
     "set_at_hangup",
     "set_at_signal",
+    "use_few_pools",
     "write_through",
 ]

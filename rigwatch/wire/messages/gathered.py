@@ -15,18 +15,17 @@ from numpy.typing import NDArray
 from rigwatch.wire.arrays import FloatArray, IntArray
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages.blocks import owned
+from rigwatch.wire.messages.layout import Layout
 from rigwatch.wire.messages.message_types import ByteArray, Column
 from rigwatch.wire.messages.packed import (
+    LARGEST_GATHERED,
     NO_QUALITY,
     UNFAMILIAR,
     K,
-    Layout,
     decode_block,
     layout_of,
 )
 
-LARGEST = 1 << 13
-"""Longest payload that is read here; a longer one is read column by column [bytes]."""
 Numbers = tuple[IntArray, FloatArray, ByteArray]
 """Times, values and quality, each with the samples in the last axis."""
 
@@ -73,8 +72,8 @@ def decode_joined(kind: type[K], payloads: Sequence[bytes]) -> tuple[list[K], in
 
 
 def _part(kind: type[K], data: bytes) -> _Part | None:
-    """None if it is too long, or its encoding is not the usual one."""
-    if len(data) > LARGEST:
+    """None if it is too large and read column by column, or its encoding is not the usual one."""
+    if len(data) > LARGEST_GATHERED:
         return None
     try:
         layout = layout_of(kind, data)

@@ -8,20 +8,26 @@ reports the error.
 """
 
 from collections.abc import Set
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigwatch.wire.messages import protobuf_schema as schema
+from rigwatch.wire.messages.layout import ColumnPlace, Layout, Span, UnfamiliarError, varint
 from rigwatch.wire.messages.message_types import ByteArray, Column, EstimateBlock, SampleBlock
 from rigwatch.wire.messages.protobuf import decode
+from rigwatch.wire.messages.recent import Recent
 
 NO_QUALITY: ByteArray = np.zeros(0, np.uint8)
 _F8, _I8, _U1 = np.dtype("<f8"), np.dtype("<i8"), np.dtype("u1")
-_MOST_LAYOUTS = 256
+LARGEST_GATHERED = 1 << 13
+"""Largest block whose offsets are needed one by one [bytes]."""
+MOST_LAYOUTS, LAYOUTS_ROOM = 48, 1 << 16
+"""Layouts kept in a generation, and the sum of their blocks' sizes [bytes].
+
+A live block has few lengths, but a busy machine makes some that hardly come again, and offsets take
+eight times the memory of a block. Little room is full within minutes; much of it fills for a year.
+"""
 _TAGS = {kind: schema.field_tags(kind) for kind in (SampleBlock, EstimateBlock)}
 _DEVICE, _BOOT, _SEQ = (_TAGS[SampleBlock][name] for name in ("device", "boot", "seq"))
 _TIMES = {
@@ -33,74 +39,10 @@ _COLUMNS = {
     EstimateBlock: _TAGS[EstimateBlock]["columns"],
 }
 _NAME, _UNIT, _VALUES, _QUALITY = schema.field_tags(Column).values()
-Span = tuple[int, int]
 K = TypeVar("K", SampleBlock, EstimateBlock)
-
-
-class UnfamiliarError(Exception):
-    """An encoding that this module leaves to the general decoder."""
-
-
 UNFAMILIAR = (UnfamiliarError, IndexError, ValueError)
 """What an encoding raises that is left to the general decoder."""
-
-
-@dataclass(frozen=True, slots=True)
-class _ColumnPlace:
-    """Offsets of a column's values and quality; -1 for none."""
-
-    name: str
-    unit: str
-    values: int
-    quality: int
-
-
-@dataclass(frozen=True)
-class Layout:
-    """The layout of blocks of one kind, length and set of columns.
-
-    Attributes:
-        samples: samples per block.
-        device: offsets of the device's name, None for an empty one.
-        boot, seq: offsets of these numbers, None for 0.
-        times: offsets of its integer arrays.
-        fixed: all other bytes, with their offsets.
-    """
-
-    samples: int
-    device: Span | None
-    boot: Span | None
-    seq: Span | None
-    times: tuple[int, ...]
-    columns: tuple[_ColumnPlace, ...]
-    fixed: tuple[tuple[int, int, bytes], ...]
-
-    @cached_property
-    def names(self) -> tuple[tuple[str, str, bool], ...]:
-        """Name and unit of each column, and whether it has quality."""
-        return tuple((place.name, place.unit, place.quality >= 0) for place in self.columns)
-
-    @cached_property
-    def numbers(self) -> NDArray[np.intp]:
-        """Offsets of all bytes of the times, then of the values, then of the quality."""
-        eights = [*self.times, *(place.values for place in self.columns)]
-        ones = [place.quality for place in self.columns if place.quality >= 0]
-        spans = [np.arange(at, at + _F8.itemsize * self.samples) for at in eights]
-        spans += [np.arange(at, at + self.samples) for at in ones]
-        return np.concatenate(spans)
-
-    def head(self, data: bytes) -> tuple[str, int, int]:
-        """Device, boot and number of the first sample.
-
-        Raises:
-            ValueError: the device's name is no text.
-        """
-        device = "" if self.device is None else data[slice(*self.device)].decode()
-        boot, seq = (0 if at is None else _integer(data, at) for at in (self.boot, self.seq))
-        return device, boot, seq
-
-
-_layouts: dict[tuple[type[Any], int, int], Layout] = {}
+_layouts: Recent[tuple[type[Any], int, int], Layout] = Recent(MOST_LAYOUTS, LAYOUTS_ROOM)
 
 
 def decode_block(kind: type[K], data: bytes) -> K:
@@ -126,15 +68,13 @@ def layout_of(kind: type[Any], data: bytes) -> Layout:
     if known is not None and _fits(known, data):
         return known
     layout = _layout(kind, data)
-    if len(_layouts) >= _MOST_LAYOUTS:
-        _layouts.clear()
-    _layouts[key] = layout
+    _layouts.put(key, layout, min(len(data), LARGEST_GATHERED))
     return layout
 
 
 def _fits(layout: Layout, data: bytes) -> bool:
     for span in (layout.boot, layout.seq):
-        if span is not None and _varint(data, span[0])[1] != span[1]:
+        if span is not None and varint(data, span[0])[1] != span[1]:
             return False
     return all(data[start:stop] == part for start, stop, part in layout.fixed)
 
@@ -180,14 +120,14 @@ def _layout(kind: type[Any], data: bytes) -> Layout:
     )
 
 
-def _column(data: bytes, span: Span, n: int) -> _ColumnPlace:
+def _column(data: bytes, span: Span, n: int) -> ColumnPlace:
     fields = _fields(data, span, {_NAME, _UNIT, _VALUES, _QUALITY})
     values = _only(fields.get(_VALUES))
     quality = _only(fields[_QUALITY]) if _QUALITY in fields else (-1, n - 1)
     if values[1] - values[0] != n * _F8.itemsize or quality[1] - quality[0] != n:
         raise UnfamiliarError
     name, unit = (_text(data, fields.get(tag)) for tag in (_NAME, _UNIT))
-    return _ColumnPlace(name, unit, values[0], quality[0])
+    return ColumnPlace(name, unit, values[0], quality[0])
 
 
 def _between(data: bytes, variable: list[Span]) -> tuple[tuple[int, int, bytes], ...]:
@@ -202,7 +142,7 @@ def _fields(data: bytes, within: Span, tags: Set[int]) -> dict[int, list[Span]]:
     found: dict[int, list[Span]] = {}
     while at < end:
         tag = data[at]
-        value, after = _varint(data, at + 1)
+        value, after = varint(data, at + 1)
         if tag not in tags:
             raise UnfamiliarError
         span = (at + 1, after) if tag in (_BOOT, _SEQ) else (after, after + value)
@@ -211,25 +151,6 @@ def _fields(data: bytes, within: Span, tags: Set[int]) -> dict[int, list[Span]]:
     if at != end:
         raise UnfamiliarError
     return found
-
-
-def _varint(data: bytes, at: int) -> tuple[int, int]:
-    value = shift = 0
-    while True:
-        byte = data[at]
-        at += 1
-        value |= (byte & 0x7F) << shift
-        shift += 7
-        if value >> 64 or shift > 70:
-            raise UnfamiliarError
-        if byte < 0x80:
-            return value, at
-
-
-def _integer(data: bytes, span: Span) -> int:
-    """A zigzag varint."""
-    value, _ = _varint(data, span[0])
-    return (value >> 1) ^ -(value & 1)
 
 
 def _only(spans: list[Span] | None) -> Span:

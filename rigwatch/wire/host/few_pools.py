@@ -1,0 +1,27 @@
+"""Memory of a process that runs for a year: in few pools, and large pieces given back at once.
+
+The C library gives each thread a pool of its own, sixteen in a process on the bus, and each grows
+to the most that its threads ever needed at a time. A large piece freed once also makes it take
+later ones from the pools, which they leave full of holes.
+"""
+
+import contextlib
+import ctypes
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8
+"""Options of mallopt(3)."""
+POOLS = 2
+LARGE = 1 << 17
+"""Size from which a piece has pages of its own [bytes]; the library's, which otherwise grows."""
+
+
+def use_few_pools() -> None:
+    """Set this up before threads are started; without effect where the library is not glibc."""
+    with contextlib.suppress(AttributeError, OSError, TypeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        for option, value in (
+            (_ARENA_MAX, POOLS),
+            (_MMAP_THRESHOLD, LARGE),
+            (_TRIM_THRESHOLD, LARGE),
+        ):
+            mallopt(option, value)

@@ -1,0 +1,95 @@
+"""Where the fields of a block of samples or estimates lie in its protobuf bytes."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+_EIGHT = 8
+"""Size of a time or value [bytes]."""
+Span = tuple[int, int]
+
+
+class UnfamiliarError(Exception):
+    """An encoding that this module leaves to the general decoder."""
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnPlace:
+    """Offsets of a column's values and quality; -1 for none."""
+
+    name: str
+    unit: str
+    values: int
+    quality: int
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The layout of blocks of one kind, length and set of columns.
+
+    Attributes:
+        samples: samples per block.
+        device: offsets of the device's name, None for an empty one.
+        boot, seq: offsets of these numbers, None for 0.
+        times: offsets of its integer arrays.
+        fixed: all other bytes, with their offsets.
+    """
+
+    samples: int
+    device: Span | None
+    boot: Span | None
+    seq: Span | None
+    times: tuple[int, ...]
+    columns: tuple[ColumnPlace, ...]
+    fixed: tuple[tuple[int, int, bytes], ...]
+
+    @cached_property
+    def names(self) -> tuple[tuple[str, str, bool], ...]:
+        """Name and unit of each column, and whether it has quality."""
+        return tuple((place.name, place.unit, place.quality >= 0) for place in self.columns)
+
+    @cached_property
+    def numbers(self) -> NDArray[np.intp]:
+        """Offsets of all bytes of the times, then of the values, then of the quality."""
+        eights = [*self.times, *(place.values for place in self.columns)]
+        ones = [place.quality for place in self.columns if place.quality >= 0]
+        spans = [np.arange(at, at + _EIGHT * self.samples) for at in eights]
+        spans += [np.arange(at, at + self.samples) for at in ones]
+        return np.concatenate(spans)
+
+    def head(self, data: bytes) -> tuple[str, int, int]:
+        """Device, boot and number of the first sample.
+
+        Raises:
+            ValueError: the device's name is no text.
+        """
+        device = "" if self.device is None else data[slice(*self.device)].decode()
+        boot, seq = (0 if at is None else integer(data, at) for at in (self.boot, self.seq))
+        return device, boot, seq
+
+
+def varint(data: bytes, at: int) -> tuple[int, int]:
+    """The unsigned number at an offset, and the offset after it.
+
+    Raises:
+        UnfamiliarError: it is longer than 64 bits.
+        IndexError: the bytes end before it does.
+    """
+    value = shift = 0
+    while True:
+        byte = data[at]
+        at += 1
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if value >> 64 or shift > 70:
+            raise UnfamiliarError
+        if byte < 0x80:
+            return value, at
+
+
+def integer(data: bytes, span: Span) -> int:
+    """A zigzag varint."""
+    value, _ = varint(data, span[0])
+    return (value >> 1) ^ -(value & 1)
