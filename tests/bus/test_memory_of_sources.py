@@ -1,10 +1,18 @@
 """What a reader remembers of sources stays the same however many there have been."""
 
 import pickle
+from functools import partial
 
+import pytest
+
+from rigwatch.wire.bus import complete_subscription
+from rigwatch.wire.bus.memory_transport import MemoryNetwork
+from rigwatch.wire.messages import ALARMS
 from rigwatch.wire.ordering import Owners, SampleOrder
 from tests.bus.samples import block
+from tests.bus.test_complete_subscription import alarm
 from tests.bus.test_sample_order import Bench
+from tests.waiting import PATIENCE, wait_until
 
 FEW, MANY = 200, 600
 
@@ -48,3 +56,25 @@ def test_boots_that_a_stranger_makes_up_fill_no_memory_and_hide_no_new_source() 
     order.on_block(block(0, 4, boot=8))
     order.on_token(7, 1, False)
     assert order.sources.current == 8
+
+
+def test_a_process_that_starts_anew_every_day_fills_no_memory(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(complete_subscription, "RUN_KEPT", 0.0)
+    network = MemoryNetwork()
+    listener = network.bus("r", "listener").listen(ALARMS)
+    heard: list[int] = []
+
+    def comes(day: int) -> bool:
+        heard.extend(alarm.seq for alarm in listener.drain())
+        return day in heard
+
+    for day in range(3):
+        monitor = network.bus("r", "monitor")
+        monitor.publish(ALARMS, alarm(day))
+        assert wait_until(partial(comes, day), PATIENCE, 0.01)
+        monitor.close()
+    listener.drain()
+    assert heard == [0, 1, 2]
+    assert len(listener._runs) == 0

@@ -32,6 +32,8 @@ SILENCE = 0.5
 """Time without a message after which the rings are queried for more [s]."""
 MOST_SENDERS = 16
 """Largest number of senders followed; a rig has fewer, so further ones are ignored."""
+RUN_KEPT = 600.0
+"""Time for which a run that has ended is remembered: nothing of it is on the way after that [s]."""
 Place = tuple[int, int]
 
 
@@ -71,6 +73,7 @@ class CompleteSubscription(Subscription):
         self._gaps_in_place, self._publish_gaps = gaps_in_place, publish_gaps
         self._senders: dict[str, Sender] = {}
         self._runs: dict[int, str] = {}
+        self._ended: dict[int, float] = {}
         self._assumed: dict[str, int] = {}
         self._early = EarlyMessages()
         self._inbox: SimpleQueue[Any] = SimpleQueue()
@@ -261,9 +264,20 @@ class CompleteSubscription(Subscription):
         peer = self._senders[process]
         if alive:
             self._runs[run] = process
+            self._ended.pop(run, None)
             self._handle(process, peer.appeared(run, since_ns, sender))
         else:
+            self._end_run(run)
             self._handle(process, peer.vanished(run, since_ns))
+
+    def _end_run(self, run: int) -> None:
+        """Note the end of a run, and forget those that ended long ago."""
+        now = time.monotonic()
+        self._ended.pop(run, None)
+        self._ended[run] = now
+        for gone in [one for one, at in self._ended.items() if now - at >= RUN_KEPT]:
+            del self._ended[gone]
+            self._runs.pop(gone, None)
 
     def _follow_new(self, token: "Token") -> bool:
         """Follow a process whose token was not seen at the start; an older run from now on."""
@@ -307,6 +321,7 @@ class CompleteSubscription(Subscription):
         first = message.seq
         reason = "the process ended before it could say who it was"
         self._runs[message.boot] = self._early.ended
+        self._end_run(message.boot)
         self._miss(self._early.ended, Loss(message.boot, first, first - 1, reason))
 
     def _look_for_more(self) -> None:
