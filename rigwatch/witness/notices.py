@@ -33,11 +33,6 @@ class Notice:
     minutes: float
 
 
-AGAIN_S = 600.0
-"""Time after its end in which an alarm that comes again, seen by nobody, is the same one [s]: a
-monitor that is restarted again and again would send a notice each time."""
-
-
 @dataclass(slots=True)
 class _Unseen:
     """An alarm that nobody has acknowledged, cleared or not.
