@@ -53,7 +53,7 @@ class ImportMapping(Section, frozen=True):
     skip_rows: Annotated[int, Meta(ge=0, description="rows of data left out at the start")] = 0
     max_hole: Annotated[
         float, Meta(gt=0, description="longest step that is bridged, in sample periods")
-    ] = 1.6
+    ] = 10.0
     flag_missing: Annotated[
         bool, Meta(description="take NaN and empty cells as invalid samples, not as an error")
     ] = False

@@ -1,5 +1,6 @@
 """Columns of a recorded session, and signals derived from them."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,13 +9,15 @@ from scipy.signal import butter, sosfiltfilt
 
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.errors import ModelError, nearest
-from rigwatch.wire.messages import Column
+from rigwatch.wire.messages import Column, SampleBlock
 from rigwatch.wire.messages import quality_flags as quality
 from rigwatch.wire.session import open_session
 from rigwatch.workbench.data.columns import Columns, bridged
 from rigwatch.workbench.data.signal_units import in_si
 from rigwatch.workbench.study import Derive, Span
 
+MOST_LOST = 0.5
+"""Share of samples up to which interpolated ones stand for lost rows; beyond, all are moved."""
 INTERPOLATED = "samples are interpolated, as their times are uneven"
 """How a recording is altered that an import has put on a uniform grid."""
 LARGEST = 1e70
@@ -41,11 +44,12 @@ def read_columns(folder: Path, span: Span) -> Columns:
             " two, one after the other"
         )
     values = {c.name: np.full(count, np.nan) for c in first.channels}
+    moved = _share_interpolated(blocks) > MOST_LOST
     for block in blocks:
         at = block.seq - first.seq
         for column in block.channels:
             into = values.setdefault(column.name, np.full(count, np.nan))
-            into[at : at + len(block)] = column.usable()
+            into[at : at + len(block)] = column.usable() if moved else _measured(column)
     begin, end = round(span.start / dt), min(count, round(min(span.end, 1e9) / dt))
     if end - begin < 2:
         raise ModelError(
@@ -54,13 +58,19 @@ def read_columns(folder: Path, span: Span) -> Columns:
         )
     units = {column.name: column.unit for block in blocks for column in block.channels}
     cut = {name: in_si(column[begin:end], units[name]) for name, column in values.items()}
-    moved = any(_is_resampled(column) for block in blocks for column in block.channels)
     measured = {name: _measurable(column) for name, column in cut.items()}
     return Columns(dt, measured, units, (INTERPOLATED,) if moved else ())
 
 
-def _is_resampled(column: Column) -> bool:
-    return bool(np.any(column.quality & quality.RESAMPLED))
+def _share_interpolated(blocks: Sequence[SampleBlock]) -> float:
+    """Share of the values that an import has interpolated."""
+    marks = np.concatenate([c.quality for block in blocks for c in block.channels])
+    return float(np.mean((marks & quality.RESAMPLED) != 0))
+
+
+def _measured(column: Column) -> FloatArray:
+    """The values; NaN where they are invalid, or interpolated where rows are lost."""
+    return np.where(column.quality & quality.RESAMPLED, np.nan, column.usable())
 
 
 def _measurable(column: FloatArray) -> FloatArray:

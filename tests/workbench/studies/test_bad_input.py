@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigwatch.commands import main
 from rigwatch.physics.engine.compile.compiled_system import compile_system
 from rigwatch.physics.engine.equations.model import Model
 from rigwatch.physics.engine.equations.system import compose
@@ -16,9 +17,11 @@ from rigwatch.wire.exchange.importing import import_file
 from rigwatch.wire.exchange.mapping import ImportMapping, parse_map_option
 from rigwatch.wire.typed_files.loading import parse
 from rigwatch.workbench.compare.compare import compare
+from rigwatch.workbench.data.recorded_columns import read_columns
 from rigwatch.workbench.fit.intervals import identifiability
 from rigwatch.workbench.study.creation import create
 from rigwatch.workbench.study.study import Study
+from rigwatch.workbench.study.study_file import Span
 from tests.workbench.machine import studied
 
 MODEL = """
@@ -181,3 +184,22 @@ def test_parameters_that_cannot_be_distinguished_are_named() -> None:
     notes = identifiability(fit(compile_system(system), recording, 100))
     assert set(notes) == {"k", "k2"}
     assert "tied to" in notes["k"]
+
+
+@pytest.mark.parametrize(
+    ("times", "missing"),
+    [
+        pytest.param([k for k in range(200) if k not in {50, 120, 121}], [50, 120, 121], id="lost"),
+        pytest.param([k + 0.2 * np.sin(k) for k in range(200)], [], id="jittered"),
+    ],
+)
+def test_rows_that_are_lost_are_missing_and_jittered_ones_are_not(
+    tmp_path: Path, times: list[float], missing: list[int]
+) -> None:
+    table = "t,y\n" + "".join(f"{10 * t},{t % 7}\n" for t in times)
+    (tmp_path / "log.csv").write_text(table)
+    given = ["--time", "t[ms]", "--map", "y=y[m]", "--rate", "100"]
+    assert main(["import", str(tmp_path / "log.csv"), str(tmp_path / "log.mcap"), *given]) == 0
+    found = read_columns(tmp_path, Span(session="log.mcap"))
+    assert np.flatnonzero(np.isnan(found.values["y"])).tolist() == missing
+    assert bool(found.altered) == (not missing)
