@@ -94,11 +94,8 @@ def _elsewhere(study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFlo
     Scores are along the base model's fit: where a drive clips its parameters may be so far off that
     they speak for a sensor that clips, and that a fit from there ends in a local minimum.
     """
-    accepted = in_order([row for row in rows if row.accepted])
-    if not accepted or accepted[0].fitted is None:
-        return []
-    best = accepted[0]
-    if own_floor(study, data, floor, best).reached(accepted[0].fitted.held_out):
+    best, left = _best_and_what_it_leaves(study, data, rows, floor)
+    if best is None or left <= floor.allowed:
         return []
     return [r for r in rows if r.effect == best.effect and r.fitted is None and not r.failure]
 
@@ -111,17 +108,23 @@ def _simpler_or_equal(
     A score is to first order in the strength: in a model that is far from linear, as a jet at a
     nearly empty tank, what a sensor's zero does to it is underrated.
     """
-    accepted = in_order([row for row in rows if row.accepted])
-    if not accepted or accepted[0].fitted is None:
-        return []
-    best = accepted[0]
-    own = own_floor(study, data, floor, best)
+    best, left = _best_and_what_it_leaves(study, data, rows, floor)
     # A short recording excuses what is left, but a rival that leaves less must be tried.
-    if own.ratio(accepted[0].fitted.held_out) <= own.usual:
+    if best is None or left <= floor.usual:
         return []
     waiting = [r for r in rows if r.fitted is None and not r.failure and not r.fitted_instead]
     likely = [r for r in waiting if r.port == best.port and r.p_value < LEVEL]
     return sorted((r for r in likely if r.free <= best.free), key=lambda r: r.p_value)[:MOST_MORE]
+
+
+def _best_and_what_it_leaves(
+    study: Study, data: Data, rows: Sequence[Ranked], floor: NoiseFloor
+) -> tuple[Ranked | None, float]:
+    """The best accepted row, and its held-out error over the floor; None without a fitted one."""
+    best = next(iter(in_order([row for row in rows if row.accepted])), None)
+    if best is None or best.fitted is None:
+        return None, 0.0
+    return best, own_floor(study, data, floor, best).ratio(best.fitted.held_out)
 
 
 def _substitute_of_failed(rows: Sequence[Ranked]) -> Ranked | None:
