@@ -148,7 +148,8 @@ def _remove(
 
 def _failures(store: Store, entry: Entry) -> Iterator[str]:
     """Remove the files of an entry; why one of them cannot be removed."""
-    beside = [] if entry.name == entry.files[0].name else [f"{entry.name}/{POSITIONS}"]
+    in_folder = entry.name != entry.files[0].name
+    beside = [f"{entry.name}/{name}" for name in POSITIONS if in_folder]
     for name in [*beside, *(file.name for file in entry.files)]:
         try:
             store.remove(name)

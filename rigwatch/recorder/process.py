@@ -14,7 +14,7 @@ from rigwatch.recorder.disk import DiskWatch
 from rigwatch.recorder.feed import Feed
 from rigwatch.recorder.folders import LONGEST_BREAK, choose
 from rigwatch.recorder.past import PastServer
-from rigwatch.recorder.positions import Positions, save_positions
+from rigwatch.recorder.positions import PositionFile, Positions
 from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
@@ -63,6 +63,7 @@ class Recorder:
         self._retention = Retention(self.settings, config.rig.id)
         self._told_at = -HEALTH_EVERY
         self._told_trouble = self._trouble()
+        self._positions = PositionFile(place.folder)
         self._kept: Positions = {}
         if not remote:
             bus.publish(RUN, run)
@@ -93,7 +94,7 @@ class Recorder:
             self._settled = t_ns - UNSETTLED_NS
         if not self.store.failure and taken != self._kept:
             self._kept = taken
-            save_positions(self.store.folder, taken)
+            self._positions.save(taken)
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:

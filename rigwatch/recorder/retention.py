@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigwatch.recorder.folders import sessions_of
-from rigwatch.recorder.positions import FILE
+from rigwatch.recorder.positions import FILES
 from rigwatch.recorder.retention_rules import expired
 from rigwatch.wire.messages import ALARMS, Event
 from rigwatch.wire.rig_config import RecorderSection
@@ -92,7 +92,8 @@ def _remove(path: Path) -> bool:
     try:
         path.unlink()
         if not any(path.parent.glob(f"*{SUFFIX}")):
-            (path.parent / FILE).unlink(missing_ok=True)
+            for name in FILES:
+                (path.parent / name).unlink(missing_ok=True)
             path.parent.rmdir()
     except OSError:
         return not path.exists()

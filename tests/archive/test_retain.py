@@ -22,7 +22,8 @@ def archive(tmp_path: Path) -> Path:
     root = tmp_path / "archive"
     write_session(root / "old" / "000001.mcap")
     write_session(root / "old" / "000002.mcap", start_s=4, boot=2)
-    (root / "old" / POSITIONS).write_text("{}")
+    for name in POSITIONS:
+        (root / "old" / name).write_text("{}")
     write_session(root / "alarmed.mcap", start_s=9, alarm="dry_friction")
     write_session(root / "middle.mcap", start_s=50 * DAY_S)
     write_session(root / "young.mcap", start_s=90 * DAY_S)

@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from rigwatch.recorder import POSITIONS
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.retention_rules import DAY
 from rigwatch.wire.messages import Alarm, Event
@@ -58,7 +59,8 @@ def left(root: Path) -> set[str]:
 def test_age_alarms_and_other_rigs_decide_what_goes(tmp_path: Path) -> None:
     old, current = tmp_path / "bench-20260101T000000Z", tmp_path / "bench-20260301T000000Z"
     segment(old, 1, age_days=40)
-    (old / "positions.json").write_text("{}")
+    for name in POSITIONS:
+        (old / name).write_text("{}")
     segment(current, 1, age_days=40)
     segment(current, 2, age_days=40, alarm=True)
     segment(current, 3, age_days=40, closed=False)
