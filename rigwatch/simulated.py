@@ -14,6 +14,7 @@ from daq.adapter import RawBlock
 from daq.conditioning import Conditioner
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.messages import SampleBlock
+from rigwatch.wire.new_file import new_file
 from rigwatch.wire.rig_config import ChannelSection, RigConfig
 from rigwatch.wire.session import SessionWriter, run_info
 from sim_plant.parameters import RigParameters
@@ -90,8 +91,8 @@ def write_session(
     notes = f"simulated rig, scenario {loaded.name}, seed {seed}"
     rate = loaded.plant.sample_rate
     rig = config.rig.id if config else "simulated"
-    with SessionWriter(out, run_info(rig, rate, t_ns=EPOCH_NS, notes=notes)) as writer:
-        count = 0
+    run, count = run_info(rig, rate, t_ns=EPOCH_NS, notes=notes), 0
+    with new_file(Path(out)) as part, SessionWriter(part, run, sync=False) as writer:
         for block in blocks:
             writer.write(block)
             count += len(block)

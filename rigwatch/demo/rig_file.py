@@ -9,6 +9,7 @@ from msgspec import structs
 
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.host import endpoint_address, free_port, is_free
+from rigwatch.wire.new_file import write_new
 from rigwatch.wire.rig_config import (
     BusSection,
     DaqSection,
@@ -57,7 +58,7 @@ def write_rig_file(source: Path, folder: Path, viewer: str) -> Path:
     # The time makes each run's file unique: the recorder continues the last session if
     # the configuration is unchanged.
     head = f"# Made by `rigwatch demo` from {source}, {time.strftime('%Y-%m-%d %H:%M:%S')}.\n"
-    target.write_text(head + as_toml(msgspec.to_builtins(own)), encoding="utf-8")
+    write_new(target, head + as_toml(msgspec.to_builtins(own)), replace=True)
     load_rig(target)
     return target
 

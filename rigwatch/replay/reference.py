@@ -16,6 +16,7 @@ from rigwatch.replay.run import judge
 from rigwatch.replay.source import items
 from rigwatch.wire.arrays import FloatArray
 from rigwatch.wire.messages import Alarm, Column, EstimateBlock, Event, RunInfo, merged, pieces
+from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session import LARGEST_BLOCK, Session, SessionWriter, open_session
 
 CONDITION = "condition"
@@ -80,8 +81,7 @@ def write_reference(path: Path, run: RunInfo, output: Output) -> None:
     Raises:
         SessionError: it cannot be written.
     """
-    path.unlink(missing_ok=True)
-    with SessionWriter(path, run, sync=False) as writer:
+    with new_file(path, replace=True) as part, SessionWriter(part, run, sync=False) as writer:
         for block in output.blocks:
             for piece in pieces(_rounded(block), LARGEST_BLOCK):
                 writer.write(piece)

@@ -5,9 +5,10 @@ session ─▶ samples, commands ─▶ RigMonitor ─▶ estimates, alarms ─�
 
 import time
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Self
 
 from monitor.alarms import Announcement
 from monitor.model import RigModel, parse_model
@@ -24,6 +25,7 @@ from rigwatch.wire.messages import (
     ModelChange,
     SampleBlock,
 )
+from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session import MERGED_SAMPLES, LostSpan, Session, SessionWriter
 
 PACED_BLOCK = 0.05
@@ -156,10 +158,10 @@ def replay(
     rate = session.info.sample_rate_hz
     size = max(1, int(PACED_BLOCK * speed * rate)) if speed > 0 else MERGED_SAMPLES
     found = _paced(items(session, *span, size), speed)
-    with _Sink(session, out) as sink:
+    with _sink(session, out) as write:
         for judged in judge(session, monitor, found):
             done.count(judged)
-            sink.write(judged)
+            write(judged)
             for announcement in judged.announced:
                 if isinstance(announcement, Alarm):
                     say(announcement)
@@ -179,34 +181,22 @@ def _paced(found: Iterator[Item], speed: float) -> Iterator[Item]:
         yield item
 
 
-class _Sink:
-    """The session file that a replay writes, or nothing."""
+@contextmanager
+def _sink(session: Session, out: Path | None) -> Iterator[Callable[[Judged], None]]:
+    """Writes what was judged to a new session file, or nowhere."""
+    if out is None:
+        yield lambda _: None
+        return
+    notes = f"replayed from {session.path.name}"
+    run = session.info
+    run = replace(run, notes=f"{run.notes}; {notes}" if run.notes else notes)
+    with new_file(out) as part, SessionWriter(part, run, sync=False) as writer:
+        yield partial(_write, writer)
 
-    def __init__(self, session: Session, out: Path | None) -> None:
-        self._writer: SessionWriter | None = None
-        if out is not None:
-            notes = f"replayed from {session.path.name}"
-            run = session.info
-            run = replace(run, notes=f"{run.notes}; {notes}" if run.notes else notes)
-            self._writer = SessionWriter(out, run, sync=False)
 
-    def write(self, judged: Judged) -> None:
-        if self._writer is None:
-            return
-        self._writer.write(judged.item)
-        if judged.watched is not None:
-            self._writer.write(judged.watched.estimates)
-        for announcement in judged.announced:
-            self._writer.write(announcement)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if self._writer is None:
-            return
-        if kind is None:
-            self._writer.close()
-        else:
-            self._writer.abandon()
-            self._writer.path.unlink(missing_ok=True)
+def _write(writer: SessionWriter, judged: Judged) -> None:
+    writer.write(judged.item)
+    if judged.watched is not None:
+        writer.write(judged.watched.estimates)
+    for announcement in judged.announced:
+        writer.write(announcement)

@@ -24,6 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     """0 on success."""
     from rigwatch.physics.engine.equations import library
     from rigwatch.wire.errors import ModelError, nearest
+    from rigwatch.wire.new_file import write_new
     from rigwatch.workbench.catalogue import described, effect_curves, plotted, text_plot
 
     name, known = arguments.name, library()
@@ -43,7 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
         for number, curve in enumerate(curves):
             file = arguments.save.with_suffix("")
             file = file.with_name(f"{file.name}{f'_{number + 1}' if number else ''}.svg")
-            file.write_text(plotted(curve, f"{name}: {curve.up} against {curve.across}"), "utf-8")
+            drawn = plotted(curve, f"{name}: {curve.up} against {curve.across}")
+            write_new(file, drawn, replace=True)
             say(f"drawn: {file}")
     return 0
 

@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 if nothing is in a fit's way, 1 otherwise."""
     from rigwatch.physics.engine.equations import model_named
+    from rigwatch.wire.new_file import write_new
     from rigwatch.workbench.catalogue import model_report, plotted, text_plot
 
     check_folder(arguments.save)
@@ -45,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         for number, curve in enumerate(report.run):
             file = arguments.save.with_suffix("")
             file = file.with_name(f"{file.name}{f'_{number + 1}' if number else ''}.svg")
-            file.write_text(plotted(curve, f"{arguments.model}: {curve.up}"), "utf-8")
+            write_new(file, plotted(curve, f"{arguments.model}: {curve.up}"), replace=True)
             say(f"drawn: {file}")
     return 0 if report.fine else 1
 

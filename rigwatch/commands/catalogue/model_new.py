@@ -22,14 +22,13 @@ def run(arguments: argparse.Namespace) -> int:
     """0 on success."""
     from rigwatch.physics.engine.equations import model_named, model_text
     from rigwatch.wire.errors import ModelError
+    from rigwatch.wire.new_file import write_new
 
     file, like = arguments.file, arguments.like
-    if file.exists():
-        raise ModelError(f"{file}: found a file, expected a name that is free")
     check_folder(file)
     name = model_named(like).name
     text = model_text(like).replace(f'name = "{name}"', f'name = "{file.stem}"', 1)
-    file.write_text(text, "utf-8")
+    write_new(file, text, raises=ModelError)
     if arguments.json:
         print_json({"file": file, "like": like})
     else:

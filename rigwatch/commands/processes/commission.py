@@ -65,6 +65,8 @@ def run(arguments: argparse.Namespace) -> int:
     from monitor.commissioning import CommissionSettings, commission_best
     from monitor.model import model_text
     from monitor.signals import commission_inertia
+    from rigwatch.wire.errors import ModelError
+    from rigwatch.wire.new_file import write_new
 
     if arguments.plant == "inertia":
         model = commission_inertia(recordings, window=arguments.window, hop=arguments.hop)
@@ -73,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
             band=tuple(arguments.band), window=arguments.window or 32, hop=arguments.hop
         )
         model = commission_best(recordings, settings, arguments.scheme, arguments.equations, say)
-    _write(arguments.output, model_text(model))
+    write_new(arguments.output, model_text(model), replace=True, raises=ModelError)
     if arguments.json:
         print_json(_summary(model, arguments.output))
     else:
@@ -99,15 +101,6 @@ def _read(role: "Role", path: Path) -> "Recording":
     say(f"reading {path} ({role})")
     session = open_session(path)
     return joined(role, path.name, session.samples(), session.info.sample_rate_hz)
-
-
-def _write(path: Path, text: str) -> None:
-    from rigwatch.wire.errors import ModelError, reason_of
-
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ModelError(f"{path}: found {reason_of(error)}, expected a file to write") from error
 
 
 def _summary(model: "RigModel", output: Path) -> dict[str, Any]:

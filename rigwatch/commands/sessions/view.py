@@ -90,6 +90,7 @@ def _draw(arguments: argparse.Namespace, say: Callable[[str], None], url: str) -
     from rigwatch.commands.common import watched as _watched
     from rigwatch.dashboard import recording
     from rigwatch.dashboard.board import Facts
+    from rigwatch.dashboard.drawn_to import drawn_to
     from rigwatch.wire.session import open_session
 
     session = open_session(arguments.session)
@@ -101,11 +102,8 @@ def _draw(arguments: argparse.Namespace, say: Callable[[str], None], url: str) -
     windows = recording.windows_for(_watched.length_of(session, span))
     messages = _watched.messages_of(session, span, model if compute else None)
     stream = recording.new_stream(session.path.stem)
-    if url:
-        stream.connect_grpc(url)
-    else:
-        stream.save(arguments.save)
     bare = arguments.picture is not None
-    return recording.draw(
-        messages, stream, facts, windows, lambda n: say(f"{n} samples drawn"), bare=bare
-    )
+    with drawn_to(stream, url, arguments.save):
+        return recording.draw(
+            messages, stream, facts, windows, lambda n: say(f"{n} samples drawn"), bare=bare
+        )

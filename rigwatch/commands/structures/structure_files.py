@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigwatch.commands.common import file_or_name, say
-from rigwatch.wire.errors import ModelError, reason_of
+from rigwatch.wire.errors import ModelError
+from rigwatch.wire.new_file import write_new
 
 if TYPE_CHECKING:
     from rigwatch.physics.engine.equations import Model
@@ -61,10 +62,7 @@ def write_page(path: Path, text: str) -> None:
     Raises:
         ModelError: it cannot be written.
     """
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ModelError(f"{path}: {reason_of(error)}, cannot be written") from error
+    write_new(path, text, replace=True, raises=ModelError)
     say(f"report: {path}")
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from rigwatch.commands.common import file_or_name, print_json
 from rigwatch.commands.structures.structure_files import add_report, write_page
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.new_file import write_new
 
 HELP = "natural modes of a structure and the share of each spring in their strain energy"
 EXAMPLE = """\
@@ -47,7 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.families:
         energy = energy.grouped(by_family(energy.springs))
     if arguments.svg:
-        arguments.svg.write_text(shares_svg(energy, f"{structure.name}: shares of strain energy"))
+        drawn = shares_svg(energy, f"{structure.name}: shares of strain energy")
+        write_new(arguments.svg, drawn, replace=True)
     if arguments.json:
         rows = [dict(zip(energy.springs, row, strict=True)) for row in energy.shares.tolist()]
         print_json({"omega": energy.omega.tolist(), "shares": rows, "ranking": energy.ranking()})

@@ -146,14 +146,12 @@ def _draw(
 ) -> None:
     from rigwatch.commands.workbench import write_views
     from rigwatch.dashboard import study_view
+    from rigwatch.dashboard.drawn_to import drawn_to
 
     def draw(url: str, *, bare: bool = False) -> None:
         stream = study_view.new_stream(arguments.record.stem)
-        if url:
-            stream.connect_grpc(url)
-        else:
-            stream.save(arguments.save)
-        study_view.draw_study(stream, seconds, outputs, story, judged=judged, bare=bare)
+        with drawn_to(stream, url, arguments.save):
+            study_view.draw_study(stream, seconds, outputs, story, judged=judged, bare=bare)
 
     for file in (arguments.save, arguments.picture):
         if file:

@@ -70,15 +70,13 @@ def _show(
     arguments: argparse.Namespace, study: "Study", found: "list[Stage]", shown: "list[Signals]"
 ) -> None:
     from rigwatch.dashboard import study_view
+    from rigwatch.dashboard.drawn_to import drawn_to
 
     def draw(url: str, *, bare: bool = False) -> None:
         stream = study_view.new_stream(study.folder.resolve().name)
-        if url:
-            stream.connect_grpc(url)
-        else:
-            stream.save(arguments.save)
         outputs = _outputs(study, found, shown)
-        study_view.draw_study(stream, shown[0].time, outputs, _story(found), bare=bare)
+        with drawn_to(stream, url, arguments.save):
+            study_view.draw_study(stream, shown[0].time, outputs, _story(found), bare=bare)
 
     if arguments.picture or arguments.save:
         write_views(draw, float(shown[0].time[-1]), arguments.picture)

@@ -7,6 +7,8 @@ from pathlib import Path
 from PIL import Image
 from rerun.experimental import ViewerClient
 
+from rigwatch.wire.new_file import new_file
+
 _EMPTY_TOP = 36
 """Height of the viewer's own bar [pixels]."""
 _FRAMES, _FRAME = 48, 0.125
@@ -22,4 +24,5 @@ def save_picture(client: ViewerClient, path: Path) -> None:
     picture = Image.open(io.BytesIO(shown)).convert("RGB")
     picture = picture.crop((0, _EMPTY_TOP, *picture.size))
     # The viewer compresses pictures for speed; better compression saves a third.
-    picture.save(path, format="PNG", optimize=True)
+    with new_file(path, replace=True) as part:
+        picture.save(part, format="PNG", optimize=True)

@@ -17,7 +17,8 @@ import numpy as np
 from rigwatch.physics.engine.equations import Model
 from rigwatch.physics.engine.fit import Recording
 from rigwatch.wire.arrays import FloatArray
-from rigwatch.wire.errors import ImportDataError, ModelError, one_line, reason_of
+from rigwatch.wire.errors import ImportDataError, ModelError, one_line
+from rigwatch.wire.new_file import new_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,18 +117,17 @@ def write_record(record: Record, path: Path | str) -> None:
         ImportDataError: the file cannot be written.
     """
     file, time = Path(path), np.arange(len(record)) * record.dt
-    try:
+    with new_file(file, replace=True, raises=ImportDataError) as part:
         if file.suffix == ".npz":
             arrays: dict[str, Any] = {"t": time, **record.columns}
-            np.savez_compressed(file, **arrays)
+            with part.open("wb") as whole:
+                np.savez_compressed(whole, **arrays)
             return
-        with file.open("w", newline="", encoding="utf-8") as stream:
+        with part.open("w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream)
             writer.writerow(["t", *record.columns])
             table = np.column_stack([time, *record.columns.values()])
             writer.writerows([[repr(cell) for cell in row] for row in table.tolist()])
-    except OSError as error:
-        raise ImportDataError(f"{file}: {reason_of(error)}, cannot be written") from error
 
 
 def _from_npz(file: Path) -> dict[str, FloatArray]:

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from rigwatch.wire.errors import MissingExtraError, SessionError, reason_of
+from rigwatch.wire.errors import MissingExtraError, SessionError
 from rigwatch.wire.exchange.session_columns import Array, table_columns
 from rigwatch.wire.messages import Block
+from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session import Session
 
 LARGEST_MAT = 1 << 31
@@ -55,21 +56,14 @@ def export_session(
     if writer is None:
         known = ", ".join(_WRITERS)
         raise SessionError(f"{target}: unknown format {target.suffix!r}, expected one of {known}")
-    if target.exists():
-        raise SessionError(f"{target}: the file exists already and is not overwritten")
     deliver = session.estimates if estimates else session.samples
-    tables = _tables(deliver(device, start, end), session.path)
-    first = next(tables, None)
-    if first is None:
-        kind = "estimates" if estimates else "samples"
-        raise SessionError(f"{session.path}: found no {kind} to export")
-    try:
-        rows = writer(target, first, tables)
-    except BaseException as error:
-        target.unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise SessionError(f"{target}: cannot be written: {reason_of(error)}") from error
-        raise
+    with new_file(target) as part:
+        tables = _tables(deliver(device, start, end), session.path)
+        first = next(tables, None)
+        if first is None:
+            kind = "estimates" if estimates else "samples"
+            raise SessionError(f"{session.path}: found no {kind} to export")
+        rows = writer(part, first, tables)
     return Exported(target, rows, tuple(first))
 
 
@@ -102,7 +96,7 @@ def _length(table: dict[str, Array]) -> int:
 
 def _write_csv(target: Path, first: dict[str, Array], rest: Tables) -> int:
     rows = 0
-    with target.open("x", newline="", encoding="utf-8") as file:
+    with target.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(first)
         for table in _all(first, rest):
@@ -138,7 +132,7 @@ def _write_mat(target: Path, first: dict[str, Array], rest: Tables) -> int:
     content: dict[str, Any] = {names[name]: column.reshape(-1, 1) for name, column in whole.items()}
     titles = [f"{variable}={name}" for name, variable in names.items()]
     content["column_titles"] = np.array(titles, dtype=object)
-    savemat(target, content, long_field_names=True, do_compression=True)
+    savemat(target, content, appendmat=False, long_field_names=True, do_compression=True)
     return _length(whole)
 
 

@@ -18,6 +18,7 @@ from rigwatch.wire.exchange.table_files import read_table
 from rigwatch.wire.exchange.tables import Table
 from rigwatch.wire.messages import Column, EstimateBlock, SampleBlock, blocks
 from rigwatch.wire.messages import quality_flags as quality
+from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session import LARGEST_BLOCK, SessionWriter, run_info
 
 
@@ -202,7 +203,7 @@ def _write(
     notes = "; ".join(filter(None, (*remarks, mapping.notes)))
     began = int(whole[0].t_ns[0]) if whole else time.time_ns()
     run = run_info(mapping.rig, rate, t_ns=began, notes=notes)
-    with SessionWriter(target, run, sync=False) as writer:
+    with new_file(target) as part, SessionWriter(part, run, sync=False) as writer:
         for block in whole:
             for piece in blocks.pieces(block, LARGEST_BLOCK):  # type: ignore[type-var]
                 writer.write(piece)

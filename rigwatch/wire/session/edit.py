@@ -10,6 +10,7 @@ import numpy as np
 
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm, Message, RunInfo, SampleBlock, blocks
+from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session.reader import LostSpan, Recorded, Session
 from rigwatch.wire.session.segment import SUFFIX
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
@@ -137,13 +138,9 @@ def copy_messages(messages: Iterable[Recorded], run: RunInfo, target: Path) -> W
     Raises:
         SessionError: the target exists or cannot be written.
     """
-    writer = SessionWriter(target, run, sync=False)
-    try:
-        with writer:
-            return _copy(messages, run, writer)
-    except BaseException:
-        target.unlink(missing_ok=True)
-        raise
+    with new_file(target) as part, SessionWriter(part, run, sync=False) as writer:
+        written = _copy(messages, run, writer)
+    return replace(written, path=target)
 
 
 def _copy(messages: Iterable[Recorded], run: RunInfo, writer: SessionWriter) -> Written:

@@ -9,6 +9,7 @@ import shutil
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError, reason_of
+from rigwatch.wire.new_file import new_file
 
 FOLDER = "configs"
 KINDS = ("imports", "plants", "rigs", "scenarios", "structures", "studies")
@@ -82,8 +83,9 @@ def copy_out(folder: Path) -> tuple[list[Path], list[Path]]:
             continue
         try:
             to.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(file, to)
         except OSError as error:
             raise ConfigError(to, "", reason_of(error), "a folder to write") from error
+        with new_file(to) as part:
+            shutil.copyfile(file, part)
         copied.append(to)
     return copied, kept

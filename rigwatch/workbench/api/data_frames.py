@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigwatch.wire.errors import ImportDataError, MissingExtraError
+from rigwatch.wire.new_file import new_file
 
 EXTRA = "notebook"
 
@@ -66,7 +67,7 @@ def columns_from(table: Any, name: str) -> NamedArrays:
 
 def write_csv(columns: NamedArrays, path: Path) -> None:
     """Write columns as a CSV file, every number with all its digits."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with new_file(path, replace=True) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*(value.tolist() for value in columns.values()), strict=True))

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rigwatch.page import page
-from rigwatch.wire.errors import ModelError, reason_of
+from rigwatch.wire.errors import ModelError
+from rigwatch.wire.new_file import write_new
 from rigwatch.workbench.compare import locate
 from rigwatch.workbench.explain import explained
 from rigwatch.workbench.report import charts, sections
@@ -54,8 +55,5 @@ def write_report(
         ModelError: data have changed or do not suit the model, or the file cannot be written.
     """
     material = gather(study, progress)
-    try:
-        path.write_text(report_html(material), encoding="utf-8")
-    except OSError as error:
-        raise ModelError(f"{path}: {reason_of(error)}, expected a file to write") from error
+    write_new(path, report_html(material), replace=True, raises=ModelError)
     return material

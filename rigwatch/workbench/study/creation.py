@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 from rigwatch.wire.errors import ConfigError
+from rigwatch.wire.new_file import write_new
 from rigwatch.wire.typed_files import load
 from rigwatch.workbench.study.folder import FILE, LEDGER
 from rigwatch.workbench.study.ledger import append
@@ -36,7 +37,7 @@ def start_study(folder: Path, text: str) -> Study:
     check_new(folder)
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        (folder / FILE).write_text(text, encoding="utf-8")
+        write_new(folder / FILE, text)
         study = open_study(folder)
         append(study, "new")
     except BaseException:
