@@ -90,7 +90,7 @@ class AlarmJournal:
         A complete journal is at the path at all times: a kill or power cut loses nothing.
         """
         beside = self.path.with_name(f"{self.path.name}.new")
-        beside.write_bytes(b"".join(map(_line, self._newest.values())))
+        beside.write_bytes(journal_text(self._newest.values()))
         file = os.open(beside, os.O_RDWR | os.O_APPEND)
         try:
             os.fsync(file)
@@ -144,6 +144,11 @@ def read_journal(path: Path | str) -> tuple[list[AlarmRecord], int]:
         raise SessionError(f"{path}: alarm journal cannot be read: {reason_of(error)}") from error
     records = [record for record in parsed if record is not None]
     return records, len(parsed) - len(records)
+
+
+def journal_text(records: Iterable[AlarmRecord]) -> bytes:
+    """A journal of `records` as this version writes it."""
+    return b"".join(map(_line, records))
 
 
 def last_records(records: Iterable[AlarmRecord]) -> list[AlarmRecord]:

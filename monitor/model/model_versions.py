@@ -11,6 +11,7 @@ import hashlib
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import cast
 
 import msgspec
 
@@ -87,6 +88,23 @@ def install(path: Path, text: str, t_ns: int, author: Author) -> None:
         replace_file(_version(path, number), before)
         replace_file(path, text)
         _note(path, "promote", text, t_ns, author)
+    except OSError as error:
+        raise ConfigError(path, "", reason_of(error), "a file to write") from error
+
+
+def rewrite(path: Path, text: str, t_ns: int) -> None:
+    """Write the model in force in another form; its line of the history is repeated with its hash.
+
+    Raises:
+        ConfigError: a file cannot be read or written.
+    """
+    now = digest_of(path)
+    line = next((one for one in reversed(history(path)) if one.sha256 == now), None)
+    try:
+        replace_file(path, text)
+        if line is not None:
+            author = Author(line.user, line.why, cast("Identity", line.identity or NOT_PROVED))
+            _note(path, line.step, text, t_ns, author)
     except OSError as error:
         raise ConfigError(path, "", reason_of(error), "a file to write") from error
 

@@ -7,7 +7,8 @@ The cursor survives a kill, `model_requests` applies model changes between two s
 `several` runs the monitors of several rigs in one process.
 """
 
-from monitor.process.loop import monitor_section, run
+from monitor.process.cursor import stored_position
+from monitor.process.loop import monitor_section, run, suitable_model
 from monitor.process.several import run_several
 
-__all__ = ["monitor_section", "run", "run_several"]
+__all__ = ["monitor_section", "run", "run_several", "stored_position", "suitable_model"]

@@ -39,15 +39,11 @@ class Cursor:
 
     def read(self) -> tuple[int, int] | None:
         """The stored position; None if there is none."""
-        data = self._bytes[:]
-        (crc,) = _CRC.unpack_from(data, _POSITION.size)
-        if crc == 0 or crc != zlib.crc32(data[: _POSITION.size]):
-            return None
-        boot, seq = _POSITION.unpack_from(data)
-        if not -1 <= seq <= LARGEST_SEQ:
+        found = stored_position(self._bytes[:])
+        if found and not -1 <= found[1] <= LARGEST_SEQ:
             self.set_aside()
             return None
-        return boot, seq
+        return found
 
     def set_aside(self) -> None:
         """Move the invalid content to a file beside it for inspection, and start afresh."""
@@ -63,6 +59,16 @@ class Cursor:
     def close(self) -> None:
         """Close the file."""
         self._bytes.close()
+
+
+def stored_position(data: bytes) -> tuple[int, int] | None:
+    """The (boot, seq) in a file's bytes; None if there is none, or they are damaged."""
+    if len(data) != _SIZE or data[_POSITION.size :] == bytes(_CRC.size):
+        return None
+    if _CRC.unpack_from(data, _POSITION.size)[0] != zlib.crc32(data[: _POSITION.size]):
+        return None
+    boot, seq = _POSITION.unpack_from(data)
+    return boot, seq
 
 
 def _mapped(file: int) -> mmap.mmap:

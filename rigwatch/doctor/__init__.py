@@ -4,6 +4,7 @@ finding.py   one result: ok, warn or fail, with a remedy
 machine.py   Python, packages, compiled kernels, clock, scheduling, disk
 viewer.py    how the dashboard can be displayed
 rig.py       a configuration: the files it names, ports, device
+kept*.py     the files that processes keep: read as they read them, and mended
 """
 
 from rigwatch.doctor.alive import check_alive

@@ -7,27 +7,59 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rigwatch.doctor.finding import Finding, judged
+from rigwatch.doctor.kept import mended, users_of
 from rigwatch.wire.access import days_left, ending_soon, in_force, key_files, read_register
-from rigwatch.wire.errors import KeysError, RigwatchError
+from rigwatch.wire.errors import ConfigError, KeysError
 from rigwatch.wire.host import endpoint_address, is_free
 from rigwatch.wire.rig_config import ModbusRtuSection, RigConfig, SerialSection, load_rig
 
 LOOPBACK = "127.0.0.1"
 
 
-def check_rig(path: Path) -> Iterator[Finding]:
-    """The configuration at `path` and everything that it names."""
-    try:
-        config = load_rig(path)
-    except RigwatchError as error:
+def check_rig(path: Path, *, fix: bool = False) -> Iterator[Finding]:
+    """The configuration at `path` and everything that it names.
+
+    Args:
+        path: the configuration.
+        fix: mend the files that can be mended, and keep what they were beside them.
+
+    Raises:
+        ConfigError: a file cannot be mended, or a process uses one.
+    """
+    # The code of the processes takes seconds to import, which a check of health does not have.
+    from rigwatch.doctor.kept_files import kept_configuration
+
+    kept = kept_configuration(path)
+    while fix and kept.mend is not None:
+        yield mended(kept)
+        kept = kept_configuration(path)
+    if kept.level == "fail" and not kept.change:
         remedy = f"correct {path}; docs/configuration.md lists every key"
-        yield Finding("configuration", "fail", str(error), remedy)
+        yield Finding("configuration", "fail", kept.text, remedy)
         return
-    yield Finding("configuration", "ok", f"{path}: rig {config.rig.id}")
+    yield kept.finding(path)
+    if kept.level == "fail":
+        return
+    config = load_rig(path)
+    yield from check_kept(config, path, fix=fix)
     yield from check_files(config)
     yield from check_keys(config)
     yield from check_ports(config)
     yield from check_device(config)
+
+
+def check_kept(config: RigConfig, path: Path, *, fix: bool) -> Iterator[Finding]:
+    """The files that the processes keep, mended if `fix`; see `check_rig`."""
+    from rigwatch.doctor.kept_files import in_use, kept_files
+
+    for kept in kept_files(config, path):
+        if not fix or kept.mend is None:
+            yield kept.finding(path)
+            continue
+        if users := users_of(set(in_use(config))):
+            found = f"process {', '.join(map(str, users))} at work on this rig's files"
+            raise ConfigError(kept.path, "", found, "the rig's processes to be stopped for --fix")
+        yield mended(kept)
 
 
 def check_keys(config: RigConfig) -> Iterator[Finding]:
@@ -53,15 +85,16 @@ def check_keys(config: RigConfig) -> Iterator[Finding]:
 
 
 def check_files(config: RigConfig) -> Iterator[Finding]:
-    """The files that the configuration names exist."""
+    """The scenario is one that the simulated device can play."""
     if config.plant is not None:
-        scenario = Path(config.plant.scenario)
-        yield judged("scenario", scenario.is_file(), f"{scenario}", "correct plant.scenario")
-    if config.monitor is not None:
-        model = Path(config.monitor.model)
-        remedy = "make it with rigwatch commission, or correct monitor.model"
-        text = f"{model}" if model.is_file() else f"{model}: no such file"
-        yield judged("model", model.is_file(), text, remedy)
+        from sim_plant.scenario import load_scenario
+
+        try:
+            load_scenario(config.plant.scenario)
+        except ConfigError as error:
+            yield Finding("scenario", "fail", str(error), "correct it, or plant.scenario")
+        else:
+            yield Finding("scenario", "ok", config.plant.scenario)
 
 
 def check_ports(config: RigConfig) -> Iterator[Finding]:

@@ -14,13 +14,20 @@ from rigwatch.wire.rig_config import load_rig
 HELP = "check the installation, ports, devices and a configuration"
 EXAMPLE = """  rigwatch doctor
   rigwatch doctor configs/demo.toml
-  rigwatch doctor configs/demo.toml --alive daq"""
+  rigwatch doctor configs/demo.toml --alive daq
+  rigwatch doctor configs/demo.toml --fix     # after an update, with the rig stopped"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument(
         "config", type=Path, nargs="?", metavar="CONFIG", help="configuration to check as well"
+    )
+    parser.add_argument(
+        "--fix",
+        action="store_true",
+        help="mend configuration, model, journal, positions and sessions that an earlier version "
+        "or a kill has left; each file as it was stays beside it",
     )
     parser.add_argument(
         "--alive",
@@ -44,7 +51,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _selected(arguments: argparse.Namespace) -> Iterator[Finding]:
     if arguments.alive is None:
-        yield from _findings(arguments.config)
+        if arguments.fix and arguments.config is None:
+            raise ConfigError("rigwatch doctor", "--fix", "no CONFIG", "the rig's configuration")
+        yield from _findings(arguments.config, fix=arguments.fix)
         return
     if arguments.config is None:
         raise ConfigError("rigwatch doctor", "--alive", "no CONFIG", "the rig's configuration")
@@ -53,11 +62,11 @@ def _selected(arguments: argparse.Namespace) -> Iterator[Finding]:
     yield check_alive(load_rig(arguments.config), arguments.alive)
 
 
-def _findings(config: Path | None) -> Iterator[Finding]:
+def _findings(config: Path | None, *, fix: bool) -> Iterator[Finding]:
     yield from check_machine(_recordings(config))
     yield from check_viewer()
     if config is not None:
-        yield from check_rig(config)
+        yield from check_rig(config, fix=fix)
 
 
 def _recordings(config: Path | None) -> Path:

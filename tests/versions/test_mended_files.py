@@ -1,0 +1,153 @@
+"""`rigwatch doctor` reads what the processes read, and `--fix` mends it with a backup.
+
+The files are those of earlier versions, moved into one rig; some are damaged as a kill leaves them.
+"""
+
+import json
+import re
+from pathlib import Path
+from shutil import copy
+
+import pytest
+
+from monitor.alarms import read_journal
+from monitor.model import load_model, model_versions
+from rigwatch.commands import main
+from rigwatch.wire.host.ports import free_port
+from rigwatch.wire.rig_config import load_rig
+from rigwatch.wire.session import open_session
+
+HERE = Path(__file__).parent
+VERSIONS = ("2026-11-20", "2026-11-22")
+Findings = dict[str, dict[str, str]]
+
+
+def rig_of(version: str, folder: Path) -> Path:
+    """The rig that a version left behind, in a folder of its own."""
+    for name in ("model.toml", "alarms.jsonl", "alarms.jsonl.position"):
+        copy(HERE / version / name, folder)
+    text = (HERE / version / "rig.toml").read_text()
+    text = text.replace("/var/lib/rig", str(folder)).replace("7447", str(free_port()))
+    (folder / "rig.toml").write_text(text)
+    for stamp in ("20261119T120000Z", "20261120T120000Z"):
+        session = folder / "sessions" / f"demo-{stamp}"
+        session.mkdir(parents=True)
+        copy(HERE / version / "session.mcap", session / "000001.mcap")
+    return folder / "rig.toml"
+
+
+def doctor(capsys: pytest.CaptureFixture[str], rig: Path, *more: str) -> Findings:
+    main(["doctor", str(rig), "--json", *more])
+    return {item["what"]: item for item in json.loads(capsys.readouterr().out)}
+
+
+def of_rig(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def cut(path: Path, part: float) -> None:
+    """The file as a kill leaves it."""
+    path.write_bytes(path.read_bytes()[: round(path.stat().st_size * part)])
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_files_of_an_earlier_version_are_mended_once_with_a_backup_of_each(
+    version: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = rig_of(version, tmp_path)
+    torn = tmp_path / "sessions" / "demo-20261119T120000Z" / "000001.mcap"
+    cut(torn, 0.9)
+    cut(tmp_path / "alarms.jsonl", 0.97)
+    (tmp_path / "alarms.jsonl.position").write_bytes(b"x" * 20)
+    positions = torn.with_name("positions.json")
+    positions.write_text('{"estimates":')
+    before = of_rig(tmp_path)
+    standing, unread = read_journal(tmp_path / "alarms.jsonl")
+    assert unread == 1
+    samples = sum(map(len, open_session(torn).samples()))
+
+    told = doctor(capsys, rig)
+    wanted = {"journal", "position", "positions", "session"}
+    if version == "2026-11-20":
+        wanted |= {"model"}
+        assert "noise.repeat" in told["model"]["text"]
+    assert {what for what in told if "--fix" in told[what]["remedy"]} == wanted
+    assert of_rig(tmp_path) == before  # only said
+
+    done = doctor(capsys, rig, "--fix")
+    backups = {}
+    for what in wanted:
+        found = re.search(r"as it was: (\S+\.backup-\S+)$", done[what]["text"])
+        assert found, done[what]
+        backups[what] = found[1]
+    after = of_rig(tmp_path)
+    kept = {Path(name).name.partition(".backup-")[0]: name for name in after if "backup" in name}
+    assert len(kept) == len(wanted)
+    assert all(after[name] == before[name.partition(".backup-")[0]] for name in kept.values())
+
+    assert repr(read_journal(tmp_path / "alarms.jsonl")) == repr((standing, 0))  # with NaN
+    session = open_session(torn)
+    assert not session.unclosed
+    assert sum(map(len, session.samples())) == samples
+    assert not positions.exists()
+    load_model(tmp_path / "model.toml")
+    again = doctor(capsys, rig)
+    assert not [what for what in again if "--fix" in again[what]["remedy"]]
+    doctor(capsys, rig, "--fix")
+    assert of_rig(tmp_path) == after
+
+
+def test_a_silence_that_earlier_versions_took_is_removed_and_all_else_stays(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = rig_of("2026-11-20", tmp_path)
+    slow = rig.read_text().replace("sample_rate = 256.0", "sample_rate = 1.0 # slow")
+    slow = re.sub(r"(?ms)^\[monitor\].*?(?=^\[recorder\])", "", slow)
+    rig.write_text(slow)
+    told = doctor(capsys, rig)["configuration"]
+    assert told["level"] == "fail"
+    assert "--fix: remove daq.stale_after" in told["remedy"]
+    assert rig.read_text() == slow
+    doctor(capsys, rig, "--fix")
+    assert load_rig(rig).stale_after == 3.0
+    assert rig.read_text() == slow.replace("stale_after = 0.5\n", "")
+    (backup,) = tmp_path.glob("rig.toml.backup-*")
+    assert backup.read_text() == slow
+
+
+def test_a_promoted_model_stays_the_one_in_force(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = rig_of("2026-11-20", tmp_path)
+    model = tmp_path / "model.toml"
+    author = model_versions.Author("ann", "study rubbing")
+    model_versions.install(model, model.read_text() + "# promoted\n", 1, author)
+    doctor(capsys, rig, "--fix")
+    assert model_versions.history(model)[-1].sha256 == model_versions.digest_of(model)
+    assert model_versions.history(model)[-1].why == "study rubbing"
+
+
+def test_a_model_that_the_monitor_refuses_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = rig_of("2026-11-22", tmp_path)
+    model = tmp_path / "model.toml"
+    model.write_text(model.read_text().replace("sample_rate = 256.0", "sample_rate = 128.0"))
+    told = doctor(capsys, rig)["model"]
+    assert (told["level"], "128 Hz" in told["text"]) == ("fail", True)
+
+
+def test_nothing_is_mended_under_a_running_process(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = rig_of("2026-11-22", tmp_path)
+    cut(tmp_path / "alarms.jsonl", 0.97)
+    before = of_rig(tmp_path)
+    with (tmp_path / "alarms.jsonl").open("ab"):
+        assert main(["doctor", str(rig), "--fix"]) == 2
+    assert "stopped for --fix" in capsys.readouterr().err
+    assert of_rig(tmp_path) == before
