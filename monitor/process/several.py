@@ -97,22 +97,32 @@ class Seat:
         now = self._process.reader.counters.delivered if self._process else 0
         return self._before + now
 
-    def turn(self) -> None:
-        """Judge what has come; a failure ends this rig's run and no other's."""
+    def read(self) -> None:
+        """Take what has come; a failure ends this rig's run and no other's."""
         if self._process is None:
             self._start()
-            return
+        else:
+            self._alone(self._read, self._process)
+
+    def judge(self) -> None:
+        """Judge what was taken; a failure as in `read`."""
+        if self._process is not None:
+            self._alone(self._judge, self._process)
+
+    def _alone(self, work: Callable[[MonitorProcess], None], process: MonitorProcess) -> None:
         try:
-            self._work(self._process)
+            work(process)
         except Exception as error:  # whatever is wrong with one rig, the others are watched
             self._fail(error)
 
-    def _work(self, process: MonitorProcess) -> None:
-        now = time.monotonic()
-        if not self._due and not len(process.reader) and now < self._look_at:
-            return
-        if not self._due:
+    def _read(self, process: MonitorProcess) -> None:
+        if not self._due and (len(process.reader) or time.monotonic() >= self._look_at):
             self._due.extend(_divided(process.reader.read(0.0)))
+
+    def _judge(self, process: MonitorProcess) -> None:
+        now = time.monotonic()
+        if not self._due and now < self._look_at:
+            return
         for _ in range(min(MOST_BLOCKS, len(self._due))):
             process.take(self._due.popleft())
         self._settled = not self._due  # all that was read has been judged
@@ -185,10 +195,15 @@ def _divided(items: Iterable[Item]) -> Iterable[Item]:
 
 
 def one_turn(seats: Iterable[Seat], together: Callable[[], AbstractContextManager[object]]) -> None:
-    """Judge what has come of all rigs, send it, and only then store the positions."""
+    """Judge what has come of all rigs, send it, and only then store the positions.
+
+    All are read before any is judged: a block of one that is judged late is as old as the others'.
+    """
     with together():
         for seat in seats:
-            seat.turn()
+            seat.read()
+        for seat in seats:
+            seat.judge()
     for seat in seats:
         seat.keep_position()
 

@@ -136,6 +136,23 @@ def test_a_rig_that_fails_starts_anew_and_goes_on_where_it_was(bench, monkeypatc
     assert sum(seat.delivered for seat in bench.seats) >= 160
 
 
+def test_all_rigs_are_read_before_any_is_judged(bench, monkeypatch):
+    bench.held.set()
+    bench.join_all(range(3))
+    for number in range(3):
+        bench.send(number, 0, 40)
+    left: list[int] = []
+
+    def judge(rig, block):
+        left.append(sum(len(seat._process.reader) for seat in bench.seats))
+        return judged(rig, block)
+
+    judged = RigMonitor.judge
+    monkeypatch.setattr(RigMonitor, "judge", judge)
+    one_turn(bench.seats, contextlib.nullcontext)
+    assert left == [0, 0, 0]
+
+
 def test_a_wrong_file_is_named_and_its_rig_joins_once_it_is_right(tmp_path, monkeypatch):
     monkeypatch.setattr("monitor.process.several.LONGEST_PAUSE", 0.01)
     network, said, path = MemoryNetwork(), [], rig_file(tmp_path, "a")

@@ -29,6 +29,7 @@ from rigwatch.wire.bus.connection import (
     log_refusals,
     open_router,
 )
+from rigwatch.wire.bus.inbox import Inbox
 from rigwatch.wire.bus.member import unique_process
 from rigwatch.wire.bus.ring_questions import RingQuestions
 from rigwatch.wire.bus.subscription import MOST_COMMANDS, QUEUE_CAPACITY, Subscription
@@ -46,6 +47,7 @@ __all__ = [
     "Close",
     "CommandCheck",
     "CompleteSubscription",
+    "Inbox",
     "ModelReply",
     "ModelRequest",
     "Place",

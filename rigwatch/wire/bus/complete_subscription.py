@@ -14,9 +14,9 @@ import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from itertools import groupby
-from queue import Empty, SimpleQueue
 from typing import Any
 
+from rigwatch.wire.bus.inbox import Inbox
 from rigwatch.wire.bus.member import Member
 from rigwatch.wire.bus.message_ring import SAID_KEY, ring_key
 from rigwatch.wire.bus.ring_questions import REPLY_TIMEOUT, RingQuestions
@@ -76,7 +76,7 @@ class CompleteSubscription(Subscription):
         self._ended: dict[int, float] = {}
         self._assumed: dict[str, int] = {}
         self._early = EarlyMessages()
-        self._inbox: SimpleQueue[Any] = SimpleQueue()
+        self._inbox: Inbox[Any] = Inbox(capacity)
         self._ready: deque[bytes | Gap] = deque()  # decoded by the call that returns them
         self._reports: list[Gap | Event] = []
         self._behind = False
@@ -106,7 +106,7 @@ class CompleteSubscription(Subscription):
                 self._end_assumed(process)
         closers = [
             self._bus.watch_names(places, self._token),
-            self._bus.transport.listen_from(self._bus.key(self.topic.key), self._receive),
+            self._inbox.follow(self._bus.transport, self._bus.key(self.topic.key), self._receive),
         ]
         self._closers = [*closers, self._questions.close]
 
@@ -117,7 +117,7 @@ class CompleteSubscription(Subscription):
         return max((reply.settled for reply in _read(replies, run)), default=-1)
 
     def __len__(self) -> int:
-        return self._inbox.qsize() + len(self._ready)
+        return len(self._inbox) + len(self._ready)
 
     def get(self, timeout: float | None = None) -> Any:
         """The next message, or None if none arrives within `timeout` [s].
@@ -137,11 +137,8 @@ class CompleteSubscription(Subscription):
         """Wait for a message until `deadline` [s on the monotonic clock]."""
         while not self._ready:
             left = SILENCE if deadline is None else min(SILENCE, deadline - time.monotonic())
-            try:
-                self._take(self._inbox.get(block=left > 0, timeout=max(left, 0.0)))
-            except Empty:
-                if left <= 0:
-                    return
+            if not self._took(left) and left <= 0:
+                return
             self._look_for_more()
 
     def drain(self, most: int | None = None) -> list[Any]:
@@ -149,8 +146,7 @@ class CompleteSubscription(Subscription):
         return self._decoded(self._drained(most))
 
     def _drained(self, most: int | None = None) -> list[bytes | Gap]:
-        for _ in range(self._inbox.qsize()):
-            self._take(self._inbox.get_nowait())
+        self._took(0.0)
         self._look_for_more()
         count = len(self._ready) if most is None else min(most, len(self._ready))
         return [self._ready.popleft() for _ in range(count)]
@@ -166,8 +162,7 @@ class CompleteSubscription(Subscription):
         until = time.monotonic() + longest
         found = self._drained()
         while self._behind and (left := until - time.monotonic()) > 0:
-            with contextlib.suppress(Empty):
-                self._take(self._inbox.get(timeout=left))
+            self._took(left)
             found += self._drained()
         return self._joined(found)
 
@@ -213,10 +208,8 @@ class CompleteSubscription(Subscription):
     def _receive(self, payload: bytes, sender: str, mark: bytes) -> None:
         if len(payload) > MAX_PAYLOAD:
             self.rejected += 1
-        elif self._inbox.qsize() >= self._capacity:
+        elif not self._inbox.accept((payload, sender, mark)):
             self.dropped += 1
-        else:
-            self._inbox.put((payload, sender, mark))
 
     def _token(self, place: str, name: str | None, alive: bool) -> None:
         self._inbox.put((*_parsed(place, name), alive, name is not None))
@@ -225,6 +218,13 @@ class CompleteSubscription(Subscription):
         self._inbox.put((key.split("/")[1], ask, replies, None))
 
     # ---- called in the subscriber's thread ----------------------------------------------
+
+    def _took(self, timeout: float) -> bool:
+        """Take what waits, after up to `timeout` [s] for the first; whether there was any."""
+        waiting = self._inbox.take(timeout)
+        for incoming in waiting:
+            self._take(incoming)
+        return bool(waiting)
 
     def _take(self, incoming: Any) -> None:
         if isinstance(incoming[2], bool):

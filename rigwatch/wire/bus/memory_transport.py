@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from rigwatch.wire.access import CommandSigner
 from rigwatch.wire.bus.bus import Bus
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, answered
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Take, answered
 
 T = TypeVar("T")
 _IDENTITIES = (f"process-{number}" for number in itertools.count(1))
@@ -66,6 +66,10 @@ class MemoryTransport:
     def listen_from(self, key: str, receive: Receive) -> Close:
         """The same with the identity of the sender and the mark."""
         return self._register(self._network.listeners.setdefault(key, []), receive)
+
+    def listen_waiting(self, key: str, receive: Receive) -> tuple[Take | None, Close]:
+        """The same: nothing waits here."""
+        return None, self.listen_from(key, receive)
 
     def serve(self, key: str, answer: Answer) -> Close:
         """Answer queries to `key`."""

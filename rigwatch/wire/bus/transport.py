@@ -12,6 +12,8 @@ REFUSED_MARK, DENIED_MARK = b"zenoh_link_tls::unicast", b"Msg intercepted!"
 Close = Callable[[], None]
 Receive = Callable[[bytes, str, bytes], None]
 """Called with a payload, the identity of its sender and its mark."""
+Take = Callable[[], None]
+"""Passes on the messages that wait; may be called in any thread."""
 Answer = Callable[[bytes], list[bytes]]
 """Returns a query's replies as bytes, each at most `MAX_PAYLOAD` long."""
 
@@ -31,6 +33,12 @@ class Transport(Protocol):
 
     def listen_from(self, key: str, receive: Receive) -> Close:
         """The same with the sender's `identity`, "" if unknown, and the mark."""
+
+    def listen_waiting(self, key: str, receive: Receive) -> tuple[Take | None, Close]:
+        """The same, where messages may wait for calls of the function returned; None: they don't.
+
+        It passes them on in order, in the caller's thread. Of too many the oldest are dropped.
+        """
 
     def serve(self, key: str, answer: Answer) -> Close:
         """Answer queries to `key`, in a thread of the transport."""

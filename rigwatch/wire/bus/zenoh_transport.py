@@ -25,10 +25,10 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 import zenoh
-from zenoh.handlers import Callback
+from zenoh.handlers import Callback, RingChannel
 
 from rigwatch.wire.bus.burst import Burst
-from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, answered
+from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Take, answered
 from rigwatch.wire.errors import BusError
 
 RETRY_MS = (100, 200)
@@ -40,6 +40,8 @@ MOST_ASKED = 4
 """Queries at a time over a link that rigs share: after a stall all ask at once, and answers that
 come too late would be asked for again, without end.
 """
+WAITING = 256
+"""Messages of a topic that wait for a process of several rigs: nine seconds of samples."""
 LEASE = 10.0
 """Silence after which a link counts as broken [s]."""
 ACCEPT_MS, MOST_PENDING = 1000, 1000
@@ -253,6 +255,26 @@ class ZenohTransport:
         """The same with the identity of the sender and the mark."""
         take = _direct(lambda s: receive(s.payload.to_bytes(), _sender(s), _mark(s)))
         return self._keep(self._session.declare_subscriber(key, take))
+
+    def listen_waiting(self, key: str, receive: Receive) -> tuple[Take | None, Close]:
+        """The same; where rigs share the session, messages wait in a channel of Zenoh's own.
+
+        A process of many rigs would otherwise be interrupted by each message, and its loop wait for
+        the interpreter each time.
+        """
+        if self._burst is None:
+            return None, self.listen_from(key, receive)
+        subscriber = self._session.declare_subscriber(key, RingChannel(WAITING))
+        channel, lock = subscriber.handler, threading.Lock()
+
+        def take() -> None:
+            with lock, contextlib.suppress(zenoh.ZError):  # closed meanwhile
+                for _ in range(WAITING):
+                    if (sample := channel.try_recv()) is None:
+                        return
+                    receive(sample.payload.to_bytes(), _sender(sample), _mark(sample))
+
+        return take, self._keep(subscriber)
 
     def serve(self, key: str, answer: Answer) -> Close:
         """Answer queries to `key`, in a separate thread."""

@@ -12,9 +12,8 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import groupby
-from queue import Empty, SimpleQueue
 
-from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus, RingQuestions
+from rigwatch.wire.bus import MAX_PAYLOAD, QUEUE_CAPACITY, Bus, Inbox, RingQuestions
 from rigwatch.wire.delivery.ring import SOURCE_KEY
 from rigwatch.wire.errors import MessageError
 from rigwatch.wire.messages import (
@@ -73,7 +72,8 @@ class SampleReader:
         heard: whether a sample block was ever received.
         rejected: payloads that were not sample blocks.
         rejected_by: the same by sender, for the first `MOST_REJECTED` of them.
-        dropped: payloads left to the ring because the inbox was full.
+        dropped: payloads left to the ring because the inbox was full; what a channel of the
+            transport drops is counted only as recovered.
     """
 
     def __init__(
@@ -96,8 +96,7 @@ class SampleReader:
         self._refused_boot: int | None = None
         self._impostor_at: float | None = None
         self._assumed: int | None = None
-        self._capacity = capacity
-        self._inbox: SimpleQueue[_Incoming] = SimpleQueue()
+        self._inbox: Inbox[_Incoming] = Inbox(capacity)
         self._questions = RingQuestions(bus, self._answered)
         self._heard_at = self._silence_told_at = time.monotonic()
         self._latest_ns = 0
@@ -115,11 +114,11 @@ class SampleReader:
                 self._end_assumed()
         self._closers = [
             self._bus.watch_names(SOURCE_KEY, self._token),
-            self._bus.transport.listen_from(self._bus.key(SAMPLES.key), self._receive),
+            self._inbox.follow(self._bus.transport, self._bus.key(SAMPLES.key), self._receive),
         ]
 
     def __len__(self) -> int:
-        return self._inbox.qsize()
+        return len(self._inbox)
 
     @property
     def counters(self) -> Counters:
@@ -149,13 +148,10 @@ class SampleReader:
         """
         deadline = time.monotonic() + timeout
         while not self._ready:
-            left = deadline - time.monotonic()
-            try:
-                first = self._inbox.get(block=left > 0, timeout=max(left, 0))
-            except Empty:
+            waiting = self._inbox.take(deadline - time.monotonic())
+            if not waiting:
                 break
-            more = [self._inbox.get_nowait() for _ in range(self._inbox.qsize())]
-            self._take_all([first, *more])
+            self._take_all(waiting)
         self._check_silence()
         items, self._ready = self._ready, []
         return joined(items)
@@ -171,10 +167,8 @@ class SampleReader:
     def _receive(self, payload: bytes, sender: str, _mark: bytes) -> None:
         if len(payload) > MAX_PAYLOAD:
             self._reject(sender)
-        elif self._inbox.qsize() >= self._capacity:
+        elif not self._inbox.accept((payload, sender)):
             self.dropped += 1
-        else:
-            self._inbox.put((payload, sender))
 
     def _reject(self, sender: str) -> None:
         self.rejected += 1

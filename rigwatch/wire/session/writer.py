@@ -31,6 +31,7 @@ from rigwatch.wire.messages import (
 from rigwatch.wire.messages import protobuf_schema as schema
 from rigwatch.wire.session.file_output import FileOutput
 from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
+from rigwatch.wire.session.packed_index import PackedIndex
 
 PROFILE = "rigwatch"
 FORMAT = 1
@@ -72,6 +73,7 @@ class SessionWriter:
         self._waiting = 0
         self._output = FileOutput(self.path, sync)
         self._mcap = Writer(self._output, _NEVER, CompressionType.ZSTD)  # type: ignore[arg-type]
+        PackedIndex.put_into(self._mcap)
         try:
             self._head(run)
         except SessionError:
