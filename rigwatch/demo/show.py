@@ -14,7 +14,8 @@ from typing import Any
 
 from rigwatch.demo.narrator import Narrator
 from rigwatch.demo.rig_file import relative
-from rigwatch.demo.verdict import ALARM, Recording, complaints, newest_session, read_recording
+from rigwatch.demo.verdict import ALARM, Recording, complaints, read_recording
+from rigwatch.recorder import newest
 from rigwatch.wire.bus import connect, unique_process
 from rigwatch.wire.errors import DeviceError
 from rigwatch.wire.messages import ALARMS, ESTIMATES, SAMPLES, Alarm, EstimateBlock, SampleBlock
@@ -154,7 +155,7 @@ class Show:
             signal.signal(signal.SIGINT, previous)
 
     def _judge(self) -> Outcome:
-        recording = read_recording(newest_session(self._folder / "sessions"))
+        recording = read_recording(newest(self._folder / "sessions", self._config.rig.id))
         found = complaints(self._narrator.alarms, recording, range(self._first, self._seen))
         seconds = recording.samples / self._config.rig.sample_rate
         whole = "; ".join(recording.faults) or "none missing"

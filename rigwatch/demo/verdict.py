@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.session import open_session
 
@@ -33,18 +32,6 @@ class Recording:
     estimates: int
     alarms: tuple[str, ...]
     faults: tuple[str, ...]
-
-
-def newest_session(folder: Path) -> Path:
-    """The newest session below `folder`.
-
-    Raises:
-        SessionError: there is none.
-    """
-    found = sorted(folder.glob("*/*.mcap"), key=lambda path: path.stat().st_mtime)
-    if not found:
-        raise SessionError(f"{folder}: no recording was left")
-    return found[-1].parent
 
 
 def read_recording(path: Path) -> Recording:

@@ -47,6 +47,18 @@ def sessions_of(root: Path, rig: str) -> Iterator[Path]:
             yield path
 
 
+def newest(root: Path, rig: str) -> Path:
+    """The newest of a rig's sessions, one that is still written included.
+
+    Raises:
+        SessionError: there is none.
+    """
+    found = _newest_first(root, rig)
+    if not found:
+        raise SessionError(f"{root}: found no recording of {rig}, expected one of its recorder")
+    return found[0]
+
+
 def choose(root: Path, run: RunInfo, longest_break: float = LONGEST_BREAK) -> Place:
     """The folder for a recording that starts at `run.t_ns`.
 

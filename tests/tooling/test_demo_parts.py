@@ -9,8 +9,7 @@ import pytest
 
 from rigwatch.demo.narrator import Narrator, acts
 from rigwatch.demo.rig_file import write_rig_file
-from rigwatch.demo.verdict import complaints, newest_session, read_recording
-from rigwatch.wire.errors import SessionError
+from rigwatch.demo.verdict import complaints, read_recording
 from rigwatch.wire.messages.message_types import Alarm, Column, EstimateBlock, SampleBlock
 from rigwatch.wire.rig_config import SerialSection, load_rig
 from rigwatch.wire.session import SessionWriter, run_info
@@ -152,7 +151,7 @@ def test_a_whole_recording_with_the_alarm_has_nothing_to_complain_about(
     recorded: Recorded,
 ) -> None:
     path = recorded(samples(0, 512), samples(512, 256), estimates(0, 768), alarm())
-    recording = read_recording(newest_session(path.parent))
+    recording = read_recording(path)
     assert (recording.samples, recording.estimates) == (768, 768)
     assert complaints([alarm()], recording, range(8, 768)) == []
 
@@ -178,8 +177,3 @@ def test_a_wrong_name_no_alarm_and_no_estimates_are_complained_about(recorded: R
     assert any("no alarm named dry friction; alarms: other_fault" in line for line in found)
     assert any("not in the recording" in line for line in found)
     assert any("no estimates" in line for line in found)
-
-
-def test_a_run_that_left_no_recording_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(SessionError, match="no recording"):
-        newest_session(tmp_path)

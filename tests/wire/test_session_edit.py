@@ -136,7 +136,14 @@ def test_trim_refuses_an_empty_span_and_keeps_no_file(
 ) -> None:
     target = tmp_path / "b.mcap"
     assert main(["trim", str(session), str(target), "--start", "900"]) == 2
-    assert "nothing was recorded in the span" in capsys.readouterr().err
+    assert (
+        f"{session}: found no samples from 2026-01-01T00:15:00.000Z to the end, expected a part of"
+        " 2026-01-01T00:00:00.000Z to 2026-01-01T00:00:04.488Z (4.488 s)"
+    ) in capsys.readouterr().err
+    span = ["--start", "2", "--end", "1"]
+    assert main(["trim", str(session), str(target), *span]) == 2
+    between = ["--start", "3.91", "--end", "4.29"]  # only the gap lies there
+    assert main(["trim", str(session), str(target), *between]) == 2
     assert main(["trim", str(session), str(target), "--start", "soon"]) == 2
     assert "--start: found 'soon', expected seconds" in capsys.readouterr().err
     assert not target.exists()

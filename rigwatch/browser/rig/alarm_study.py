@@ -52,7 +52,7 @@ def study_of_alarm(root: Path, config: RigConfig, alarm: Alarm, now: float | Non
         raise SessionError("found no [recorder] of the rig, expected one that has what it did")
     if alarm.seq < 0:
         raise SessionError(f"{alarm.name}: found no sample that raised it, expected one")
-    onset = onset_of(Path(config.recorder.folder), alarm)
+    onset = onset_of(Path(config.recorder.folder), config.rig.id, alarm)
     name = f"{alarm.name}-{onset.t_ns // 1_000_000_000}"
     if (root / name / FILE).exists():
         return open_study(root / name)

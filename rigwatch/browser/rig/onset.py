@@ -4,10 +4,10 @@ An alarm's time is that of its latest transition: an operator who acknowledges i
 not the onset.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from rigwatch.recorder import sessions_of
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.messages import Alarm
 from rigwatch.wire.session import SUFFIX, Session, open_session
@@ -48,18 +48,19 @@ def _cleared(alarm: Alarm) -> bool:
     return alarm.state == "cleared_unacknowledged"
 
 
-def onset_of(folder: Path, alarm: Alarm) -> Onset:
-    """The onset of an alarm, looked for from the newest recording back.
+def onset_of(folder: Path, rig: str, alarm: Alarm) -> Onset:
+    """The onset of an alarm, looked for from the rig's newest recording back.
 
     Args:
-        folder: of the recorder.
+        folder: of the recorder; other rigs may record there too.
+        rig: id of the rig.
         alarm: with a sample.
 
     Raises:
         SessionError: the sample was not recorded.
     """
     number = alarm.onset_seq if alarm.onset_seq >= 0 else alarm.seq
-    for path in _newest_first(folder):
+    for path in _newest_first(folder, rig):
         t_ns = _time_of(path, alarm.device, alarm.boot, number)
         if t_ns is not None:
             return Onset(_around(path), t_ns)
@@ -69,8 +70,9 @@ def onset_of(folder: Path, alarm: Alarm) -> Onset:
     )
 
 
-def _newest_first(folder: Path) -> Iterator[Path]:
-    yield from sorted(folder.glob(f"*/*{SUFFIX}"), key=lambda path: -path.stat().st_mtime)
+def _newest_first(folder: Path, rig: str) -> list[Path]:
+    segments = (path for own in sessions_of(folder, rig) for path in own.glob(f"*{SUFFIX}"))
+    return sorted(segments, key=lambda path: -path.stat().st_mtime)
 
 
 def _time_of(path: Path, device: str, boot: int, number: int) -> int | None:

@@ -4,9 +4,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from monitor.model import load_model, model_versions
+from rigwatch.recorder import newest
 from rigwatch.wire.errors import SessionError
 from rigwatch.wire.rig_config import load_rig
-from rigwatch.wire.session import newest, open_session
+from rigwatch.wire.session import open_session
 from rigwatch.workbench.steps import Rehearsal, model_path, promotion, rehearse
 from rigwatch.workbench.study import Study
 
@@ -26,10 +27,11 @@ def rehearsal(study: Study, rig: Path, progress: Callable[[str], None]) -> Rehea
         ModelError: the monitor's model supports no effect of the study.
         SessionError: the rig has recorded nothing.
     """
-    recorder = load_rig(rig).recorder
+    config = load_rig(rig)
+    recorder = config.recorder
     if recorder is None:
         raise SessionError(f"{rig}: found no [recorder], expected one that has what the rig did")
-    session = open_session(newest(Path(recorder.folder)))
+    session = open_session(newest(Path(recorder.folder), config.rig.id))
     old = load_model(model_path(rig))
     new = promotion(study, old).model
     progress("rehearsing on what the rig did last")

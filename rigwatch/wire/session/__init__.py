@@ -4,7 +4,7 @@
 describes.
 """
 
-from rigwatch.wire.session.edit import Written, first_time, iso_time, newest, recover, trim
+from rigwatch.wire.session.edit import Written, first_time, iso_time, recover, trim
 from rigwatch.wire.session.losses import Span, without
 from rigwatch.wire.session.merging import LARGEST_BLOCK, merge_pending
 from rigwatch.wire.session.reader import (
@@ -41,7 +41,6 @@ __all__ = [
     "iso_time",
     "merge_pending",
     "message_time",
-    "newest",
     "open_session",
     "read_page",
     "recover",

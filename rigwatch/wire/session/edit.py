@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from rigwatch.wire.errors import SessionError
-from rigwatch.wire.messages import Alarm, Message, RunInfo, SampleBlock, blocks
+from rigwatch.wire.messages import Alarm, Block, Message, RunInfo, SampleBlock, blocks
 from rigwatch.wire.new_file import new_file
 from rigwatch.wire.session.reader import LostSpan, Recorded, Session
-from rigwatch.wire.session.segment import SUFFIX
 from rigwatch.wire.session.writer import SessionWriter, message_time, run_info
 
 FLUSH_EVERY = 4096
@@ -66,18 +65,6 @@ def _rate(session: Session) -> float:
     return 1e9 / step if step > 0 else 0.0
 
 
-def newest(folder: Path) -> Path:
-    """The newest of a recorder's sessions, one that it still writes included.
-
-    Raises:
-        SessionError: there is none.
-    """
-    found = list(folder.glob(f"*/*{SUFFIX}"))
-    if not found:
-        raise SessionError(f"{folder}: found no recording, expected one of a recorder")
-    return max(found, key=lambda path: path.stat().st_mtime).parent
-
-
 def first_time(session: Session) -> int:
     """Time of the first sample, else of the first message [ns]; 0 if there is none."""
     first = next(session.samples(size=1), None)
@@ -92,15 +79,31 @@ def trim(session: Session, target: Path, start: int | None, end: int | None) -> 
     It keeps the description of the run and the alarms active at the start of the part.
 
     Raises:
-        SessionError: nothing lies in the span, or the target exists or cannot be written.
+        SessionError: the span has no samples, or the target exists or cannot be written.
     """
     run = session.info
     cut = f"trimmed to {_text(start, 'the start')} … {_text(end, 'the end')}"
     run = replace(run, notes=f"{run.notes}; {cut}" if run.notes else cut)
-    if next(session.messages(start=start, end=end), None) is None:
-        raise SessionError(f"{session.path}: nothing was recorded in the span {cut[11:]}")
+    _check_span(session, start, end)
     written = copy_messages(_part(session, start, end), run, target)
     return replace(written, lost=session.lost, notes=cut)
+
+
+def _check_span(session: Session, start: int | None, end: int | None) -> None:
+    """Raise if the span has no samples, or of a recording without samples no estimates."""
+    for kind, deliver in (("samples", session.samples), ("estimates", session.estimates)):
+        if next(deliver(None, start, end, 1), None) is not None:
+            return
+        blocks: list[Block] = list(deliver())
+        if blocks:
+            first = min(int(block.t_ns[0]) for block in blocks)
+            last = max(int(block.t_ns[-1]) for block in blocks)
+            raise SessionError(
+                f"{session.path}: found no {kind} from {_text(start, 'the start')} to"
+                f" {_text(end, 'the end')}, expected a part of {iso_time(first)} to"
+                f" {iso_time(last)} ({(last - first) / 1e9:.3f} s)"
+            )
+    raise SessionError(f"{session.path}: found neither samples nor estimates to trim")
 
 
 def _text(t_ns: int | None, otherwise: str) -> str:

@@ -45,7 +45,7 @@ def config(tmp_path: Path) -> RigConfig:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Of one session."""
-    made = tmp_path / "sessions" / "story-1"
+    made = tmp_path / "sessions" / "story-20260101T000000Z"
     made.mkdir(parents=True)
     return made
 
