@@ -18,7 +18,7 @@ from rigwatch.wire.access import (
 )
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.transport import Close
-from rigwatch.wire.errors import BusError
+from rigwatch.wire.errors import NoRouterError
 from rigwatch.wire.rig_config import RigConfig
 
 if TYPE_CHECKING:
@@ -62,7 +62,8 @@ class SharedLinks:
         with self._lock:
             place = self._places.setdefault(repr((endpoint, lease, sorted(tls.items()))), _Place())
         if not place.lock.acquire(timeout=-1 if timeout is None else timeout):
-            raise BusError(f"no router answers at {endpoint}: another rig of this process waits")
+            reason = "another rig of this process waits"
+            raise NoRouterError(f"no router answers at {endpoint}: {reason}")
         try:
             if place.link is None:
                 place.link = _client(endpoint, timeout, lease, tls, stop)
@@ -156,12 +157,15 @@ def joined(
         stop: ends the wait.
         say: called once with one line if the router does not answer; the log if not given.
         links: those of the process, if it serves several rigs.
+
+    Raises:
+        BusError: the router's endpoint is invalid.
     """
     bus, say = None, say or _log.warning
     while bus is None and not stop.is_set():
         try:
             bus = connect(config, process, ATTEMPT, links, stop)
-        except BusError as error:
+        except NoRouterError as error:
             if not stop.is_set():
                 say(str(error))
             say = _say_nothing

@@ -28,7 +28,7 @@ from zenoh.handlers import Callback
 
 from rigwatch.wire.bus.burst import Burst
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, answered
-from rigwatch.wire.errors import BusError
+from rigwatch.wire.errors import BusError, NoRouterError
 
 RETRY_MS = (100, 200)
 BATCHES = 16
@@ -158,10 +158,10 @@ def _reach(
         except zenoh.ZError:
             waited = time.monotonic() - started
         if stop is not None and stop.is_set():
-            raise BusError(f"stopped before a router answered at {endpoint}")
+            raise NoRouterError(f"stopped before a router answered at {endpoint}")
         if timeout is not None and waited >= timeout:
             remedy = "start `rigwatch router` or correct bus.router"
-            raise BusError(f"no router answers at {endpoint}: {remedy}")
+            raise NoRouterError(f"no router answers at {endpoint}: {remedy}")
 
 
 class ZenohTransport:
