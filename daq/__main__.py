@@ -14,7 +14,7 @@ from daq.adapters import adapter_for
 from daq.publisher import Publisher
 from daq.supervisor import Supervisor
 from daq.turns import Turns
-from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.delivery import SampleRing
 from rigwatch.wire.errors import RigwatchError
 from rigwatch.wire.host import (
@@ -105,12 +105,10 @@ def run(path: Path | str, stop: threading.Event) -> None:
     config = load_rig(path)
     adapter = adapter_for(config.daq.device, config.channels)
     raise_priority(DAQ)
-    bus = connect(config, "daq")
-    prepare_for_real_time()
-    try:
-        acquire(config, adapter, bus, stop, Heartbeat("daq"))
-    finally:
-        bus.close()
+    with joined(config, "daq", stop) as bus:
+        prepare_for_real_time()
+        if bus is not None:
+            acquire(config, adapter, bus, stop, Heartbeat("daq"))
 
 
 def main(path: Path | str) -> int:

@@ -22,7 +22,7 @@ from monitor.process.operator_desk import OperatorDesk
 from monitor.process.presence import Presence
 from monitor.process.startup_grace import Patience
 from monitor.signals import MONITOR_RESET
-from rigwatch.wire.bus import Bus, CommandCheck, connect, serve_alarm_list
+from rigwatch.wire.bus import Bus, CommandCheck, joined, serve_alarm_list
 from rigwatch.wire.delivery import POSITION_WRONG, SampleReader
 from rigwatch.wire.errors import ConfigError, SessionError
 from rigwatch.wire.host import (
@@ -379,11 +379,9 @@ def run(path: Path | str) -> int:
     config = load_rig(path)
     model = prepared(config, path)  # before joining: a monitor that is visible there is ready
     raise_priority(MONITOR)
-    bus = connect(config, "monitor")
-    try:
-        process = MonitorProcess(config, path, model, bus)
-        watch(process, stop)
-        process.close()
-    finally:
-        bus.close()
+    with joined(config, "monitor", stop) as bus:
+        if bus is not None:
+            process = MonitorProcess(config, path, model, bus)
+            watch(process, stop)
+            process.close()
     return 0

@@ -35,17 +35,22 @@ class LiveDashboard:
         settings: section [dashboard] of the configuration.
         choice: which viewer.
         say: called with messages for people.
+        stop: ends `run` when set.
 
     Attributes:
-        stop: ends `run` when set.
         viewer: the viewer in use, None before the first.
         facts: known facts, kept between viewers.
     """
 
     def __init__(
-        self, bus: Bus, settings: DashboardSection, choice: Choice, say: Callable[[str], None]
+        self,
+        bus: Bus,
+        settings: DashboardSection,
+        choice: Choice,
+        say: Callable[[str], None],
+        stop: threading.Event,
     ) -> None:
-        self.stop = threading.Event()
+        self.stop = stop
         self.viewer: Viewer | ForeignViewer | None = None
         self.facts = Facts(bus.rig)
         self._bus, self._settings, self._choice, self._say = bus, settings, choice, say

@@ -18,7 +18,7 @@ from rigwatch.recorder.positions import PositionFile, Positions
 from rigwatch.recorder.remote_feed import RemoteFeed
 from rigwatch.recorder.retention import Retention
 from rigwatch.recorder.store import Store
-from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.host import Heartbeat, Pulse, free_share, use_few_pools
 from rigwatch.wire.messages import (
     ALARMS,
@@ -159,8 +159,10 @@ def describe_run(path: Path | str, config: RigConfig, notes: str = "") -> RunInf
     )
 
 
-def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path:
+def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path | None:
     """Record the rig whose configuration is at `path`, until `stop` is set; the session's folder.
+
+    None if no router answered before.
 
     Raises:
         ConfigError: the configuration is invalid.
@@ -168,8 +170,7 @@ def run(path: Path | str, stop: threading.Event, notes: str = "") -> Path:
     """
     use_few_pools()
     config = load_rig(path)
-    bus = connect(config, process_name(config))
-    try:
+    with joined(config, process_name(config), stop) as bus:
+        if bus is None:
+            return None
         return record(config, describe_run(path, config, notes), bus, stop, Heartbeat(PROCESS))
-    finally:
-        bus.close()

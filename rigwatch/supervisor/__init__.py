@@ -6,11 +6,15 @@ vitals.py      what a process has reported, and when it counts as hung
 child.py       one process: start, notifications, output, end
 supervisor.py  all processes: restart with back-off, status, orderly stop
 config_watch.py  a change of the configuration restarts what it concerns
+rig_set.py     rigs and processes join and leave with their files and sections
+console.py     events and status as lines
+printer.py     prints them without waiting for who reads
 """
 
 from rigwatch.supervisor.config_watch import ConfigWatch
 from rigwatch.supervisor.console import Console, Flow
 from rigwatch.supervisor.plan import PROCESSES, ProcessPlan, plan
+from rigwatch.supervisor.rig_set import RigSet, planned
 from rigwatch.supervisor.several import plan_several
 from rigwatch.supervisor.supervisor import Supervisor
 
@@ -20,7 +24,9 @@ __all__ = [
     "Console",
     "Flow",
     "ProcessPlan",
+    "RigSet",
     "Supervisor",
     "plan",
     "plan_several",
+    "planned",
 ]

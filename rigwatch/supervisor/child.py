@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import subprocess
+from functools import partial
 from pathlib import Path
 
 from rigwatch.supervisor.plan import ProcessPlan
@@ -14,6 +15,10 @@ from rigwatch.supervisor.vitals import Vitals
 _LIBC = ctypes.CDLL(None)
 _PR_SET_PDEATHSIG = 1
 _READ_SIZE = 65536
+LONGEST_LINE = 16384
+"""Part of a line that is kept [bytes]."""
+KILLED_WITHIN = 1.0
+"""Longest wait for the end of a killed process [s]."""
 
 
 class Child:
@@ -29,6 +34,7 @@ class Child:
         self.vitals = Vitals(0.0)
         self.last_line = ""
         self._unfinished = b""
+        self._skips = False
         self._output = -1
         self._process: subprocess.Popen[bytes] | None = None
         # Not by name: an address has room for a hundred bytes, and a rig's id may be long.
@@ -58,7 +64,7 @@ class Child:
             stdout=writing,
             stderr=writing,
             process_group=0,
-            preexec_fn=_die_with_parent,  # noqa: PLW1509 (this process has one thread)
+            preexec_fn=_die_with_parent,  # noqa: PLW1509 (it takes no lock that another thread may hold)
         )
         os.close(writing)
 
@@ -69,10 +75,16 @@ class Child:
                 self.vitals.take(self.words.recv(4096).decode(errors="replace"), now)
 
     def lines(self) -> list[str]:
-        """The whole lines it has printed since the last call."""
+        """The whole lines it has printed since the last call, without the rest of endless ones."""
         with contextlib.suppress(BlockingIOError):
             self._unfinished += os.read(self._output, _READ_SIZE)
         *whole, self._unfinished = self._unfinished.split(b"\n")
+        if whole and self._skips:
+            whole, self._skips = whole[1:], False
+        if len(self._unfinished) > LONGEST_LINE:
+            if not self._skips:
+                whole.append(self._unfinished[:LONGEST_LINE] + "…".encode())
+            self._unfinished, self._skips = b"", True
         found = [line.decode(errors="replace").rstrip() for line in whole if line.strip()]
         if found:
             self.last_line = found[-1]
@@ -92,26 +104,40 @@ class Child:
         if self._process is not None:
             self._process.send_signal(signal.SIGHUP)
 
-    def kill(self) -> None:
-        """Kill it and everything that it has started."""
-        if self._process is not None:
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.killpg(self._process.pid, signal.SIGKILL)
-            self._process.wait()
+    def kill(self) -> bool:
+        """Kill it and everything that it has started; whether it has ended.
 
-    def close_run(self) -> None:
-        """Clean up after an ended run: its children, its pipe, its unread notifications."""
+        A process in uninterruptible sleep, as of a disk or driver that does not answer, may stay.
+        """
         if self._process is None:
-            return
-        self.kill()
+            return True
+        for kill in (partial(os.killpg, self._process.pid), self._process.send_signal):
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                kill(signal.SIGKILL)
+        try:
+            self._process.wait(KILLED_WITHIN)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+    def close_run(self) -> bool:
+        """Clean up after a run: its children, its pipe, its unread notifications.
+
+        False if it could not be killed: its process is kept for the next attempt.
+        """
+        if self._process is None:
+            return True
+        if not self.kill():
+            return False
         os.close(self._output)
-        self._process, self._unfinished = None, b""
+        self._process, self._unfinished, self._skips = None, b"", False
         with contextlib.suppress(BlockingIOError):
             while True:
                 self.words.recv(_READ_SIZE)
+        return True
 
     def close(self) -> None:
-        """Kill it and free the socket."""
+        """Kill it and free the socket; a process that cannot be killed is left."""
         self.close_run()
         self.words.close()
         Path(self._address).unlink(missing_ok=True)

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from rigwatch.supervisor.plan import PROCESSES
+from rigwatch.supervisor.plan import PROCESSES, ProcessPlan
 from rigwatch.supervisor.supervisor import Supervisor
 from rigwatch.wire.errors import ConfigError
 from rigwatch.wire.rig_config import RigConfig, load_rig, rig_text
@@ -32,6 +32,8 @@ class ConfigWatch:
         supervisor: restarts the processes.
         tell: called with one line for each change.
         read: reads the file, and raises `ConfigError` if it is wrong.
+        follow: called with path and configuration to start and end processes that it has more or
+            less than before.
         clock: seconds on a monotonic clock [s].
     """
 
@@ -43,18 +45,19 @@ class ConfigWatch:
         tell: Callable[[str], None],
         *,
         read: Callable[[Path], RigConfig] = load_rig,
+        follow: Callable[[Path, RigConfig], None] = lambda _path, _config: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._path, self._config, self._supervisor = Path(path), config, supervisor
-        self._tell, self._load, self._clock = tell, read, clock
-        self._hash, self._looked_at = self._read(), clock()
+        self._tell, self._load, self._follow, self._clock = tell, read, follow, clock
+        self._hash, self._looked_at = hash_of(self._path), clock()
 
     def look(self) -> None:
         """Look at the file if it is time to, and act on a change."""
         if self._clock() - self._looked_at < INTERVAL:
             return
         self._looked_at = self._clock()
-        found = self._read()
+        found = hash_of(self._path)
         if found in (self._hash, ""):
             return
         self._hash = found
@@ -66,20 +69,33 @@ class ConfigWatch:
     def _take(self, config: RigConfig) -> None:
         roles = affected(self._config, config)
         self._config = config
-        plans = [watched.child.plan for watched in self._supervisor.processes.values()]
-        concerned = [one for one in plans if one.role in roles and one.reads(str(self._path))]
-        names = ", ".join(one.name for one in concerned)
-        self._tell(f"{self._path} has changed; started anew: {names or 'nothing'}")
+        before = self._plans()
+        self._follow(self._path, config)
+        now = self._plans()
+        started = [one for name, one in now.items() if one != before.get(name)]
+        ended = [one for name, one in before.items() if name not in now]
+        concerned = [
+            one
+            for one in now.values()
+            if one not in started and one.role in roles and one.reads(str(self._path))
+        ]
         for one in concerned:
             act = self._supervisor.renew if one.renews else self._supervisor.restart
             act(one.name, f"the configuration {self._path.name} has changed")
+        anew = ", ".join(one.name for one in (*started, *concerned))
+        gone = f"; ended: {', '.join(one.name for one in ended)}" if ended else ""
+        self._tell(f"{self._path} has changed; started anew: {anew or 'nothing'}{gone}")
 
-    def _read(self) -> str:
-        """Hash of the file's content; "" while it cannot be read, as in the midst of a save."""
-        try:
-            return hashlib.sha256(_content(self._path)).hexdigest()
-        except OSError:
-            return ""
+    def _plans(self) -> dict[str, ProcessPlan]:
+        return {name: one.child.plan for name, one in self._supervisor.processes.items()}
+
+
+def hash_of(path: Path) -> str:
+    """Hash of a configuration's content; "" while it cannot be read, as in the midst of a save."""
+    try:
+        return hashlib.sha256(_content(path)).hexdigest()
+    except OSError:
+        return ""
 
 
 def _content(path: Path) -> bytes:

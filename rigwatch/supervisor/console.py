@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import TextIO
 
+from rigwatch.supervisor.printer import Printer
 from rigwatch.supervisor.supervisor import ProcessEvent, Supervisor
 
 NAME_WIDTH = 10
@@ -53,8 +54,9 @@ class Console:
     def __init__(self, rig: str, as_json: bool, out: TextIO | None = None) -> None:
         self._rig = rig
         self._json = as_json
-        self._out = out or sys.stdout
-        self._on_terminal = self._out.isatty() and not as_json
+        out = out or sys.stdout
+        self._on_terminal = out.isatty() and not as_json
+        self._printer = Printer(out.fileno(), self._lost)
         self._every = STATUS_EVERY_TERMINAL if self._on_terminal or as_json else STATUS_EVERY_FILE
         self._started_at = self._status_at = time.monotonic()
 
@@ -85,15 +87,27 @@ class Console:
             return
         line = status_line(self._rig, now - self._started_at, supervisor, flow)
         if self._on_terminal:
-            self._out.write(f"\r\x1b[K{line}")
-            self._out.flush()
+            self._printer.print(f"\r\x1b[K{line}")
         else:
             self._print(line)
 
     def _print(self, text: str) -> None:
         clear = "\r\x1b[K" if self._on_terminal else ""
-        self._out.write(f"{clear}{text}\n")
-        self._out.flush()
+        self._printer.print(f"{clear}{text}\n")
+
+    def close(self) -> None:
+        """Print the last lines, if the output takes them."""
+        self._printer.close()
+
+    def _lost(self, count: int) -> str:
+        """The line that says how many could not be printed."""
+        text = f"{count} lines could not be printed"
+        if self._json:
+            return (
+                json.dumps({"event": "says", "t": time.time(), "process": "up", "text": text})
+                + "\n"
+            )
+        return f"{'up':{NAME_WIDTH}} | {text}\n"
 
 
 def _fields(event: ProcessEvent) -> dict[str, object]:

@@ -99,10 +99,8 @@ class Supervisor:
         self._limits = limits or Limits()
         self._clock = clock
         self._folder = Path(tempfile.mkdtemp(prefix="rigwatch-"))
-        self._watched = {plan.name: Watched(Child(plan, self._folder)) for plan in plans}
         self._selector = selectors.DefaultSelector()
-        for watched in self._watched.values():
-            self._selector.register(watched.child.words, selectors.EVENT_READ)
+        self._watched = {plan.name: self._new(plan) for plan in plans}
         self._stopped = False
 
     @property
@@ -124,6 +122,33 @@ class Supervisor:
     def stop(self) -> None:
         """End `run` after the current turn; may be called from a signal handler."""
         self._stopped = True
+
+    def follow(self, plans: Sequence[ProcessPlan]) -> None:
+        """Run these processes from now on: end others, start new ones, and those that differ."""
+        names = [plan.name for plan in plans]
+        for name in [name for name in reversed(self._watched) if name not in names]:
+            watched = self._watched[name]
+            self._stop(watched)
+            self._selector.unregister(watched.child.words)
+            watched.child.close()
+            del self._watched[name]
+        before, self._watched = self._watched, {}
+        for plan in plans:
+            self._watched[plan.name] = before.get(plan.name) or self._new(plan)
+        for plan in plans:
+            watched = self._watched[plan.name]
+            if plan.name not in before:
+                self._start_or_hold(watched)
+                continue
+            differs = watched.child.plan.arguments != plan.arguments
+            watched.child.plan = plan
+            if differs:
+                self.restart(plan.name, "it serves other rigs from now on")
+
+    def _new(self, plan: ProcessPlan) -> Watched:
+        child = Child(plan, self._folder)
+        self._selector.register(child.words, selectors.EVENT_READ)
+        return Watched(child)
 
     def restart(self, name: str, reason: str) -> None:
         """Stop a process in good order and start it anew in the next turn."""
@@ -176,7 +201,7 @@ class Supervisor:
         if watched.start_at is not None:
             if watched.held and self._all_ready(watched.child.plan.after):
                 watched.start_at = now
-            if now >= watched.start_at:
+            if now >= watched.start_at and self._is_gone(watched, now):
                 watched.restarts += not watched.held
                 self._start(watched)
             return
@@ -190,6 +215,14 @@ class Supervisor:
             self._pause(watched, now)
         elif now - watched.vitals.started_at > self._limits.settled:
             watched.failures = 0
+
+    def _is_gone(self, watched: Watched, now: float) -> bool:
+        """Whether the run before has ended; one that cannot be killed is tried again later."""
+        if watched.child.close_run():
+            return True
+        self._say(watched, "ill", "cannot be killed; it starts again once its process has ended")
+        watched.start_at = now + self._limits.longest_pause
+        return False
 
     def _source(self, watched: Watched) -> Vitals | None:
         source = self._watched.get(watched.child.plan.source)

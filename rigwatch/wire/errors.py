@@ -9,6 +9,7 @@ RigwatchError             one plain line, shown by the command line without a tr
 ├── DeviceError           a device cannot be opened or is gone
 ├── KeysError             keys or certificates are missing
 ├── BusError              the bus cannot be reached
+│   └── NoRouterError     no router has answered yet
 ├── SessionError          a session file cannot be read or written
 ├── ImportDataError       foreign data cannot be imported as a session (column, unit, rate)
 ├── ModelError            a model cannot be fitted or does not match the data
@@ -94,6 +95,10 @@ class KeysError(RigwatchError):
 
 class BusError(RigwatchError):
     """The bus cannot be reached or has been closed."""
+
+
+class NoRouterError(BusError):
+    """No router has answered yet; one may later."""
 
 
 class SessionError(RigwatchError):

@@ -13,7 +13,7 @@ from rigwatch.wire.bus import (
     Bus,
     CommandCheck,
     ask_alarm_list,
-    connect,
+    joined,
     serve_alarm_list,
 )
 from rigwatch.wire.errors import BusError
@@ -145,14 +145,10 @@ def run(config: RigConfig, stop: threading.Event) -> None:
         BusError: the bus cannot be reached.
     """
     use_few_pools()
-    bus = connect(config, PROCESS)
-    try:
-        witness = Witness(
-            patient(config),
-            bus,
-            time.monotonic(),
-            config.bus.security,
-        )
+    with joined(config, PROCESS, stop) as bus:
+        if bus is None:
+            return
+        witness = Witness(patient(config), bus, time.monotonic(), config.bus.security)
         heartbeat = Heartbeat(PROCESS)
         heartbeat.ready()
         turns = 0
@@ -162,5 +158,3 @@ def run(config: RigConfig, stop: threading.Event) -> None:
             heartbeat.advance(turns)
         heartbeat.stopping()
         witness.close()
-    finally:
-        bus.close()

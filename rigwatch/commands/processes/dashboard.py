@@ -45,22 +45,20 @@ def run(arguments: argparse.Namespace) -> int:
     from msgspec.structs import replace
 
     from rigwatch.dashboard.process import LiveDashboard
-    from rigwatch.wire.bus import connect
+    from rigwatch.wire.bus import joined
     from rigwatch.wire.host import free_port, set_at_signal
 
     settings = config.dashboard or DashboardSection()
     if arguments.port is not None:
         settings = replace(settings, web_port=arguments.port, grpc_port=free_port())
-    bus = connect(config, "dashboard")
-    choice = arguments.viewer or settings.viewer
-    live = LiveDashboard(bus, settings, choice, _say_json if arguments.json else _say)
-    if config.monitor is not None:
-        _know_model(live.facts, config.monitor.model)
-    set_at_signal(live.stop)
-    try:
+    choice, stop = arguments.viewer or settings.viewer, set_at_signal()
+    with joined(config, "dashboard", stop) as bus:
+        if bus is None:
+            return 0
+        live = LiveDashboard(bus, settings, choice, _say_json if arguments.json else _say, stop)
+        if config.monitor is not None:
+            _know_model(live.facts, config.monitor.model)
         live.run()
-    finally:
-        bus.close()
     return 0
 
 

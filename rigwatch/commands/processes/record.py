@@ -28,12 +28,13 @@ def run(arguments: argparse.Namespace) -> int:
     if len(paths) == 1:
         folder = record(paths[0], stop, arguments.notes)
         result: dict[str, object] = {"session": folder}
-        folders = [folder]
+        folders = [folder] if folder is not None else []
     else:
         folders = run_several(paths, stop, arguments.notes)
         result = {"sessions": folders}
     if arguments.json:
         print_json(result)
     else:
-        print("\n".join(map(str, folders)))
+        for one in folders:
+            print(one)
     return 0

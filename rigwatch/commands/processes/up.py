@@ -6,21 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rigwatch.commands.common import file_or_name
-from rigwatch.supervisor import (
-    PROCESSES,
-    ConfigWatch,
-    Console,
-    Flow,
-    ProcessPlan,
-    Supervisor,
-    plan,
-    plan_several,
-)
+from rigwatch.supervisor import PROCESSES, Console, Flow, RigSet, Supervisor, planned
 from rigwatch.wire.errors import BusError
 from rigwatch.wire.host import Heartbeat, endpoint_address, is_free
-from rigwatch.wire.rig_config import RigConfig, load_rig
+from rigwatch.wire.rig_config import load_rig
 from rigwatch.wire.several_rigs import Rigs, valid_rigs
 
+NO_DASHBOARD = "no dashboard for several rigs: `rigwatch fleet`, or `rigwatch dashboard` of one"
 HELP = "start and supervise all processes of one or several rigs"
 EXAMPLE = """  rigwatch up configs/demo.toml
   rigwatch up configs/demo.toml --without dashboard --json
@@ -52,21 +44,20 @@ def run(arguments: argparse.Namespace) -> int:
     console = Console(_name(rigs), arguments.json)
     for remark in remarks:
         console.remark(remark)
-    supervisor = Supervisor(_planned(rigs, arguments.without, console.remark), console.event)
+    paths, without = arguments.config, arguments.without
+    supervisor = Supervisor(planned(paths, rigs, without), console.event)
     supervisor.stop_on_signals()
+    if len(paths) > 1 and "dashboard" not in without and any(one.dashboard for _, one in rigs):
+        console.remark(NO_DASHBOARD)
     flow, heartbeat = Flow(supervisor), Heartbeat("up")
-    watches = [
-        ConfigWatch(*rig, supervisor, console.changed, read=_reading(arguments.config))
-        for rig in rigs
-    ]
+    rig_set = RigSet(paths, rigs, without, supervisor, console.changed)
     stop_at = time.monotonic() + arguments.seconds
     is_ready = False
 
     def each_turn() -> None:
         nonlocal is_ready
         flow.look()
-        for watch in watches:
-            watch.look()
+        rig_set.look()
         console.status(supervisor, flow)
         if not is_ready and all(w.was_ready for w in supervisor.processes.values()):
             is_ready = True
@@ -78,6 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     supervisor.run(each_turn)
     heartbeat.stopping()
+    console.close()
     return 0
 
 
@@ -88,28 +80,8 @@ def _loaded(paths: list[Path], say: Callable[[str], None]) -> Rigs:
     return valid_rigs(paths, lambda mistake: say(f"{mistake}; this rig is left out"))
 
 
-def _reading(paths: list[Path]) -> Callable[[Path], RigConfig]:
-    """Reads one of the files, which must still be of a rig of its own."""
-
-    def read(path: Path) -> RigConfig:
-        config = load_rig(path)
-        valid_rigs(paths)
-        return config
-
-    return read
-
-
 def _name(rigs: Rigs) -> str:
     return rigs[0][1].rig.id if len(rigs) == 1 else f"{len(rigs)} rigs"
-
-
-def _planned(rigs: Rigs, without: list[str], say: Callable[[str], None]) -> list[ProcessPlan]:
-    if len(rigs) == 1:
-        path, config = rigs[0]
-        return plan(config, path, without)
-    if "dashboard" not in without and any(config.dashboard for _, config in rigs):
-        say("no dashboard for several rigs: `rigwatch fleet`, or `rigwatch dashboard` of one")
-    return plan_several(rigs, without)
 
 
 def _refuse_second_start(rigs: Rigs, without: list[str]) -> None:

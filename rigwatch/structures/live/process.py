@@ -3,7 +3,7 @@
 import time
 
 from rigwatch.structures.live.live_watch import LiveDamage
-from rigwatch.wire.bus import Bus, connect
+from rigwatch.wire.bus import Bus, joined
 from rigwatch.wire.delivery import SampleReader
 from rigwatch.wire.errors import ModelError
 from rigwatch.wire.host import set_at_signal
@@ -80,11 +80,10 @@ def watch_rig(config: RigConfig, watched: LiveDamage) -> None:
     """
     stop = set_at_signal()
     watched.prepare()
-    bus = connect(config, PROCESS)
-    try:
+    with joined(config, PROCESS, stop) as bus:
+        if bus is None:
+            return
         process = StructureProcess(bus, watched, config.daq.ring)
         while not stop.is_set():
             process.turn()
         process.close()
-    finally:
-        bus.close()

@@ -4,6 +4,7 @@ Zenoh is slow to import and not needed for a bus in memory, so it is imported on
 """
 
 import contextlib
+import logging
 import threading
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
@@ -17,11 +18,13 @@ from rigwatch.wire.access import (
 )
 from rigwatch.wire.bus.bus import Bus
 from rigwatch.wire.bus.transport import Close
-from rigwatch.wire.errors import BusError
+from rigwatch.wire.errors import NoRouterError
 from rigwatch.wire.rig_config import RigConfig
 
 if TYPE_CHECKING:
     from rigwatch.wire.bus.zenoh_transport import ZenohTransport
+
+_log = logging.getLogger(__name__)
 
 ATTEMPT = 2.0
 """Longest that `joined` waits for a router before it looks at its event [s]."""
@@ -44,7 +47,12 @@ class SharedLinks:
         self._places: dict[str, _Place] = {}
 
     def transport(
-        self, endpoint: str, timeout: float | None, lease: float, tls: dict[str, Any]
+        self,
+        endpoint: str,
+        timeout: float | None,
+        lease: float,
+        tls: dict[str, Any],
+        stop: threading.Event | None = None,
     ) -> "ZenohTransport":
         """A transport over the router's link, which is made if there is none.
 
@@ -54,10 +62,11 @@ class SharedLinks:
         with self._lock:
             place = self._places.setdefault(repr((endpoint, lease, sorted(tls.items()))), _Place())
         if not place.lock.acquire(timeout=-1 if timeout is None else timeout):
-            raise BusError(f"no router answers at {endpoint}: another rig of this process waits")
+            reason = "another rig of this process waits"
+            raise NoRouterError(f"no router answers at {endpoint}: {reason}")
         try:
             if place.link is None:
-                place.link = _client(endpoint, timeout, lease, tls)
+                place.link = _client(endpoint, timeout, lease, tls, stop)
             return place.link.beside()
         finally:
             place.lock.release()
@@ -91,6 +100,7 @@ def connect(
     process: str,
     timeout: float | None = None,
     links: SharedLinks | None = None,
+    stop: threading.Event | None = None,
 ) -> Bus:
     """Join the bus of a rig as `process`.
 
@@ -100,14 +110,16 @@ def connect(
         timeout: longest wait for the router [s]; None waits indefinitely, so processes can be
             started in any order. A router lost later is reconnected in the background.
         links: those of the process, if it serves several rigs.
+        stop: ends the wait.
 
     Raises:
-        BusError: the router was not reached within `timeout`, or its endpoint is invalid.
+        BusError: the router was not reached within `timeout` or before `stop`, or its endpoint is
+            invalid.
     """
     name = certificate_name(config.bus, process)
     tls = dict(tls_settings(config.bus, name))
     made = links.transport if links else _client
-    transport = made(config.bus.router, timeout, config.bus.lease, tls)
+    transport = made(config.bus.router, timeout, config.bus.lease, tls, stop)
     signer = signer_of(config.bus.security, name)
     megabytes = config.bus.ring_megabytes
     if links:
@@ -116,13 +128,17 @@ def connect(
 
 
 def _client(
-    endpoint: str, timeout: float | None, lease: float, tls: dict[str, Any]
+    endpoint: str,
+    timeout: float | None,
+    lease: float,
+    tls: dict[str, Any],
+    stop: threading.Event | None = None,
 ) -> "ZenohTransport":
     from rigwatch.wire.bus.zenoh_transport import (
         ZenohTransport,  # slow to import, not needed in memory
     )
 
-    return ZenohTransport.client(endpoint, timeout, lease, tls)
+    return ZenohTransport.client(endpoint, timeout, lease, tls, stop)
 
 
 @contextlib.contextmanager
@@ -130,7 +146,7 @@ def joined(
     config: RigConfig,
     process: str,
     stop: threading.Event,
-    say: Callable[[str], None],
+    say: Callable[[str], None] | None = None,
     links: SharedLinks | None = None,
 ) -> Iterator[Bus | None]:
     """The bus of a rig, left at the end; None if `stop` is set before the router answers.
@@ -139,15 +155,19 @@ def joined(
         config: the rig's configuration.
         process: name of the process, such as "daq".
         stop: ends the wait.
-        say: called once with one line if the router does not answer.
+        say: called once with one line if the router does not answer; the log if not given.
         links: those of the process, if it serves several rigs.
+
+    Raises:
+        BusError: the router's endpoint is invalid.
     """
-    bus = None
+    bus, say = None, say or _log.warning
     while bus is None and not stop.is_set():
         try:
-            bus = connect(config, process, ATTEMPT, links)
-        except BusError as error:
-            say(str(error))
+            bus = connect(config, process, ATTEMPT, links, stop)
+        except NoRouterError as error:
+            if not stop.is_set():
+                say(str(error))
             say = _say_nothing
             stop.wait(ATTEMPT / 2)
     try:

@@ -16,7 +16,6 @@ Reasons for the settings:
 
 import contextlib
 import json
-import logging
 import os
 import threading
 import time
@@ -29,7 +28,7 @@ from zenoh.handlers import Callback, RingChannel
 
 from rigwatch.wire.bus.burst import Burst
 from rigwatch.wire.bus.transport import MAX_PAYLOAD, Answer, Close, Receive, Take, answered
-from rigwatch.wire.errors import BusError
+from rigwatch.wire.errors import BusError, NoRouterError
 
 RETRY_MS = (100, 200)
 BATCHES = 16
@@ -53,7 +52,6 @@ _LOGGED = (
     "zenoh=error,zenoh_link_tls=warn,"
     f"{_INTERCEPTORS}=trace,{_INTERCEPTORS}::access_control=off,{_INTERCEPTORS}::low_pass=off"
 )
-_log = logging.getLogger(__name__)
 
 
 def _common_settings(lease: float) -> dict[str, Any]:
@@ -146,21 +144,26 @@ def open_router(
     return close
 
 
-def _reach(endpoint: str, timeout: float | None, lease: float, secured: Mapping[str, Any]) -> Any:
-    """A session with the router at `endpoint`, with repeated attempts."""
-    started, told = time.monotonic(), False
+def _reach(
+    endpoint: str,
+    timeout: float | None,
+    lease: float,
+    secured: Mapping[str, Any],
+    stop: threading.Event | None = None,
+) -> Any:
+    """A session with the router at `endpoint`, with repeated attempts until `stop` is set."""
+    started = time.monotonic()
     while True:
         try:
             settings = _client_settings(endpoint, lease) | dict(secured)
             return zenoh.open(_configured(settings, endpoint))
         except zenoh.ZError:
             waited = time.monotonic() - started
+        if stop is not None and stop.is_set():
+            raise NoRouterError(f"stopped before a router answered at {endpoint}")
         if timeout is not None and waited >= timeout:
             remedy = "start `rigwatch router` or correct bus.router"
-            raise BusError(f"no router answers at {endpoint}: {remedy}")
-        if timeout is None and waited > 2.0 and not told:
-            _log.warning("waiting for the router at %s", endpoint)
-            told = True
+            raise NoRouterError(f"no router answers at {endpoint}: {remedy}")
 
 
 class ZenohTransport:
@@ -197,8 +200,11 @@ class ZenohTransport:
         timeout: float | None = None,
         lease: float = LEASE,
         secured: Mapping[str, Any] | None = None,
+        stop: threading.Event | None = None,
     ) -> "ZenohTransport":
         """A client of the router at `endpoint`, awaited for `timeout` [s], None: indefinitely.
+
+        `stop` ends the wait within half a second.
 
         A link that is silent for `lease` [s] counts as broken; `secured` holds the settings of
         certificates, none without keys.
@@ -206,7 +212,7 @@ class ZenohTransport:
         Raises:
             BusError: the endpoint is not well formed, or no router answers there.
         """
-        session = _reach(endpoint, timeout, lease, secured or {})
+        session = _reach(endpoint, timeout, lease, secured or {}, stop)
         return cls(session, session.close)
 
     def beside(self) -> "ZenohTransport":

@@ -1,0 +1,167 @@
+"""`rigwatch up` under what its surroundings do: output, configuration, children out of hand."""
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import termios
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rigwatch.demo.rig_file import write_rig_file
+from rigwatch.supervisor.child import LONGEST_LINE
+from rigwatch.wire.typed_files.shipped import find_config
+from tests.tooling.test_supervisor import WORKER, of_kind, supervise, worker
+from tests.tooling.test_up import WITHOUT, Rig, on_a_port_of_its_own
+from tests.waiting import eventually
+
+pytestmark = pytest.mark.xdist_group("rig")
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    return on_a_port_of_its_own(write_rig_file(find_config("demo.toml"), tmp_path, "web"))
+
+
+def child_of(parent: int, name: str) -> int:
+    """Process id of the child that runs a command of rigwatch; 0 if there is none."""
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            status = (folder / "stat").read_text().rpartition(")")[2].split()
+            words = (folder / "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if int(status[1]) == parent and status[0] != "Z" and name.encode() in words:
+            return int(folder.name)
+    return 0
+
+
+def waiting(pipe: int) -> int:
+    """Bytes that wait in a pipe."""
+    return int.from_bytes(fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)), sys.byteorder)
+
+
+@pytest.mark.parametrize("output", ["stalled", "closed", "full"])
+def test_the_rig_goes_on_whatever_becomes_of_the_output(output: str, config: Path) -> None:
+    reading, writing = os.pipe()
+    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
+    if output == "full":
+        os.close(writing)
+        writing = os.open("/dev/full", os.O_WRONLY)
+    command = [sys.executable, "-m", "rigwatch", "up", "--json", *WITHOUT, str(config)]
+    with subprocess.Popen(command, stdout=writing, stderr=subprocess.DEVNULL) as up:
+        os.close(writing)
+        try:
+            if output == "stalled":
+                eventually(lambda: waiting(reading) > 3000, "the pipe is full")
+            elif output == "closed":
+                eventually(lambda: waiting(reading) > 0, "it prints")
+                os.close(reading)
+            for _ in range(2):
+                eventually(lambda: child_of(up.pid, "daq") > 0, "daq runs")
+                killed = child_of(up.pid, "daq")
+                os.kill(killed, signal.SIGKILL)
+                eventually(
+                    lambda gone=killed: child_of(up.pid, "daq") not in (0, gone), "daq is back"
+                )
+        finally:
+            up.terminate()
+        assert up.wait(timeout=40) == 0
+
+
+@pytest.fixture
+def rig(config: Path) -> Iterator[Rig]:
+    running = Rig(config, *WITHOUT)
+    yield running
+    if running.process.poll() is None:
+        running.end()
+
+
+def test_a_section_that_is_added_or_removed_is_followed(rig: Rig) -> None:
+    before = rig.flows("daq")
+    text = rig.config.read_text()
+    rig.config.write_text(f"{text}\n[witness]\n")
+    rig.wait_for("ready", process="witness")
+    rig.config.write_text(text)
+    changed = rig.wait_for("changed")["text"]
+    if "started anew: witness" in changed:  # the change before
+        changed = rig.wait_for("changed")["text"]
+    assert "ended: witness" in changed
+    status = rig.wait_for("status")["processes"]
+    assert "witness" not in status
+    assert status["daq"]["pid"] == before["daq"]["pid"]
+    assert rig.end() == 0
+
+
+def test_rigs_join_and_leave_with_their_files(config: Path, tmp_path: Path) -> None:
+    second = tmp_path / "two" / "second.toml"
+    second.parent.mkdir()
+    text = config.read_text().replace('id = "demo"', 'id = "second"')
+    text = text.replace(str(tmp_path / "serial-line"), str(second.parent / "serial-line"))
+    second.write_text(f"{text}\n[rgi]\n")
+    rig = Rig(config, *WITHOUT, str(second))
+    try:
+        rig.wait_for("started", process="plant demo")
+        second.write_text(text)
+        assert "second joins" in rig.wait_for("changed")["text"]
+        rig.wait_for("ready", process="plant second")
+        rig.flows("daq", more_than=400.0)
+        second.unlink()
+        assert "second leaves" in rig.wait_for("changed")["text"]
+        rig.wait_for("stopped", process="plant second")
+        rig.flows("daq")
+        assert rig.end() == 0
+    finally:
+        rig.process.kill()
+
+
+def test_an_endless_line_takes_no_memory_and_hides_no_later_line() -> None:
+    endless = (
+        "import sys\nfor _ in range(30): sys.stdout.write('x' * 65536)\nprint()\nprint('done')\n"
+    )
+    events = supervise(
+        [worker("daq", endless + WORKER.format(step=1))],
+        lambda _, events: any(one.text == "done" for one in of_kind(events, "daq", "says")),
+    )
+    said = [one.text for one in of_kind(events, "daq", "says")]
+    assert max(map(len, said)) <= LONGEST_LINE + 1
+    assert said[1] == "done"
+
+
+AWAY = "import os, time; os.setresuid(*[65534] * 3); print('away', flush=True); time.sleep(600)"
+SUPERVISED = """
+import sys
+from tests.tooling.test_supervisor import *
+away = ProcessPlan("away", (sys.executable, "-c", sys.argv[1]))
+limits = Limits(start=1.0, stop=0.5, first_pause=0.1, longest_pause=0.5)
+events = []
+supervisor = Supervisor([away, worker("daq")], events.append, limits)
+def turn():
+    told = [event for event in events if "cannot be killed" in event.text]
+    if len(told) == 2 and supervisor.processes["daq"].vitals.count > 0:
+        supervisor.stop()
+supervisor.run(turn)
+print(*[event.pid for event in of_kind(events, "away", "started")])
+print(of_kind(events, "daq", "stopped")[0].text)
+"""
+NO_RIGHT_TO_KILL = ("setpriv", "--bounding-set", "-kill", "--inh-caps", "-all")
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can start a process of another user")
+def test_a_child_that_cannot_be_killed_delays_nothing_and_is_not_started_beside_itself() -> None:
+    # Another user's process, where one has no right to kill, outlives SIGKILL as one in a driver.
+    done = subprocess.run(
+        [*NO_RIGHT_TO_KILL, sys.executable, "-c", SUPERVISED, AWAY],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    started, last = done.stdout.strip().splitlines()
+    (pid,) = map(int, started.split())
+    os.kill(pid, signal.SIGKILL)
+    assert last == "stopped"
